@@ -1,0 +1,112 @@
+"""The tutorial's child script: velocity commands in, four propeller velocities out.
+
+Same names, gains and order of arithmetic as the Lua script that the tutorial builds, with one addition:
+the collective thrust is kept within `thrust_limits`.
+"""
+
+# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
+
+GAINS = (
+    "thrust_gravity",  # compensation for gravity
+    "thrust_limits",
+    "Dthrust",
+    "Kzref",
+    "Dzref",
+    "Dyaw",
+    "angle_min",
+    "angle_max",
+    "Pangle",
+    "Dangle",
+    "Kvcorr",
+)
+
+
+def sysCall_init():
+    """Find the objects, set the variables for control, subscribe to the commands."""
+    self.d = sim.getObjectHandle("Quadricopter_base")
+    self.trackBase = sim.getObjectHandle("Track_base")
+    sim.setObjectParent(self.trackBase, -1, True)
+    self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
+
+    for name in GAINS:
+        setattr(self, name, sim.getScriptSimulationParameter(sim.handle_self, name))
+    self.dt = sim.getSimulationTimeStep()
+    self.thrust = self.thrust_gravity
+    self.pitch_corr = self.yaw_corr = self.roll_corr = 0
+    self.pitch_prev = self.roll_prev = 0
+    self.zref = sim.getObjectPosition(self.d, -1)[2]  # used if z-speed command is null
+    self.vx = self.vy = self.vz = self.rz = 0  # current twist command
+
+    self.twist_subscriber = simROS.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist", 1)
+
+
+def on_twist(msg):
+    """Keep the command: front, lateral and vertical speed (track frame, m/s), yaw speed (rad/s)."""
+    self.vx, self.vy, self.vz = msg.linear.x, msg.linear.y, msg.linear.z
+    self.rz = msg.angular.z
+
+
+def sysCall_actuation():
+    """Mix thrust and corrections into the propellers: front left, back left, back right, front right."""
+    particlesTargetVelocities = (
+        self.thrust * (1 - self.pitch_corr - self.roll_corr - self.yaw_corr),
+        self.thrust * (1 + self.pitch_corr - self.roll_corr + self.yaw_corr),
+        self.thrust * (1 + self.pitch_corr + self.roll_corr - self.yaw_corr),
+        self.thrust * (1 - self.pitch_corr + self.roll_corr + self.yaw_corr),
+    )
+    for script, velocity in zip(self.propellerScripts, particlesTargetVelocities):
+        sim.setScriptSimulationParameter(script, "particleVelocity", velocity)
+
+
+def sysCall_sensing():
+    """Move the track frame, then compute thrust and corrections for the next actuation."""
+    pos = sim.getObjectPosition(self.d, -1)
+    ori = sim.getObjectOrientation(self.d, -1)
+    sim.setObjectPosition(self.trackBase, -1, pos)
+    sim.setObjectOrientation(self.trackBase, -1, [0, 0, ori[2]])
+
+    local_ori = sim.getObjectOrientation(self.d, self.trackBase)  # orientation in the track frame
+    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # global linear and angular speeds
+    track_mat_inv = sim.getInvertedMatrix(sim.getObjectMatrix(self.trackBase, -1))
+    track_mat_inv[3] = track_mat_inv[7] = track_mat_inv[11] = 0
+    d_local_pos = sim.multiplyVector(track_mat_inv, d_global_pos)  # linear speed in the track frame
+
+    control_elevation(pos[2], d_global_pos[2])
+    self.yaw_corr = self.Dyaw * (self.rz - d_global_ori[2])
+
+    pitch = local_ori[1]
+    dpitch = (pitch - self.pitch_prev) / self.dt
+    self.pitch_prev = pitch
+    pitch_target = target_angle(self.vx, d_local_pos[0])
+    self.pitch_corr = self.Pangle * (pitch_target - pitch) - self.Dangle * dpitch
+
+    roll = -local_ori[0]
+    droll = (roll - self.roll_prev) / self.dt
+    self.roll_prev = roll
+    roll_target = target_angle(self.vy, d_local_pos[1])
+    self.roll_corr = self.Pangle * (roll_target - roll) - self.Dangle * droll
+
+
+def control_elevation(z, vz):
+    """Hold the elevation zref, or follow a vertical speed and remember where it led."""
+    if self.vz == 0:
+        self.thrust = self.thrust_gravity + self.Kzref * (self.zref - z) - self.Dzref * vz
+    else:
+        self.thrust = self.thrust_gravity + self.Dthrust * (self.vz - vz)
+        self.zref = z
+    if self.thrust_limits:
+        lowest, highest = self.thrust_limits
+        self.thrust = min(max(self.thrust, lowest), highest)
+
+
+def target_angle(command, speed):
+    """Lean (rad) towards the commanded speed; further for speeding up than for braking."""
+    target = self.Kvcorr * (command - speed)
+    if command >= 0:
+        return min(max(target, -self.angle_min), self.angle_max)
+    return min(max(target, -self.angle_max), self.angle_min)
+
+
+def sysCall_cleanup():
+    """End the subscription."""
+    simROS.shutdownSubscriber(self.twist_subscriber)
