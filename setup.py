@@ -1,0 +1,9 @@
+"""catkin reads this (catkin_python_setup); do not call it yourself."""
+
+from distutils.core import setup
+
+from catkin_pkg.python_setup import generate_distutils_setup
+
+PACKAGES = ["drone_sim", "drone_sim.camera", "drone_sim.child_scripts", "drone_sim.ros", "drone_sim.scripting"]
+
+setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

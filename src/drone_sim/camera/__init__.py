@@ -1,0 +1,1 @@
+"""Camera pictures from meshes and poses: knows numpy and OpenGL, neither PyBullet nor ROS."""

@@ -1,0 +1,37 @@
+"""An OpenGL context without a display."""
+
+from __future__ import annotations
+
+import moderngl
+
+# glvnd's libEGL hands out every GL function too, so neither libGL nor libOpenGL has to be installed.
+LIBEGL = "libEGL.so.1"
+REQUIRED = 330
+DEVICES = 4  # how many devices to try: the first may be a graphics card that this user may not open
+
+
+class RendererUnavailable(RuntimeError):
+    """No OpenGL context can be had through EGL; the message is one line."""
+
+
+def create(device_index: int) -> moderngl.Context:
+    """A context of the EGL device with this index or, where that fails, of the next that works."""
+    reasons = []
+    for index in range(device_index, device_index + DEVICES):
+        try:
+            return moderngl.create_context(
+                require=REQUIRED,
+                standalone=True,
+                backend="egl",
+                libgl=LIBEGL,
+                libegl=LIBEGL,
+                device_index=index,
+            )
+        except Exception as error:  # moderngl raises bare Exceptions
+            reasons.append(" ".join(str(error).split()))
+    raise RendererUnavailable(f"no EGL context (Debian: apt install libegl1 libgl1-mesa-dri): {reasons[0]}")
+
+
+def is_software(context: moderngl.Context) -> bool:
+    """Whether the CPU draws, so that costly texture filters should be left alone."""
+    return any(name in context.info["GL_RENDERER"].lower() for name in ("llvmpipe", "softpipe", "swrast"))

@@ -1,0 +1,89 @@
+"""The pinhole model of a camera, in the conventions of ROS and of OpenGL.
+
+Optical frame (REP 103): z forward, x right, y down. Pixel coordinates (u, v) have whole numbers at pixel
+centres, as in OpenCV and image_geometry: the top left pixel's centre is (0, 0), the picture covers
+-0.5..width-0.5, and the optical axis meets its centre at ((width - 1) / 2, (height - 1) / 2).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Sequence, Tuple
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Intrinsics:
+    """A camera without distortion and with square pixels.
+
+    width, height: pixels; horizontal_fov: rad; near, far: metres along the optical z.
+    Raises ValueError for a size, angle or range with which no picture can be made.
+    """
+
+    width: int
+    height: int
+    horizontal_fov: float
+    near: float
+    far: float
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise ValueError(f"image size {self.width} x {self.height}: both must be at least 1")
+        if not 0.0 < self.horizontal_fov < math.pi:
+            raise ValueError(f"horizontal_fov {self.horizontal_fov}: must lie between 0 and pi rad")
+        if not 0.0 < self.near < self.far < math.inf:
+            raise ValueError(f"near {self.near}, far {self.far}: 0 < near < far is needed")
+
+    @property
+    def fx(self) -> float:
+        """Focal length in pixels: width / 2 = fx tan(horizontal_fov / 2)."""
+        return self.width / 2.0 / math.tan(self.horizontal_fov / 2.0)
+
+    @property
+    def fy(self) -> float:
+        """Focal length in pixels, equal to `fx`: the pixels are square."""
+        return self.fx
+
+    @property
+    def cx(self) -> float:
+        """Column of the optical axis, the middle of the picture."""
+        return (self.width - 1) / 2.0
+
+    @property
+    def cy(self) -> float:
+        """Row of the optical axis, the middle of the picture."""
+        return (self.height - 1) / 2.0
+
+    @property
+    def K(self) -> Tuple[float, ...]:  # noqa: N802 - the name CameraInfo gives it
+        """Camera matrix, 3 x 3 row-major, as in sensor_msgs/CameraInfo."""
+        return (self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
+
+    @property
+    def P(self) -> Tuple[float, ...]:  # noqa: N802 - the name CameraInfo gives it
+        """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo."""
+        return (self.fx, 0.0, self.cx, 0.0, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+    def pixel(self, point_optical: Sequence[float]) -> Tuple[float, float]:
+        """Pixel (u, v) of a point (x, y, z) in the optical frame, in metres; z must be positive."""
+        x, y, z = point_optical
+        if not z > 0.0:
+            raise ValueError(f"a point at z = {z} is not in front of the camera")
+        return self.fx * x / z + self.cx, self.fy * y / z + self.cy
+
+    def projection(self) -> np.ndarray:
+        """OpenGL clip matrix (4, 4) float64 of the optical frame, acting on column vectors.
+
+        Depth near..far maps to -1..1 as in glFrustum. OpenGL counts rows from the bottom; here y down in
+        the optical frame is y up in the clip space, so that a plain glReadPixels yields the top row first.
+        """
+        near, far = self.near, self.far
+        clip = np.zeros((4, 4))
+        clip[0, 0] = 2.0 * self.fx / self.width
+        clip[1, 1] = 2.0 * self.fy / self.height
+        clip[2, 2] = (far + near) / (far - near)
+        clip[2, 3] = -2.0 * far * near / (far - near)
+        clip[3, 2] = 1.0
+        return clip

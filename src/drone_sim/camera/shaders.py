@@ -1,0 +1,109 @@
+"""The shaders, GLSL 3.30. World coordinates are relative to the camera's position, axes those of the world."""
+
+# Per instance: a world-from-mesh matrix by rows, which may scale; `paint.a` is what alpha the picture gets.
+_INPUTS = """
+#version 330 core
+uniform mat4 clip_from_world;
+in vec3 position;
+in vec4 row0;
+in vec4 row1;
+in vec4 row2;
+vec3 world_point() {
+    vec4 p = vec4(position, 1.0);
+    return vec3(dot(row0, p), dot(row1, p), dot(row2, p));
+}
+"""
+
+# Light is computed per vertex: floors and boxes have one normal per face, and round things enough vertices.
+SURFACE_VERTEX = _INPUTS + """
+uniform vec3 to_sun;
+in vec3 normal;
+in vec4 paint;
+out vec4 colour;
+#ifdef TEXTURED
+in vec2 uv;
+out vec2 texel;
+#endif
+void main() {
+    vec3 n = normalize(vec3(dot(row0.xyz, normal), dot(row1.xyz, normal), dot(row2.xyz, normal)));
+    vec3 ambient = mix(vec3(0.42, 0.41, 0.40), vec3(0.52, 0.54, 0.57), 0.5 + 0.5 * n.z);
+    vec3 light = ambient + vec3(0.54, 0.52, 0.48) * max(0.85 * dot(n, to_sun) + 0.15, 0.0);
+    colour = vec4(min(paint.rgb * light, 1.0), paint.a);
+#ifdef TEXTURED
+    texel = uv;
+#endif
+    gl_Position = clip_from_world * vec4(world_point(), 1.0);
+}
+"""
+
+SURFACE_FRAGMENT = """
+#version 330 core
+in vec4 colour;
+#ifdef TEXTURED
+in vec2 texel;
+uniform sampler2D image;
+#endif
+out vec4 pixel;
+void main() {
+#ifdef TEXTURED
+    pixel = colour * texture(image, texel);
+#else
+    pixel = colour;
+#endif
+}
+"""
+
+# Every vertex slides along the light onto the floor; what lies below the floor casts nothing beyond itself.
+SHADOW_VERTEX = _INPUTS + """
+uniform vec3 to_sun;
+uniform float floor_height;
+void main() {
+    vec3 p = world_point();
+    p.xy -= to_sun.xy * (max(p.z - floor_height, 0.0) / to_sun.z);
+    gl_Position = clip_from_world * vec4(p.xy, floor_height, 1.0);
+}
+"""
+
+SHADOW_FRAGMENT = """
+#version 330 core
+out vec4 pixel;
+void main() { pixel = vec4(0.0, 0.0, 0.0, 1.0); }
+"""
+
+# A coarse dome around the camera, at the far plane; its vertices lie where the gradient bends.
+SKY_VERTEX = """
+#version 330 core
+uniform mat4 clip_from_world;
+in vec3 direction;
+in vec3 tint;
+out vec3 colour;
+void main() {
+    colour = tint;
+    gl_Position = (clip_from_world * vec4(direction, 0.0)).xyww;
+}
+"""
+
+SKY_FRAGMENT = """
+#version 330 core
+in vec3 colour;
+out vec4 pixel;
+void main() { pixel = vec4(colour, 1.0); }
+"""
+
+# Depth along the optical axis is the clip w, which the projection makes equal to the optical z.
+DATA_VERTEX = _INPUTS + """
+in float label;
+flat out float visual;
+void main() {
+    visual = label;
+    gl_Position = clip_from_world * vec4(world_point(), 1.0);
+}
+"""
+
+DATA_FRAGMENT = """
+#version 330 core
+flat in float visual;
+uniform bool depth;
+out float value;
+void main() { value = depth ? 1.0 / gl_FragCoord.w : visual; }
+"""

@@ -1,0 +1,1 @@
+"""ROS around the simulation: the only package that imports rospy."""

@@ -1,0 +1,31 @@
+"""A neutral description of one thing to draw, shared by the world (which fills it) and the renderer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Hashable, Tuple
+
+SHAPES = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
+
+
+@dataclass(frozen=True)
+class Visual:
+    """One shape with its look, in its own frame; where it stands is given per frame, as a pose.
+
+    key: identity, for example ``(body, index)``; a different Visual under a known key replaces it.
+    shape: one of `SHAPES`.
+    size: metres. box: full x, y, z; cylinder and capsule: radius, length along z (a capsule's without its
+        caps), centred; sphere: radius; mesh: scale x, y, z (no unit); plane: ignored.
+    rgba: 0..1, multiplied with what the mesh's own material says; white leaves the material as it is.
+    file: path of the mesh.
+    texture: path of an image that replaces the mesh's own texture.
+    floor: receives the shadows; a horizontal surface whose top is the top of its geometry.
+    """
+
+    key: Hashable
+    shape: str
+    size: Tuple[float, ...]
+    rgba: Tuple[float, float, float, float]
+    file: str = ""
+    texture: str = ""
+    floor: bool = False

@@ -1,0 +1,65 @@
+"""Pacing against a clock that the test turns."""
+
+from drone_sim.pacing import Pacer
+
+
+class Clock:
+    """A clock that advances only by sleeping and by `work`."""
+
+    def __init__(self):
+        self.now = 100.0
+        self.late_by = 0.0
+
+    def __call__(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds + self.late_by
+
+    def work(self, seconds):
+        self.now += seconds
+
+
+def passes(pacer, clock, works):
+    times = []
+    for seconds in works:
+        pacer.wait()
+        times.append(round(clock.now - 100.0, 9))
+        clock.work(seconds)
+    return times
+
+
+def make(period=0.05):
+    clock = Clock()
+    return Pacer(period, clock, clock.sleep), clock
+
+
+def test_one_pass_per_period():
+    pacer, clock = make()
+    assert passes(pacer, clock, [0.01] * 4) == [0.05, 0.1, 0.15, 0.2]
+    assert pacer.overruns == 0
+
+
+def test_late_wake_ups_do_not_add_up():
+    pacer, clock = make()
+    clock.late_by = 0.003
+    assert passes(pacer, clock, [0.01] * 100)[-1] == round(100 * 0.05 + 0.003, 9)
+    assert pacer.overruns == 0
+
+
+def test_an_overrun_is_counted_and_not_caught_up():
+    pacer, clock = make()
+    assert passes(pacer, clock, [0.01, 0.12, 0.01, 0.01]) == [0.05, 0.1, 0.22, 0.27]
+    assert pacer.overruns == 1
+
+
+def test_as_fast_as_it_can():
+    pacer, clock = make(period=0.0)
+    assert passes(pacer, clock, [0.01] * 4) == [0.0, 0.01, 0.02, 0.03]
+    assert pacer.overruns == 0
+
+
+def test_a_long_sleep_ends_when_interrupted():
+    pacer, clock = make(period=60.0)
+    pacer.wait(lambda: clock.now > 101.0)
+    assert 101.0 < clock.now < 101.2

@@ -1,0 +1,59 @@
+"""V-REP's particle law against its closed form, and world-fixed forces against their definition."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drone_sim import frames, parameters
+from drone_sim.propeller import ParticleFan, Wrench
+
+NEWTONS_PER_PARTICLE = 8500 * math.pi * 0.005**3 / (6 * 0.05)  # per m/s, at dt = 0.05 s
+
+
+def fan(law="3.x", rotation=1):
+    return ParticleFan(parameters.load({"propellers": {"law": law}}).propellers, rotation, 0.05)
+
+
+def particles(law, steps):
+    one = fan(law)
+    return [one.emit(1.0)[0] / NEWTONS_PER_PARTICLE for _ in range(steps)]
+
+
+def test_3x_carries_the_fraction_of_a_particle():
+    assert particles("3.x", 6) == pytest.approx([21, 22, 21, 22, 21, 22])
+
+
+def test_4x_drops_the_fraction_of_a_particle():
+    assert particles("4.x", 6) == pytest.approx([21] * 6)
+
+
+@pytest.mark.parametrize("law, newtons, hover", [("3.x", 0.23922, 5.331), ("4.x", 0.23366, 5.458)])
+def test_thrust_per_velocity_and_hover(law, newtons, hover):
+    one = fan(law)
+    mean = sum(one.emit(1.0)[0] for _ in range(200)) / 200
+    assert mean == pytest.approx(newtons, abs=5e-6)
+    assert 0.52 * 9.81 / (4 * mean) == pytest.approx(hover, abs=5e-4)
+
+
+def test_reaction_torque_has_the_sense_of_the_propeller():
+    assert fan(rotation=-1).emit(5.0)[1] == pytest.approx(-0.002 * 5.0)
+    assert fan(rotation=+1).emit(5.0)[1] == pytest.approx(+0.002 * 5.0)
+
+
+vectors = st.tuples(*[st.floats(-5, 5)] * 3)
+
+
+@given(st.lists(st.tuples(vectors, vectors, vectors), max_size=5), st.tuples(*[st.floats(-3, 3)] * 3))
+def test_wrench_is_the_sum_of_forces_at_points_that_turn_with_the_body(forces, angles):
+    turn = frames.from_euler((0, 0, 0), angles)
+    wrench = Wrench()
+    force, torque = np.zeros(3), np.zeros(3)
+    for f, t, point in forces:
+        wrench.add(f, t, point)
+        force += f
+        torque += np.add(t, np.cross(frames.rotate(turn, point), f))
+    assert wrench.force == pytest.approx(list(force), abs=1e-9)
+    assert wrench.torque_under(frames.to_quaternion(turn)) == pytest.approx(tuple(torque), abs=1e-9)

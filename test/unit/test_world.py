@@ -1,0 +1,102 @@
+"""The world's dynamics against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from drone_sim import frames, urdf
+from drone_sim.propeller import Wrench
+from drone_sim.resources import package_path
+from drone_sim.state import Pose
+from drone_sim.world import World
+
+SUB_STEP = 0.005
+BODY = urdf.read(str(package_path() / "urdf" / "drone.urdf"))
+TILTED = frames.to_quaternion(frames.from_rpy((0, 0, 0), (0.7, -0.4, 2.0)))
+
+
+@pytest.fixture(name="space")
+def _space():
+    world = World(SUB_STEP, gravity=0.0)
+    yield world
+    world.close()
+
+
+def wrench(force=(0, 0, 0), torque=(0, 0, 0), point=(0, 0, 0)):
+    made = Wrench()
+    made.add(force, torque, point)
+    return made
+
+
+def test_free_fall_without_drag():
+    world = World(SUB_STEP, gravity=-9.81)
+    drone = world.add_rigid_body(BODY, Pose((1, 2, 50), TILTED))
+    world.advance({drone: Wrench()}, 200)
+    # Bullet's semi-implicit Euler: z = z0 - g dt^2 n (n + 1) / 2, v = -g n dt
+    assert world.state(drone).linear_velocity == pytest.approx((0, 0, -9.81), abs=1e-9)
+    assert world.state(drone).position == pytest.approx((1, 2, 50 - 9.81 * SUB_STEP**2 * 200 * 201 / 2), abs=1e-6)
+    world.close()
+
+
+def test_a_force_at_the_centre_of_mass_does_not_turn(space):
+    drone = space.add_rigid_body(BODY, Pose((0, 0, 1), TILTED))
+    space.advance({drone: wrench(force=(1.0, -2.0, 3.0))}, 10)
+    assert space.state(drone).angular_velocity == pytest.approx((0, 0, 0), abs=1e-12)
+    assert space.state(drone).linear_velocity == pytest.approx(np.array([1, -2, 3]) / 0.52 * 0.05, abs=1e-9)
+
+
+def test_a_torque_turns_by_the_inertia_in_the_world(space):
+    drone = space.add_rigid_body(BODY, Pose((0, 0, 1), TILTED))
+    torque = np.array([1e-3, -2e-3, 3e-3])
+    space.advance({drone: wrench(torque=torque)}, 1)
+    turn = np.reshape(Pose((0, 0, 0), TILTED).matrix, (3, 4))[:, :3]
+    expected = np.linalg.inv(turn @ BODY.inertia @ turn.T) @ torque * SUB_STEP
+    assert space.state(drone).angular_velocity == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_force_off_the_centre_turns_with_the_body_s_point(space):
+    drone = space.add_rigid_body(BODY, Pose((0, 0, 1), TILTED))
+    force, point = np.array([0.1, 0.2, -0.3]), np.array([0.09, -0.09, 0.001])
+    space.advance({drone: wrench(force=force, point=point)}, 1)
+    turn = np.reshape(Pose((0, 0, 0), TILTED).matrix, (3, 4))[:, :3]
+    torque = np.cross(turn @ point, force)
+    expected = np.linalg.inv(turn @ BODY.inertia @ turn.T) @ torque * SUB_STEP
+    assert space.state(drone).angular_velocity == pytest.approx(expected, rel=1e-5)
+
+
+def test_the_pose_of_the_root_link_comes_back_as_it_was_set(space):
+    drone = space.add_rigid_body(BODY, Pose((0, 0, 1)))
+    space.set_pose(drone, Pose((0.1, -0.2, 0.3), TILTED))
+    assert space.state(drone).position == pytest.approx((0.1, -0.2, 0.3), abs=1e-12)
+    assert space.state(drone).orientation == pytest.approx(TILTED, abs=1e-12)
+
+
+def test_the_velocity_of_the_root_link_is_that_of_its_point(space):
+    drone = space.add_rigid_body(BODY, Pose((0, 0, 1)))
+    space.advance({drone: wrench(torque=(1e-3, 0, 0))}, 1)
+    spin = space.state(drone).angular_velocity[0]
+    below_centre = BODY.centre_of_mass[2]
+    assert space.state(drone).linear_velocity == pytest.approx((0, spin * below_centre, 0), abs=1e-9)
+
+
+def test_the_drone_lands_on_the_floor(space):
+    world = World(SUB_STEP, gravity=-9.81)
+    world.add_floor(10.0, str(package_path() / "urdf" / "floor.png"))
+    drone = world.add_rigid_body(BODY, Pose((0, 0, 0.3)))
+    world.advance({drone: Wrench()}, 400)
+    # It rests on the four propeller cylinders and the stick: lowest point 0.01 m below the root.
+    assert world.state(drone).position[2] == pytest.approx(0.010, abs=0.003)
+    assert math.hypot(*world.state(drone).linear_velocity) < 1e-3
+    world.close()
+
+
+def test_two_worlds_do_not_know_each_other(space):
+    other = World(SUB_STEP, gravity=-9.81)
+    here = space.add_rigid_body(BODY, Pose((0, 0, 1)))
+    there = other.add_rigid_body(BODY, Pose((0, 0, 1)))
+    other.advance({there: Wrench()}, 10)
+    assert space.state(here).position == pytest.approx((0, 0, 1), abs=1e-12)
+    other.close()
+    other.close()
+    assert space.state(here).position == pytest.approx((0, 0, 1), abs=1e-12)
