@@ -52,9 +52,10 @@ class Wrench:
     """World-fixed forces at body-fixed points, summed: what the sub-steps of one step re-apply.
 
     V-REP turns each force into the world once per step and re-applies that world vector in every
-    sub-step, at a point that moves with the body. For points p_i (inertial frame of the body) and forces F_i (world), the torque about the centre of mass under the rotation R is
-    sum (R p_i) x F_i. It is linear in R, so nine sums hold it for any number of forces: column c of
-    `moments` is sum p_i F_i[c].
+    sub-step, at a point that moves with the body. For points p_i (inertial frame of the body) and
+    forces F_i (world), the torque about the centre of mass under the rotation R is sum (R p_i) x F_i.
+    It is linear in R, so nine sums hold it for any number of forces: column c of `moments` is
+    sum p_i F_i[c].
     """
 
     def __init__(self) -> None:
@@ -64,7 +65,7 @@ class Wrench:
         self.moments: List[List[float]] = [[0.0, 0.0, 0.0] for _ in range(3)]
 
     def add(self, force: Sequence[float], torque: Sequence[float], point: Sequence[float]) -> None:
-        """Add a force (N, world) at a point (m, inertial frame of the body) and a torque (N m, world)."""
+        """Add a force (N, world) at a point (m, inertial frame of the body), and a torque (N m, world)."""
         for axis in range(3):
             self.force[axis] += force[axis]
             self.torque[axis] += torque[axis]

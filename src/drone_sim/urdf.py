@@ -182,9 +182,7 @@ def _moved(element: Xml.Element, pose: Matrix, path: Path) -> Xml.Element:
     place = multiply(pose, _origin(element))
     for origin in moved.findall("origin"):
         moved.remove(origin)
-    Xml.SubElement(
-        moved, "origin", xyz=" ".join(map(repr, position(place))), rpy=" ".join(map(repr, _to_rpy(place)))
-    )
+    Xml.SubElement(moved, "origin", xyz=" ".join(map(repr, position(place))), rpy=" ".join(map(repr, _to_rpy(place))))
     for mesh in moved.iter("mesh"):
         name = mesh.attrib["filename"]
         mesh.set("filename", str(resolve(name if "://" in name else str(path.parent / name))))

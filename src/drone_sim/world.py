@@ -101,9 +101,7 @@ class World:
     def _add_body(
         self, mass: float, collision: int, visual: int, position: Sequence[float], orientation: Sequence[float]
     ) -> int:
-        number = pybullet.createMultiBody(
-            mass, collision, visual, position, orientation, physicsClientId=self._client
-        )
+        number = pybullet.createMultiBody(mass, collision, visual, position, orientation, physicsClientId=self._client)
         self._set_material(number)
         return number
 
@@ -195,6 +193,12 @@ class World:
             poses.append(root @ local)
         return np.concatenate(poses) if poses else np.empty((0, 4, 4))
 
+    def place_visuals(self, body: int, places: Mapping[int, Matrix]) -> None:
+        """Move some of a body's visuals, by index, to other places in its root link's frame."""
+        shapes = self._shapes(body)
+        for index, place in places.items():
+            shapes[index] = (shapes[index][0], place)
+
     def _bodies(self) -> List[int]:
         count = pybullet.getNumBodies(self._client)
         return [pybullet.getBodyUniqueId(index, self._client) for index in range(count)]
@@ -221,7 +225,7 @@ class World:
             key=key,
             shape=shape,
             size=size,
-            rgba=tuple(rgba),
+            rgba=(rgba[0], rgba[1], rgba[2], rgba[3]),
             file=file.decode() if shape == "mesh" else "",
             texture=self._floor_texture if is_floor else "",
             floor=is_floor,

@@ -28,7 +28,9 @@ class RealTime(unittest.TestCase):
         listeners["front"].wait_for(lambda _: len(listeners["front"].messages) >= STEPS)
         stamps = {name: [m.header.stamp for m in one.messages] for name, one in listeners.items()}
         for child in ("base_link", "Track_base"):
-            stamps[child] = [t.header.stamp for m in transforms.messages for t in m.transforms if t.child_frame_id == child]
+            stamps[child] = [
+                t.header.stamp for m in transforms.messages for t in m.transforms if t.child_frame_id == child
+            ]
         first = max(times[0] for times in stamps.values())
         last = min(times[-1] for times in stamps.values())
         common = {name: [t for t in times if first <= t <= last] for name, times in stamps.items()}

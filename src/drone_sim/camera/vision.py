@@ -9,6 +9,7 @@ import numpy as np
 
 from drone_sim.camera.context import RendererUnavailable
 from drone_sim.camera.intrinsics import Intrinsics
+from drone_sim.camera.renderer import Renderer
 from drone_sim.visual import Visual
 
 _LOG = logging.getLogger(__name__)
@@ -35,14 +36,14 @@ class Vision:
     def __init__(self, scene: Scene):
         """Make the renderer when the first picture is asked for: not every run needs one."""
         self._scene = scene
-        self._renderer = None
+        self._renderer: Optional[Renderer] = None
         self._fallback = False
 
     def picture(self, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
         """Return the RGB picture (height, width, 3) from `pose` (4, 4), world from optical frame."""
         if self._renderer is None and not self._fallback:
             self._open()
-        if self._fallback:
+        if self._renderer is None:
             vertical_fov = 2 * np.arctan(intrinsics.height / 2 / intrinsics.fy)
             return self._scene.tiny_picture(
                 pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far
@@ -51,8 +52,6 @@ class Vision:
         return self._renderer.render(intrinsics, pose, self._scene.visual_poses())
 
     def _open(self) -> None:
-        from drone_sim.camera.renderer import Renderer
-
         try:
             self._renderer = Renderer()
         except RendererUnavailable as error:

@@ -41,9 +41,7 @@ class DroneInput:
     def _on_twist(self, message: TwistMessage) -> None:
         linear, angular = message.linear, message.angular
         try:
-            twist = checks.twist(
-                (linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z), self._parameters
-            )
+            twist = checks.twist((linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z), self._parameters)
         except checks.Refused as refused:
             rospy.logwarn_throttle(5, f"cmd_vel refused, the last good one is kept: {refused}")
             return

@@ -32,7 +32,9 @@ class MasterWatch(threading.Thread):
                 rospy.logwarn("the ROS master answers again")
             elif pid is not None and pid != self._pid:
                 self._pid = pid
-                rospy.logwarn("a new ROS master is there, which does not know this node: restart it to be found by others")
+                rospy.logwarn(
+                    "a new ROS master is there, which does not know this node: restart it to be found by others"
+                )
             lost = pid is None
 
     def _ask(self) -> int | None:

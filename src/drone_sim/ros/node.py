@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import logging
 import sys
+from typing import List, Union
 
 import rospy
 from rosgraph_msgs.msg import Clock
 
 from drone_sim import parameters as parameters_module
 from drone_sim.frames import position, to_euler
-from drone_sim.parameters import ParameterError, Parameters
 from drone_sim.pacing import Pacer
+from drone_sim.parameters import ParameterError, Parameters
 from drone_sim.ros.inputs import DroneInput
 from drone_sim.ros.master_watch import MasterWatch
 from drone_sim.ros.outputs import CameraOutput, DroneOutput, broadcast_mounts
@@ -37,7 +38,7 @@ class Node:
         self._simulated_time = bool(rospy.get_param("/use_sim_time", False))
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if self._simulated_time else None
         self._input = DroneInput(simulation.drone, parameters)
-        self._outputs = [DroneOutput(simulation.drone)]
+        self._outputs: List[Union[DroneOutput, CameraOutput]] = [DroneOutput(simulation.drone)]
         for name, camera in simulation.cameras.items():
             topic = f"{simulation.drone.name}/{name}"
             self._outputs.append(CameraOutput(topic, camera, parameters.cameras[name]))
