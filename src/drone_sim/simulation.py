@@ -10,8 +10,6 @@ from __future__ import annotations
 
 from typing import Dict
 
-import numpy as np
-
 from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.camera.vision import Camera, Vision
 from drone_sim.drone import Drone
@@ -46,8 +44,7 @@ class Simulation:
     def _camera(self, parameters: CameraParameters) -> Camera:
         size = (parameters.width, parameters.height)
         intrinsics = Intrinsics(*size, parameters.horizontal_fov, parameters.near, parameters.far)
-        pose = self.drone.mount(parameters)
-        return Camera(intrinsics, lambda: np.reshape((*pose(), 0, 0, 0, 1), (4, 4)), self.vision)
+        return Camera(parameters.kind, intrinsics, self.drone.mount(parameters), self.vision)
 
     @property
     def time(self) -> float:
@@ -60,9 +57,18 @@ class Simulation:
         self.world.advance(dict([self.drone.wrench()]), self.parameters.sub_steps)
         self.drone.refresh()
         self.steps += 1
-        for camera in self.cameras.values():
-            camera.sense()
+        self._take_pictures()
         self.drone.script.call("sensing")
+
+    def _take_pictures(self) -> None:
+        every = {name: camera.every for name, camera in self.parameters.cameras.items()}
+        watched = [
+            camera for name, camera in self.cameras.items() if self.steps % every[name] == 0 and camera.watched()
+        ]
+        if watched:
+            self.drone.show_blades()
+        for camera in self.cameras.values():
+            camera.image = camera.take() if camera in watched else None
 
     def close(self) -> None:
         """Run cleanup once, whatever happened before, and free the world; may be called twice."""

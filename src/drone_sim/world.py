@@ -234,10 +234,11 @@ class World:
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
-    ) -> np.ndarray:
-        """Return an RGB picture (height, width, 3) of PyBullet's software renderer, slow but always there.
+    ) -> Tuple[np.ndarray, np.ndarray]:
+        """Return RGB (height, width, 3) and depth (height, width) of PyBullet's software renderer.
 
-        `camera` is the (4, 4) pose world from optical frame; the field of view is in radians.
+        Slow, but always there. `camera` is the (4, 4) pose world from optical frame; the field of view is
+        in radians; depth is in metres along the optical z, NaN where nothing is nearer than `far`.
         """
         gl_from_optical = np.diag([1.0, -1.0, -1.0, 1.0])
         view = gl_from_optical @ np.linalg.inv(camera)
@@ -253,7 +254,10 @@ class World:
             flags=pybullet.ER_NO_SEGMENTATION_MASK,
             physicsClientId=self._client,
         )
-        return np.ascontiguousarray(np.reshape(picture[2], (height, width, 4))[:, :, :3])
+        color = np.ascontiguousarray(np.reshape(picture[2], (height, width, 4))[:, :, :3], dtype=np.uint8)
+        buffer = np.reshape(picture[3], (height, width))
+        depth = np.where(buffer < 1, far * near / (far - (far - near) * buffer), np.nan)
+        return color, depth.astype(np.float32)
 
     def look_from_behind(self, position: Sequence[float], yaw: float) -> None:
         """Put the camera of PyBullet's window behind and above a place; nothing without `gui`."""

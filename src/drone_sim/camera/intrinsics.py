@@ -29,6 +29,7 @@ class Intrinsics:
     far: float
 
     def __post_init__(self) -> None:
+        """Refuse what no camera can be."""
         if self.width < 1 or self.height < 1:
             raise ValueError(f"image size {self.width} x {self.height}: both must be at least 1")
         if not 0.0 < self.horizontal_fov < math.pi:
@@ -57,12 +58,12 @@ class Intrinsics:
         return (self.height - 1) / 2.0
 
     @property
-    def K(self) -> Tuple[float, ...]:  # noqa: N802 - the name CameraInfo gives it
+    def K(self) -> Tuple[float, ...]:
         """Camera matrix, 3 x 3 row-major, as in sensor_msgs/CameraInfo."""
         return (self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
 
     @property
-    def P(self) -> Tuple[float, ...]:  # noqa: N802 - the name CameraInfo gives it
+    def P(self) -> Tuple[float, ...]:
         """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo."""
         return (self.fx, 0.0, self.cx, 0.0, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
 

@@ -11,9 +11,10 @@ import trimesh
 
 from drone_sim.visual import Visual
 
-SECTIONS = 32  # of a cylinder, capsule or sphere around its axis
+SECTIONS = 24  # of a cylinder or capsule around its axis
 PLANE_HALF_SIZE = 200.0  # metres; a plane is infinite, a camera sees 100 m
 CREASE = np.radians(40.0)  # faces that meet more sharply than this keep an edge
+_SPHERE = 1.0029  # radius of the polyhedron of 1280 faces that has the volume of the unit sphere
 WHITE = (1.0, 1.0, 1.0, 1.0)
 
 
@@ -61,10 +62,10 @@ def load(visual: Visual) -> Tuple[Mesh, ...]:
         radius, length = visual.size
         corners = _triangles(trimesh.creation.cylinder(_outer(radius), length, sections=SECTIONS))
     elif visual.shape == "sphere":
-        corners = _triangles(trimesh.creation.icosphere(subdivisions=3, radius=visual.size[0]))
+        corners = _triangles(trimesh.creation.icosphere(subdivisions=3, radius=_SPHERE * visual.size[0]))
     elif visual.shape == "capsule":
         radius, length = visual.size
-        corners = _triangles(trimesh.creation.capsule(length, _outer(radius), count=[SECTIONS, SECTIONS // 2]))
+        corners = _triangles(trimesh.creation.capsule(length, _outer(radius), count=[SECTIONS // 2, SECTIONS]))
     else:
         raise ValueError(f"visual {visual.key}: unknown shape {visual.shape!r}")
     return (_assemble(corners, uv, WHITE, _read_image(visual.texture)),)
@@ -128,8 +129,9 @@ def _assemble(
 def crease_normals(corners: np.ndarray, crease: float = float(CREASE)) -> np.ndarray:
     """Unit normals (m, 3, 3) at the corners of triangles (m, 3, 3).
 
-    A corner's normal is the area-weighted mean over the faces at that point which are turned from its own by
-    less than `crease` rad: round things look round and edges stay sharp, whatever the file's own normals say.
+    A corner's normal is the mean, weighted by the angles there (so that it does not matter which way a quad was
+    cut), over the faces at that point which are turned from its own by less than `crease` rad: round things
+    look round and edges stay sharp, whatever the file's own normals say.
     """
     area = _areas(corners)
     unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-30)
@@ -140,11 +142,11 @@ def crease_normals(corners: np.ndarray, crease: float = float(CREASE)) -> np.nda
     repeats = count[point]
     corner = np.repeat(np.arange(len(repeats)), repeats)
     within = np.arange(len(corner)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-    face, neighbour = corner // 3, order[start[point[corner]] + within] // 3
-    near = np.einsum("ij,ij->i", unit[face], unit[neighbour]) > np.cos(crease)
-    total = np.stack(
-        [np.bincount(corner[near], area[neighbour[near], k], minlength=len(repeats)) for k in range(3)], axis=1
-    )
+    neighbour = order[start[point[corner]] + within]
+    near = np.einsum("ij,ij->i", unit[corner // 3], unit[neighbour // 3]) > np.cos(crease)
+    corner, neighbour = corner[near], neighbour[near]
+    share = unit[neighbour // 3] * _angles(corners).ravel()[neighbour, None]
+    total = np.stack([np.bincount(corner, share[:, k], minlength=len(repeats)) for k in range(3)], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0, total / np.maximum(length, 1e-30), [0.0, 0.0, 1.0]).reshape(-1, 3, 3)
 
@@ -152,6 +154,13 @@ def crease_normals(corners: np.ndarray, crease: float = float(CREASE)) -> np.nda
 def _areas(corners: np.ndarray) -> np.ndarray:
     """Normals (m, 3) as long as twice the triangles' areas."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _angles(corners: np.ndarray) -> np.ndarray:
+    """Interior angles (m, 3), rad."""
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    sine = np.linalg.norm(np.cross(ahead, back), axis=2)
+    return np.arctan2(sine, np.einsum("ijk,ijk->ij", ahead, back))
 
 
 def _points(corners: np.ndarray) -> np.ndarray:
@@ -197,7 +206,7 @@ def _read_file(visual: Visual) -> Iterator[Mesh]:
         if np.prod(visual.size) < 0:
             corners = corners[:, ::-1]  # a mirror image turns the faces inside out
             uv = None if uv is None else uv[:, ::-1]
-        yield _assemble(corners, uv, rgba, own if texture is None else texture)
+        yield _assemble(corners, uv, rgba if texture is None else WHITE, own if texture is None else texture)
     if not found:
         raise ValueError(f"mesh {visual.file}: holds no triangles")
 
@@ -205,7 +214,7 @@ def _read_file(visual: Visual) -> Iterator[Mesh]:
 def _parts(path: str) -> Iterator[trimesh.Trimesh]:
     """The file's meshes, placed as its scene graph says."""
     try:
-        loaded = trimesh.load(path, process=False)
+        loaded: Any = trimesh.load(path, process=False)
     except Exception as error:  # trimesh's readers raise whatever their parser raised
         raise ValueError(f"mesh {path}: cannot be read ({' '.join(str(error).split())})") from error
     if isinstance(loaded, trimesh.Trimesh):

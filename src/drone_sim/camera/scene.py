@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import moderngl
 import numpy as np
@@ -17,7 +17,7 @@ MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
 FIXED_LAYOUT = (("paint", "4f", 16), ("label", "1f", 4))
 ANISOTROPY = 8.0
 
-Programs = Dict[str, moderngl.Program]
+Programs = Dict[str, Any]  # moderngl.Program by role
 
 
 @dataclass
@@ -62,6 +62,7 @@ class Scene:
     """The visuals as batches; must be used with its context current."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, software: bool) -> None:
+        """Empty. programs: by name: plain, textured, shadow, data; software: whether the CPU draws."""
         self._context = context
         self._programs = programs
         self._software = software
@@ -183,7 +184,8 @@ class Scene:
                     solids[id(part)].members.append(index)
                 else:
                     solids[id(part)] = Batch(part, [index])
-        batches = sorted(solids.values(), key=lambda batch: (batch.part.texture is not None, batch.part.closed)) + singles
+        alike = sorted(solids.values(), key=lambda batch: (batch.part.texture is not None, batch.part.closed))
+        batches = alike + singles
         first = 0
         for batch in batches:
             batch.first = first
@@ -194,9 +196,7 @@ class Scene:
         """Make the record buffers and the vertex arrays that read them."""
         if not self.batches:
             return
-        records = [
-            (*self._paint(batch, index), float(index)) for batch in self.batches for index in batch.members
-        ]
+        records = [(*self._paint(batch, index), float(index)) for batch in self.batches for index in batch.members]
         moving = self._context.buffer(reserve=48 * len(records), dynamic=True)
         fixed = self._context.buffer(np.array(records, dtype=np.float32))
         self._buffers = [moving, fixed]
@@ -209,7 +209,7 @@ class Scene:
         red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.part.rgba)
         return (red, green, blue, SHADE if batch.floor else alpha if batch.transparent else 1.0)
 
-    def _array(self, batch: Batch, program: moderngl.Program) -> moderngl.VertexArray:
+    def _array(self, batch: Batch, program: Any) -> moderngl.VertexArray:
         array = self._context.vertex_array(program, [], index_buffer=batch.part.indices, index_element_size=4)
         moving, fixed = self._buffers
         for layout, buffer, first, divisor in (

@@ -15,7 +15,9 @@ vec3 world_point() {
 """
 
 # Light is computed per vertex: floors and boxes have one normal per face, and round things enough vertices.
-SURFACE_VERTEX = _INPUTS + """
+SURFACE_VERTEX = (
+    _INPUTS
+    + """
 uniform vec3 to_sun;
 in vec3 normal;
 in vec4 paint;
@@ -35,6 +37,7 @@ void main() {
     gl_Position = clip_from_world * vec4(world_point(), 1.0);
 }
 """
+)
 
 SURFACE_FRAGMENT = """
 #version 330 core
@@ -54,7 +57,9 @@ void main() {
 """
 
 # Every vertex slides along the light onto the floor; what lies below the floor casts nothing beyond itself.
-SHADOW_VERTEX = _INPUTS + """
+SHADOW_VERTEX = (
+    _INPUTS
+    + """
 uniform vec3 to_sun;
 uniform float floor_height;
 void main() {
@@ -63,6 +68,7 @@ void main() {
     gl_Position = clip_from_world * vec4(p.xy, floor_height, 1.0);
 }
 """
+)
 
 SHADOW_FRAGMENT = """
 #version 330 core
@@ -91,7 +97,9 @@ void main() { pixel = vec4(colour, 1.0); }
 """
 
 # Depth along the optical axis is the clip w, which the projection makes equal to the optical z.
-DATA_VERTEX = _INPUTS + """
+DATA_VERTEX = (
+    _INPUTS
+    + """
 in float label;
 flat out float visual;
 void main() {
@@ -99,6 +107,7 @@ void main() {
     gl_Position = clip_from_world * vec4(world_point(), 1.0);
 }
 """
+)
 
 DATA_FRAGMENT = """
 #version 330 core

@@ -1,15 +1,17 @@
-"""The sky: a dome of a few bands, each vertex with its colour, so that no pixel costs more than a blend."""
+"""The sky: a dome of a few bands, each vertex with its colour, so that no pixel costs more than a blend.
+
+It ends a little below the horizon, where the ground is of one colour and costs nothing at all.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 SECTORS = 8
-# Elevation in degrees, and the colour there: ground below the horizon, haze at it, blue above.
+HAZE = (0.60, 0.61, 0.60)  # the ground far away; the picture is cleared to it
+# Elevation in degrees, and the colour there: the ground's haze brightens to the horizon, blue above it.
 BANDS = (
-    (-90.0, (0.44, 0.45, 0.43)),
-    (-30.0, (0.50, 0.51, 0.49)),
-    (-6.0, (0.60, 0.61, 0.60)),
+    (-6.0, HAZE),
     (-0.6, (0.70, 0.72, 0.73)),
     (0.6, (0.85, 0.89, 0.93)),
     (6.0, (0.74, 0.83, 0.92)),

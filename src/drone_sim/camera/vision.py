@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
-from typing import Callable, List, Optional, Protocol
+from typing import Callable, List, Optional, Protocol, Tuple
 
 import numpy as np
 
 from drone_sim.camera.context import RendererUnavailable
 from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.camera.renderer import Renderer
+from drone_sim.frames import Matrix
 from drone_sim.visual import Visual
 
 _LOG = logging.getLogger(__name__)
@@ -26,8 +27,8 @@ class Scene(Protocol):
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
-    ) -> np.ndarray:
-        """Return an RGB picture (height, width, 3), drawn without OpenGL."""
+    ) -> Tuple[np.ndarray, np.ndarray]:
+        """Return RGB (height, width, 3) and depth (height, width), drawn without OpenGL."""
 
 
 class Vision:
@@ -39,17 +40,26 @@ class Vision:
         self._renderer: Optional[Renderer] = None
         self._fallback = False
 
-    def picture(self, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
-        """Return the RGB picture (height, width, 3) from `pose` (4, 4), world from optical frame."""
+    def picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
+        """Return the picture from `pose` (4, 4), world from optical frame.
+
+        `kind` "color": (height, width, 3) uint8 RGB. "depth": (height, width) float32, metres along the
+        optical z, NaN beyond the far plane.
+        """
         if self._renderer is None and not self._fallback:
             self._open()
         if self._renderer is None:
-            vertical_fov = 2 * np.arctan(intrinsics.height / 2 / intrinsics.fy)
-            return self._scene.tiny_picture(
-                pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far
-            )
+            return self._tiny_picture(kind, intrinsics, pose)
         self._renderer.set_visuals(self._scene.visuals())
-        return self._renderer.render(intrinsics, pose, self._scene.visual_poses())
+        render = self._renderer.render if kind == "color" else self._renderer.render_depth
+        return render(intrinsics, pose, self._scene.visual_poses())
+
+    def _tiny_picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
+        vertical_fov = 2 * np.arctan(intrinsics.height / 2 / intrinsics.fy)
+        color, depth = self._scene.tiny_picture(
+            pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far
+        )
+        return color if kind == "color" else depth
 
     def _open(self) -> None:
         try:
@@ -68,14 +78,15 @@ class Vision:
 class Camera:
     """One vision sensor: where it is, what it sees, and who looks."""
 
-    def __init__(self, intrinsics: Intrinsics, pose: Callable[[], np.ndarray], vision: Vision):
-        """Take the pinhole model, a function that gives the pose world from optical frame, and the renderer."""
+    def __init__(self, kind: str, intrinsics: Intrinsics, pose: Callable[[], Matrix], vision: Vision):
+        """Take what it measures ("color" or "depth"), how, from where (world from optical frame), and by what."""
+        self.kind = kind
         self.intrinsics = intrinsics
         self.watched: Callable[[], bool] = lambda: False
         self.image: Optional[np.ndarray] = None  # of the last step, if somebody looked
-        self._pose = pose
+        self.pose = pose
         self._vision = vision
 
     def take(self) -> np.ndarray:
-        """Return a picture of the scene as it stands, (height, width, 3) uint8 RGB."""
-        return self._vision.picture(self.intrinsics, self._pose())
+        """Return a picture of the scene as it stands; shape and type as Vision.picture says."""
+        return self._vision.picture(self.kind, self.intrinsics, np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4)))

@@ -18,9 +18,10 @@ from drone_sim import parameters as parameters_module
 from drone_sim.frames import position, to_euler
 from drone_sim.pacing import Pacer
 from drone_sim.parameters import ParameterError, Parameters
+from drone_sim.ros.cameras import CameraOutput
 from drone_sim.ros.inputs import DroneInput
 from drone_sim.ros.master_watch import MasterWatch
-from drone_sim.ros.outputs import CameraOutput, DroneOutput, broadcast_mounts
+from drone_sim.ros.outputs import DroneOutput
 from drone_sim.scripting.python_script import ScriptError
 from drone_sim.simulation import Simulation
 from drone_sim.urdf import UrdfError
@@ -38,12 +39,13 @@ class Node:
         self._simulated_time = bool(rospy.get_param("/use_sim_time", False))
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if self._simulated_time else None
         self._input = DroneInput(simulation.drone, parameters)
-        self._outputs: List[Union[DroneOutput, CameraOutput]] = [DroneOutput(simulation.drone)]
+        self._outputs: List[Union[DroneOutput, CameraOutput]] = []
+        settings = parameters.cameras
+        mounted = {settings[name].frame: camera for name, camera in simulation.cameras.items() if settings[name].mount}
+        self._outputs.append(DroneOutput(simulation.drone, mounted))
         for name, camera in simulation.cameras.items():
-            topic = f"{simulation.drone.name}/{name}"
-            self._outputs.append(CameraOutput(topic, camera, parameters.cameras[name]))
+            self._outputs.append(CameraOutput(simulation.drone.name, camera, settings[name]))
             camera.take()  # the first picture takes long: compiling shaders must not make a step late
-        broadcast_mounts(list(parameters.cameras.values()))
 
     def run(self) -> None:
         """Step until the node is shut down. Raises ScriptError."""
