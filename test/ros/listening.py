@@ -18,6 +18,10 @@ class Listener:
             self.messages.append(message)
             self._came.notify_all()
 
+    def close(self):
+        """Stop listening."""
+        self._subscriber.unregister()
+
     def wait_for(self, condition=lambda message: True, after=None, timeout=20.0):
         """Return the first message that fulfils `condition`, of those that come after `after` messages."""
         start = len(self.messages) if after is None else after

@@ -32,8 +32,9 @@ class Node:
 
     def __init__(self, parameters: Parameters):
         """Build the simulation and advertise. Raises what Simulation raises."""
-        self._simulation = Simulation(parameters, script=parameters.script, gui=parameters.gui)
-        simulation = self._simulation
+        self._window = parameters.gui
+        self.simulation = Simulation(parameters, script=parameters.script, gui=parameters.gui)
+        simulation = self.simulation
         factor = parameters.real_time_factor
         self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
         self._simulated_time = bool(rospy.get_param("/use_sim_time", False))
@@ -49,7 +50,7 @@ class Node:
 
     def run(self) -> None:
         """Step until the node is shut down. Raises ScriptError."""
-        simulation = self._simulation
+        simulation = self.simulation
         rospy.loginfo(f"drone_sim: flying; commands on {rospy.resolve_name(simulation.drone.name + '/cmd_vel')}")
         self._pacer.restart()
         while not rospy.is_shutdown():
@@ -62,18 +63,19 @@ class Node:
         """Take what has come in, run one step, publish it under one stamp."""
         stamp = rospy.Time.now()
         self._input.apply()
-        self._simulation.step()
+        self.simulation.step()
         if self._clock is not None:
-            stamp = rospy.Time.from_sec(self._simulation.time)
+            stamp = rospy.Time.from_sec(self.simulation.time)
             self._clock.publish(stamp)
         for output in self._outputs:
             output.publish(stamp)
-        track = self._simulation.drone.track
-        self._simulation.world.look_from_behind(position(track), to_euler(track)[2])
+        if self._window:
+            track = self.simulation.drone.track
+            self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
 
     def close(self) -> None:
         """Run the script's cleanup and free the world. Raises ScriptError."""
-        self._simulation.close()
+        self.simulation.close()
 
 
 class _ToRosout(logging.Handler):

@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+"""The cameras' topics, step by step: the test steps the node itself, so that it knows what each step made."""
+
+import math
+import sys
+import unittest
+
+import cv2
+import numpy as np
+import rospy
+import rostest
+from dynamic_reconfigure.client import Client
+from listening import Listener
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from tf2_msgs.msg import TFMessage
+
+from drone_sim import parameters
+from drone_sim.ros.node import Node
+
+CAMERAS = {
+    "front": ("/drone/front", "/drone/camera_info", "front_optical", "rgb8"),
+    "depth": ("/drone/depth/image", "/drone/depth/camera_info", "front_optical", "32FC1"),
+    "track": ("/drone/track/image", "/drone/track/camera_info", "track_optical", "rgb8"),
+    "floor": ("/drone/floor/image", "/drone/floor/camera_info", "floor_optical", "rgb8"),
+}
+
+
+class Cameras(unittest.TestCase):
+    """One node in this process; every test connects its own subscribers."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.parameters = parameters.load({"cameras": {"floor": {"every": 3}}})
+        cls.node = Node(cls.parameters)
+        vision = cls.node.simulation.vision
+        picture, cls.pictures = vision.picture, []
+
+        def counted(kind, intrinsics, pose):
+            cls.pictures.append(kind)
+            return picture(kind, intrinsics, pose)
+
+        vision.picture = counted
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.node.close()
+
+    def setUp(self):
+        self.listeners = []
+
+    def tearDown(self):
+        for listener in self.listeners:
+            listener.close()
+        self.step_until(lambda: not self.rendered_in_a_step())
+
+    def listen(self, topic, kind):
+        self.listeners.append(Listener(topic, kind))
+        return self.listeners[-1]
+
+    def step_until(self, condition):
+        for _ in range(400):
+            self.node.step()
+            if condition():
+                return
+            rospy.rostime.wallsleep(0.01)  # the connections are made in other threads
+        self.fail("nothing such in 400 steps")
+
+    def rendered_in_a_step(self):
+        self.pictures.clear()
+        self.node.step()
+        return list(self.pictures)
+
+    def test_nothing_is_rendered_while_nobody_listens(self):
+        self.assertEqual([self.rendered_in_a_step() for _ in range(5)], [[]] * 5)
+        image = self.listen("/drone/front", Image)
+        self.step_until(lambda: image.messages)
+        self.assertEqual(self.rendered_in_a_step(), ["color"])
+
+    def test_camera_info_alone_renders_nothing(self):
+        info = self.listen("/drone/camera_info", CameraInfo)
+        self.step_until(lambda: info.messages)
+        self.assertEqual(self.rendered_in_a_step(), [])
+
+    def test_each_camera_has_its_image_its_model_and_odometry_s_stamp(self):
+        odometry = self.listen("/drone/odom", Odometry)
+        for name, (topic, info_topic, frame, encoding) in CAMERAS.items():
+            with self.subTest(name):
+                image, info = self.listen(topic, Image), self.listen(info_topic, CameraInfo)
+                self.step_until(lambda image=image, info=info: image.messages and info.messages)
+                self.step_until(lambda image=image: len(image.messages) > 3)
+                expected = self.parameters.cameras[name]
+                picture, model = image.messages[-1], info.messages[-1]
+                self.assertEqual((picture.encoding, picture.header.frame_id), (encoding, frame))
+                self.assertEqual((picture.width, picture.height), (expected.width, expected.height))
+                self.assertEqual((model.width, model.height), (expected.width, expected.height))
+                self.assertEqual(model.header.frame_id, frame)
+                focal = expected.width / 2 / math.tan(expected.horizontal_fov / 2)
+                for matrix, row in ((model.K, 3), (model.P, 4)):
+                    np.testing.assert_allclose([matrix[0], matrix[row + 1]], focal, atol=1e-9)
+                    np.testing.assert_allclose(matrix[2], (expected.width - 1) / 2, atol=1e-9)
+                    np.testing.assert_allclose(matrix[row + 2], (expected.height - 1) / 2, atol=1e-9)
+                stamps = {m.header.stamp for m in odometry.messages}
+                self.assertLessEqual({m.header.stamp for m in image.messages[1:]}, stamps)
+                self.assertIn(picture.header.stamp, {m.header.stamp for m in info.messages})
+
+    def test_every_third_step(self):
+        image = self.listen("/drone/floor/image", Image)
+        self.step_until(lambda: image.messages)
+        self.assertEqual(sum(len(self.rendered_in_a_step()) for _ in range(9)), 3)
+
+    def test_depth_of_the_floor(self):
+        depth = self.listen("/drone/depth/image", Image)
+        self.step_until(lambda: depth.messages)
+        message = depth.messages[-1]
+        metres = np.frombuffer(message.data, np.float32).reshape(message.height, message.width)
+        self.assertTrue(np.isnan(metres[0]).all())  # the sky
+        camera = self.node.simulation.cameras["front"]
+        height = camera.pose()[11]
+        rows = np.arange(440, 480)
+        expected = height * camera.intrinsics.fy / (rows - camera.intrinsics.cy)
+        np.testing.assert_allclose(metres[440:480, 320], expected, rtol=0.01)
+
+    def test_jpeg_and_png(self):
+        compressed, raw = self.listen("/drone/front/compressed", CompressedImage), self.listen("/drone/front", Image)
+        self.step_until(lambda: compressed.messages and raw.messages)
+        client = Client("/drone/front/compressed", timeout=10)
+        self.assertEqual(client.get_configuration(timeout=10)["jpeg_quality"], 80)
+        self.assert_like_raw(compressed, raw, "rgb8; jpeg compressed bgr8", tolerance=25)
+        client.update_configuration({"format": "png", "png_level": 1})
+        self.assert_like_raw(compressed, raw, "rgb8; png compressed bgr8", tolerance=0)
+        client.update_configuration({"format": "jpeg", "jpeg_quality": 5})
+        self.assert_like_raw(compressed, raw, "rgb8; jpeg compressed bgr8", tolerance=120)
+        client.close()
+
+    def assert_like_raw(self, compressed, raw, encoding, tolerance):
+        for listener in (compressed, raw):
+            listener.messages.clear()
+        self.step_until(lambda: common_stamp(compressed, raw))
+        stamp = common_stamp(compressed, raw)
+        packed = next(m for m in compressed.messages if m.header.stamp == stamp)
+        plain = next(m for m in raw.messages if m.header.stamp == stamp)
+        self.assertEqual((packed.format, packed.header.frame_id), (encoding, "front_optical"))
+        decoded = cv2.cvtColor(cv2.imdecode(np.frombuffer(packed.data, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+        expected = np.frombuffer(plain.data, np.uint8).reshape(plain.height, plain.width, 3)
+        self.assertLessEqual(np.abs(decoded.astype(int) - expected).max(), tolerance)
+
+    def test_mounted_cameras_have_their_transform(self):
+        transforms = self.listen("/tf", TFMessage)
+        self.step_until(lambda: transforms.messages)
+        children = {t.child_frame_id for t in transforms.messages[-1].transforms}
+        self.assertEqual(children, {"base_link", "Track_base", "track_optical", "floor_optical"})
+
+
+def common_stamp(one, other):
+    stamps = {m.header.stamp for m in one.messages} & {m.header.stamp for m in other.messages}
+    return max(stamps, default=None)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_cameras")
+    sys.exit(rostest.rosrun("drone_sim", "cameras", Cameras))

@@ -1,0 +1,96 @@
+"""Cameras in a simulation, with OpenGL and without."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from drone_sim import parameters
+from drone_sim.simulation import Simulation
+
+SCENE = {
+    "scene": {"objects": [{"shape": "box", "size": [0.5, 0.5, 0.5], "position": [2, 0, 0.8], "color": [1, 0, 0, 1]}]}
+}
+
+SOURCE = os.pathsep.join(path for path in sys.path if path)
+PICTURE = """
+import logging, sys
+import numpy as np
+from drone_sim import parameters
+from drone_sim.simulation import Simulation
+logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s")
+simulation = Simulation(parameters.load({scene!r}))
+pictures = {{name: simulation.cameras[name].take() for name in ("front", "depth", "front", "depth")}}
+np.savez(sys.argv[1], **pictures)
+simulation.close()
+"""
+
+
+def pictures_of_a_process(folder, **environment):
+    file = folder / "pictures.npz"
+    command = [sys.executable, "-c", PICTURE.format(scene=SCENE), str(file)]
+    ended = subprocess.run(
+        command, env={**os.environ, "PYTHONPATH": SOURCE, **environment}, capture_output=True, text=True, check=False, timeout=100
+    )
+    assert ended.returncode == 0, ended.stderr
+    return dict(np.load(file)), ended.stderr
+
+
+def red(picture):
+    picture = picture.astype(int)
+    return (picture[:, :, 0] > 2 * picture[:, :, 1]) & (picture[:, :, 0] > 2 * picture[:, :, 2])
+
+
+def test_without_egl_pybullet_draws_the_same_view_after_one_warning(tmp_path):
+    # glvnd finds its vendors by this list: an empty one is a machine without EGL.
+    drawn, warnings = pictures_of_a_process(tmp_path, __EGL_VENDOR_LIBRARY_FILENAMES="/dev/null")
+    assert warnings.count("WARNING") == 1, warnings
+    assert "TinyRenderer" in warnings
+    expected, quiet = pictures_of_a_process(tmp_path)
+    assert "WARNING" not in quiet
+    ours, theirs = red(expected["front"]), red(drawn["front"])
+    assert (ours & theirs).sum() / (ours | theirs).sum() > 0.98
+    both = ours & theirs
+    assert drawn["depth"][both] == pytest.approx(expected["depth"][both], abs=0.02)
+    assert np.isnan(drawn["depth"][0]).all()
+
+
+def test_a_picture_is_taken_only_while_somebody_looks():
+    simulation = Simulation(parameters.load())
+    front = simulation.cameras["front"]
+    simulation.step()
+    assert front.image is None
+    front.watched = lambda: True
+    simulation.step()
+    assert front.image.shape == (480, 640, 3)
+    front.watched = lambda: False
+    simulation.step()
+    assert front.image is None
+    simulation.close()
+
+
+def test_the_own_body_is_not_in_the_front_picture():
+    simulation = Simulation(parameters.load())
+    depth = simulation.cameras["depth"].take()
+    assert np.nanmin(depth) > 0.5
+    simulation.close()
+
+
+def test_an_unknown_parent_of_a_camera_is_named():
+    wrong = {"cameras": {"track": {"mount": {"parent": "Nobody"}}}}
+    with pytest.raises(parameters.ParameterError, match="no object is named Nobody"):
+        Simulation(parameters.load(wrong))
+
+
+def test_the_track_camera_stays_level_while_its_parent_is_the_track_frame():
+    level = {}
+    for parent in ("Track_base", "Quadricopter_base"):
+        simulation = Simulation(parameters.load({"cameras": {"track": {"mount": {"parent": parent}}}}))
+        simulation.drone.move(simulation.drone.state._replace(orientation=(0.2, 0.0, 0.0, 0.98)))
+        simulation.step()
+        across = simulation.cameras["track"].pose()[8]  # z of the optical x axis in the world
+        level[parent] = abs(across) < 1e-6
+        simulation.close()
+    assert level == {"Track_base": True, "Quadricopter_base": False}
