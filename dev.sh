@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | lint
+# Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | lint | bench [NAME...]
 #
 # Installs what is missing (Debian 12: its own ROS 1; Ubuntu 20.04: /opt/ros/noetic), keeps the pip packages
 # in .venv, and builds into build/ and devel/. What is there already is left alone, so a second run takes seconds.
@@ -114,5 +114,6 @@ case "$command" in
   run) setup; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   lint) setup; lint ;;
+  bench) setup; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   *) sed -n '2,5s/^# \{0,1\}//p' "$0" ;;
 esac

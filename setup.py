@@ -4,6 +4,13 @@ from distutils.core import setup
 
 from catkin_pkg.python_setup import generate_distutils_setup
 
-PACKAGES = ["drone_sim", "drone_sim.camera", "drone_sim.child_scripts", "drone_sim.ros", "drone_sim.scripting"]
+PACKAGES = [
+    "drone_sim",
+    "drone_sim.camera",
+    "drone_sim.child_scripts",
+    "drone_sim.offline",
+    "drone_sim.ros",
+    "drone_sim.scripting",
+]
 
 setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

@@ -1,0 +1,74 @@
+"""`./dev.sh bench [NAME...] [--plot FILE]`: measure, print tables, write benchmarks/results.json."""
+
+import argparse
+import json
+import platform
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any, Callable, Dict, List
+
+from benchmarks import loop, node, plot, render
+
+Row = Dict[str, Any]
+RESULTS = Path(__file__).parent / "results.json"
+
+
+def _in_a_folder(measure: Callable[[Path], List[Row]]) -> Callable[[], List[Row]]:
+    def measured() -> List[Row]:
+        with tempfile.TemporaryDirectory() as folder:
+            return measure(Path(folder))
+
+    return measured
+
+
+BENCHMARKS: Dict[str, Callable[[], List[Row]]] = {
+    "render": _in_a_folder(render.compare),
+    "growth": _in_a_folder(render.growth),
+    "loop": loop.compare,
+    "node": node.measure,
+}
+
+
+def machine() -> str:
+    """Name the processor."""
+    names = [line.partition(": ")[2] for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line]
+    return f"{(names or [platform.machine()])[0]}, {len(names)} cores"
+
+
+def table(rows: List[Row]) -> str:
+    """Lay rows out in columns; a number gets three digits."""
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    cells = [keys] + [[_text(row.get(key, "")) for key in keys] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells)]
+    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip() for line in cells)
+
+
+def _text(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) and value < 1000 else str(round(value)) if isinstance(value, float) else str(value)
+
+
+def main() -> int:
+    """Run the benchmarks named, or all."""
+    parser = argparse.ArgumentParser(prog="./dev.sh bench", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(BENCHMARKS)}; all without")
+    parser.add_argument("--plot", metavar="FILE", help="draw the results to a picture")
+    arguments = parser.parse_args()
+    unknown = set(arguments.names) - set(BENCHMARKS)
+    if unknown:
+        parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(BENCHMARKS)}")
+    results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    results["machine"] = machine()
+    print(f"on {results['machine']}\n")
+    for name in arguments.names or BENCHMARKS:
+        print(f"measuring: {name} ...", file=sys.stderr, flush=True)
+        results[name] = BENCHMARKS[name]()
+        print(f"{name}\n{table(results[name])}\n", flush=True)
+        RESULTS.write_text(json.dumps(results, indent=1) + "\n")
+    if arguments.plot:
+        plot.draw(results, arguments.plot)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,160 @@
+"""The node as a process on one core, with a master of its own: real-time factors and latencies."""
+
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any, Dict, Iterator, List
+
+import numpy as np
+
+Row = Dict[str, Any]
+CORE = "0"  # the node's; listeners have the others
+
+
+@contextlib.contextmanager
+def master() -> Iterator[None]:
+    """Run a ROS master on a free port."""
+    with socket.socket() as probe:
+        probe.bind(("localhost", 0))
+        port = str(probe.getsockname()[1])
+    os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+    process = subprocess.Popen(["rosmaster", "--core", "-p", port], stdout=subprocess.DEVNULL)
+    try:
+        while subprocess.run(["rosparam", "list"], capture_output=True, check=False).returncode:
+            time.sleep(0.1)
+        yield
+    finally:
+        process.terminate()
+        process.wait()
+
+
+@contextlib.contextmanager
+def node(*arguments: str, program: str = "") -> Iterator[List[str]]:
+    """Run the simulator, or a python program, on one core until the block ends; yield its lines of output."""
+    what = [sys.executable, "-c", program] if program else ["rosrun", "drone_sim", "simulator"]
+    process = subprocess.Popen(
+        ["taskset", "-c", CORE, *what, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    lines: List[str] = []
+    flying = threading.Event()
+
+    def read() -> None:
+        for line in process.stdout or ():
+            lines.append(line)
+            if "flying" in line:
+                flying.set()
+
+    reader = threading.Thread(target=read, daemon=True)
+    reader.start()
+    if not flying.wait(30):
+        process.kill()
+        raise RuntimeError("the node does not fly:\n" + "".join(lines))
+    try:
+        yield lines
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+        reader.join()
+
+
+def real_time_factors(seconds: float = 6.0) -> List[Row]:
+    """As fast as it can, heard by nobody, and with the front camera published to a subscriber."""
+    from sensor_msgs.msg import Image
+
+    rows = []
+    for name, topics in (("node, nobody listens", []), ("node, front camera published", ["/drone/front"])):
+        with node("_real_time_factor:=0") as lines:
+            listening = [_listen(topic, Image) for topic in topics]
+            time.sleep(seconds)
+            for subscriber in listening:
+                subscriber.unregister()
+            # The factor counts the whole run; ending at once keeps the unheard rest short.
+        flew = re.search(r"flew ([\d.]+) s at ([\d.]+) times real time", "".join(lines))
+        if flew is None:
+            raise RuntimeError("the node said nothing of its flight:\n" + "".join(lines))
+        rows.append({"name": name, "factor": float(flew.group(2))})
+    return rows
+
+
+def _listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
+    import rospy
+
+    return rospy.Subscriber(topic, kind, callback, queue_size=1, buff_size=2**22, tcp_nodelay=True)
+
+
+# The node with a clock at its ear: a command says, in a field that the drone does not use, when it was sent.
+PROBE = """
+import sys, time
+from drone_sim.ros import inputs, node
+delays = []
+heard = inputs.DroneInput._on_twist
+def probe(self, message):
+    delays.append((time.monotonic() % 10 - message.angular.x) % 10)
+    heard(self, message)
+inputs.DroneInput._on_twist = probe
+path, sys.argv[1:] = sys.argv[1], sys.argv[2:]
+node.main()
+open(path, "w").write("\\n".join(map(repr, delays)))
+"""
+
+
+def latencies(seconds: float = 20.0) -> List[Row]:
+    """At real time with the camera on: command to the loop's inbox, stamp of an image to its subscriber, jitter."""
+    import rospy
+    from geometry_msgs.msg import Twist
+    from sensor_msgs.msg import Image
+
+    came: List[float] = []
+    ages: List[float] = []
+
+    def image(message: Any) -> None:
+        now = time.time()
+        came.append(now)
+        ages.append(now - message.header.stamp.to_sec())
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "delays"
+        with node(str(path), program=PROBE) as lines:
+            subscriber = _listen("/drone/front", Image, image)
+            publisher = rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
+            time.sleep(2.0)
+            del came[:], ages[:]
+            end, random = time.monotonic() + seconds, np.random.RandomState(1)
+            while time.monotonic() < end:
+                twist = Twist()
+                twist.angular.x = time.monotonic() % 10
+                publisher.publish(twist)
+                time.sleep(random.uniform(0.03, 0.07))
+            subscriber.unregister()
+        delays = [float(line) for line in path.read_text().split()]
+    late = re.search(r"(\d+) late steps", "".join(lines))
+    jitter = np.abs(np.diff(came) - 0.05)
+    return [
+        _spread("cmd_vel published -> seen by the loop", delays),
+        _spread("image stamped -> in the subscriber's callback", ages),
+        {**_spread("jitter of the 20 Hz images", jitter), "late_steps": int(late.group(1)) if late else -1},
+    ]
+
+
+def _spread(name: str, seconds: Any) -> Row:
+    median, high = np.percentile(1e3 * np.asarray(seconds), [50, 95])
+    return {"name": name, "median_ms": float(median), "p95_ms": float(high), "samples": len(seconds)}
+
+
+def measure() -> List[Row]:
+    """Return all rows."""
+    import rospy
+
+    with master():
+        rospy.init_node("benchmark", disable_signals=True)
+        rows = real_time_factors() + latencies()
+        rospy.signal_shutdown("done")
+        return rows

@@ -1,0 +1,37 @@
+"""The results of a benchmark run as one picture."""
+
+from typing import Any, Dict
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+from matplotlib import pyplot  # noqa: E402
+
+
+def draw(results: Dict[str, Any], file: str) -> None:
+    """Draw what there is: frame times, real-time factors, growth."""
+    figure, (left, middle, right) = pyplot.subplots(1, 3, figsize=(15, 4.5), constrained_layout=True)
+    _bars(left, results.get("render", []), "median_ms", "frame, 640 x 480 [ms]")
+    factors = results.get("loop", []) + [row for row in results.get("node", []) if "factor" in row]
+    _bars(middle, factors, "factor", "simulated seconds per second")
+    for name, key in (("size", "pixels"), ("bodies", "bodies"), ("triangles", "triangles")):
+        rows = [row for row in results.get("growth", []) if row["name"] == name]
+        amounts = [row.get(key, row.get("width", 0) * row.get("height", 0)) for row in rows]
+        right.loglog(amounts, [row["median_ms"] for row in rows], "o-", label=f"number of {key}")
+    right.set_ylabel("frame [ms]")
+    right.legend()
+    right.grid(alpha=0.3)
+    figure.suptitle(results.get("machine", ""))
+    figure.savefig(file, dpi=90)
+
+
+def _bars(axes: Any, rows: Any, key: str, label: str) -> None:
+    names = [row["name"] for row in rows]
+    values = [row[key] for row in rows]
+    bars = axes.barh(names, values, color=["#c0392b" if "drone_sim" in name or "node" in name else "#7f8c8d" for name in names])
+    axes.bar_label(bars, [f"{value:.3g}" for value in values], padding=3)
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+    axes.set_xlim(right=max(values, default=1) * 3)
+    axes.set_xlabel(label)

@@ -1,0 +1,185 @@
+"""Frame time of our renderer and of PyBullet's, on one scene and one view; run alone it prints a table.
+
+Every function returns rows: ``{"name": ..., "median_ms": ..., "p10_ms": ..., "p90_ms": ..., ...}``.
+"""
+
+import importlib.util
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Tuple
+
+import cv2
+import numpy as np
+import pybullet
+import trimesh
+
+from drone_sim.camera.intrinsics import Intrinsics
+from drone_sim.camera.renderer import Renderer
+from drone_sim.visual import Visual
+
+Row = Dict[str, Any]
+Scene = Tuple[List[Visual], np.ndarray]
+
+CAMERA = Intrinsics(640, 480, np.radians(60.0), 0.02, 100.0)
+AHEAD = np.array([[0.0, 0.0, 1.0, 0.2], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.8], [0.0, 0.0, 0.0, 1.0]])
+WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.2, 0.2, 0.22, 1.0)
+COLOURS = ((0.85, 0.25, 0.2, 1.0), (0.2, 0.5, 0.8, 1.0), (0.95, 0.75, 0.2, 1.0), (0.35, 0.65, 0.35, 1.0))
+ARM = 0.13  # metres from the middle to a propeller
+
+
+def measure(name: str, draw: Callable[[], Any], seconds: float = 2.0, **facts: Any) -> Row:
+    """Time `draw` until `seconds` are over, at least five times after two for warming up."""
+    times: List[float] = []
+    for _ in range(2):
+        draw()
+    end = time.perf_counter() + seconds
+    while len(times) < 5 or time.perf_counter() < end:
+        start = time.perf_counter()
+        draw()
+        times.append(1000.0 * (time.perf_counter() - start))
+    p10, median, p90 = (float(value) for value in np.percentile(times, [10, 50, 90]))
+    return {"name": name, "median_ms": median, "p10_ms": p10, "p90_ms": p90, "frames": len(times), **facts}
+
+
+def pose(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:
+    """World-from-visual, (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def build(folder: Path, things: int = 10, triangles: int = 0) -> Scene:
+    """A textured floor of 10 x 10 m, a quadrotor at 0.8 m, boxes and cylinders, perhaps a ball of triangles."""
+    parts: List[Tuple[str, Tuple[float, ...], Tuple[float, ...], np.ndarray, str]] = [
+        ("mesh", (1.0, 1.0, 1.0), WHITE, np.eye(4), _floor(folder)),
+        ("box", (0.1, 0.1, 0.05), DARK, pose(0, 0, 0.8), ""),
+        ("sphere", (0.04,), COLOURS[0], pose(0.05, 0, 0.8), ""),
+    ]
+    for angle in np.pi * np.array([0.25, 0.75, 1.25, 1.75]):
+        x, y = ARM * np.cos(angle), ARM * np.sin(angle)
+        parts.append(("box", (0.26, 0.02, 0.012), DARK, pose(x / 2, y / 2, 0.8, angle), ""))
+        parts.append(("cylinder", (0.014, 0.03), DARK, pose(x, y, 0.81), ""))
+        parts.append(("cylinder", (0.08, 0.004), COLOURS[0], pose(x, y, 0.83), ""))
+    random = np.random.RandomState(3)
+    for index in range(things):
+        x, y, yaw = random.uniform((1.2, -3.2, 0.0), (4.5, 3.2, 3.0))
+        width, height = random.uniform((0.3, 0.4), (0.7, 1.3)) * min(1.0, np.sqrt(10.0 / things))
+        shape, size = ("box", (width, width, height)) if index % 2 else ("cylinder", (width / 2, height))
+        parts.append((shape, size, COLOURS[index % 4], pose(x, y, height / 2, yaw), ""))
+    if triangles:
+        parts.append(("mesh", (1.0, 1.0, 1.0), COLOURS[1], pose(3, 0, 0.8), _ball(folder, triangles)))
+    visuals = [
+        Visual((index, 0), shape, size, rgba, file=file, floor=index == 0)
+        for index, (shape, size, rgba, _, file) in enumerate(parts)
+    ]
+    return visuals, np.array([part[3] for part in parts])
+
+
+def _floor(folder: Path) -> str:
+    tile = np.full((256, 256, 3), 170, np.uint8)
+    tile[:128, :128] = tile[128:, 128:] = 150
+    noise = np.random.RandomState(0).normal(0.0, 8.0, tile.shape[:2])
+    cv2.imwrite(str(folder / "tile.png"), np.clip(tile + noise[:, :, None], 0, 255).astype(np.uint8))
+    (folder / "floor.mtl").write_text("newmtl tile\nKd 1 1 1\nmap_Kd tile.png\n")
+    corners = "v -5 -5 0\nv 5 -5 0\nv 5 5 0\nv -5 5 0\nvt 0 0\nvt 10 0\nvt 10 10\nvt 0 10\n"
+    (folder / "floor.obj").write_text(f"mtllib floor.mtl\n{corners}usemtl tile\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n")
+    return str(folder / "floor.obj")
+
+
+def _ball(folder: Path, triangles: int) -> str:
+    path = folder / f"ball{triangles}.stl"
+    around = int(np.sqrt(triangles))
+    trimesh.creation.uv_sphere(0.7, count=[max(around // 2, 4), max(around, 8)]).export(str(path))
+    return str(path)
+
+
+def populate(client: int, scene: Scene) -> None:
+    """The same things as PyBullet bodies that only look."""
+    kinds = {"box": pybullet.GEOM_BOX, "sphere": pybullet.GEOM_SPHERE, "cylinder": pybullet.GEOM_CYLINDER}
+    for visual, matrix in zip(*scene):
+        form: Dict[str, Any] = {"shapeType": kinds.get(visual.shape, pybullet.GEOM_MESH), "rgbaColor": visual.rgba}
+        if visual.shape == "mesh":
+            form["fileName"] = visual.file
+        elif visual.shape == "box":
+            form["halfExtents"] = [length / 2 for length in visual.size]
+        else:
+            form.update(zip(("radius", "length"), visual.size))
+        shape = pybullet.createVisualShape(physicsClientId=client, **form)
+        yaw = np.arctan2(matrix[1, 0], matrix[0, 0])
+        turn = pybullet.getQuaternionFromEuler((0.0, 0.0, yaw))
+        pybullet.createMultiBody(0, -1, shape, matrix[:3, 3].tolist(), turn, physicsClientId=client)
+
+
+def bullet_draw(client: int, **options: int) -> Callable[[], Any]:
+    """Draw our camera's view by PyBullet; the optical frame's y and z point against those of its eye."""
+    turned = np.diag([1.0, -1.0, -1.0, 1.0])
+    view = (turned @ np.linalg.inv(AHEAD)).T.ravel().tolist()
+    projection = (np.diag([1.0, -1.0, 1.0, 1.0]) @ CAMERA.projection() @ turned).T.ravel().tolist()
+    size = CAMERA.width, CAMERA.height
+    return lambda: pybullet.getCameraImage(*size, view, projection, physicsClientId=client, **options)
+
+
+def compare(folder: Path, seconds: float = 2.0) -> List[Row]:
+    """Ours beside TinyRenderer and PyBullet's EGL plugin."""
+    scene = build(folder)
+    rows = [ours("drone_sim", scene, seconds), ours("drone_sim, 4 samples", scene, seconds, samples=4)]
+    bare = {"shadow": 0, "flags": pybullet.ER_NO_SEGMENTATION_MASK}
+    for name, plugin in (("TinyRenderer", False), ("EGL plugin", True)):
+        client = pybullet.connect(pybullet.DIRECT)
+        try:
+            if plugin and not _load_plugin(client):
+                continue  # not every wheel of PyBullet has it
+            populate(client, scene)
+            kind = pybullet.ER_BULLET_HARDWARE_OPENGL if plugin else pybullet.ER_TINY_RENDERER
+            rows.append(measure(f"PyBullet {name}, default", bullet_draw(client, renderer=kind), seconds))
+            name = f"PyBullet {name}, no shadow, no segmentation"
+            rows.append(measure(name, bullet_draw(client, renderer=kind, **bare), seconds))
+        finally:
+            pybullet.disconnect(client)
+    return rows
+
+
+def _load_plugin(client: int) -> bool:
+    spec = importlib.util.find_spec("eglRenderer")
+    path = spec.origin if spec else None
+    return bool(path) and pybullet.loadPlugin(path, "_eglRendererPlugin", physicsClientId=client) >= 0
+
+
+def ours(name: str, scene: Scene, seconds: float, camera: Intrinsics = CAMERA, samples: int = 0, **facts: Any) -> Row:
+    """Our renderer, poses sent anew for every frame, into one buffer."""
+    renderer = Renderer(samples=samples)
+    try:
+        visuals, poses = scene
+        renderer.set_visuals(visuals)
+        out = np.empty((camera.height, camera.width, 3), np.uint8)
+        draw = lambda: renderer.render(camera, AHEAD, poses, out)  # noqa: E731 - it is only timed
+        return measure(name, draw, seconds, renderer=renderer.description, **facts)
+    finally:
+        renderer.close()
+
+
+def growth(folder: Path, seconds: float = 1.0) -> List[Row]:
+    """Our frame time against picture size, number of bodies and number of triangles."""
+    scene, rows = build(folder), []
+    for width, height in ((160, 120), (320, 240), (640, 480), (1280, 720), (1920, 1080)):
+        camera = Intrinsics(width, height, CAMERA.horizontal_fov, CAMERA.near, CAMERA.far)
+        rows.append(ours("size", scene, seconds, camera, width=width, height=height))
+    for things in (1, 10, 100, 1000):
+        rows.append(ours("bodies", build(folder, things), seconds, bodies=things))
+    for triangles in (100, 1000, 10000, 100000):
+        rows.append(ours("triangles", build(folder, triangles=triangles), seconds, triangles=triangles))
+    return rows
+
+
+def main() -> None:
+    """Print all of it."""
+    with tempfile.TemporaryDirectory() as name:
+        for row in compare(Path(name)) + growth(Path(name)):
+            facts = " ".join(f"{key}={row[key]}" for key in row if key in ("width", "height", "bodies", "triangles"))
+            print(f"{row['median_ms']:9.2f} ms  [{row['p10_ms']:.2f}, {row['p90_ms']:.2f}]  {row['name']} {facts}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,174 @@
+"""`rosrun drone_sim fly`: the simulation without ROS and without a master, as fast as it can."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import sys
+import time
+from typing import Any, Callable, ContextManager, Dict, NoReturn, Optional, Sequence, TextIO
+
+import yaml
+from tqdm import tqdm
+
+from drone_sim import parameters as parameters_module
+from drone_sim.frames import to_euler
+from drone_sim.offline import timeline as timeline_module
+from drone_sim.offline.recording import Recording
+from drone_sim.offline.timeline import Timeline, first_step
+from drone_sim.parameters import ParameterError
+from drone_sim.scripting.python_script import ScriptError
+from drone_sim.simulation import Simulation
+
+_AFTER = 5.0  # s flown on after the last command
+_WITHOUT_COMMANDS = 10.0  # s
+_BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
+_FAILED, _INTERRUPTED = 1, 130  # exit statuses; 130 is what shells report after Ctrl-C
+_EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> int:
+    """Fly; return 0, or 1 after a line on stderr for a wrong input or script, or 130 after Ctrl-C."""
+    options = _parser().parse_args(arguments)
+    return _status_of(lambda: _run(options))
+
+
+def settings(assignments: Sequence[str]) -> Dict[str, Any]:
+    """Return `a.b=VALUE` assignments as the nested mapping that parameters.load takes; VALUE is YAML.
+
+    Of several for one key the last one counts. Raises ParameterError.
+    """
+    nested: Dict[str, Any] = {}
+    for assignment in assignments:
+        key, equals, text = assignment.partition("=")
+        *parents, last = key.split(".")
+        if not equals or not all((*parents, last)):
+            raise ParameterError(f"--set {assignment}: must be KEY=VALUE, such as control.Kzref=4")
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise ParameterError(f"--set {assignment}: {' '.join(str(error).split())}") from None
+        place = nested
+        for parent in parents:
+            if not isinstance(place.get(parent), dict):
+                place[parent] = {}
+            place = place[parent]
+        place[last] = value
+    return nested
+
+
+def _run(options: argparse.Namespace) -> int:
+    parameters = parameters_module.load(settings(options.set))
+    timeline = Timeline((), parameters.time_step)
+    if options.commands:
+        timeline = timeline_module.read(options.commands, parameters)
+    steps = first_step(_duration(options, timeline), parameters.time_step)
+    with _csv(options.csv) as file:
+        recording = Recording(file)
+        simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
+        began = time.perf_counter()
+        flown = _status_of(lambda: _fly(simulation, timeline, steps, recording))
+        took = time.perf_counter() - began
+        # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
+        closed = _status_of(simulation.close)
+    print(_summary(recording, took), flush=True)
+    draw = options.plot and recording.rows
+    drawn = _status_of(lambda: _plot(options.plot, recording, timeline)) if draw else 0
+    return flown or closed or drawn
+
+
+def _csv(path: Optional[str]) -> ContextManager[Optional[TextIO]]:
+    return open(path, "w", encoding="utf-8", newline="\n") if path else contextlib.nullcontext()
+
+
+def _duration(options: argparse.Namespace, timeline: Timeline) -> float:
+    if options.duration is not None:
+        return float(options.duration)
+    return timeline.end + _AFTER if timeline.entries else _WITHOUT_COMMANDS
+
+
+def _fly(simulation: Simulation, timeline: Timeline, steps: int, recording: Recording) -> None:
+    recording.add(simulation)
+    # disable=None: no bar where stderr is not a terminal.
+    with tqdm(total=steps, unit=" steps", delay=_BAR_AFTER, disable=None, leave=False) as bar:
+        for step in range(steps):
+            timeline.apply(step, simulation.drone)
+            simulation.step()
+            recording.add(simulation)
+            bar.update()
+
+
+def _plot(path: str, recording: Recording, timeline: Timeline) -> None:
+    from drone_sim.offline import plot  # matplotlib takes as long to import as a short flight
+
+    plot.save(path, recording, timeline)
+
+
+def _summary(recording: Recording, took: float) -> str:
+    if not recording.rows:
+        return "flew 0.00 s"
+    row = recording.rows[-1]
+    # + 0.0 makes a 0 of -0
+    x, y, z, yaw = (round(value, 3) + 0.0 for value in (*row[1:4], to_euler(recording.matrix(-1))[2]))
+    return (
+        f"flew {row[0]:.2f} s in {took:.2f} s ({row[0] / took:.0f} times real time); "
+        f"ended at x {x:.3f} y {y:.3f} z {z:.3f} m, yaw {yaw:.3f} rad"
+    )
+
+
+def _status_of(action: Callable[[], Optional[int]]) -> int:
+    """Return the action's exit status, 0 for None; where it fails as users may expect, after one line."""
+    try:
+        return action() or 0
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+    except _EXPECTED as error:
+        print(f"fly: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
+        return _FAILED
+
+
+# ---- arguments
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """Give one line, as for every other mistake, instead of the usage."""
+        self.exit(_FAILED, f"fly: {message} (see fly --help)\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
+    parser.add_argument("--script", metavar="FILE", help="child script (default: the tutorial's)")
+    parser.add_argument("--commands", metavar="FILE.yaml", help="timeline of twists, poses and pushes")
+    parser.add_argument(
+        "--duration",
+        metavar="S",
+        type=_seconds,
+        help=f"simulated seconds (default: {_AFTER:g} after the last command, {_WITHOUT_COMMANDS:g} without commands)",
+    )
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="extend",
+        nargs="+",
+        default=[],
+        help="another value for a key of config/drone.yaml, such as control.thrust_limits=null",
+    )
+    parser.add_argument("--csv", metavar="OUT", help="write a row per step: state, command, propellers")
+    parser.add_argument("--plot", metavar="OUT.png", help="draw velocities, height, attitude and propellers")
+    return parser
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0 <= seconds < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: must be a number of seconds, 0 or more")
+    return seconds
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,109 @@
+"""A flight as a picture: commanded and flown velocities on the left, the drone itself on the right."""
+
+from __future__ import annotations
+
+from typing import Sequence, Tuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from drone_sim import frames
+from drone_sim.offline.recording import Recording
+from drone_sim.offline.timeline import Push, Timeline
+from drone_sim.state import Twist
+
+_BLUE, _ORANGE, _GREEN, _RED = "#1f5fa8", "#d9730d", "#2c8a57", "#a8325e"
+_GREY, _GRID, _SHADE = "#707070", "#e4e4e4", "#f2c9c4"
+_PROPELLERS = (("1 front left", _BLUE), ("2 back left", _ORANGE), ("3 back right", _GREEN), ("4 front right", _RED))
+_VELOCITIES = ("forward $v_x$ [m/s]", "left $v_y$ [m/s]", "up $v_z$ [m/s]", "yaw rate $w_z$ [rad/s]")
+_SMALLEST_RANGE = 0.05  # of an axis, in its unit: less would blow a ripple up to look like a manoeuvre
+
+
+def save(path: str, recording: Recording, timeline: Timeline) -> None:
+    """Draw a recording, with the timeline's poses and pushes marked; the path's ending gives the format.
+
+    Raises OSError, and ValueError for a format that matplotlib does not have.
+    """
+    # No pyplot: it would look for a display, and keep every figure.
+    figure = Figure(figsize=(12, 9.5), layout="constrained")
+    axes = figure.subplots(4, 2, sharex=True)
+    rows = np.array(recording.rows)
+    in_track = np.array([_in_track(recording.matrix(index), row[8:11]) for index, row in enumerate(rows)])
+    flown = np.column_stack((in_track[:, :3], rows[:, 13]))
+    _draw_velocities(axes[:, 0], rows[:, 0], rows[:, 14:18], flown)
+    _draw_drone(axes[:, 1], rows, in_track[:, 3:])
+    for ax in axes.flat:
+        _finish(ax)
+        _mark(ax, timeline)
+    for ax in axes[-1]:
+        ax.set_xlabel("simulated time [s]")
+        ax.set_xlim(0, max(rows[-1, 0], 1e-3))
+    figure.savefig(path, dpi=120)
+
+
+def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> Tuple[float, ...]:
+    """Return velocity (m/s) and pitch, roll (rad) in the track frame, as the tutorial has them, and the yaw."""
+    yaw = frames.to_euler(matrix)[2]
+    track_from_world = frames.from_euler((0.0, 0.0, 0.0), (0.0, 0.0, -yaw))
+    alpha, beta, _ = frames.to_euler(frames.multiply(track_from_world, matrix))
+    return (*frames.rotate(track_from_world, velocity), beta, -alpha, yaw)
+
+
+def _draw_velocities(axes: Sequence[Axes], times: np.ndarray, commanded: np.ndarray, flown: np.ndarray) -> None:
+    for column, (ax, name) in enumerate(zip(axes, _VELOCITIES)):
+        # A command is in force during the step that ends at its row's time.
+        ax.step(times, commanded[:, column], where="pre", color=_ORANGE, linestyle="--", label="commanded")
+        ax.plot(times, flown[:, column], color=_BLUE, label="flown")
+        ax.set_ylabel(name)
+    _title(axes[0], "Velocities (track frame)", legend=True)
+
+
+def _draw_drone(axes: Sequence[Axes], rows: np.ndarray, angles: np.ndarray) -> None:
+    height, lean, heading, propellers = axes
+    times = rows[:, 0]
+    height.plot(times, rows[:, 3], color=_BLUE)
+    height.set_ylabel("height $z$ [m]")
+    _title(height, "Drone")
+    lean.plot(times, angles[:, 0], color=_BLUE, label="pitch (+ nose down)")
+    lean.plot(times, angles[:, 1], color=_ORANGE, label="roll (+ to the left)")
+    lean.set_ylabel("attitude [rad]")
+    _title(lean, legend=True)
+    heading.plot(times, np.unwrap(angles[:, 2]), color=_BLUE)
+    heading.set_ylabel("yaw [rad]")
+    for (name, color), velocities in zip(_PROPELLERS, rows[:, 18:22].T):
+        propellers.step(times, velocities, where="pre", color=color, linewidth=1, label=name)
+    propellers.set_ylabel("propellers [m/s]")
+    _title(propellers, legend=True)
+
+
+def _title(ax: Axes, title: str = "", legend: bool = False) -> None:
+    ax.set_title(title, loc="left", fontweight="bold")
+    if legend:  # above the axes, where it hides nothing
+        ax.legend(loc="lower right", bbox_to_anchor=(1, 1), ncol=4, fontsize="small", frameon=False, borderpad=0)
+
+
+def _finish(ax: Axes) -> None:
+    low, high = ax.get_ylim()
+    missing = _SMALLEST_RANGE - (high - low)
+    if missing > 0:
+        ax.set_ylim(low - missing / 2, high + missing / 2)
+    ax.grid(color=_GRID)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def _mark(ax: Axes, timeline: Timeline) -> None:
+    """Shade the pushes, draw a line at the poses, and name them."""
+    for entry in timeline.entries:
+        if isinstance(entry.action, Twist):
+            continue
+        if isinstance(entry.action, Push):
+            ax.axvspan(entry.at, entry.end, color=_SHADE, linewidth=0, zorder=0)
+        else:
+            ax.axvline(entry.at, color=_GREY, linestyle=":", zorder=0)
+        name = type(entry.action).__name__.lower()
+        text = ax.annotate(name, (entry.end, 1), xycoords=("data", "axes fraction"), xytext=(3, -1),
+                           textcoords="offset points", va="top", fontsize="x-small", color=_GREY)  # fmt: skip
+        text.set_clip_on(True)  # those after the end of the flight
+        text.set_in_layout(False)

@@ -1,0 +1,52 @@
+"""What a flight was, step by step: kept for the plot, written to a CSV file as it goes."""
+
+from __future__ import annotations
+
+from typing import Iterable, List, Optional, TextIO, Tuple
+
+from drone_sim.frames import Matrix, from_quaternion
+from drone_sim.simulation import Simulation
+
+COLUMNS = (
+    "t [s]",
+    *(f"{axis} [m]" for axis in "xyz"),
+    *(f"q{axis}" for axis in "xyzw"),
+    *(f"v{axis} [m/s]" for axis in "xyz"),
+    *(f"w{axis} [rad/s]" for axis in "xyz"),
+    *(f"command_v{axis} [m/s]" for axis in "xyz"),
+    "command_wz [rad/s]",
+    *(f"propeller{number} [m/s]" for number in (1, 2, 3, 4)),
+)
+
+
+class Recording:
+    """A row per step: the state after it, and the command and the propellers that led there.
+
+    The row of t = 0 is the state before any step. Position, quaternion and velocities are those of
+    base_link in the world frame, the command is in the track frame, propellers are particle velocities.
+    """
+
+    def __init__(self, file: Optional[TextIO] = None):
+        """Take the CSV file, if there is to be one, and write its header. Raises OSError."""
+        self.rows: List[Tuple[float, ...]] = []
+        self._file = file
+        self._write(COLUMNS)
+
+    def add(self, simulation: Simulation) -> None:
+        """Add a row: now. Raises OSError where the disk is full."""
+        drone = simulation.drone
+        position, orientation, linear, angular = drone.state
+        command = (*drone.command.linear, drone.command.angular.z)
+        row = (simulation.time, *position, *orientation, *linear, *angular, *command, *drone.particle_velocities)
+        self.rows.append(row)
+        # 17 digits bring every float back to the last bit.
+        self._write(f"{value:.17g}" for value in row)
+
+    def matrix(self, index: int) -> Matrix:
+        """Return the transform world from base_link of a row."""
+        row = self.rows[index]
+        return from_quaternion(row[1:4], row[4:8])
+
+    def _write(self, fields: Iterable[str]) -> None:
+        if self._file is not None:
+            self._file.write(",".join(fields) + "\n")  # at once: Ctrl-C leaves no half row

@@ -1,0 +1,193 @@
+"""A flight's commands in a YAML file: what happens to the drone, and when.
+
+    - {at: 1.0, twist: {linear: [1, 0, 0], angular: [0, 0, 0]}}            # m/s, rad/s, track frame
+    - {at: 5.0, pose: {position: [0, 0, 2], rpy: [0.3, 0, 0]}}             # m, rad; put there at rest
+    - {at: 8.0, push: {force: [1, 0, 0], torque: [0, 0, 0], duration: 0.2}}  # N, N m, world frame; s
+
+`at` is in seconds of simulated time, in any order; three numbers that are left out are zeros.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, Dict, Iterable, List, NamedTuple, Type, Union
+
+import yaml
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from typing_extensions import Annotated  # typing has it from Python 3.9 on
+
+from drone_sim import checks
+from drone_sim.drone import Drone
+from drone_sim.frames import Vector, from_rpy, to_quaternion
+from drone_sim.parameters import NonNegative, Parameters, Positive
+from drone_sim.state import Pose, Twist
+
+_ZERO = (0.0, 0.0, 0.0)
+_TOLERANCE = 1e-6  # of a step: decimal times are not exact multiples of a binary step
+
+
+class TimelineError(ValueError):
+    """A timeline is wrong; one line that names file, entry (from 1), key, value and what is allowed."""
+
+
+class Push(NamedTuple):
+    """A force (N) at the centre of mass and a torque (N m), world frame, for `duration` seconds."""
+
+    force: Vector
+    torque: Vector
+    duration: float
+
+
+class Entry(NamedTuple):
+    """What happens to the drone at `at` seconds of simulated time."""
+
+    at: float
+    action: Union[Twist, Pose, Push]
+
+    @property
+    def end(self) -> float:
+        """The time (s) at which a push is over; of anything else `at`."""
+        return self.at + (self.action.duration if isinstance(self.action, Push) else 0.0)
+
+    def apply(self, drone: Drone) -> None:
+        """Do it."""
+        if isinstance(self.action, Twist):
+            drone.receive(self.action)
+        elif isinstance(self.action, Pose):
+            drone.move(self.action)
+        else:
+            drone.push(*self.action)
+
+
+class Timeline:
+    """Entries by the simulation step whose actuation is the first at or after their time."""
+
+    def __init__(self, entries: Iterable[Entry], time_step: float):
+        """Sort the entries by time, those of one time in the order given; `time_step` in seconds."""
+        self.entries = sorted(entries, key=lambda entry: entry.at)
+        self._due: Dict[int, List[Entry]] = {}
+        for entry in self.entries:
+            self._due.setdefault(first_step(entry.at, time_step), []).append(entry)
+
+    @property
+    def end(self) -> float:
+        """The time (s) at which the last command is given and the last push is over; 0 without entries."""
+        return max((entry.end for entry in self.entries), default=0.0)
+
+    def apply(self, step: int, drone: Drone) -> None:
+        """Do what is due in a step (counted from 0), just before it runs."""
+        for entry in self._due.get(step, ()):
+            entry.apply(drone)
+
+
+def first_step(time: float, time_step: float) -> int:
+    """Return the number of the first step that begins at or after `time` (s); step k begins at k time_step."""
+    return math.ceil(time / time_step - _TOLERANCE)
+
+
+def read(path: str, parameters: Parameters) -> Timeline:
+    """Return the timeline in a YAML file; raises TimelineError."""
+    try:
+        rows = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
+        raise TimelineError(f"{path}: {' '.join(str(error).split())}") from None
+    if not isinstance(rows, list):
+        raise TimelineError(f"{path}: must be a list of `- {{at: 1.0, twist: ...}}` entries, not {rows!r:.60}")
+    entries = []
+    for number, row in enumerate(rows, start=1):
+        try:
+            entries.append(_entry(row, parameters))
+        except ValueError as error:
+            raise TimelineError(f"{path}: entry {number}: {error}") from None
+    return Timeline(entries, parameters.time_step)
+
+
+# ---- one entry
+
+
+def _vector(value: Any) -> Vector:
+    try:
+        x, y, z = (float(number) for number in value)
+    except (TypeError, ValueError):
+        x = y = z = math.nan
+    if isinstance(value, str) or not math.isfinite(x + y + z):
+        raise ValueError("must be three finite numbers, such as [1, 0, 0]")
+    return x, y, z
+
+
+_Vector = Annotated[Vector, BeforeValidator(_vector)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Time(_Model):
+    at: NonNegative
+
+
+class _Twist(_Model):
+    linear: _Vector = _ZERO
+    angular: _Vector = _ZERO
+
+    def checked(self, parameters: Parameters) -> Twist:
+        return checks.twist(self.linear, self.angular, parameters)
+
+
+class _Pose(_Model):
+    position: _Vector = _ZERO
+    rpy: _Vector = _ZERO
+
+    def checked(self, parameters: Parameters) -> Pose:
+        return checks.pose(self.position, to_quaternion(from_rpy(_ZERO, self.rpy)), parameters)
+
+
+class _Push(_Model):
+    force: _Vector = _ZERO
+    torque: _Vector = _ZERO
+    duration: Positive
+
+    def checked(self, _parameters: Parameters) -> Push:
+        return Push(self.force, self.torque, self.duration)
+
+
+_KINDS: Dict[str, Type[Union[_Twist, _Pose, _Push]]] = {"twist": _Twist, "pose": _Pose, "push": _Push}
+
+
+def _entry(row: Any, parameters: Parameters) -> Entry:
+    if not isinstance(row, dict):
+        raise ValueError(f"{row!r:.60}: must be a mapping such as {{at: 1.0, twist: ...}}")
+    for key in row:
+        if key != "at" and key not in _KINDS:
+            raise ValueError(f"{key}: unknown key; known are at, {', '.join(_KINDS)}")
+    kinds = [kind for kind in _KINDS if kind in row]
+    if len(kinds) != 1:
+        raise ValueError(f"must hold one of {', '.join(_KINDS)}; it holds {' and '.join(kinds) or 'none'}")
+    kind = kinds[0]
+    at = _checked(_Time, {key: row[key] for key in row if key == "at"}, "").at
+    try:
+        return Entry(at, _checked(_KINDS[kind], row[kind], f"{kind}.").checked(parameters))
+    except checks.Refused as refused:
+        raise ValueError(f"{kind}.{refused}") from None
+
+
+def _checked(model: Type[Any], values: Any, prefix: str) -> Any:
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise ValueError(_one_line(error, model, prefix)) from None
+
+
+def _one_line(error: ValidationError, model: Type[BaseModel], prefix: str) -> str:
+    first = error.errors()[0]
+    key = (prefix + ".".join(str(part) for part in first["loc"])).rstrip(".")
+    known = ", ".join(model.model_fields)
+    if first["type"] == "extra_forbidden":
+        return f"{key}: unknown key; known are {known}"
+    if first["type"] == "missing":
+        return f"{key}: missing; it is a number of seconds"
+    if first["type"] == "model_type":
+        return f"{key} = {first['input']!r:.60}: must be a mapping of {known}"
+    message = first["msg"].replace("Value error, ", "")
+    return f"{key} = {first['input']!r:.60}: {message[0].lower()}{message[1:]}"

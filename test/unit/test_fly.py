@@ -1,0 +1,285 @@
+"""The `fly` command: what it flies, writes, draws, and how it ends."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+from drone_sim import parameters
+from drone_sim.offline.fly import main, settings
+from drone_sim.offline.recording import COLUMNS
+from drone_sim.parameters import ParameterError
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist, Vector3
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMANDS = """
+- {at: 0.15, twist: {linear: [1, 0, 0.2], angular: [0, 0, 0.5]}}
+- {at: 1.0, push: {force: [0, 1, 0], torque: [0, 0, 0.01], duration: 0.2}}
+- {at: 1.5, pose: {position: [1, 2, 3], rpy: [0.1, 0, 0.7]}}
+"""
+
+
+@pytest.fixture(name="commands")
+def _commands(tmp_path):
+    path = tmp_path / "commands.yaml"
+    path.write_text(COMMANDS)
+    return str(path)
+
+
+@pytest.fixture(name="script")
+def _script(tmp_path):
+    def write(text):
+        path = tmp_path / "script.py"
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def read_csv(path):
+    with open(path, newline="") as file:
+        header, *rows = csv.reader(file)
+    return header, [[float(value) for value in row] for row in rows]
+
+
+def environment(**more):
+    return {**os.environ, "PYTHONPATH": str(ROOT / "src"), **more}
+
+
+# ---- CSV
+
+
+def test_csv_holds_the_flight_to_the_last_bit(tmp_path, commands):
+    out = tmp_path / "out.csv"
+    assert main(["--commands", commands, "--duration", "1", "--csv", str(out)]) == 0
+    header, rows = read_csv(out)
+    assert header == list(COLUMNS)
+    assert len(rows) == 21
+
+    simulation = Simulation(parameters.load())
+    for step, row in enumerate(rows):
+        drone, state = simulation.drone, simulation.drone.state
+        assert row[:14] == [simulation.time, *(number for part in state for number in part)]
+        assert row[14:] == [*drone.command.linear, drone.command.angular.z, *drone.particle_velocities]
+        if step == 3:
+            drone.receive(Twist(Vector3(1, 0, 0.2), Vector3(0, 0, 0.5)))
+        simulation.step()
+    simulation.close()
+
+
+def test_header_names_every_column_once():
+    assert len(set(COLUMNS)) == len(COLUMNS) == 22
+    assert " ".join(name.split()[0] for name in COLUMNS[:14]) == "t x y z qx qy qz qw vx vy vz wx wy wz"
+
+
+def test_entries_take_effect_in_the_step_that_begins_at_their_time(tmp_path, commands):
+    out = tmp_path / "out.csv"
+    assert main(["--commands", commands, "--csv", str(out)]) == 0
+    _, rows = read_csv(out)
+    assert [row[14] for row in rows[:6]] == [0, 0, 0, 0, 1, 1]  # the step that begins at 0.15 s ends at 0.20 s
+    assert rows[30][3] < 2 < rows[31][3]  # put to z = 3 at 1.5 s
+
+
+def test_two_processes_write_the_same_bytes(tmp_path, commands):
+    written = []
+    for seed in ("1", "2"):
+        out = tmp_path / f"{seed}.csv"
+        command = [sys.executable, str(ROOT / "scripts" / "fly"), "--commands", commands, "--csv", str(out)]
+        ended = subprocess.run(
+            command, env=environment(PYTHONHASHSEED=seed), cwd=tmp_path, stdout=subprocess.PIPE, check=True, text=True
+        )
+        assert "flew 6.50 s in" in ended.stdout
+        written.append(out.read_bytes())
+    assert written[0] == written[1]
+
+
+# ---- duration, script, --set
+
+
+@pytest.mark.parametrize(
+    "arguments, last",
+    [
+        (["--duration", "2"], 2.0),
+        (["--duration", "0"], 0.0),
+        (["--duration", "0.15"], 0.15),
+        (["--set", "time_step=0.1", "sub_step=0.01"], 10.0),
+        (["--commands", "COMMANDS"], 6.5),
+    ],
+)
+def test_duration(tmp_path, commands, arguments, last):
+    out = tmp_path / "out.csv"
+    arguments = [commands if argument == "COMMANDS" else argument for argument in arguments]
+    assert main([*arguments, "--csv", str(out)]) == 0
+    assert read_csv(out)[1][-1][0] == pytest.approx(last, abs=1e-9)
+
+
+def test_a_script_gets_the_twists_as_messages(script, commands, capsys):
+    path = script(
+        """
+def sysCall_init():
+    simROS.subscribe("/drone/cmd_vel", "geometry_msgs/Twist", "on_twist")
+
+def on_twist(msg):
+    print("heard", round(sim.getSimulationTime(), 9), msg.linear.x, msg.linear.z, msg.angular.z)
+"""
+    )
+    assert main(["--script", path, "--commands", commands]) == 0
+    heard = [line for line in capsys.readouterr().out.splitlines() if line.startswith("heard")]
+    assert heard == ["heard 0.15 1.0 0.2 0.5"]
+
+
+def test_settings_are_nested_by_dots_and_read_as_yaml():
+    assert settings(["control.thrust_limits=null", "drone.position=[0, 0, 5]", "drone.yaw=1", "script=a=b"]) == {
+        "control": {"thrust_limits": None},
+        "drone": {"position": [0, 0, 5], "yaw": 1},
+        "script": "a=b",
+    }
+    assert settings(["gravity=1", "gravity=2"]) == {"gravity": 2}
+
+
+@pytest.mark.parametrize("assignment", ["gravity", "=3", "control.=3", "control..Kzref=3", "gravity=["])
+def test_a_setting_that_cannot_be_read_is_refused(assignment):
+    with pytest.raises(ParameterError, match="--set"):
+        settings([assignment])
+
+
+def test_settings_are_what_is_flown(tmp_path):
+    out = tmp_path / "out.csv"
+    assert main(["--duration", "1", "--set", "drone.position=[1, 2, 5]", "--set", "gravity=0", "--csv", str(out)]) == 0
+    _, rows = read_csv(out)
+    assert rows[0][1:4] == [1, 2, 5]
+    assert rows[-1][3] > 5.1  # nothing holds it down
+
+
+# ---- how it ends
+
+
+@pytest.mark.parametrize(
+    "arguments, says",
+    [
+        (["--set", "control.Kzre=3"], "parameter control/Kzre: unknown key"),
+        (["--set", "gravity"], "--set gravity: must be KEY=VALUE"),
+        (["--duration", "nan"], "nan: must be a number of seconds"),
+        (["--duration", "-1"], "-1: must be a number of seconds"),
+        (["--duration", "long"], "long: must be a number of seconds"),
+        (["--commands", "nowhere.yaml"], "nowhere.yaml"),
+        (["--csv", "nowhere/out.csv"], "nowhere/out.csv"),
+        (["--plot", "nowhere/out.png"], "nowhere/out.png"),
+        (["--plot", "out.wrong"], "wrong"),
+        (["--sped", "2"], "unrecognized arguments: --sped 2"),
+        (["--script", "nowhere.py"], "nowhere.py"),
+    ],
+)
+def test_a_mistake_ends_with_one_line_and_status_1(tmp_path, monkeypatch, capsys, arguments, says):
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = main(arguments)
+    except SystemExit as ended:  # argparse's own way
+        status = ended.code
+    lines = capsys.readouterr().err.splitlines()
+    assert status == 1
+    assert len(lines) == 1
+    assert lines[0].startswith("fly: ")
+    assert says in lines[0]
+
+
+def test_a_script_error_leaves_the_csv_up_to_there_and_runs_cleanup(tmp_path, script, capsys):
+    out = tmp_path / "out.csv"
+    path = script(
+        """
+def sysCall_actuation():
+    if sim.getSimulationTime() > 0.49:
+        undefined
+
+def sysCall_cleanup():
+    print("cleaned up")
+"""
+    )
+    assert main(["--script", path, "--csv", str(out)]) == 1
+    captured = capsys.readouterr()
+    assert "cleaned up" in captured.out
+    assert "flew 0.50 s" in captured.out
+    assert len(captured.err.splitlines()) == 1
+    assert f"{path}:4: NameError" in captured.err
+    assert [row[0] for row in read_csv(out)[1]] == pytest.approx([step * 0.05 for step in range(11)])
+
+
+def test_an_error_in_cleanup_is_told_too(script, capsys):
+    assert main(["--script", script("def sysCall_cleanup():\n    undefined\n"), "--duration", "1"]) == 1
+    assert "NameError" in capsys.readouterr().err
+
+
+def test_ctrl_c_stops_and_keeps_what_was_flown(tmp_path, script):
+    out = tmp_path / "out.csv"
+    path = script(
+        """
+def sysCall_sensing():
+    if abs(sim.getSimulationTime() - 1) < 0.01:
+        print("flying", flush=True)
+
+def sysCall_cleanup():
+    print("cleaned up", flush=True)
+"""
+    )
+    process = subprocess.Popen(
+        [sys.executable, str(ROOT / "scripts" / "fly"), "--script", path, "--duration", "1e6", "--csv", str(out)],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A test run in the background may have SIGINT ignored, which a child inherits.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    while "flying" not in process.stdout.readline():
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    printed, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert "cleaned up" in printed
+    header, rows = read_csv(out)
+    assert len(rows) > 20
+    assert {len(row) for row in rows} == {len(header)}
+
+
+def test_it_needs_no_ros(tmp_path):
+    program = (
+        "import sys\n"
+        "for name in ('rospy', 'rospkg', 'roslib', 'genpy', 'geometry_msgs', 'cv_bridge'): sys.modules[name] = None\n"
+        "from drone_sim.offline.fly import main\n"
+        "sys.exit(main(['--duration', '1', '--plot', 'out.png']))\n"
+    )
+    variables = {name: value for name, value in environment().items() if not name.startswith("ROS")}
+    subprocess.run([sys.executable, "-c", program], env=variables, cwd=tmp_path, check=True)
+
+
+# ---- plot
+
+
+def test_plot_is_a_picture(tmp_path, commands):
+    out = tmp_path / "out.png"
+    assert main(["--commands", commands, "--plot", str(out)]) == 0
+    assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_plot_shows_velocities_in_the_track_frame(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    commands = tmp_path / "forward.yaml"
+    commands.write_text("[{at: 0, twist: {linear: [1, 0, 0]}}]")
+    turned = ["--set", "drone.yaw=1.5707963267948966"]
+    assert main([*turned, "--commands", str(commands), "--duration", "5", "--plot", "out.png"]) == 0
+    axes = {ax.get_ylabel(): ax for ax in drawn[0].axes}
+    commanded, flown = axes["forward $v_x$ [m/s]"].get_lines()[:2]
+    assert commanded.get_ydata()[-1] == 1.0
+    assert flown.get_ydata()[-1] == pytest.approx(0.943, rel=0.02)  # which is along y in the world
+    pitch, roll = axes["attitude [rad]"].get_lines()[:2]
+    assert max(pitch.get_ydata()) > 0.1  # nose down to go forward
+    assert max(abs(roll.get_ydata())) < 0.01
+    assert axes["yaw [rad]"].get_lines()[0].get_ydata()[-1] == pytest.approx(1.5708, abs=1e-3)

@@ -1,0 +1,137 @@
+"""Timelines: which step an entry takes effect in, and what a mistake in the file says."""
+
+import random
+
+import pytest
+
+from drone_sim import parameters
+from drone_sim.offline import timeline
+from drone_sim.offline.timeline import Entry, Push, Timeline, TimelineError, first_step
+from drone_sim.state import Pose, Twist, Vector3
+
+PARAMETERS = parameters.load()
+
+
+class DroneLog:
+    """Stands in for a drone, and keeps what it is told."""
+
+    def __init__(self):
+        self.calls = []
+
+    def receive(self, twist):
+        self.calls.append(("receive", twist))
+
+    def move(self, pose):
+        self.calls.append(("move", pose))
+
+    def push(self, force, torque, duration):
+        self.calls.append(("push", force, torque, duration))
+
+
+def read(folder, text):
+    path = folder / "commands.yaml"
+    path.write_text(text)
+    return timeline.read(str(path), PARAMETERS)
+
+
+@pytest.mark.parametrize("time_step", [0.05, 0.01, 0.03, 1 / 240])
+def test_entry_at_a_steps_own_time_belongs_to_that_step(time_step):
+    for step in range(50_000):
+        assert first_step(step * time_step, time_step) == step
+        assert first_step(round(step * time_step, 9), time_step) == step  # as somebody writes it
+
+
+@pytest.mark.parametrize("time, step", [(0.0, 0), (0.001, 1), (0.049, 1), (0.051, 2), (0.0999, 2), (3599.96, 72000)])
+def test_entry_between_steps_waits_for_the_next_one(time, step):
+    assert first_step(time, 0.05) == step
+
+
+def test_each_kind_reaches_the_drone_once_in_its_step(tmp_path):
+    commands = read(
+        tmp_path,
+        """
+        - {at: 0.1, twist: {linear: [1, 2, 3], angular: [0, 0, 0.5]}}
+        - {at: 0.15, pose: {position: [4, 5, 6], rpy: [0, 0, 3.141592653589793]}}
+        - {at: 0.3, push: {force: [1, 0, 0], torque: [0, 2, 0], duration: 0.2}}
+        """,
+    )
+    told = {}
+    for step in range(20):
+        drone = DroneLog()
+        commands.apply(step, drone)
+        if drone.calls:
+            told[step] = drone.calls
+    assert told == {
+        2: [("receive", Twist(Vector3(1, 2, 3), Vector3(0, 0, 0.5)))],
+        3: [("move", Pose((4, 5, 6), pytest.approx((0, 0, 1, 0), abs=1e-12)))],
+        6: [("push", (1, 0, 0), (0, 2, 0), 0.2)],
+    }
+
+
+def test_parts_that_are_left_out_are_zero(tmp_path):
+    commands = read(tmp_path, "[{at: 0, twist: {}}, {at: 1, pose: {}}, {at: 2, push: {duration: 1}}]")
+    zero = (0, 0, 0)
+    assert [entry.action for entry in commands.entries] == [Twist(), Pose(zero), Push(zero, zero, 1)]
+
+
+def test_entries_are_sorted_by_time_and_keep_the_files_order_within_one():
+    entries = [Entry(at, Twist(Vector3(number))) for number, at in enumerate([0.3, 0.1, 0.3, 0.2, 0.1])]
+    assert [entry.action.linear.x for entry in Timeline(entries, 0.05).entries] == [1, 4, 3, 0, 2]
+
+    numbered = [Entry(random.Random(number).choice([0.0, 0.5]), Twist(Vector3(number))) for number in range(100)]
+    drone = DroneLog()
+    Timeline(numbered, 0.05).apply(10, drone)
+    applied = [twist.linear.x for _, twist in drone.calls]
+    assert applied == sorted(applied)
+    assert len(applied) == sum(entry.at == 0.5 for entry in numbered)
+
+
+def test_end_counts_the_longest_push():
+    push = Push((1, 0, 0), (0, 0, 0), 4.0)
+    assert Timeline([Entry(1.0, push), Entry(3.0, Twist())], 0.05).end == 5.0
+    assert Timeline([Entry(1.0, push), Entry(6.0, Twist())], 0.05).end == 6.0
+    assert Timeline([], 0.05).end == 0.0
+
+
+@pytest.mark.parametrize(
+    "text, says",
+    [
+        ("", "must be a list"),
+        ("{at: 1, twist: {}}", "must be a list"),
+        ("[{at: 1, twist: ", "while parsing"),
+        ("[{at: 0, twist: {}}, 3]", "entry 2: 3: must be a mapping"),
+        ("[{twist: {}}]", "entry 1: at: missing"),
+        ("[{at: 1}]", "entry 1: must hold one of twist, pose, push; it holds none"),
+        ("[{at: 1, twist: {}, pose: {}}]", "entry 1: must hold one of twist, pose, push; it holds twist and pose"),
+        ("[{at: 1, twsit: {}}]", "entry 1: twsit: unknown key; known are at, twist, pose, push"),
+        ("[{at: 1, twist: }]", "entry 1: twist = None: must be a mapping of linear, angular"),
+        ("[{at: -0.1, twist: {}}]", "entry 1: at = -0.1: input should be greater than or equal to 0"),
+        ("[{at: .nan, twist: {}}]", "entry 1: at = nan: input should be a finite number"),
+        ("[{at: soon, twist: {}}]", "entry 1: at = 'soon': input should be a valid number"),
+        ("[{at: 1, twist: {liner: [1, 0, 0]}}]", "entry 1: twist.liner: unknown key; known are linear, angular"),
+        ("[{at: 1, twist: {linear: [1, 0]}}]", "entry 1: twist.linear = [1, 0]: must be three finite numbers"),
+        ("[{at: 1, twist: {linear: [.nan, 0, 0]}}]", "entry 1: twist.linear = [nan, 0, 0]: must be three finite"),
+        ("[{at: 1, twist: {linear: 5}}]", "entry 1: twist.linear = 5: must be three finite numbers"),
+        ("[{at: 1, twist: {linear: [0, 21, 0]}}]", "entry 1: twist.linear.y = 21.0: must lie within +-20.0 m/s"),
+        ("[{at: 1, twist: {angular: [0, 0, 11]}}]", "entry 1: twist.angular.z = 11.0: must lie within +-10.0 rad/s"),
+        (
+            "[{at: 1, pose: {position: [0, 0, -1]}}]",
+            "entry 1: pose.position.z = -1.0: must lie within 0.0 and 1000.0 m",
+        ),
+        ("[{at: 1, push: {force: [1, 0, 0]}}]", "entry 1: push.duration: missing"),
+        ("[{at: 1, push: {duration: 0}}]", "entry 1: push.duration = 0: input should be greater than 0"),
+        ("[{at: 1, push: {duration: 1, torque: [0, .inf, 0]}}]", "entry 1: push.torque = [0, inf, 0]: must be three"),
+    ],
+)
+def test_a_mistake_is_named_in_one_line(tmp_path, text, says):
+    with pytest.raises(TimelineError) as caught:
+        read(tmp_path, text)
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path}/commands.yaml: ")
+    assert says in message
+    assert "\n" not in message
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(TimelineError, match=r"nowhere\.yaml"):
+        timeline.read(str(tmp_path / "nowhere.yaml"), PARAMETERS)

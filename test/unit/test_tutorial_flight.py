@@ -1,0 +1,84 @@
+"""The tutorial's drone flies as measured in V-REP's numbers: hover, commands, and return from any displacement."""
+
+import itertools
+import math
+
+import pytest
+
+from drone_sim import parameters
+from drone_sim.simulation import Simulation
+from drone_sim.state import Pose, Twist, Vector3
+
+FORWARD, LEFT, UP = Twist(Vector3(1, 0, 0)), Twist(Vector3(0, 1, 0)), Twist(Vector3(0, 0, 1))
+TURN = Twist(Vector3(), Vector3(0, 0, 1))
+COMMANDS = {"vx": (FORWARD, 0), "vy": (LEFT, 1), "vz": (UP, 2), "wz": (TURN, 5)}  # and where it shows
+STARTS = list(
+    itertools.product(
+        (0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -2.0, 3.0, -3.0),  # m, above the height to hold
+        (0.0, 0.3, 0.6, 0.9, 1.2),  # rad, tilt
+        (0.0, math.pi / 4, math.pi / 2, 0.9 * math.pi),  # rad, azimuth of the axis of the tilt
+    )
+)
+
+
+@pytest.fixture(name="simulation")
+def _simulation():
+    simulation = Simulation(parameters.load())
+    yield simulation
+    simulation.close()
+
+
+def fly(simulation, seconds):
+    for _ in range(round(seconds / simulation.parameters.time_step)):
+        simulation.step()
+
+
+def velocity(simulation):
+    state = simulation.drone.state
+    return (*state.linear_velocity, *state.angular_velocity)
+
+
+def test_hover_holds_the_height_for_a_minute(simulation):
+    for _ in range(1200):
+        simulation.step()
+        assert simulation.drone.state.position == pytest.approx((0, 0, 0.8), abs=1e-3)
+
+
+@pytest.mark.parametrize("name, reached", [("vx", 0.943), ("vy", 0.943), ("vz", 0.998), ("wz", 1.0)])
+def test_a_command_reaches_its_velocity_in_5_s_and_ends_at_rest_in_6_s(simulation, name, reached):
+    command, index = COMMANDS[name]
+    fly(simulation, 1)
+    simulation.drone.receive(command)
+    fly(simulation, 5)
+    assert velocity(simulation)[index] == pytest.approx(reached, rel=0.02)
+    simulation.drone.receive(Twist())
+    fly(simulation, 6)
+    assert velocity(simulation) == pytest.approx([0.0] * 6, abs=0.02)
+
+
+@pytest.mark.parametrize("limits, lowest, highest", [([3.0, 8.0], 176, 180), ("none", 133, 143)])
+def test_displaced_starts_return_to_rest(limits, lowest, highest):
+    values = parameters.load({"control": {"thrust_limits": limits}, "drone": {"position": [0, 0, 5]}})
+    returned = sum(returns(values, *start) for start in STARTS)
+    assert lowest <= returned <= highest
+
+
+def returns(values, above, tilt, azimuth):
+    """Tell whether the drone comes to rest within 12 s, at 5 m; a second of rest decides it."""
+    simulation = Simulation(values)
+    half = math.sin(tilt / 2)
+    turn = (half * math.cos(azimuth), half * math.sin(azimuth), 0.0, math.cos(tilt / 2))
+    simulation.drone.move(Pose((0.0, 0.0, 5.0 + above), turn))
+    still = 0
+    for _ in range(240):
+        simulation.step()
+        still = still + 1 if is_still(simulation.drone) else 0
+        if still == 20:
+            break
+    simulation.close()
+    return still > 0
+
+
+def is_still(drone):
+    speed, lean = math.hypot(*drone.state.linear_velocity), math.acos(min(1.0, drone.matrix[10]))
+    return abs(drone.state.position[2] - 5.0) < 0.02 and speed < 0.05 and lean < 0.02
