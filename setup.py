@@ -11,6 +11,7 @@ PACKAGES = [
     "drone_sim.offline",
     "drone_sim.ros",
     "drone_sim.scripting",
+    "drone_sim.world",
 ]
 
 setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

@@ -3,25 +3,34 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import Any, Callable, Dict, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
-from drone_sim import frames, urdf
-from drone_sim.frames import Matrix
-from drone_sim.objects import ObjectTree
+import numpy as np
+
+from drone_sim import drone_objects, frames, urdf
+from drone_sim.drone_objects import DRONE, joint, respondable
+from drone_sim.frames import IDENTITY, Matrix, Vector
+from drone_sim.objects import near_names
 from drone_sim.parameters import CameraParameters, ParameterError, Parameters
 from drone_sim.propeller import ParticleFan, Wrench
-from drone_sim.scripting.api import Sim
+from drone_sim.scripting import load
+from drone_sim.scripting.api import make_sim, make_sim_ros
+from drone_sim.scripting.host import DrawingSink, Surroundings
 from drone_sim.scripting.messages import MessageBus
-from drone_sim.scripting.python_script import PythonScript
+from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.state import Pose, State, Twist
 from drone_sim.world import World
 
 # V-REP's propellers 1 to 4: where they sit, and the sense of their reaction torque.
 PROPELLERS = (("front_left", -1), ("back_left", +1), ("back_right", -1), ("front_right", +1))
-_BASE = frames.from_rpy((0.0, 0.0, -0.01), (0.0, 0.0, 0.0))  # Quadricopter_base in the root's frame
-TUTORIAL = Path(__file__).parent / "child_scripts" / "tutorial.py"
 _PARTICLE_VELOCITY = "particleVelocity"
+_BLADE_TURN = 3.0  # rad per metre of air: slow enough for 20 pictures a second to show which way
+
+
+class _Push(NamedTuple):
+    force: Vector
+    torque: Vector
+    steps: int  # that it still lasts
 
 
 class Drone:
@@ -40,29 +49,49 @@ class Drone:
         inertial_from_root = frames.invert(world.inertial_frame(self._id))
         self._links = [self._link(f"propeller_{place}") for place, _ in PROPELLERS]
         self._points = [frames.position(frames.multiply(inertial_from_root, link)) for link in self._links]
+        shapes = [(respondable(number), link) for number, link in enumerate(self._links, start=1)]
+        self._shapes = {name: frames.multiply(inertial_from_root, link) for name, link in [(DRONE, IDENTITY), *shapes]}
+        self.script: load.Script = load.NoScript()
+        self.drawing: Optional[DrawingSink] = None
         self.reset()
 
     def reset(self) -> None:
         """Return to the starting place, at rest, with no script loaded."""
+        self.close()
         self._world.set_pose(self._id, self._start)
         self.refresh()
         step = self._parameters.time_step
         self.fans = [ParticleFan(self._parameters.propellers, turn, step) for _, turn in PROPELLERS]
+        self._blade_turns = [0.0] * len(PROPELLERS)
         self.command = Twist()
         self._command_age = 0.0
-        self.objects, self._scripts = self._scene_objects()
+        self._pushes: List[_Push] = []
+        self._added = Wrench()
+        self._joint_angles: Dict[str, float] = {}
+        cameras = self._parameters.cameras
+        self.objects = drone_objects.scene_objects(self, self.body.links, self._links, cameras)
+        self.script_parameters = self._script_parameters()
+        self._propellers = [self.script_parameters[respondable(number)] for number in (1, 2, 3, 4)]
 
-    def _scene_objects(self) -> Tuple[ObjectTree, Dict[str, Dict[str, Any]]]:
-        objects = ObjectTree()
-        objects.add("Drone", body=self)
-        objects.add("Quadricopter_base", "Drone", _BASE)
-        objects.add("Track_base", "Drone", _BASE)
-        scripts: Dict[str, Dict[str, Any]] = {"Drone": self._parameters.control.model_dump()}
-        for number, link in enumerate(self._links, start=1):
-            name = f"Quadricopter_propeller_respondable{number}"
-            objects.add(name, "Drone", link)
-            scripts[name] = {_PARTICLE_VELOCITY: 0.0}
-        return objects, scripts
+    def _script_parameters(self) -> Dict[str, Dict[str, Any]]:
+        """Return what V-REP's scripts have as simulation parameters, and the gains of control."""
+        law = self._parameters.propellers
+        seen = {"particlesAreVisible": True, "simulateParticles": True, "fakeShadow": True}
+        particles = {
+            "particleCountPerSecond": law.particles_per_second,
+            "particleDensity": law.particle_density,
+            "particleSize": 1.0,  # a factor, in the stock scripts
+        }
+        own = {**self._parameters.control.model_dump(), **seen, **particles, "propeller_law": law.law}
+        return {
+            DRONE: own,
+            **{respondable(number): {_PARTICLE_VELOCITY: 0.0, **particles} for number in (1, 2, 3, 4)},
+        }
+
+    @property
+    def own_script(self) -> str:
+        """Name of the object that the child script is attached to."""
+        return DRONE
 
     def _link(self, name: str) -> Matrix:
         if name not in self.body.links:
@@ -89,7 +118,37 @@ class Drone:
     @property
     def particle_velocities(self) -> Tuple[float, ...]:
         """What the script commands: m/s, propellers 1 to 4."""
-        return tuple(self._velocity(number) for number in (1, 2, 3, 4))
+        return tuple(propeller[_PARTICLE_VELOCITY] for propeller in self._propellers)
+
+    @property
+    def blade_angles(self) -> Dict[str, float]:
+        """Angle (rad) of each propeller's blades, by joint of the URDF.
+
+        They turn against the torque that they leave, unless the script turns them.
+        """
+        return {
+            f"blades_{place}_joint": self.turn_joint(joint(number)) % (2 * math.pi)
+            for number, (place, _) in enumerate(PROPELLERS, start=1)
+        }
+
+    def turn_joint(self, name: str, angle: Optional[float] = None) -> float:
+        """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError."""
+        names = [joint(number) for number in (1, 2, 3, 4)]
+        if name not in names:
+            raise ValueError(f"'{name}' is not a joint; {near_names(name, names)}")
+        if angle is not None:
+            self._joint_angles[name] = angle
+        number = names.index(name)
+        return self._joint_angles.get(name, -PROPELLERS[number][1] * _BLADE_TURN * self._blade_turns[number])
+
+    def show_blades(self) -> None:
+        """Turn the blades in the world's pictures to where they are."""
+        angles = self.blade_angles
+        places = {}
+        for blades in self.body.blades:
+            turned = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angles.get(blades.joint_name, 0.0)))
+            places[blades.visual] = frames.multiply(frames.multiply(blades.joint, turned), blades.local)
+        self._world.place_visuals(self._id, places)
 
     def refresh(self) -> None:
         """Read the state back from the world."""
@@ -119,18 +178,48 @@ class Drone:
 
     # ---- script
 
-    def load_script(self, path: str, clock: Callable[[], float]) -> None:
-        """Load a child script ('' for the tutorial's) and call its init. Raises ScriptError."""
-        path = path or str(TUTORIAL)
-        sim = Sim(self.objects, self._scripts, "Drone", clock, self._parameters.time_step)
-        self.script = PythonScript(path, {"sim": sim, "simROS": self.bus})
+    def load_script(
+        self, path: str, clock: Callable[[], float], pictures: Optional[Mapping[str, Callable[[], np.ndarray]]] = None
+    ) -> None:
+        """Load a child script ('' for the tutorial's) and call its init. Raises ScriptError.
+
+        `pictures` are the cameras by name: functions that return a picture (height, width, 3).
+        """
+        self.close()
+        limit = TimeLimit(self._parameters.script_time_limit)
+        sensors = {drone_objects.vision_sensor(name): take for name, take in (pictures or {}).items()}
+        surroundings = Surroundings(clock, self._parameters.time_step, sensors, limit.paused)
+        modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
+        self.script = load.load(path, modules, limit)
         self.script.call("init")
+
+    def close(self) -> None:
+        """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
+        self.script.close()
+        self.script = load.NoScript()
+        self.bus.close()
 
     def receive(self, twist: Twist) -> None:
         """Take a command for the next step; held until the next one, or for cmd_vel_timeout."""
         self.command = twist
         self._command_age = 0.0
         self.bus.post("cmd_vel", twist)
+
+    def push(self, force: Vector, torque: Vector, duration: float) -> None:
+        """Push with a force (N) at the centre of mass and a torque (N m), fixed in the world.
+
+        It lasts `duration` seconds of simulated time, rounded to whole steps, one at least. Pushes add up.
+        """
+        self._pushes.append(_Push(force, torque, max(1, round(duration / self._parameters.time_step))))
+
+    def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
+        """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m, world).
+
+        Both keep their direction through the sub-steps. Raises ValueError for an object that is no dynamic shape.
+        """
+        if shape not in self._shapes:
+            raise ValueError(f"'{shape}' is not a dynamic shape; there are: {', '.join(self._shapes)}")
+        self._added.add(force, torque, frames.transform(self._shapes[shape], offset))
 
     # ---- phases
 
@@ -144,17 +233,16 @@ class Drone:
         self.script.call("actuation")
 
     def wrench(self) -> Tuple[int, Wrench]:
-        """Emit a step's particles; return the body id, and thrusts and torques turned into the world."""
-        wrench = Wrench()
-        for number, (fan, link, point) in enumerate(zip(self.fans, self._links, self._points), start=1):
-            thrust, torque = fan.emit(self._velocity(number))
+        """Emit a step's particles, use up a step of the pushes; return the body id and the step's wrench."""
+        wrench, self._added = self._added, Wrench()
+        step = self._parameters.time_step
+        for number, (fan, link, point) in enumerate(zip(self.fans, self._links, self._points)):
+            velocity = self._propellers[number][_PARTICLE_VELOCITY]
+            thrust, torque = fan.emit(velocity)
+            self._blade_turns[number] += velocity * step
             x, y, z = frames.rotate(self._matrix, (link[2], link[6], link[10]))  # the propeller's +z
             wrench.add((x * thrust, y * thrust, z * thrust), (x * torque, y * torque, z * torque), point)
+        for push in self._pushes:
+            wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
+        self._pushes = [push._replace(steps=push.steps - 1) for push in self._pushes if push.steps > 1]
         return self._id, wrench
-
-    def _velocity(self, propeller: int) -> float:
-        value = self._scripts[f"Quadricopter_propeller_respondable{propeller}"][_PARTICLE_VELOCITY]
-        velocity = float(value)
-        if not math.isfinite(velocity):
-            raise ValueError(f"propeller {propeller}: particleVelocity {velocity}: must be finite")
-        return velocity

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from typing import Dict, Iterable, Optional, Protocol
+from typing import Dict, Iterable, Iterator, Optional, Protocol, Sequence, Tuple
 
 from drone_sim import frames
 from drone_sim.frames import IDENTITY, Matrix, Vector
@@ -30,12 +30,32 @@ class Body(Protocol):
 class SceneObject:
     """One frame: carried by its parent, or by a body."""
 
-    def __init__(self, name: str, parent: Optional[SceneObject], local: Matrix, body: Optional[Body]):
-        """Stand at `local` in the parent's frame (the world's if None), or wherever `body` is."""
-        self.name = name
+    def __init__(
+        self,
+        names: Tuple[str, ...],
+        alias: str,
+        parent: Optional[SceneObject],
+        local: Matrix = IDENTITY,
+        body: Optional[Body] = None,
+    ):
+        """Stand at `local` in the parent's frame (the world's if None), or wherever `body` is.
+
+        Take the names that no other object has (V-REP 3.x), and the alias that siblings may share (4.x paths).
+        """
+        self.names = names
+        self.alias = alias
         self.parent = parent
         self.local = local
         self.body = body
+
+    @property
+    def name(self) -> str:
+        """The first of its names."""
+        return self.names[0]
+
+    def is_called(self, name: str) -> bool:
+        """Tell whether that is its alias or one of its names."""
+        return name == self.alias or name in self.names
 
     @property
     def matrix(self) -> Matrix:
@@ -78,12 +98,23 @@ class ObjectTree:
         self._handles: Dict[str, int] = {}
 
     def add(
-        self, name: str, parent: Optional[str] = None, local: Matrix = IDENTITY, body: Optional[Body] = None
+        self,
+        name: str,
+        parent: Optional[str] = None,
+        local: Matrix = IDENTITY,
+        body: Optional[Body] = None,
+        *,
+        alias: str = "",
+        also: Sequence[str] = (),
     ) -> int:
-        """Add an object at `local` in the frame of the object named `parent`; return its handle."""
+        """Add an object at `local` in the frame of the object named `parent`; return its handle.
+
+        `alias` is what it is called in 4.x paths (its name by default), `also` are further names of it.
+        """
         handle = len(self._objects)
-        self._objects[handle] = SceneObject(name, self._objects[self._handles[parent]] if parent else None, local, body)
-        self._handles[name] = handle
+        above = self._objects[self._handles[parent]] if parent else None
+        self._objects[handle] = SceneObject((name, *also), alias or name, above, local, body)
+        self._handles.update((known, handle) for known in (name, *also))
         return handle
 
     def handle(self, name: str) -> int:
@@ -91,6 +122,29 @@ class ObjectTree:
         if name in self._handles:
             return self._handles[name]
         raise ValueError(f"no object named '{name}'; {near_names(name, self._handles)}")
+
+    @property
+    def names(self) -> Iterable[str]:
+        """Every name that an object has."""
+        return self._handles.keys()
+
+    def children(self, parent: Optional[SceneObject]) -> Iterator[Tuple[int, SceneObject]]:
+        """Yield handle and object of what hangs on an object (on nothing, for None), in the order of handles."""
+        return ((handle, child) for handle, child in self._objects.items() if child.parent is parent)
+
+    def path(self, handle: int) -> str:
+        """Return the 4.x path of an object from the root, such as /Quadcopter/propeller[0]/joint."""
+        parts = []
+        here: Optional[SceneObject] = self[handle]
+        while here is not None:
+            twins = [child for _, child in self.children(here.parent) if child.alias == here.alias]
+            parts.append(f"{here.alias}[{twins.index(here)}]" if len(twins) > 1 else here.alias)
+            here = here.parent
+        return "/" + "/".join(reversed(parts))
+
+    def __iter__(self) -> Iterator[int]:
+        """Yield every handle."""
+        return iter(self._objects)
 
     def __contains__(self, name: str) -> bool:
         """Tell whether an object has that name."""
@@ -101,10 +155,13 @@ class ObjectTree:
         return WORLD if sought is None else self._handles[sought.name]
 
     def __getitem__(self, handle: int) -> SceneObject:
-        """Return the object of a handle; raises ValueError."""
-        if handle not in self._objects:
-            raise ValueError(f"no object has the handle {handle}")
-        return self._objects[handle]
+        """Return the object of a handle; raises ValueError, or TypeError where it is no number."""
+        try:
+            return self._objects[handle]
+        except (KeyError, TypeError):
+            if isinstance(handle, (int, float)):
+                raise ValueError(f"no object has the handle {handle}") from None
+            raise TypeError("a handle is a whole number") from None
 
     def matrix(self, handle: int, relative_to: int = WORLD) -> Matrix:
         """Return the transform of an object relative to another, or to the world."""

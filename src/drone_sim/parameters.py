@@ -8,10 +8,11 @@ from __future__ import annotations
 import difflib
 import math
 from pathlib import Path
-from typing import Annotated, Any, Dict, List, Literal, Mapping, Optional, Tuple, Union
+from typing import Any, Dict, List, Literal, Mapping, Optional, Tuple, Union
 
 import yaml
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from typing_extensions import Annotated
 
 from drone_sim.frames import Matrix, from_rpy, multiply
 from drone_sim.resources import package_path, resolve
@@ -46,6 +47,7 @@ Point = Tuple[Finite, Finite, Finite]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Color = Tuple[Fraction, Fraction, Fraction, Fraction]
 File = Annotated[str, AfterValidator(_existing_file)]
+OptionalFile = Annotated[str, AfterValidator(lambda name: _existing_file(name) if name else "")]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 Limits = Annotated[Optional[Tuple[Finite, Finite]], BeforeValidator(_none_from_word), AfterValidator(_increasing)]
 
@@ -68,22 +70,66 @@ class FloorParameters(_Parameters):
     texture: File
 
 
-class BoxParameters(_Parameters):
+class _ObjectParameters(_Parameters):
+    """What the objects of a scene have in common; a mass of 0 stands still."""
+
+    name: str = ""
+    position: Point
+    rpy: Point = (0.0, 0.0, 0.0)
+    mass: NonNegative = 0.0
+    color: Color = (0.7, 0.7, 0.7, 1.0)
+    texture: OptionalFile = ""
+
+
+class BoxParameters(_ObjectParameters):
     """A box; `size` is its full length, width and height."""
 
     shape: Literal["box"]
     size: Tuple[Positive, Positive, Positive]
-    position: Point
-    rpy: Point = (0.0, 0.0, 0.0)
-    color: Color = (0.7, 0.7, 0.7, 1.0)
-    mass: NonNegative = 0.0
+
+
+class CylinderParameters(_ObjectParameters):
+    """A cylinder along its z axis; `size` is radius and length."""
+
+    shape: Literal["cylinder"]
+    size: Tuple[Positive, Positive]
+
+
+class SphereParameters(_ObjectParameters):
+    """A sphere; `size` is its radius."""
+
+    shape: Literal["sphere"]
+    size: Tuple[Positive]
+
+
+class MeshParameters(_ObjectParameters):
+    """A mesh file (OBJ, STL, DAE); `size` is its scale along x, y and z."""
+
+    shape: Literal["mesh"]
+    file: File
+    size: Tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
+    color: Color = (1.0, 1.0, 1.0, 1.0)
+
+
+class UrdfParameters(_ObjectParameters):
+    """A URDF, which says itself how it looks; a mass of 0 nails its root link to the world."""
+
+    shape: Literal["urdf"]
+    file: File
+    size: Tuple[()] = ()
+
+
+ObjectParameters = Annotated[
+    Union[BoxParameters, CylinderParameters, SphereParameters, MeshParameters, UrdfParameters],
+    Field(discriminator="shape"),
+]
 
 
 class SceneParameters(_Parameters):
     """The world without the drone."""
 
     floor: FloorParameters
-    objects: List[BoxParameters]
+    objects: List[ObjectParameters]
 
 
 class DroneParameters(_Parameters):
@@ -137,8 +183,11 @@ class MountParameters(_Parameters):
 class CameraParameters(_Parameters):
     """A vision sensor: where it sits, what it sees."""
 
+    topic: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_/]*$")]
+    kind: Literal["color", "depth"]
     frame: Name
     mount: Optional[MountParameters] = None
+    every: Annotated[int, Field(ge=1)]
     width: Annotated[int, Field(ge=1, le=8192)]
     height: Annotated[int, Field(ge=1, le=8192)]
     horizontal_fov: Annotated[float, Field(gt=0, lt=3.14)]
@@ -149,6 +198,9 @@ class CameraParameters(_Parameters):
 class Parameters(_Parameters):
     """Everything in config/drone.yaml."""
 
+    gui: bool
+    script: str
+    script_time_limit: NonNegative
     real_time_factor: NonNegative
     cmd_vel_timeout: NonNegative
     cmd_vel_limits: TwistLimits
@@ -156,6 +208,7 @@ class Parameters(_Parameters):
     time_step: Positive
     sub_step: Positive
     gravity: Finite
+    scene_file: str
     scene: SceneParameters
     drone: DroneParameters
     propellers: PropellerParameters
@@ -184,10 +237,25 @@ def load(overrides: Optional[Mapping[str, Any]] = None) -> Parameters:
     Raises ParameterError.
     """
     values = _merge(read_yaml(package_path() / "config" / "drone.yaml"), overrides or {})
+    if values["scene_file"]:
+        values = _merge(values, _scene(values["scene_file"]))
     try:
         return Parameters.model_validate(values)
     except ValidationError as error:
         raise ParameterError(_one_line(error)) from None
+
+
+def _scene(file: str) -> Dict[str, Any]:
+    """Return a scene file's floor, objects and drone as they stand among the parameters."""
+    try:
+        content = read_yaml(resolve(file))
+    except FileNotFoundError as error:
+        raise ParameterError(f"parameter scene_file = '{file}': {error}") from None
+    unknown = set(content) - {"floor", "objects", "drone"}
+    if unknown:
+        raise ParameterError(f"{file}: unknown key {min(unknown)}; known are drone, floor, objects")
+    scene = {"scene": {key: content[key] for key in ("floor", "objects") if key in content}}
+    return {**scene, "drone": content.get("drone", {})}
 
 
 def read_yaml(path: Union[str, Path]) -> Dict[str, Any]:

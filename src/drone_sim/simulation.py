@@ -8,13 +8,17 @@
 
 from __future__ import annotations
 
-from typing import Dict
+from functools import partial
+from typing import Dict, Optional, Tuple
+
+import numpy as np
 
 from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.camera.vision import Camera, Vision
 from drone_sim.drone import Drone
 from drone_sim.parameters import CameraParameters, Parameters, SceneParameters
-from drone_sim.world import World
+from drone_sim.scripting.messages import Backend
+from drone_sim.world import Shape, World
 
 
 class Simulation:
@@ -23,8 +27,13 @@ class Simulation:
     Not thread-safe: one thread owns it. `drone.bus` alone may be used from others.
     """
 
-    def __init__(self, parameters: Parameters, *, script: str = "", gui: bool = False):
+    def __init__(
+        self, parameters: Parameters, *, script: str = "", gui: bool = False, backend: Optional[Backend] = None
+    ):
         """Build the scene and run the child script's init ('' is the tutorial's script).
+
+        `backend` carries what the script subscribes to and publishes; without it the messages stay in
+        `drone.bus`.
 
         Raises UrdfError, ScriptError, and RuntimeError where `gui` finds no display.
         """
@@ -37,8 +46,15 @@ class Simulation:
         self.cameras: Dict[str, Camera] = {
             name: self._camera(camera) for name, camera in parameters.cameras.items()
         }
+        self._looked: Dict[str, Tuple[int, np.ndarray]] = {}  # by camera, step and picture of the script's last look
+        self._pictures = {name: partial(self._picture, name) for name in self.cameras}
         self._running = False
-        self.drone.load_script(script, lambda: self.time)
+        self.drone.bus.backend = backend
+        try:
+            self.drone.load_script(script, lambda: self.time, self._pictures)
+        except BaseException:
+            self.close()
+            raise
         self._running = True
 
     def _camera(self, parameters: CameraParameters) -> Camera:
@@ -70,6 +86,16 @@ class Simulation:
         for camera in self.cameras.values():
             camera.image = camera.take() if camera in watched else None
 
+    def _picture(self, name: str) -> np.ndarray:
+        """Return what a camera sees, for the script: the step's picture if there is one, else a new one."""
+        camera = self.cameras[name]
+        if camera.image is not None:
+            return camera.image
+        if self._looked.get(name, (-1,))[0] != self.steps:
+            self.drone.show_blades()
+            self._looked[name] = (self.steps, camera.take())
+        return self._looked[name][1]
+
     def close(self) -> None:
         """Run cleanup once, whatever happened before, and free the world; may be called twice."""
         try:
@@ -77,11 +103,14 @@ class Simulation:
                 self._running = False
                 self.drone.script.call("cleanup")
         finally:
+            self.drone.close()
             self.vision.close()
             self.world.close()
 
 
 def _build(world: World, scene: SceneParameters) -> None:
     world.add_floor(scene.floor.size, scene.floor.texture)
-    for box in scene.objects:
-        world.add_box(box.size, box.position, box.rpy, box.color, box.mass)
+    for one in scene.objects:
+        world.add_shape(
+            Shape(one.shape, one.size, one.position, one.rpy, one.color, one.mass, getattr(one, "file", ""), one.texture)
+        )

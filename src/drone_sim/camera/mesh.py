@@ -221,7 +221,9 @@ def _parts(path: str) -> Iterator[trimesh.Trimesh]:
         if len(loaded.faces):
             yield loaded
         return
-    for node in getattr(loaded, "graph", trimesh.Scene().graph).nodes_geometry:
+    if not isinstance(loaded, trimesh.Scene):
+        return  # points or lines: nothing that covers a pixel
+    for node in loaded.graph.nodes_geometry:
         transform, name = loaded.graph[node]
         part = loaded.geometry[name]
         if isinstance(part, trimesh.Trimesh) and len(part.faces):

@@ -40,7 +40,8 @@ class _Target:
 class Renderer:
     """Draws visuals for any number of cameras; belongs to the thread that made it.
 
-    samples: per pixel, for smooth edges; 0 for none; 4 make a frame about four times as dear where the CPU draws. device_index: which EGL device to try first.
+    samples: per pixel, for smooth edges; 0 for none. Where the CPU draws, 4 make a frame three to four times as
+    long. device_index: which EGL device to try first.
     Raises `RendererUnavailable` when there is no EGL context to be had, ValueError for samples it cannot do.
     """
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import logging
 import math
 import sys
 import time
-from typing import Any, Callable, ContextManager, Dict, NoReturn, Optional, Sequence, TextIO
+from typing import Any, Callable, ContextManager, Dict, Iterator, NoReturn, Optional, Sequence, TextIO
 
 import yaml
 from tqdm import tqdm
@@ -18,7 +19,8 @@ from drone_sim.offline import timeline as timeline_module
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import Timeline, first_step
 from drone_sim.parameters import ParameterError
-from drone_sim.scripting.python_script import ScriptError
+from drone_sim.scripting.api_scripts import LOG as SCRIPT_LOG
+from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Simulation
 
 _AFTER = 5.0  # s flown on after the last command
@@ -31,7 +33,8 @@ _EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages a
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Fly; return 0, or 1 after a line on stderr for a wrong input or script, or 130 after Ctrl-C."""
     options = _parser().parse_args(arguments)
-    return _status_of(lambda: _run(options))
+    with _shown_on_stdout(SCRIPT_LOG):
+        return _status_of(lambda: _run(options))
 
 
 def settings(assignments: Sequence[str]) -> Dict[str, Any]:
@@ -80,6 +83,17 @@ def _run(options: argparse.Namespace) -> int:
 
 def _csv(path: Optional[str]) -> ContextManager[Optional[TextIO]]:
     return open(path, "w", encoding="utf-8", newline="\n") if path else contextlib.nullcontext()
+
+
+@contextlib.contextmanager
+def _shown_on_stdout(log: logging.Logger) -> Iterator[None]:
+    """Let what a script prints be seen."""
+    handler = logging.StreamHandler(sys.stdout)
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
 
 
 def _duration(options: argparse.Namespace, timeline: Timeline) -> float:

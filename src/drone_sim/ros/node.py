@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import time
 from typing import List, Union
 
 import rospy
@@ -53,11 +54,15 @@ class Node:
         simulation = self.simulation
         rospy.loginfo(f"drone_sim: flying; commands on {rospy.resolve_name(simulation.drone.name + '/cmd_vel')}")
         self._pacer.restart()
+        began = time.monotonic()
         while not rospy.is_shutdown():
             late = self._pacer.wait(rospy.is_shutdown)
             if late:
                 rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
             self.step()
+        seconds = time.monotonic() - began
+        factor = f"{simulation.time / seconds:.2f} times real time" if seconds else "no time"
+        rospy.loginfo(f"drone_sim: flew {simulation.time:.2f} s at {factor}, {self._pacer.overruns} late steps")
 
     def step(self) -> None:
         """Take what has come in, run one step, publish it under one stamp."""

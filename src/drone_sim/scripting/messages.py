@@ -1,59 +1,244 @@
 """Topics as a child script sees them, `simROS`, with or without ROS behind.
 
 Whoever has a message leaves it here from any thread; the simulation hands it to the script's callback
-at the start of its next step.
+at the start of its next step. What a script publishes is kept in `published`, and goes to the Backend
+where there is one: that is the seam to ROS.
 """
 
 from __future__ import annotations
 
 import threading
 from collections import deque
-from typing import Any, Callable, Deque, Dict, List, Tuple
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Protocol, Tuple, Union
+
+from drone_sim.scripting.calls import Function, WrongValue
+
+# The names by which messages say what is expected.
+Name = str
+Handle = int
+Callback = Union[str, Callable[[Any], None]]
+
+_KEPT = 32  # published messages
+
+
+class Sender(Protocol):
+    """One advertised topic of a backend."""
+
+    def publish(self, message: Any) -> None:
+        """Send a message; the simulation's thread calls it.
+
+        It is what the script gave: a mapping of field names (nested; arrays are sequences, strings are
+        str, or bytes where they are no UTF-8; times are numbers of seconds), or an object with the fields
+        as attributes. A field left out keeps its default. An image (Backend.advertise_image) is an Image.
+        Raises ValueError, in one line, for a field that does not exist or does not fit.
+        """
+
+    def shutdown(self) -> None:
+        """Stop advertising."""
+
+
+class Backend(Protocol):
+    """What carries messages to and from others, such as rospy. Topics come resolved: '/drone/front'.
+
+    Types are written as ROS does: 'geometry_msgs/Twist'. Every function is called in the simulation's
+    thread, and raises ValueError, in one line, for a type that is not installed.
+    """
+
+    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
+        """Call `take` with every message, from any thread; return what ends that.
+
+        A message is an object with the fields as attributes (rospy's own will do), or a mapping.
+        """
+
+    def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> Sender:
+        """Advertise a topic of any installed type."""
+
+    def advertise_image(self, topic: str, queue: int) -> Sender:
+        """Advertise a sensor_msgs/Image; its Sender takes Image tuples."""
+
+
+class Image(NamedTuple):
+    """A picture that a script publishes: rgb8, the top row first, as sensor_msgs/Image has it."""
+
+    data: bytes
+    width: int
+    height: int
+    frame_id: str
+
+
+class Published(NamedTuple):
+    """A message that a script published."""
+
+    topic: str
+    kind: str
+    message: Any
+
+
+class _Subscription(NamedTuple):
+    topic: str
+    callback: Callback
+    messages: Deque[Any]
+    end: Callable[[], None]
+
+
+class _Publisher(NamedTuple):
+    topic: str
+    kind: str
+    sender: Optional[Sender]
 
 
 class MessageBus:
-    """What one drone's script subscribes to; relative names stand in the drone's namespace."""
+    """What one drone's script subscribes to and publishes; relative names stand in the drone's namespace.
 
-    def __init__(self, namespace: str):
-        """Take the drone's namespace, such as 'drone'."""
+    `backend` may be set at any time; it serves what is subscribed and advertised after that. Topics in
+    `own_topics` are never asked of it: the drone itself posts them.
+    """
+
+    def __init__(self, namespace: str, own_topics: Tuple[str, ...] = ("cmd_vel",)):
+        """Take the drone's namespace, such as 'drone', and the topics that the drone posts itself."""
+        self.backend: Optional[Backend] = None
+        self.published: Deque[Published] = deque(maxlen=_KEPT)
         self._namespace = namespace
+        self._own_topics = {self._resolve(topic) for topic in own_topics}
         self._lock = threading.Lock()
         self._next_handle = 0
-        self._subscriptions: Dict[int, Tuple[str, str, Deque[Any]]] = {}
+        self._subscriptions: Dict[int, _Subscription] = {}
+        self._publishers: Dict[int, _Publisher] = {}
 
-    def subscribe(self, topic: str, _type: str, callback: str, queue: int = 1, *_ignored: Any) -> int:
+    def functions(self) -> Dict[str, Function]:
+        """Return what a script may call, by name."""
+        names = (
+            "subscribe",
+            "shutdownSubscriber",
+            "advertise",
+            "publish",
+            "shutdownPublisher",
+            "imageTransportAdvertise",
+            "imageTransportPublish",
+            "imageTransportShutdownPublisher",
+        )
+        return {name: getattr(self, name) for name in names}
+
+    # ---- what a script calls
+
+    def subscribe(self, topic: Name, kind: Name, callback: Callback, queue: int = 1, *_ignored: Any) -> int:
         """Call the script's function `callback` with each message on `topic`; return a handle.
 
         Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1.
         """
+        resolved = self._resolve(topic)
+        messages: Deque[Any] = deque(maxlen=max(1, int(queue)))
+        end: Callable[[], None] = _nothing
+        if self.backend is not None and resolved not in self._own_topics:
+            end = self.backend.subscribe(resolved, kind, messages.append)
         with self._lock:
-            self._next_handle += 1
-            messages: Deque[Any] = deque(maxlen=max(1, int(queue)))
-            self._subscriptions[self._next_handle] = (self._resolve(topic), callback, messages)
-            return self._next_handle
+            handle = self._new_handle()
+            self._subscriptions[handle] = _Subscription(resolved, callback, messages, end)
+        return handle
 
-    def shutdownSubscriber(self, handle: int) -> None:
+    def shutdownSubscriber(self, handle: Handle) -> None:
         """End a subscription; raises ValueError where there is none of that handle."""
         with self._lock:
-            if self._subscriptions.pop(handle, None) is None:
-                raise ValueError(f"no subscription has the handle {handle}")
+            subscription = self._subscriptions.pop(handle, None)
+        if subscription is None:
+            raise ValueError(f"no subscription has the handle {handle}")
+        subscription.end()
+
+    def advertise(self, topic: Name, kind: Name, queue: int = 1, latch: bool = False, *_ignored: Any) -> int:
+        """Advertise a topic; return a handle to publish on."""
+        resolved = self._resolve(topic)
+        sender = self.backend.advertise(resolved, kind, max(1, int(queue)), bool(latch)) if self.backend else None
+        return self._add_publisher(_Publisher(resolved, kind, sender))
+
+    def publish(self, handle: Handle, message: Any) -> None:
+        """Publish a message: a table of its fields."""
+        publisher = self._publisher(handle)
+        if message is None or isinstance(message, (str, bytes, int, float)):
+            raise WrongValue("a table of the message's fields is expected")
+        self._send(publisher, message)
+
+    def shutdownPublisher(self, handle: Handle) -> None:
+        """Stop advertising; raises ValueError where nothing has that handle."""
+        publisher = self._publisher(handle)
+        del self._publishers[handle]
+        if publisher.sender is not None:
+            publisher.sender.shutdown()
+
+    def imageTransportAdvertise(self, topic: Name, queue: int = 1) -> int:
+        """Advertise an image topic; return a handle to publish on."""
+        resolved = self._resolve(topic)
+        sender = self.backend.advertise_image(resolved, max(1, int(queue))) if self.backend else None
+        return self._add_publisher(_Publisher(resolved, "sensor_msgs/Image", sender))
+
+    def imageTransportPublish(self, handle: Handle, data: Any, width: int, height: int, frame_id: Name) -> None:
+        """Publish a vision sensor's image as getVisionSensorCharImage returns it, the bottom row first."""
+        pixels = data.encode("utf-8") if isinstance(data, str) else bytes(data)
+        row, rows = 3 * int(width), int(height)
+        if len(pixels) != row * rows:
+            raise ValueError(f"an image of {width} x {height} has {row * rows} bytes, not {len(pixels)}")
+        top_first = b"".join(pixels[start : start + row] for start in range(row * (rows - 1), -1, -row))
+        self._send(self._publisher(handle), Image(top_first, int(width), rows, frame_id))
+
+    def imageTransportShutdownPublisher(self, handle: Handle) -> None:
+        """Stop advertising an image topic."""
+        self.shutdownPublisher(handle)
+
+    # ---- what the simulation calls
 
     def post(self, topic: str, message: Any) -> None:
         """Leave a message for the next step; any thread may call it."""
+        resolved = self._resolve(topic)
         with self._lock:
-            for subscribed, _, messages in self._subscriptions.values():
-                if subscribed == self._resolve(topic):
-                    messages.append(message)
+            for subscription in self._subscriptions.values():
+                if subscription.topic == resolved:
+                    subscription.messages.append(message)
 
-    def deliver(self, call: Callable[[str, Any], None]) -> None:
+    def deliver(self, call: Callable[[Callback, Any], None]) -> None:
         """Hand every waiting message to `call(callback, message)`, oldest first."""
-        waiting: List[Tuple[str, Any]] = []
+        if not self._subscriptions:
+            return
+        waiting: List[Tuple[Callback, Any]] = []
         with self._lock:
-            for _, callback, messages in self._subscriptions.values():
-                waiting += [(callback, message) for message in messages]
-                messages.clear()
+            for subscription in self._subscriptions.values():
+                while subscription.messages:
+                    waiting.append((subscription.callback, subscription.messages.popleft()))
         for callback, message in waiting:
             call(callback, message)
 
+    def close(self) -> None:
+        """End every subscription and stop advertising: the script that made them is gone."""
+        with self._lock:
+            subscriptions, self._subscriptions = self._subscriptions, {}
+            publishers, self._publishers = self._publishers, {}
+        for subscription in subscriptions.values():
+            subscription.end()
+        for publisher in publishers.values():
+            if publisher.sender is not None:
+                publisher.sender.shutdown()
+
+    def _add_publisher(self, publisher: _Publisher) -> int:
+        with self._lock:
+            handle = self._new_handle()
+            self._publishers[handle] = publisher
+        return handle
+
+    def _publisher(self, handle: int) -> _Publisher:
+        if handle not in self._publishers:
+            raise ValueError(f"no publisher has the handle {handle}")
+        return self._publishers[handle]
+
+    def _send(self, publisher: _Publisher, message: Any) -> None:
+        self.published.append(Published(publisher.topic, publisher.kind, message))
+        if publisher.sender is not None:
+            publisher.sender.publish(message)
+
+    def _new_handle(self) -> int:
+        self._next_handle += 1
+        return self._next_handle
+
     def _resolve(self, topic: str) -> str:
         return topic if topic.startswith("/") else f"/{self._namespace}/{topic}"
+
+
+def _nothing() -> None:
+    pass

@@ -1,0 +1,140 @@
+"""`sim`: time, the simulation parameters of scripts, and the log."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import Any, Dict, List, Optional, Tuple
+
+from drone_sim.objects import near_names
+from drone_sim.scripting import object_paths
+from drone_sim.scripting.calls import WrongValue
+from drone_sim.scripting.constants import CONSTANTS
+from drone_sim.scripting.host import Host, Parameters, Surroundings
+
+LOG = logging.getLogger("drone_sim.script")
+LOG.setLevel(logging.INFO)  # a script's print is wanted, whatever the level of the rest
+
+Handle = int
+Name = str
+
+_VERSION = 40600  # the CoppeliaSim whose API this is nearest to
+_SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
+
+
+class Scripts:
+    """The functions on scripts and time."""
+
+    def __init__(self, host: Host, surroundings: Surroundings):
+        """Take the drone whose scripts they are, and the clock."""
+        self._host = host
+        self._names = list(host.script_parameters)
+        self._parameters: List[Parameters] = list(host.script_parameters.values())
+        self._own = self._names.index(host.own_script)
+        self._clock = surroundings.clock
+        self._time_step = surroundings.time_step
+
+    # ---- time
+
+    def getSimulationTime(self) -> float:
+        """Return the simulated time in seconds."""
+        return self._clock()
+
+    def getSimulationTimeStep(self) -> float:
+        """Return the simulation step in seconds."""
+        return self._time_step
+
+    def getInt32Parameter(self, parameter: int) -> int:
+        """Return sim.intparam_program_version; there is no other."""
+        if parameter != CONSTANTS["intparam_program_version"]:
+            raise ValueError(f"no integer parameter {parameter}; known is sim.intparam_program_version")
+        return _VERSION
+
+    def getInt32Param(self, parameter: int) -> int:
+        """Return sim.intparam_program_version; there is no other."""
+        return self.getInt32Parameter(parameter)
+
+    # ---- scripts
+
+    def getScriptHandle(self, name: Optional[Name] = None) -> int:
+        """Return the handle of the script that is attached to an object; of this one without a name."""
+        if name is None:
+            return self._own
+        if name in self._names:
+            return self._names.index(name)
+        objects = self._host.objects
+        try:
+            attached = objects[object_paths.find(objects, name, self._host.own_script)].name
+        except ValueError:
+            attached = ""
+        if attached not in self._names:
+            raise ValueError(f"no script is attached to '{name}'; {near_names(name, self._names)}")
+        return self._names.index(attached)
+
+    def getObjectAssociatedWithScript(self, script: Handle) -> int:
+        """Return the handle of the object that a script is attached to."""
+        return self._host.objects.handle(self._names[self._index(script)])
+
+    def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
+        """Return a simulation parameter of a script."""
+        parameters = self._parameters[self._index(script)]
+        if name not in parameters:
+            raise ValueError(f"no script parameter '{name}'; {near_names(name, parameters)}")
+        value = parameters[name]
+        return list(value) if isinstance(value, tuple) else value
+
+    def setScriptSimulationParameter(self, script: Handle, name: Name, value: Any) -> None:
+        """Set a simulation parameter of a script: `particleVelocity` (m/s) drives a propeller.
+
+        With sim.handle_tree it is set in this script and those below.
+        """
+        if script == _TREE:
+            for parameters in self._parameters:
+                parameters[name] = _stored(value, parameters.get(name))
+            return
+        parameters = self._parameters[self._index(script)]
+        parameters[name] = _stored(value, parameters.get(name))
+
+    def _index(self, script: int) -> int:
+        if script == _SELF:
+            return self._own
+        if not isinstance(script, (int, float)):
+            raise WrongValue("the handle of a script is expected")
+        if not 0 <= script < len(self._parameters):
+            raise ValueError(f"no script has the handle {script}")
+        return int(script)
+
+    # ---- log
+
+    def addStatusbarMessage(self, message: Any) -> None:
+        """Write a line to the log."""
+        LOG.info("%s", message)
+
+    def addLog(self, _verbosity: int, message: Any) -> None:
+        """Write a line to the log."""
+        LOG.info("%s", message)
+
+
+def _stored(value: Any, before: Any) -> Any:
+    """Return a value as V-REP keeps it, where '5.33' is a number and 'true' is true.
+
+    Raises WrongValue where something else comes in the place of a number.
+    """
+    if isinstance(value, str):
+        value = _from_text(value)
+    if type(value) is float or type(value) is int:
+        if not math.isfinite(value):
+            raise WrongValue("a finite number is expected")
+    elif type(before) is float or type(before) is int:
+        raise WrongValue("a number is expected")
+    return value
+
+
+def _from_text(text: str) -> Any:
+    words: Dict[str, Tuple[Any]] = {"true": (True,), "false": (False,)}
+    if text in words:
+        return words[text][0]
+    try:
+        return float(text)
+    except ValueError:
+        return text

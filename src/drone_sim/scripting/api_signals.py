@@ -1,0 +1,71 @@
+"""`sim`: signals, values under a name that one script leaves for another, or for itself."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, Optional, Type
+
+from drone_sim.scripting.calls import WrongValue
+
+Name = str
+Number = float
+Text = str
+
+
+class Signals:
+    """Float, integer and string signals; a name may be used once for each kind."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self._values: Dict[Type[Any], Dict[str, Any]] = {float: {}, int: {}, str: {}}
+
+    def setFloatSignal(self, name: Name, value: Number) -> None:
+        """Set a number."""
+        self._values[float][_name(name)] = float(value)
+
+    def getFloatSignal(self, name: Name) -> Optional[float]:
+        """Return a number, or nothing where it is not set."""
+        return self._values[float].get(name)
+
+    def clearFloatSignal(self, name: Optional[Name] = None) -> None:
+        """Forget a number, or all of them."""
+        self._clear(float, name)
+
+    def setInt32Signal(self, name: Name, value: int) -> None:
+        """Set a whole number."""
+        self._values[int][_name(name)] = int(value)
+
+    def getInt32Signal(self, name: Name) -> Optional[int]:
+        """Return a whole number, or nothing where it is not set."""
+        return self._values[int].get(name)
+
+    def clearInt32Signal(self, name: Optional[Name] = None) -> None:
+        """Forget a whole number, or all of them."""
+        self._clear(int, name)
+
+    setIntegerSignal, getIntegerSignal, clearIntegerSignal = setInt32Signal, getInt32Signal, clearInt32Signal
+
+    def setStringSignal(self, name: Name, value: Text) -> None:
+        """Set a string."""
+        if not isinstance(value, (str, bytes)):
+            raise WrongValue("a string is expected")
+        self._values[str][_name(name)] = value
+
+    def getStringSignal(self, name: Name) -> Optional[str]:
+        """Return a string, or nothing where it is not set."""
+        return self._values[str].get(name)
+
+    def clearStringSignal(self, name: Optional[Name] = None) -> None:
+        """Forget a string, or all of them."""
+        self._clear(str, name)
+
+    def _clear(self, kind: Type[Any], name: Optional[str]) -> None:
+        if name is None:
+            self._values[kind].clear()
+        else:
+            self._values[kind].pop(name, None)
+
+
+def _name(name: str) -> str:
+    if not isinstance(name, str):
+        raise WrongValue("the name of a signal is a string")
+    return name

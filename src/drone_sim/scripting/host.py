@@ -1,0 +1,60 @@
+"""What the script API needs from the drone that the script flies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Callable, ContextManager, Dict, Mapping, Optional, Protocol, Sequence
+
+import numpy as np
+
+from drone_sim.frames import Vector
+from drone_sim.objects import ObjectTree
+
+Parameters = Dict[str, Any]
+
+
+class DrawingSink(Protocol):
+    """Draws what a script asks for."""
+
+    def __call__(self, function: str, arguments: Sequence[Any], handle: int) -> None:
+        """Take a call such as ("addDrawingObjectItem", (1, [x, y, z]), 1).
+
+        `handle` is what the script gets back from a function that makes something (addDrawingObject,
+        addParticleObject, floatingViewAdd), and the first argument of every other function.
+        """
+
+
+class Host(Protocol):
+    """The drone, as the API sees it."""
+
+    @property
+    def objects(self) -> ObjectTree:
+        """The objects of the scene."""
+
+    @property
+    def script_parameters(self) -> Mapping[str, Parameters]:
+        """Simulation parameters of the script that is attached to each object, by the object's name."""
+
+    @property
+    def own_script(self) -> str:
+        """Name of the object that this script is attached to."""
+
+    @property
+    def drawing(self) -> Optional[DrawingSink]:
+        """Where to draw, if anywhere."""
+
+    def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
+        """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m)."""
+
+    def turn_joint(self, joint: str, angle: Optional[float]) -> float:
+        """Turn a joint to an angle (rad), unless None; return the angle. Raises ValueError for what is none."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What the API needs besides the drone: the simulation's clock, and the vision sensors by object name."""
+
+    clock: Callable[[], float]
+    time_step: float
+    pictures: Mapping[str, Callable[[], np.ndarray]] = field(default_factory=dict)
+    paused: Optional[Callable[[], ContextManager[None]]] = None

@@ -1,0 +1,77 @@
+"""Child scripts by file: .py and .lua behind one interface."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Mapping, Protocol
+
+from drone_sim.objects import near_names
+from drone_sim.resources import resolve
+from drone_sim.scripting.calls import Api
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.messages import Callback
+from drone_sim.scripting.python_script import PythonScript
+from drone_sim.scripting.time_limit import TimeLimit
+
+_BUILT_IN = Path(__file__).resolve().parents[1] / "child_scripts"
+DEFAULT = "tutorial"
+
+
+class Script(Protocol):
+    """A child script that is loaded."""
+
+    def call(self, phase: str) -> None:
+        """Run a phase: init, actuation, sensing or cleanup. Raises ScriptError."""
+
+    def callback(self, callback: Callback, message: Any) -> None:
+        """Call a function of the script with a message. Raises ScriptError."""
+
+    def close(self) -> None:
+        """Free what the script holds; may be called twice."""
+
+
+class NoScript:
+    """What a drone has before a script is loaded."""
+
+    def call(self, _phase: str) -> None:
+        """Do nothing."""
+
+    def callback(self, _callback: Callback, _message: Any) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def script_path(script: str) -> str:
+    """Return the path of a script: a file, a package:// address, or the name of a built-in one.
+
+    '' is the tutorial's. Raises ScriptError.
+    """
+    name = script or DEFAULT
+    if "/" not in name and not Path(name).suffix:
+        known = {path.stem: path for path in _BUILT_IN.glob("*.py") if path.stem != "__init__"}
+        if name not in known:
+            raise ScriptError("load", name, 0, f"no built-in script of that name; {near_names(name, known)}")
+        return str(known[name])
+    if Path(name).suffix not in (".py", ".lua"):
+        raise ScriptError("load", name, 0, "a child script's name ends in .py or .lua")
+    try:
+        return str(resolve(name))
+    except FileNotFoundError as error:
+        raise ScriptError("load", name, 0, str(error)) from None
+
+
+def load(script: str, modules: Mapping[str, Api], limit: TimeLimit) -> Script:
+    """Load a child script; raises ScriptError."""
+    path = script_path(script)
+    try:
+        if path.endswith(".lua"):
+            from drone_sim.scripting.lua_script import LuaScript  # whoever flies Python needs no lupa
+
+            return LuaScript(path, modules, limit)
+        return PythonScript(path, modules, limit)
+    except OSError as error:
+        raise ScriptError("load", path, 0, error.strerror or str(error)) from None
+    except ImportError as error:
+        raise ScriptError("load", path, 0, f"Lua scripts need lupa (pip install lupa): {error}") from None

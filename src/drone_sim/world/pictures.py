@@ -1,0 +1,134 @@
+"""What can be seen of the world: PyBullet's visual shapes as neutral descriptions, and where they are."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
+
+import numpy as np
+import pybullet
+
+from drone_sim.frames import Matrix, from_quaternion, multiply
+from drone_sim.state import Pose, compose
+from drone_sim.visual import Visual
+
+
+class _Part(NamedTuple):
+    visual: Visual
+    link: int  # -1: the root link
+    local: Matrix  # the link's frame from the visual
+
+
+class Pictures:
+    """The visual shapes of one client's bodies, read once for each body."""
+
+    def __init__(self, client: int):
+        """Start with an empty world."""
+        self._client = client
+        self._floor = -1
+        self._textures: Dict[int, str] = {}
+        self._parts: Dict[int, List[_Part]] = {}
+
+    def set_floor(self, body: int, texture: str) -> None:
+        """Say which body receives the shadows, and its texture."""
+        self._floor = body
+        self.set_texture(body, texture)
+
+    def set_texture(self, body: int, texture: str) -> None:
+        """Say which image covers a body: PyBullet does not tell."""
+        self._textures[body] = texture
+
+    def forget(self, body: int) -> None:
+        """Read a body anew: it has changed, or is gone."""
+        self._parts.pop(body, None)
+
+    def place(self, body: int, places: Mapping[int, Matrix]) -> None:
+        """Move some of a body's visuals, by index, to other places in their link's frame."""
+        parts = self._of(body)
+        for index, place in places.items():
+            parts[index] = parts[index]._replace(local=place)
+
+    def visuals(self, bodies: Iterable[int]) -> List[Visual]:
+        """Return all that can be drawn of these bodies."""
+        return [part.visual for body in bodies for part in self._of(body)]
+
+    def poses(self, root_from_inertial: Mapping[int, Pose]) -> np.ndarray:
+        """Return the poses world from visual, (N, 4, 4), of bodies given with the inverse of their inertial frame."""
+        poses = [np.empty((0, 4, 4))]
+        for body, inverse in root_from_inertial.items():
+            centre = Pose(*pybullet.getBasePositionAndOrientation(body, self._client))
+            root = compose(centre, inverse).matrix
+            links = {-1: root}
+            for part in self._of(body):
+                if part.link not in links:
+                    links[part.link] = self._link(body, part.link)
+            local = np.tile(np.eye(4), (len(self._of(body)), 1, 1))
+            local[:, :3] = np.reshape(
+                [multiply(links[part.link], part.local) for part in self._of(body)] or np.empty(0), (-1, 3, 4)
+            )
+            poses.append(local)
+        return np.concatenate(poses)
+
+    def _link(self, body: int, link: int) -> Matrix:
+        state = pybullet.getLinkState(body, link, 0, 1, self._client)
+        return from_quaternion(state[4], state[5])
+
+    def _of(self, body: int) -> List[_Part]:
+        if body not in self._parts:
+            rows = pybullet.getVisualShapeData(body, physicsClientId=self._client)
+            self._parts[body] = [self._part((body, index), row) for index, row in enumerate(rows)]
+        return self._parts[body]
+
+    def _part(self, key: Tuple[int, int], row: Sequence[Any]) -> _Part:
+        _, link, kind, dimensions, file, position, orientation, rgba = row[:8]
+        shape, size = _shape_and_size(kind, dimensions)
+        visual = Visual(
+            key=key,
+            shape=shape,
+            size=size,
+            rgba=tuple(rgba),
+            file=file.decode() if shape == "mesh" else "",
+            texture=self._textures.get(key[0], ""),
+            floor=key[0] == self._floor,
+        )
+        return _Part(visual, link, from_quaternion(position, orientation))
+
+    def tiny(
+        self, camera: np.ndarray, size: Tuple[int, int], vertical_fov: float, depths: Tuple[float, float]
+    ) -> Tuple[np.ndarray, np.ndarray]:
+        """Return RGB (height, width, 3) and depth (height, width) of PyBullet's software renderer.
+
+        Slow, but always there. `camera` is the (4, 4) pose world from optical frame, `size` (width, height),
+        the field of view in radians, `depths` the near and far plane; depth is in metres along the optical
+        z, NaN where nothing is nearer than the far plane.
+        """
+        (width, height), (near, far) = size, depths
+        gl_from_optical = np.diag([1.0, -1.0, -1.0, 1.0])
+        view = gl_from_optical @ np.linalg.inv(camera)
+        projection = pybullet.computeProjectionMatrixFOV(
+            np.degrees(vertical_fov), width / height, near, far, self._client
+        )
+        picture = pybullet.getCameraImage(
+            width,
+            height,
+            view.T.ravel().tolist(),
+            projection,
+            shadow=0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            flags=pybullet.ER_NO_SEGMENTATION_MASK,
+            physicsClientId=self._client,
+        )
+        color = np.ascontiguousarray(np.reshape(picture[2], (height, width, 4))[:, :, :3], dtype=np.uint8)
+        buffer = np.reshape(picture[3], (height, width))
+        depth = np.where(buffer < 1, far * near / (far - (far - near) * buffer), np.nan)
+        return color, depth.astype(np.float32)
+
+
+def _shape_and_size(kind: int, dimensions: Sequence[float]) -> Tuple[str, Tuple[float, ...]]:
+    if kind in (pybullet.GEOM_CYLINDER, pybullet.GEOM_CAPSULE):
+        length, radius = dimensions[:2]  # PyBullet's order
+        return ("cylinder" if kind == pybullet.GEOM_CYLINDER else "capsule"), (radius, length)
+    if kind == pybullet.GEOM_SPHERE:
+        return "sphere", (dimensions[0],)
+    if kind == pybullet.GEOM_PLANE:
+        return "plane", ()
+    return ("box" if kind == pybullet.GEOM_BOX else "mesh"), tuple(dimensions)

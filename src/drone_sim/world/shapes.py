@@ -1,0 +1,99 @@
+"""Make PyBullet bodies: the floor, and the objects of a scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Dict, NamedTuple, Sequence, Tuple
+
+import pybullet
+
+from drone_sim.frames import from_rpy, to_quaternion
+
+_FLOOR_TILE = 2.0  # m covered by one floor texture
+_FLOOR_THICKNESS = 0.1  # m, below z = 0
+
+
+class Shape(NamedTuple):
+    """An object: what, where (m, rad), how it looks (rgba 0..1), how heavy (kg, 0 stands still).
+
+    kind and size (m): box: length, width, height; cylinder: radius, length; sphere: radius; mesh: scale x, y, z
+    (no unit); urdf: none.
+    """
+
+    kind: str
+    size: Sequence[float]
+    position: Sequence[float]
+    rpy: Sequence[float] = (0.0, 0.0, 0.0)
+    color: Sequence[float] = (1.0, 1.0, 1.0, 1.0)
+    mass: float = 0.0
+    file: str = ""
+    texture: str = ""
+
+
+def create(client: int, shape: Shape) -> int:
+    """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
+    orientation = to_quaternion(from_rpy((0, 0, 0), shape.rpy))
+    try:
+        if shape.kind == "urdf":
+            return pybullet.loadURDF(
+                shape.file, shape.position, orientation, useFixedBase=shape.mass == 0, physicsClientId=client
+            )
+        collision, visual = _geometry(shape)
+        solid = pybullet.createCollisionShape(physicsClientId=client, **collision)
+        seen = pybullet.createVisualShape(rgbaColor=shape.color, physicsClientId=client, **visual)
+        body = pybullet.createMultiBody(
+            shape.mass, solid, seen, shape.position, orientation, physicsClientId=client
+        )
+    except pybullet.error:
+        raise ValueError(f"{shape.kind} {shape.file}: PyBullet cannot read it") from None
+    if shape.texture:
+        image = pybullet.loadTexture(shape.texture, physicsClientId=client)
+        pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
+    return body
+
+
+def _geometry(shape: Shape) -> Tuple[Dict[str, Any], Dict[str, Any]]:
+    """Return PyBullet's arguments for the collision and for the visual shape, which differ in their words."""
+    if shape.kind == "box":
+        both: Dict[str, Any] = {"shapeType": pybullet.GEOM_BOX, "halfExtents": [length / 2 for length in shape.size]}
+        return both, both
+    if shape.kind == "sphere":
+        both = {"shapeType": pybullet.GEOM_SPHERE, "radius": shape.size[0]}
+        return both, both
+    if shape.kind == "cylinder":
+        both = {"shapeType": pybullet.GEOM_CYLINDER, "radius": shape.size[0]}
+        return {**both, "height": shape.size[1]}, {**both, "length": shape.size[1]}
+    both = {"shapeType": pybullet.GEOM_MESH, "fileName": shape.file, "meshScale": list(shape.size)}
+    if shape.mass == 0:  # what stands still may be hollow; what moves is its convex hull
+        return {**both, "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH}, both
+    return both, both
+
+
+def create_floor(client: int, folder: Path, size: float, texture: str) -> int:
+    """Add a square floor with its top at z = 0, `size` metres a side; return its body id."""
+    solid = pybullet.createCollisionShape(
+        pybullet.GEOM_BOX,
+        halfExtents=[size / 2, size / 2, _FLOOR_THICKNESS / 2],
+        collisionFramePosition=[0, 0, -_FLOOR_THICKNESS / 2],
+        physicsClientId=client,
+    )
+    seen = pybullet.createVisualShape(
+        pybullet.GEOM_MESH, fileName=_write_floor_mesh(folder, size), physicsClientId=client
+    )
+    body = pybullet.createMultiBody(0, solid, seen, physicsClientId=client)
+    image = pybullet.loadTexture(texture, physicsClientId=client)
+    pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
+    return body
+
+
+def _write_floor_mesh(folder: Path, size: float) -> str:
+    """Write a square whose texture repeats every _FLOOR_TILE metres, centred; return its path."""
+    half, reach = size / 2, size / 2 / _FLOOR_TILE
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    lines = [f"v {x * half} {y * half} 0" for x, y in corners]
+    lines += [f"vt {x * reach} {y * reach}" for x, y in corners]
+    lines += ["vn 0 0 1", "f 1/1/1 2/2/1 3/3/1", "f 1/1/1 3/3/1 4/4/1", ""]
+    # PyBullet and the renderer keep meshes by file name: another size is another file.
+    path = folder / f"floor_{size}.obj"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return str(path)

@@ -1,0 +1,188 @@
+"""The PyBullet world. Metres, kilograms, seconds, world frame ENU.
+
+One thread owns it. Every call names its client, so several worlds can live in one process.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Dict, List, Mapping, Sequence, Tuple
+
+import numpy as np
+import pybullet
+
+from drone_sim.frames import Matrix, cross
+from drone_sim.propeller import Wrench
+from drone_sim.state import Pose, State, compose, inverse
+from drone_sim.urdf import RigidBody
+from drone_sim.visual import Visual
+from drone_sim.world import shapes
+from drone_sim.world.pictures import Pictures
+
+
+class World:
+    """A floor, objects and rigid bodies under gravity."""
+
+    def __init__(self, sub_step: float, gravity: float, gui: bool = False):
+        """Make an empty world that steps by `sub_step` (s); `gui` opens PyBullet's window.
+
+        Raises RuntimeError where `gui` finds no display.
+        """
+        self._client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
+        if self._client < 0:
+            raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
+        self._sub_step, self._gravity = sub_step, gravity
+        self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_")
+        if gui:
+            pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
+        self.clear()
+
+    def clear(self) -> None:
+        """Remove everything."""
+        pybullet.resetSimulation(self._client)
+        pybullet.setGravity(0, 0, self._gravity, self._client)
+        pybullet.setTimeStep(self._sub_step, self._client)
+        self._inertial_frames: Dict[int, Tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
+        self._pictures = Pictures(self._client)
+
+    def close(self) -> None:
+        """Free the world; may be called twice."""
+        if self._client >= 0:
+            pybullet.disconnect(self._client)
+            self._client = -1
+            self._folder.cleanup()
+
+    # ---- building
+
+    def add_floor(self, size: float, texture: str) -> int:
+        """Add a square floor with its top at z = 0, `size` metres a side; return its body id."""
+        body = shapes.create_floor(self._client, Path(self._folder.name), size, texture)
+        self._set_material(body)
+        self._pictures.set_floor(body, texture)
+        return body
+
+    def add_shape(self, shape: shapes.Shape) -> int:
+        """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
+        body = shapes.create(self._client, shape)
+        self._set_material(body)
+        if shape.texture:
+            self._pictures.set_texture(body, shape.texture)
+        return body
+
+    def add_rigid_body(self, body: RigidBody, pose: Pose) -> int:
+        """Add a merged URDF with its root link at `pose`, at rest; return its body id."""
+        path = Path(self._folder.name) / "body.urdf"
+        path.write_text(body.xml, encoding="utf-8")
+        # The merged inertia is right; what PyBullet would derive from the collision shapes' bounds is not.
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+        number = pybullet.loadURDF(
+            str(path), pose.position, pose.orientation, flags=flags, physicsClientId=self._client
+        )
+        self._set_material(number)
+        self.set_pose(number, pose)  # again, for PyBullet reads a URDF's pose in single precision
+        return number
+
+    def remove(self, body: int) -> None:
+        """Take a body out of the world."""
+        pybullet.removeBody(body, self._client)
+        del self._inertial_frames[body]
+        self._pictures.forget(body)
+
+    def set_color(self, body: int, rgba: Sequence[float]) -> None:
+        """Paint all of a body (0..1 each)."""
+        for link in range(-1, pybullet.getNumJoints(body, self._client)):
+            pybullet.changeVisualShape(body, link, rgbaColor=rgba, physicsClientId=self._client)
+        self._pictures.forget(body)
+
+    def _set_material(self, number: int) -> None:
+        # V-REP's Bullet material: friction 1, no restitution, no damping (PyBullet's default damps).
+        pybullet.changeDynamics(
+            number,
+            -1,
+            lateralFriction=1,
+            restitution=0,
+            linearDamping=0,
+            angularDamping=0,
+            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            physicsClientId=self._client,
+        )
+        info = pybullet.getDynamicsInfo(number, -1, self._client)
+        inertial = Pose(info[3], info[4])
+        self._inertial_frames[number] = (inertial, inverse(inertial))
+
+    # ---- dynamics
+
+    def inertial_frame(self, body: int) -> Matrix:
+        """Return the transform root link from inertial frame (centre of mass, principal axes)."""
+        return self._inertial_frames[body][0].matrix
+
+    def state(self, body: int) -> State:
+        """Return pose and velocity of a body's root link."""
+        centre, turn = pybullet.getBasePositionAndOrientation(body, self._client)
+        linear, angular = pybullet.getBaseVelocity(body, self._client)
+        root = compose(Pose(centre, turn), self._inertial_frames[body][1])
+        arm = (root.position[0] - centre[0], root.position[1] - centre[1], root.position[2] - centre[2])
+        swing = cross(angular, arm)
+        velocity = (linear[0] + swing[0], linear[1] + swing[1], linear[2] + swing[2])
+        return State(*root, velocity, angular)
+
+    def set_pose(self, body: int, pose: Pose) -> None:
+        """Move a body's root link to `pose` and stop it."""
+        inertial = self._inertial_frames[body][0]
+        centre, turn = compose(pose, inertial)
+        pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
+        pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
+
+    def advance(self, wrenches: Mapping[int, Wrench], sub_steps: int) -> None:
+        """Step `sub_steps` times, re-applying each body's wrench every time (PyBullet forgets it)."""
+        # Local names and positional arguments: this loop is most of a step.
+        client, in_world = self._client, pybullet.WORLD_FRAME
+        where, push, turn, step = (
+            pybullet.getBasePositionAndOrientation,
+            pybullet.applyExternalForce,
+            pybullet.applyExternalTorque,
+            pybullet.stepSimulation,
+        )
+        for _ in range(sub_steps):
+            for body, wrench in wrenches.items():
+                centre, orientation = where(body, client)
+                push(body, -1, wrench.force, centre, in_world, client)
+                turn(body, -1, wrench.torque_under(orientation), in_world, client)
+            step(client)
+
+    def snapshot(self) -> int:
+        """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget`."""
+        return pybullet.saveState(self._client)
+
+    def restore(self, number: int) -> None:
+        """Bring back what `snapshot` remembered, to the last bit."""
+        pybullet.restoreState(number, physicsClientId=self._client)
+
+    def forget(self, number: int) -> None:
+        """Free a snapshot."""
+        pybullet.removeState(number, physicsClientId=self._client)
+
+    # ---- pictures
+
+    def visuals(self) -> List[Visual]:
+        """Return everything that can be drawn, in the order of `visual_poses`."""
+        return self._pictures.visuals(self._inertial_frames)
+
+    def visual_poses(self) -> np.ndarray:
+        """Return the poses world from visual, (N, 4, 4)."""
+        return self._pictures.poses({body: frame[1] for body, frame in self._inertial_frames.items()})
+
+    def place_visuals(self, body: int, places: Mapping[int, Matrix]) -> None:
+        """Move some of a body's visuals, by index, to other places in its root link's frame."""
+        self._pictures.place(body, places)
+
+    def tiny_picture(
+        self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
+    ) -> Tuple[np.ndarray, np.ndarray]:
+        """Return RGB and depth of PyBullet's software renderer: see Pictures.tiny."""
+        return self._pictures.tiny(camera, (width, height), vertical_fov, (near, far))
+
+    def look_from_behind(self, position: Sequence[float], yaw: float) -> None:
+        """Put the camera of PyBullet's window behind and above a place (m), looking along a yaw (rad)."""
+        pybullet.resetDebugVisualizerCamera(2.0, np.degrees(yaw) - 90, -20, position, self._client)

@@ -1,0 +1,212 @@
+"""What the functions of `sim` do."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from drone_sim import frames, parameters
+from drone_sim.scripting.api import make_sim
+from drone_sim.scripting.errors import ApiError, UnknownName
+from drone_sim.scripting.host import Surroundings
+from drone_sim.simulation import Simulation
+from drone_sim.state import Pose
+
+SMALL = {"front": {"width": 8, "height": 6}}
+PICTURE = np.array([[[255, 0, 0]] * 3, [[0, 0, 255]] * 3], dtype=np.uint8)  # red above, blue below
+
+
+@pytest.fixture(name="simulation")
+def _simulation(tmp_path):
+    script = tmp_path / "still.py"
+    script.write_text("", encoding="utf-8")
+    simulation = Simulation(parameters.load({"cameras": SMALL, "gravity": 0.0}), script=str(script))
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture(name="sim")
+def _sim(simulation):
+    return make_sim(simulation.drone, Surroundings(lambda: simulation.time, 0.05, {"FrontVision": lambda: PICTURE}))
+
+
+@pytest.fixture(name="base")
+def _base(sim):
+    return sim.getObject("/Quadcopter/base")
+
+
+def test_positions_and_orientations(simulation, sim, base):
+    simulation.drone.move(Pose((1, 2, 3), frames.to_quaternion(frames.from_euler((0, 0, 0), (0.1, 0.2, 0.3)))))
+    heli = sim.getObject(".")
+    assert sim.getObjectPosition(heli) == pytest.approx([1, 2, 3])
+    assert sim.getObjectOrientation(base, -1) == pytest.approx([0.1, 0.2, 0.3])
+    assert sim.getObjectPosition(base, heli) == pytest.approx([0, 0, -0.01])
+    assert sim.getObjectPosition(base, sim.handle_parent) == pytest.approx([0, 0, -0.01])
+    m = sim.getObjectMatrix(base, sim.handle_world)
+    assert m[3::4] == pytest.approx(sim.getObjectPosition(base))
+    assert sim.multiplyVector(sim.getMatrixInverse(m), m[3::4]) == pytest.approx([0, 0, 0], abs=1e-12)
+    assert sim.multiplyMatrices(m, sim.getInvertedMatrix(m)) == pytest.approx(list(frames.IDENTITY), abs=1e-12)
+    assert sim.buildMatrix(sim.getObjectPosition(base), sim.getEulerAnglesFromMatrix(m)) == pytest.approx(m)
+    assert sim.getObjectPose(base)[3:] == pytest.approx(sim.getObjectQuaternion(base))
+
+
+@pytest.mark.parametrize("order", ["3.x", "4.x", "world left out"])
+def test_setters_take_their_arguments_in_either_order(sim, order):
+    target = sim.getObject("/target")
+    sim.setObjectParent(target, -1, True)
+
+    def arguments(values):
+        return {"3.x": (-1, values), "4.x": (values, -1), "world left out": (values,)}[order]
+
+    sim.setObjectPosition(target, *arguments([1, 2, 3]))
+    sim.setObjectOrientation(target, *arguments([0.1, -0.2, 0.3]))
+    assert sim.getObjectPosition(target) == [1, 2, 3]
+    assert sim.getObjectOrientation(target) == pytest.approx([0.1, -0.2, 0.3])
+    sim.setObjectPose(target, *arguments([0, 0, 1, 0, 0, 0, 2]))
+    assert sim.getObjectMatrix(target) == pytest.approx([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 1])
+    sim.setObjectMatrix(target, *arguments(list(frames.from_euler((3, 2, 1), (0, 0, 1)))))
+    assert sim.getObjectOrientation(target) == pytest.approx([0, 0, 1])
+    sim.setObjectQuaternion(target, *arguments([0, 0, 0, 1]))
+    assert sim.getObjectOrientation(target) == pytest.approx([0, 0, 0])
+
+
+def test_names(sim, base):
+    assert (sim.getObjectName(base), sim.getObjectAlias(base), sim.getObjectAlias(base, 1)) == (
+        "Quadricopter_base",
+        "base",
+        "/Quadcopter/base",
+    )
+    assert sim.getObjectParent(base) == sim.getObject("/Quadcopter")
+    assert sim.getObject("/nothing", {"noError": True}) == -1
+    assert [sim.getNameSuffix(name) for name in ("Drone", "Drone#", "Drone#2", None)] == [-1, -1, 2, -1]
+    assert sim.getObjectSizeFactor(base) == 1
+
+
+def test_scripts(sim):
+    own = sim.getScriptHandle("Drone")
+    assert sim.getScriptHandle() == sim.getScriptHandle("Quadricopter") == own
+    propeller = sim.getScriptHandle("Quadricopter_propeller_respondable2")
+    assert sim.getScriptHandle("/propeller[1]/respondable") == propeller
+    assert sim.getObjectName(sim.getObjectAssociatedWithScript(propeller)) == "Quadricopter_propeller_respondable2"
+    sim.setScriptSimulationParameter(propeller, "particleVelocity", "5.5")
+    assert sim.getScriptSimulationParameter(propeller, "particleVelocity") == 5.5
+    sim.setScriptSimulationParameter(sim.handle_tree, "particlesAreVisible", "false")
+    assert sim.getScriptSimulationParameter(sim.handle_self, "particlesAreVisible") is False
+    with pytest.raises(ApiError, match="near names are particleVelocity"):
+        sim.getScriptSimulationParameter(propeller, "particleVelocty")
+    with pytest.raises(ApiError, match="no script is attached to 'FrontVision'"):
+        sim.getScriptHandle("FrontVision")
+
+
+def test_signals(sim):
+    sim.setFloatSignal("a", 1)
+    sim.setInt32Signal("a", 2)
+    sim.setStringSignal("a", "three")
+    assert (sim.getFloatSignal("a"), sim.getIntegerSignal("a"), sim.getStringSignal("a")) == (1.0, 2, "three")
+    sim.clearIntegerSignal("a")
+    sim.clearFloatSignal()
+    assert (sim.getFloatSignal("a"), sim.getInt32Signal("a"), sim.getStringSignal("a")) == (None, None, "three")
+    sim.clearStringSignal("a")
+    sim.clearStringSignal("a")
+    assert sim.getStringSignal("a") is None
+    with pytest.raises(ApiError, match="a string is expected: got"):
+        sim.setStringSignal("a", 1)
+
+
+def test_a_force_accelerates_and_lasts_one_step(simulation, sim):
+    mass = 0.52
+    sim.addForceAndTorque(sim.getObject("/Quadcopter"), [0.52, 0, 0], [0, 0, 0])
+    simulation.step()
+    speed = simulation.drone.state.linear_velocity[0]
+    assert speed == pytest.approx(0.52 / mass * 0.05, rel=0.05)
+    simulation.step()
+    assert simulation.drone.state.linear_velocity[0] == pytest.approx(speed, rel=1e-3)
+
+
+def test_a_force_at_a_propeller_acts_at_its_centre_of_mass(simulation, sim):
+    """The torque about z of a force along x at (0.09192, 0.09192) is -0.09192 F; inertia 8.93e-3."""
+    sim.addForceAndTorque(sim.getObject("/propeller[0]/respondable"), [0.1, 0, 0])
+    simulation.step()
+    assert simulation.drone.state.angular_velocity[2] == pytest.approx(-0.09192 * 0.1 / 8.93e-3 * 0.05, rel=1e-2)
+
+
+def test_add_force_is_given_in_the_frame_of_the_body(simulation, sim):
+    simulation.drone.move(Pose((0, 0, 2), frames.to_quaternion(frames.from_rpy((0, 0, 0), (0, 0, 1.5707963267948966)))))
+    sim.addForce(sim.getObject("/Quadcopter"), [0, 0, 0], [0.52, 0, 0])
+    simulation.step()
+    x, y, _ = simulation.drone.state.linear_velocity
+    assert y == pytest.approx(0.05, rel=0.05) and abs(x) < 1e-6
+
+
+def test_forces_act_on_bodies_alone(sim):
+    with pytest.raises(ApiError, match="'Floor' is not a dynamic shape"):
+        sim.addForceAndTorque(sim.getObject("/Floor"), [0, 0, 1], [0, 0, 0])
+    with pytest.raises(ApiError, match="is not a joint"):
+        sim.setJointPosition(sim.getObject("/Floor"), 1)
+
+
+def test_velocities(simulation, sim, base):
+    sim.addForceAndTorque(sim.getObject("."), [0, 0.1, 0], [0, 0, 0.001])
+    simulation.step()
+    linear, angular = sim.getObjectVelocity(base)
+    assert (linear, angular) == sim.getVelocity(base)
+    state = simulation.drone.state
+    swing = frames.cross(state.angular_velocity, frames.rotate(state.matrix, (0, 0, -0.01)))
+    assert linear == pytest.approx([a + b for a, b in zip(state.linear_velocity, swing)], abs=1e-12)
+    assert angular == pytest.approx(simulation.drone.state.angular_velocity)
+
+
+def test_images_come_with_the_bottom_row_first(sim):
+    front = sim.getObject("/FrontVision")
+    image, width, height = sim.getVisionSensorCharImage(front)
+    assert (width, height, image) == (3, 2, bytes([0, 0, 255] * 3 + [255, 0, 0] * 3))
+    assert sim.getVisionSensorImg(front) == (image, [3, 2])
+    assert sim.getVisionSensorRes(front) == sim.getVisionSensorResolution(front) == [3, 2]
+    assert sim.handleVisionSensor(front) == 0
+    with pytest.raises(ApiError, match="'Drone' is not a vision sensor; there are: FrontVision"):
+        sim.getVisionSensorCharImage(sim.getObject("."))
+
+
+def test_what_cannot_be_drawn_is_said_once(sim, caplog):
+    with caplog.at_level(logging.INFO):
+        first = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 10)
+        second = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 10)
+        for _ in range(3):
+            assert sim.addDrawingObjectItem(first, [0, 0, 0]) is None
+    assert first != second
+    said = [record.getMessage() for record in caplog.records]
+    assert [line.partition(":")[0] for line in said] == ["sim.addDrawingObject", "sim.addDrawingObjectItem"]
+
+
+def test_a_sink_gets_what_is_drawn(simulation, sim, caplog):
+    drawn = []
+    simulation.drone.drawing = lambda function, arguments, handle: drawn.append((function, arguments, handle))
+    handle = sim.addParticleObject(sim.particle_points1, 1)
+    sim.addParticleObjectItem(handle, [1, 2, 3, 4, 5, 6])
+    assert drawn == [
+        ("addParticleObject", (0, 1), handle),
+        ("addParticleObjectItem", (handle, [1, 2, 3, 4, 5, 6]), handle),
+    ]
+    assert not caplog.records
+
+
+def test_unknown_functions_and_constants_list_the_near_ones(sim):
+    with pytest.raises(UnknownName, match="sim has no 'getObjctHandle'; near names are getObjectHandle"):
+        sim.getObjctHandle("x")
+    assert not hasattr(sim, "nothing_of_the_kind")
+
+
+def test_a_script_sees_each_step_once(tmp_path):
+    script = tmp_path / "look.py"
+    look = "sim.getVisionSensorCharImage(sim.getObject('/FrontVision'))"
+    script.write_text(f"def sysCall_sensing():\n    assert {look} == {look}", encoding="utf-8")
+    simulation = Simulation(parameters.load({"cameras": SMALL}), script=str(script))
+    camera, taken = simulation.cameras["front"], []
+    take = camera.take
+    camera.take = lambda: taken.append(simulation.steps) or take()
+    simulation.step()
+    simulation.step()
+    camera.watched = lambda: True
+    simulation.step()
+    simulation.close()
+    assert taken == [1, 2, 3]

@@ -1,0 +1,196 @@
+"""A broken script gives one line: phase, file, line, message. The next start works."""
+
+import pytest
+
+from drone_sim import parameters
+from drone_sim.scripting.constants import PHASES
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist
+
+PARAMETERS = parameters.load({"script_time_limit": 0.2})
+STOPPED = "stopped after 0.2 s without returning (script_time_limit)"
+
+
+def run(path, steps=3):
+    """Fly a script, with a command; return the messages of what it raised."""
+    said = []
+    simulation = None
+    try:
+        simulation = Simulation(PARAMETERS, script=str(path))
+        simulation.drone.receive(Twist())
+        for _ in range(steps):
+            simulation.step()
+    except ScriptError as error:
+        said.append(str(error))
+    try:
+        if simulation is not None:
+            simulation.close()
+    except ScriptError as error:
+        said.append(str(error))
+    return said
+
+
+@pytest.fixture(name="fails")
+def _fails(tmp_path):
+    def check(ending, source, phase, line, *words):
+        path = tmp_path / f"script.{ending}"
+        path.write_text(source, encoding="utf-8")
+        said = run(path)
+        assert len(said) == 1 and "\n" not in said[0]
+        assert said[0].startswith(f"[{phase}] {path}:{line}: ")
+        for word in words:
+            assert word in said[0]
+        path.write_text("", encoding="utf-8")
+        assert run(path) == [], "the next start works"
+
+    return check
+
+
+@pytest.mark.parametrize(
+    "source, phase, line, words",
+    [
+        ("x = 1\nx = = 1\n", "load", 2, ["unexpected symbol"]),
+        ("function f()\n", "load", 2, ["'end' expected"]),
+        ("\nerror('boom')", "load", 2, ["boom"]),
+        *((f"function sysCall_{phase}()\n  error('boom')\nend", phase, 2, ["boom"]) for phase in PHASES),
+        *(
+            (
+                f"if (sim_call_type==sim_childscriptcall_{name}) then\n\n  local x = nil + 1\nend",
+                phase,
+                3,
+                ["arithmetic"],
+            )
+            for name, phase in (
+                ("initialization", "init"),
+                ("actuation", "actuation"),
+                ("sensing", "sensing"),
+                ("cleanup", "cleanup"),
+            )
+        ),
+        (
+            "function sysCall_init()\n  sim.getObjctPosition(1)\nend",
+            "init",
+            2,
+            ["getObjctPosition", "getObjectPosition"],
+        ),
+        ("\n\nsimGetObjctHandle('x')", "load", 3, ["near names are simGetObjectHandle"]),
+        ("sim.getObject('/Quadcopter/bse')", "load", 1, ["near names are /Quadcopter/base"]),
+        ("local function f() return sim.getObjectHandle('Quadricopter_bas') end\nlocal h = f()", "load", 2, []),
+        ("sim.multiplyVector({1,2,3},{1,2,3})", "load", 1, ["sim.multiplyVector: 12 numbers are expected, not 3"]),
+        ("simSetObjectPosition(1,-1,{1,2})\n", "load", 1, ["simSetObjectPosition: 3 numbers", "[1, 2]", "position"]),
+        ("sim.getObjectPosition()", "load", 1, ["wrong number of values: got (), expected (handle: Handle"]),
+        ("sim.getObjectPosition(1,2,3)", "load", 1, ["wrong number of values: got (1, 2, 3)"]),
+        ("sim.getObjectPosition(nil,-1)", "load", 1, ["wrong kind of value: got (nothing, -1)"]),
+        ("local h = 1\nsim.setObjectPosition(h,-1,{0,0,0/0})", "load", 2, ["finite numbers are expected"]),
+        ("sim.setScriptSimulationParameter(1,'particleVelocity',{})", "load", 1, ["a number is expected"]),
+        ("function on_twist(m)\n error('x')\nend\nsimROS.subscribe('cmd_vel','T','on_twist')", "on_twist", 2, ["x"]),
+        ("\nrequire'foo'", "load", 2, ["no module 'foo'"]),
+    ],
+)
+def test_lua(fails, source, phase, line, words):
+    fails("lua", source, phase, line, *words)
+
+
+@pytest.mark.parametrize(
+    "source, phase, line, words",
+    [
+        ("x = 1\nx = = 1\n", "load", 2, ["SyntaxError"]),
+        ("\n1 / 0", "load", 2, ["ZeroDivisionError: division by zero"]),
+        *(
+            (f"def sysCall_{phase}():\n    raise RuntimeError('boom')", phase, 2, ["RuntimeError: boom"])
+            for phase in PHASES
+        ),
+        ("def sysCall_init():\n    sim.getObjctPosition(1)", "init", 2, ["near names are getObjectPosition"]),
+        ("sim.getObject('/Quadcopter/bse')", "load", 1, ["near names are /Quadcopter/base"]),
+        ("sim.multiplyVector([1, 2, 3], [1, 2])", "load", 1, ["sim.multiplyVector: 12 numbers", "expected (matrix"]),
+        ("sim.getObjectPosition()", "load", 1, ["wrong number of values"]),
+        ("sim.getObjectPosition('Drone')", "load", 1, ["wrong kind of value: got ('Drone')"]),
+        ("sim.getObjectPosition(99)", "load", 1, ["no object has the handle 99"]),
+        ("def f(m):\n    undefined\nsimROS.subscribe('cmd_vel', 'T', 'f')", "f", 2, ["NameError"]),
+        ("\nrequire('foo')", "load", 2, ["no module 'foo'"]),
+        ("import sys\nsys.exit(1)", "load", 2, ["SystemExit"]),
+        ("import no_such_module_", "load", 1, ["ModuleNotFoundError"]),
+    ],
+)
+def test_python(fails, source, phase, line, words):
+    fails("py", source, phase, line, *words)
+
+
+LOOP = "while true do end"
+
+
+@pytest.mark.parametrize(
+    "source, phase, line",
+    [
+        (f"\n{LOOP}", "load", 2),
+        *((f"function sysCall_{phase}()\n{LOOP}\nend", phase, 2) for phase in PHASES),
+        (f"function on_twist(m)\n{LOOP}\nend\nsimROS.subscribe('cmd_vel','T','on_twist')", "on_twist", 2),
+        (f"\nif sim_call_type==sim_childscriptcall_sensing then\n{LOOP}\nend", "sensing", 3),
+        (f"while true do pcall(function() {LOOP} end) end", "load", 1),
+        (f"while true do xpcall(function() {LOOP} end, function() {LOOP} end) end", "load", 1),
+        (f"while true do coroutine.wrap(function() {LOOP} end)() end", "load", 1),
+        (f"while true do coroutine.resume(coroutine.create(function() pcall(load('{LOOP}')) end)) end", "load", 1),
+        ("c = coroutine.wrap(function() while true do coroutine.yield() end end)\nwhile true do c() end", "load", 2),
+        (f"table.sort({{3,2,1}}, function() {LOOP} end)", "load", 1),
+        (f"local t = setmetatable({{}}, {{__index = function() {LOOP} end}})\nlocal x = t.y", "load", 1),
+        (f"print(setmetatable({{}}, {{__tostring = function() {LOOP} end}}))", "load", 1),
+        ("while true do sim.getSimulationTime() end", "load", 1),
+    ],
+)  # fmt: skip
+def test_endless_lua_is_stopped(fails, source, phase, line):
+    fails("lua", source, phase, line, STOPPED)
+
+
+@pytest.mark.parametrize(
+    "source, phase, line",
+    [
+        ("\nwhile True: pass", "load", 2),
+        *((f"def sysCall_{phase}():\n    while True: pass", phase, 2) for phase in PHASES),
+        ("def f(m):\n    while True: pass\nsimROS.subscribe('cmd_vel', 'T', f)", "f", 2),
+        ("while True:\n  try:\n    while True: pass\n  except: pass", "load", 3),
+        ("while True:\n  try:\n    while True: pass\n  except BaseException: pass\n  finally: pass", "load", 3),
+        ("import time\nwhile True: time.sleep(0.001)", "load", 2),
+        ("while True: sim.getSimulationTime()", "load", 1),
+    ],
+)
+def test_endless_python_is_stopped(fails, source, phase, line):
+    fails("py", source, phase, line, STOPPED)
+
+
+def test_a_callback_that_does_not_exist_is_named(tmp_path):
+    for ending in ("py", "lua"):
+        path = tmp_path / f"script.{ending}"
+        path.write_text("simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'on_twst')", encoding="utf-8")
+        assert run(path) == [f"[on_twst] {path}: the script has no function 'on_twst' to call back"]
+
+
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        ("script.txt", "ends in .py or .lua"),
+        ("missing.lua", "no such file"),
+        ("missing.py", "no such file"),
+        ("turtorial", "no built-in script of that name; near names are tutorial"),
+        ("package://no_such_package_/x.lua", "no ROS package"),
+    ],
+)
+def test_a_wrong_file(name, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "script.txt").write_text("", encoding="utf-8")
+    (said,) = run(name)
+    assert said.startswith(f"[load] {name}: ") and words in said
+
+
+def test_memory_is_limited(tmp_path):
+    path = tmp_path / "script.lua"
+    path.write_text("x = string.rep('x', 1e9)", encoding="utf-8")
+    (said,) = run(path)
+    assert "not enough memory" in said
+
+
+def test_the_limit_can_be_switched_off(tmp_path):
+    path = tmp_path / "script.py"
+    path.write_text("import time\ntime.sleep(0.3)", encoding="utf-8")
+    simulation = Simulation(parameters.load({"script_time_limit": 0}), script=str(path))
+    simulation.close()

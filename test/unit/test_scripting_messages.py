@@ -1,0 +1,198 @@
+"""simROS without ROS, and the seam to it."""
+
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from drone_sim import parameters
+from drone_sim.scripting.messages import Image, MessageBus
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist, Vector3
+
+
+class FakeSender:
+    def __init__(self):
+        self.sent = []
+        self.ended = False
+
+    def publish(self, message):
+        self.sent.append(message)
+
+    def shutdown(self):
+        self.ended = True
+
+
+class FakeBackend:
+    def __init__(self):
+        self.takes = {}
+        self.senders = {}
+        self.ended = []
+
+    def subscribe(self, topic, kind, take):
+        if kind == "no/Type":
+            raise ValueError("no message type no/Type")
+        self.takes[topic] = take
+        return lambda: self.ended.append(topic)
+
+    def advertise(self, topic, kind, queue, latch):
+        return self.senders.setdefault((topic, kind, queue, latch), FakeSender())
+
+    def advertise_image(self, topic, queue):
+        return self.senders.setdefault((topic, "image", queue), FakeSender())
+
+
+def test_names_stand_in_the_drones_namespace():
+    bus, heard = MessageBus("drone"), []
+    bus.subscribe("cmd_vel", "geometry_msgs/Twist", "relative")
+    bus.subscribe("/drone/cmd_vel", "geometry_msgs/Twist", "absolute")
+    bus.subscribe("/other/cmd_vel", "geometry_msgs/Twist", "other")
+    bus.post("cmd_vel", 1)
+    bus.deliver(lambda callback, message: heard.append((callback, message)))
+    assert heard == [("relative", 1), ("absolute", 1)]
+
+
+@pytest.mark.parametrize("queue, kept", [(0, [4]), (1, [4]), (3, [2, 3, 4]), (10, [0, 1, 2, 3, 4])])
+def test_the_last_messages_are_kept(queue, kept):
+    bus, heard = MessageBus("drone"), []
+    handle = bus.subscribe("x", "T", "f", queue)
+    for message in range(5):
+        bus.post("x", message)
+    bus.deliver(lambda _, message: heard.append(message))
+    bus.deliver(lambda _, message: heard.append(message))
+    assert heard == kept
+    bus.shutdownSubscriber(handle)
+    with pytest.raises(ValueError, match=f"no subscription has the handle {handle}"):
+        bus.shutdownSubscriber(handle)
+
+
+def test_without_a_backend_what_is_published_is_kept():
+    bus = MessageBus("drone")
+    handle = bus.advertise("said", "std_msgs/String")
+    bus.publish(handle, {"data": "x"})
+    image = bus.imageTransportAdvertise("/drone/front")
+    bus.imageTransportPublish(image, bytes(range(12)), 2, 2, "here")
+    assert list(bus.published) == [
+        ("/drone/said", "std_msgs/String", {"data": "x"}),
+        ("/drone/front", "sensor_msgs/Image", Image(bytes([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5]), 2, 2, "here")),
+    ]
+    with pytest.raises(ValueError, match="an image of 2 x 2 has 12 bytes, not 3"):
+        bus.imageTransportPublish(image, b"abc", 2, 2, "here")
+    bus.shutdownPublisher(handle)
+    bus.imageTransportShutdownPublisher(image)
+    with pytest.raises(ValueError, match="no publisher has the handle"):
+        bus.publish(handle, {})
+
+
+def test_a_backend_carries_messages():
+    bus, backend, heard = MessageBus("drone"), FakeBackend(), []
+    bus.backend = backend
+    bus.subscribe("/scan", "sensor_msgs/LaserScan", "on_scan", 2)
+    bus.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist")
+    assert list(backend.takes) == ["/scan"], "the drone posts its own commands"
+    thread = threading.Thread(target=backend.takes["/scan"], args=("message",))
+    thread.start()
+    thread.join()
+    bus.deliver(lambda callback, message: heard.append((callback, message)))
+    assert heard == [("on_scan", "message")]
+
+    bus.publish(bus.advertise("said", "std_msgs/String", 5, True), {"data": "x"})
+    bus.imageTransportAdvertise("front", 1)
+    sender = backend.senders[("/drone/said", "std_msgs/String", 5, True)]
+    assert sender.sent == [{"data": "x"}]
+    bus.close()
+    assert backend.ended == ["/scan"] and all(sender.ended for sender in backend.senders.values())
+    with pytest.raises(ValueError, match="no message type"):
+        bus.subscribe("/x", "no/Type", "f")
+
+
+LUA = """
+function sysCall_init()
+    said = simROS.advertise('said', 'x/Y')
+    simROS.subscribe('/in', 'x/Y', 'heard')
+    simROS.subscribe('/in', 'x/Y', function(msg) print('also') end)
+end
+function heard(msg)
+    simROS.publish(said, {
+        x = msg.linear.x, list = msg.list, first = msg.list[1], n = #msg.list, name = msg.name, raw = msg.raw,
+        nested = {a = {1, {b = true}}}, stamp = msg.stamp,
+    })
+end
+"""
+
+PYTHON = """
+def sysCall_init():
+    self.said = simROS.advertise('said', 'x/Y')
+    simROS.subscribe('/in', 'x/Y', 'heard')
+
+def heard(msg):
+    simROS.publish(self.said, {
+        'x': msg.linear.x, 'list': msg.list, 'first': msg.list[0], 'n': len(msg.list), 'name': msg.name,
+        'raw': msg.raw, 'nested': {'a': [1, {'b': True}]}, 'stamp': msg.stamp.to_sec(),
+    })
+"""
+
+
+@pytest.mark.parametrize("ending, source", [("lua", LUA), ("py", PYTHON)])
+def test_messages_pass_through_a_script(tmp_path, ending, source):
+    path = tmp_path / f"script.{ending}"
+    path.write_text(source, encoding="utf-8")
+    backend = FakeBackend()
+    simulation = Simulation(parameters.load(), script=str(path), backend=backend)
+    simulation.drone.bus.post(
+        "/in",
+        SimpleNamespace(
+            linear=Vector3(1.5, 0, 0),
+            list=[1.5, 2.5],
+            name="näme",
+            raw=b"\xff\x00",
+            stamp=SimpleNamespace(to_sec=lambda: 12.5),
+        ),
+    )
+    simulation.step()
+    (sender,) = backend.senders.values()
+    assert sender.sent == [
+        {
+            "x": 1.5,
+            "list": [1.5, 2.5],
+            "first": 1.5,
+            "n": 2,
+            "name": "näme",
+            "raw": b"\xff\x00",
+            "nested": {"a": [1, {"b": True}]},
+            "stamp": 12.5,
+        }
+    ]
+    simulation.close()
+    assert sender.ended
+
+
+def test_twists_reach_the_script(tmp_path):
+    path = tmp_path / "script.lua"
+    path.write_text(
+        "simROS.subscribe('/drone/cmd_vel', 'geometry_msgs/Twist', 'f')\n"
+        "function f(m) assert(m.linear.x == 1 and m.linear.z == 0 and m.angular.z == 0.5) heard = true end\n"
+        "function sysCall_cleanup() assert(heard) end",
+        encoding="utf-8",
+    )
+    simulation = Simulation(parameters.load(), script=str(path))
+    simulation.drone.receive(Twist(Vector3(1, 0, 0), Vector3(0, 0, 0.5)))
+    simulation.step()
+    simulation.close()
+
+
+def test_scripts_leave_nothing_behind(tmp_path):
+    import gc
+    import weakref
+
+    path = tmp_path / "script.lua"
+    path.write_text("function sysCall_sensing() sim.getObjectPosition(0) end", encoding="utf-8")
+    scripts = []
+    for _ in range(5):
+        simulation = Simulation(parameters.load(), script=str(path))
+        simulation.step()
+        scripts.append(weakref.ref(simulation.drone.script))
+        simulation.close()
+    del simulation
+    gc.collect()
+    assert [script() for script in scripts] == [None] * 5

@@ -1,0 +1,125 @@
+"""The objects of the scene: names, paths, parents, where cameras look."""
+
+import pytest
+
+from drone_sim import frames, parameters
+from drone_sim.scripting import object_paths
+from drone_sim.simulation import Simulation
+from drone_sim.state import Pose
+
+
+@pytest.fixture(name="simulation", scope="module")
+def _simulation():
+    simulation = Simulation(parameters.load())
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture(name="objects")
+def _objects(simulation):
+    simulation.drone.reset()
+    return simulation.drone.objects
+
+
+@pytest.mark.parametrize(
+    "path, name",
+    [
+        ("Drone", "Drone"),
+        ("Quadricopter", "Drone"),
+        ("Quadcopter", "Drone"),
+        ("Quadricopter_base", "Quadricopter_base"),
+        ("Quadricopter_base#", "Quadricopter_base"),
+        ("Quadricopter_base#0", "Quadricopter_base"),
+        ("Quadricopter_target", "DronePosition"),
+        ("/Quadcopter", "Drone"),
+        ("/Quadcopter/base", "Quadricopter_base"),
+        ("/Drone/base", "Quadricopter_base"),
+        ("/Quadricopter/Quadricopter_base", "Quadricopter_base"),
+        ("/base", "Quadricopter_base"),
+        ("/target", "DronePosition"),
+        ("./target", "DronePosition"),
+        ("../target", "DronePosition"),
+        (":/base", "Quadricopter_base"),
+        (".", "Drone"),
+        ("..", "Drone"),
+        (":", "Drone"),
+        ("./base", "Quadricopter_base"),
+        ("./base/..", "Drone"),
+        ("./propeller[0]/respondable", "Quadricopter_propeller_respondable1"),
+        ("../propeller[2]/respondable", "Quadricopter_propeller_respondable3"),
+        ("/Quadcopter/propeller[3]/joint", "Quadricopter_propeller_joint4"),
+        ("/Quadcopter/propeller/joint", "Quadricopter_propeller_joint1"),
+        ("/propeller[1]", "Quadricopter_propeller2"),
+        ("/Quadcopter/respondable[1]", "Quadricopter_propeller_respondable2"),
+        ("/TrackCam", "TrackCam"),
+        ("./Track_base/TrackCam", "TrackCam"),
+        ("/FrontVision", "FrontVision"),
+        ("/Floor", "Floor"),
+        ("ResizableFloor_5_25", "Floor"),
+    ],
+)
+def test_paths(objects, path, name):
+    assert objects[object_paths.find(objects, path, "Drone")].name == name
+
+
+@pytest.mark.parametrize(
+    "path, near",
+    [
+        ("Quadricopter_bas", "near names are Quadricopter_base"),
+        ("/Quadcopter/propeller[4]", "/Quadcopter/propeller[3]"),
+        ("/Quadcopter/bases", "/Quadcopter/base"),
+        ("/", "names none"),
+        ("/Floor/base", "near names"),
+        ("/Quadcopter/propeller[x]", "near names"),
+        ("../..", "known are"),
+        ("zzzzzzzz", "known are"),
+    ],
+)
+def test_unknown_names_list_the_near_ones(objects, path, near):
+    with pytest.raises(ValueError, match="no object") as raised:
+        object_paths.find(objects, path, "Drone")
+    assert near in str(raised.value)
+
+
+def test_paths_are_found_again(objects):
+    for handle in objects:
+        assert object_paths.find(objects, objects.path(handle), "Drone") == handle
+
+
+def test_parents(objects):
+    def parent(name):
+        return objects[objects.handle(name)].parent
+
+    assert parent("Drone") is None
+    assert parent("TrackCam").name == "Track_base"
+    assert parent("Quadricopter_propeller_respondable2").name == "Quadricopter_propeller2"
+    assert parent("DronePosition").name == "Drone"
+
+
+def test_a_target_without_parent_stays(simulation, objects):
+    target = objects.handle("DronePosition")
+    carried = objects.matrix(target)
+    assert frames.position(carried) == pytest.approx((0, 0, 0.79))
+    objects.set_parent(target, -1, True)
+    simulation.drone.move(Pose((1, 2, 3)))
+    assert objects.matrix(target) == carried
+
+
+def test_no_object_hangs_on_itself(objects):
+    with pytest.raises(ValueError, match="its own ancestor"):
+        objects.set_parent(objects.handle("Track_base"), objects.handle("TrackCam"), True)
+
+
+@pytest.mark.parametrize("name, toward", [("FrontVision", (1, 0, 0)), ("Quadricopter_floorCamera", (0, 0, -1))])
+def test_cameras_look_along_z_with_x_to_the_left(objects, name, toward):
+    m = objects.matrix(objects.handle(name), objects.handle("Drone"))
+    assert (m[2], m[6], m[10]) == pytest.approx(toward, abs=1e-9)
+    assert (m[0], m[4], m[8]) == pytest.approx((0, 1, 0), abs=1e-9)
+
+
+def test_track_cam_looks_at_the_track_frame(objects):
+    m = objects.matrix(objects.handle("TrackCam"), objects.handle("Track_base"))
+    assert frames.position(m) == pytest.approx((-1.2, 0, 0.5))
+    ahead = frames.transform(m, (0, 0, (1.2**2 + 0.5**2) ** 0.5))
+    assert ahead == pytest.approx((0, 0, 0), abs=1e-12)
+    assert m[9] > 0, "y is up"

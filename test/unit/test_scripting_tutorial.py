@@ -1,0 +1,65 @@
+"""The tutorial's Lua flies as the built-in Python script does, to the last digit."""
+
+from pathlib import Path
+
+import pytest
+
+from drone_sim import frames, parameters
+from drone_sim.simulation import Simulation
+from drone_sim.state import Pose, Twist, Vector3
+
+SCRIPTS = Path(__file__).parent / "scripts"
+STEPS = 1200  # 60 s
+SMALL = {"front": {"width": 16, "height": 12}}
+
+
+def pose(position, rpy):
+    return Pose(position, frames.to_quaternion(frames.from_rpy((0, 0, 0), rpy)))
+
+
+EVENTS = {
+    20: lambda drone: drone.receive(Twist(Vector3(1, 0, 0))),
+    120: lambda drone: drone.receive(Twist(Vector3(0, -1, 0.5), Vector3(0, 0, 0.7))),
+    250: lambda drone: drone.receive(Twist(Vector3(-0.5, 0.4, -0.3), Vector3(0, 0, -0.4))),
+    380: lambda drone: drone.receive(Twist()),
+    500: lambda drone: drone.move(pose((0, 0, 2.4), (0.3, 0.2, 1))),
+    700: lambda drone: drone.receive(Twist(Vector3(0, 0, 0), Vector3(0, 0, 1))),
+    850: lambda drone: drone.move(pose((1, 0, 1.5), (-0.3, 0.4, -2))),
+}
+
+
+def fly(script, steps=STEPS):
+    simulation = Simulation(parameters.load({"control": {"thrust_limits": None}, "cameras": SMALL}), script=script)
+    path = []
+    try:
+        for step in range(steps):
+            if step in EVENTS:
+                EVENTS[step](simulation.drone)
+            simulation.step()
+            path.append(simulation.drone.state.position)
+        return path, list(simulation.drone.bus.published)
+    finally:
+        simulation.close()
+
+
+@pytest.fixture(name="built_in", scope="module")
+def _built_in():
+    path, _ = fly("")
+    assert max(abs(value) for position in path for value in position) < 50, "the reference flight itself is lost"
+    return path
+
+
+@pytest.mark.parametrize("script", ["tutorial_v3.lua", "tutorial_v4.lua"])
+def test_lua_flies_as_the_python_script(script, built_in):
+    path, _ = fly(str(SCRIPTS / script))
+    worst = max(abs(a - b) for ours, theirs in zip(path, built_in) for a, b in zip(ours, theirs))
+    assert len(path) == STEPS and worst < 1e-9
+
+
+def test_the_tutorials_lua_publishes_its_camera():
+    _, published = fly(str(SCRIPTS / "tutorial_v3.lua"), steps=3)
+    topic, kind, image = published[-1]
+    assert (topic, kind, len(published)) == ("/drone/front", "sensor_msgs/Image", 3)
+    assert (image.width, image.height, len(image.data), image.frame_id) == (16, 12, 16 * 12 * 3, "drone front")
+    top, bottom = image.data[: 16 * 3], image.data[-16 * 3 :]
+    assert sum(top) > sum(bottom), "the sky is brighter than the floor: the top row comes first"
