@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
@@ -11,9 +12,10 @@ from drone_sim import drone_objects, frames, urdf
 from drone_sim.drone_objects import DRONE, joint, respondable
 from drone_sim.frames import IDENTITY, Matrix, Vector
 from drone_sim.objects import near_names
-from drone_sim.parameters import CameraParameters, ParameterError, Parameters
+from drone_sim.parameters import CameraParameters, Parameters
 from drone_sim.propeller import ParticleFan, Wrench
 from drone_sim.scripting import load
+from drone_sim.scripting.api_signals import Signals
 from drone_sim.scripting.api import make_sim, make_sim_ros
 from drone_sim.scripting.host import DrawingSink, Surroundings
 from drone_sim.scripting.messages import MessageBus
@@ -70,6 +72,7 @@ class Drone:
         self._joint_angles: Dict[str, float] = {}
         cameras = self._parameters.cameras
         self.objects = drone_objects.scene_objects(self, self.body.links, self._links, cameras)
+        self.signals = Signals()
         self.script_parameters = self._script_parameters()
         self._propellers = [self.script_parameters[respondable(number)] for number in (1, 2, 3, 4)]
 
@@ -160,21 +163,32 @@ class Drone:
         self._world.set_pose(self._id, pose)
         self.refresh()
 
-    def mount(self, camera: CameraParameters) -> Callable[[], Matrix]:
-        """Return a function that gives the pose world from the camera's optical frame.
+    def optical(self, camera: CameraParameters) -> Matrix:
+        """World from a camera's optical frame (z forward, x right, y down)."""
+        sensor = self.objects.matrix(self.objects.handle(camera.object))
+        return frames.multiply(sensor, drone_objects.OPTICAL_FROM_SENSOR)
 
-        A camera stands at the URDF's link that is named like its frame, or where its `mount` says.
-        Raises ParameterError where there is neither, or no such parent.
-        """
-        if camera.mount is None:
-            if camera.frame not in self.body.links:
-                raise ParameterError(f"camera frame {camera.frame}: neither a link of the URDF, nor a `mount` given")
-            link = self.body.links[camera.frame]
-            return lambda: frames.multiply(self.matrix, link)
-        parent, local = camera.mount.parent, camera.mount.matrix
-        if parent not in self.objects:
-            raise ParameterError(f"camera frame {camera.frame}: no object is named {parent}")
-        return lambda: frames.multiply(self.objects.matrix(self.objects.handle(parent)), local)
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back all that the drone's body is not: propellers, objects, script."""
+        own = (self.command, self._command_age, list(self._pushes), list(self._blade_turns), dict(self._joint_angles))
+        carries = [fan.carry for fan in self.fans]
+        parameters = copy.deepcopy(self.script_parameters)
+        others = [self.objects.remember(), self.signals.remember(), self.script.remember()]
+
+        def recall() -> None:
+            self.command, self._command_age, pushes, turns, angles = own
+            self._pushes, self._blade_turns, self._joint_angles = list(pushes), list(turns), dict(angles)
+            self._added = Wrench()
+            for fan, carry in zip(self.fans, carries):
+                fan.carry = carry
+            for name, values in copy.deepcopy(parameters).items():
+                self.script_parameters[name].clear()
+                self.script_parameters[name].update(values)
+            for one in others:
+                one()
+            self.refresh()
+
+        return recall
 
     # ---- script
 
@@ -187,7 +201,7 @@ class Drone:
         """
         self.close()
         limit = TimeLimit(self._parameters.script_time_limit)
-        sensors = {drone_objects.vision_sensor(name): take for name, take in (pictures or {}).items()}
+        sensors = {self._parameters.cameras[name].object: take for name, take in (pictures or {}).items()}
         surroundings = Surroundings(clock, self._parameters.time_step, sensors, limit.paused)
         modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
         self.script = load.load(path, modules, limit)

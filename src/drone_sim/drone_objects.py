@@ -3,11 +3,10 @@
     Drone                                        /Quadcopter             carried by the dynamics
       Quadricopter_base                          /Quadcopter/base        the pose that scripts read
       Track_base                                 /Quadcopter/Track_base
-        TrackCam                                 /TrackCam
       Quadricopter_propeller<i>                  /Quadcopter/propeller[i-1]
         Quadricopter_propeller_respondable<i>    .../respondable
         Quadricopter_propeller_joint<i>          .../joint
-      FrontVision, one for every camera          /FrontVision
+      FrontVision, TrackCam, one for every camera  /FrontVision
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
       DronePosition                              /target                 the green sphere
     Floor                                        /Floor
@@ -23,13 +22,12 @@ from typing import Mapping, Sequence
 from drone_sim import frames
 from drone_sim.frames import Matrix
 from drone_sim.objects import Body, ObjectTree
-from drone_sim.parameters import CameraParameters
+from drone_sim.parameters import CameraParameters, ParameterError
 
 DRONE = "Drone"
 BASE = frames.from_rpy((0.0, 0.0, -0.01), (0.0, 0.0, 0.0))  # Quadricopter_base in the root's frame
 _ALONG_X = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)  # z forward, y up, x left
-_FROM_OPTICAL = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # optical frames: y down, x right
-_TRACK_CAM = (-1.2, 0.0, 0.5)  # m from Track_base: behind the drone, slightly above
+OPTICAL_FROM_SENSOR = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # optical frames: y down, x right
 
 
 def respondable(number: int) -> str:
@@ -53,7 +51,6 @@ def scene_objects(
     objects.add(DRONE, body=body, alias="Quadcopter", also=("Quadricopter", "Quadcopter"))
     objects.add("Quadricopter_base", DRONE, BASE, alias="base")
     objects.add("Track_base", DRONE, BASE)
-    objects.add("TrackCam", "Track_base", _looking_at_parent(_TRACK_CAM))
     for number, link in enumerate(propellers, start=1):
         name = f"Quadricopter_propeller{number}"
         objects.add(name, DRONE, link, alias="propeller")
@@ -63,31 +60,20 @@ def scene_objects(
     objects.add("Quadricopter_floorCamera", DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera")
     front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
     objects.add("Quadricopter_frontCamera", DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera")
-    for name, camera in cameras.items():
-        _add_camera(objects, links, name, camera)
+    for camera in cameras.values():
+        _add_camera(objects, links, camera)
     objects.add("DronePosition", DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
     objects.add("Floor", also=("ResizableFloor_5_25",))
     return objects
 
 
-def vision_sensor(camera: str) -> str:
-    """Return the name of the object that a camera of config/drone.yaml is: FrontVision for `front`."""
-    return f"{camera[:1].upper()}{camera[1:]}Vision"
-
-
-def _add_camera(objects: ObjectTree, links: Mapping[str, Matrix], name: str, camera: CameraParameters) -> None:
-    # A camera that sits nowhere is not our complaint: mounting it is what raises.
-    if camera.mount is not None and camera.mount.parent in objects:
-        parent, optical = camera.mount.parent, camera.mount.matrix
-    elif camera.mount is None and camera.frame in links:
+def _add_camera(objects: ObjectTree, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
+    if camera.mount is None:
+        if camera.frame not in links:
+            raise ParameterError(f"camera frame {camera.frame}: neither a link of the URDF, nor a `mount` given")
         parent, optical = DRONE, links[camera.frame]
     else:
-        return
-    objects.add(vision_sensor(name), parent, frames.multiply(optical, _FROM_OPTICAL))
-
-
-def _looking_at_parent(position: Sequence[float]) -> Matrix:
-    """Return the frame of a camera at a place behind its parent's origin that it looks at."""
-    x, _, z = position
-    pitch = math.atan2(z, -x)
-    return frames.multiply(frames.from_rpy(position, (0.0, pitch, 0.0)), _ALONG_X)
+        parent, optical = camera.mount.parent, camera.mount.matrix
+        if parent not in objects:
+            raise ParameterError(f"camera frame {camera.frame}: no object is named {parent}")
+    objects.add(camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR))

@@ -58,6 +58,14 @@ def to_euler(m: Sequence[float]) -> Vector:
     return math.atan2(-m[6], m[10]), beta, math.atan2(-m[1], m[0])
 
 
+def to_rpy(m: Sequence[float]) -> Vector:
+    """Return ROS's roll, pitch and yaw of a transform, in radians; at pitch = +-pi/2 roll is 0."""
+    pitch = math.asin(max(-1.0, min(1.0, -m[8])))
+    if abs(m[8]) > 1 - 1e-12:
+        return 0.0, pitch, math.atan2(-m[1], m[5])
+    return math.atan2(m[9], m[10]), pitch, math.atan2(m[4], m[0])
+
+
 def to_quaternion(m: Sequence[float]) -> Quaternion:
     """Return the unit quaternion (x, y, z, w), w >= 0, of a transform (Shepperd's method)."""
     xx, yy, zz = m[0], m[5], m[10]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from typing import Dict, Iterable, Iterator, Optional, Protocol, Sequence, Tuple
+from typing import Callable, Dict, Iterable, Iterator, Optional, Protocol, Sequence, Tuple
 
 from drone_sim import frames
 from drone_sim.frames import IDENTITY, Matrix, Vector
@@ -162,6 +162,16 @@ class ObjectTree:
             if isinstance(handle, (int, float)):
                 raise ValueError(f"no object has the handle {handle}") from None
             raise TypeError("a handle is a whole number") from None
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that puts every object back where it is now, under its present parent."""
+        kept = [(one, one.parent, one.local) for one in self._objects.values()]
+
+        def recall() -> None:
+            for one, parent, local in kept:
+                one.parent, one.local = parent, local
+
+        return recall
 
     def matrix(self, handle: int, relative_to: int = WORLD) -> Matrix:
         """Return the transform of an object relative to another, or to the world."""

@@ -183,6 +183,7 @@ class MountParameters(_Parameters):
 class CameraParameters(_Parameters):
     """A vision sensor: where it sits, what it sees."""
 
+    object: Name
     topic: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_/]*$")]
     kind: Literal["color", "depth"]
     frame: Name
@@ -220,6 +221,12 @@ class Parameters(_Parameters):
         """Number of Bullet steps in a simulation step."""
         return round(self.time_step / self.sub_step)
 
+    def with_scene_read_again(self) -> Parameters:
+        """Return the parameters with floor, objects and drone as the scene file says now. Raises ParameterError."""
+        if not self.scene_file:
+            return self
+        return _checked(_merge(self.model_dump(), _scene(self.scene_file)))
+
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several keys at once."""
         if self.sub_steps < 1 or abs(self.sub_steps * self.sub_step - self.time_step) > 1e-9 * self.time_step:
@@ -239,6 +246,10 @@ def load(overrides: Optional[Mapping[str, Any]] = None) -> Parameters:
     values = _merge(read_yaml(package_path() / "config" / "drone.yaml"), overrides or {})
     if values["scene_file"]:
         values = _merge(values, _scene(values["scene_file"]))
+    return _checked(values)
+
+
+def _checked(values: Dict[str, Any]) -> Parameters:
     try:
         return Parameters.model_validate(values)
     except ValidationError as error:

@@ -9,58 +9,119 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Dict, Optional, Tuple
+from typing import Callable, Dict, NamedTuple, Optional, Tuple
 
 import numpy as np
 
 from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.camera.vision import Camera, Vision
 from drone_sim.drone import Drone
-from drone_sim.parameters import CameraParameters, Parameters, SceneParameters
+from drone_sim.parameters import CameraParameters, Parameters
+from drone_sim.scene import Scene
 from drone_sim.scripting.messages import Backend
-from drone_sim.world import Shape, World
+from drone_sim.world import World
+
+
+class Snapshot(NamedTuple):
+    """The exact dynamic state at a moment; see Simulation.snapshot."""
+
+    steps: int
+    world: int
+    recall: Callable[[], None]
+    run: int
 
 
 class Simulation:
     """A world, the drone in it, its cameras, and the clock that counts steps.
 
-    Not thread-safe: one thread owns it. `drone.bus` alone may be used from others.
+    Not thread-safe: one thread owns it. `drone.bus` alone may be used from others. `drone` and `scene` are
+    new ones after every start and stop.
     """
 
     def __init__(
-        self, parameters: Parameters, *, script: str = "", gui: bool = False, backend: Optional[Backend] = None
+        self,
+        parameters: Parameters,
+        *,
+        script: str = "",
+        gui: bool = False,
+        backend: Optional[Backend] = None,
+        started: bool = True,
     ):
-        """Build the scene and run the child script's init ('' is the tutorial's script).
+        """Build the scene and, if `started`, run the init of the child script ('' is the tutorial's).
 
         `backend` carries what the script subscribes to and publishes; without it the messages stay in
         `drone.bus`.
 
-        Raises UrdfError, ScriptError, and RuntimeError where `gui` finds no display.
+        Raises ParameterError, UrdfError, ScriptError, and RuntimeError where `gui` finds no display.
         """
         self.parameters = parameters
-        self.steps = 0
+        self.script = script
+        self.running = False
+        self._backend = backend
+        self._runs = 0
         self.world = World(parameters.sub_step, parameters.gravity, gui)
-        _build(self.world, parameters.scene)
-        self.drone = Drone(parameters, self.world)
         self.vision = Vision(self.world)
-        self.cameras: Dict[str, Camera] = {
-            name: self._camera(camera) for name, camera in parameters.cameras.items()
-        }
-        self._looked: Dict[str, Tuple[int, np.ndarray]] = {}  # by camera, step and picture of the script's last look
-        self._pictures = {name: partial(self._picture, name) for name in self.cameras}
-        self._running = False
-        self.drone.bus.backend = backend
         try:
-            self.drone.load_script(script, lambda: self.time, self._pictures)
+            self._build()
+            self.cameras: Dict[str, Camera] = {name: self._camera(one) for name, one in parameters.cameras.items()}
+            if started:
+                self.start()
         except BaseException:
             self.close()
             raise
-        self._running = True
+
+    def _build(self) -> None:
+        """Put the scene, as its file says now, and a drone without a script into an empty world."""
+        self.steps = 0
+        self._runs += 1
+        self._looked: Dict[str, Tuple[int, np.ndarray]] = {}  # by camera, step and picture of the script's last look
+        self.parameters = self.parameters.with_scene_read_again()
+        self.world.clear()
+        self.scene = Scene(self.parameters.scene, self.world)
+        self.drone = Drone(self.parameters, self.world)
+        self.drone.bus.backend = self._backend
+        self.scene.name_objects(self.drone.objects)
 
     def _camera(self, parameters: CameraParameters) -> Camera:
         size = (parameters.width, parameters.height)
         intrinsics = Intrinsics(*size, parameters.horizontal_fov, parameters.near, parameters.far)
-        return Camera(parameters.kind, intrinsics, self.drone.mount(parameters), self.vision)
+        return Camera(parameters.kind, intrinsics, lambda: self.drone.optical(parameters), self.vision)
+
+    # ---- start and stop
+
+    def start(self) -> None:
+        """Read scene and script from disk, and run the script's init. Raises ParameterError, ScriptError."""
+        self.stop()
+        self.running = True
+        pictures = {name: partial(self._picture, name) for name in self.cameras}
+        self.drone.load_script(self.script, lambda: self.time, pictures)
+
+    def stop(self) -> None:
+        """Run the script's cleanup, and restore the initial scene, at time 0. Raises ScriptError."""
+        try:
+            self._clean_up()
+        finally:
+            self._build()
+
+    def close(self) -> None:
+        """Run cleanup if it is due, and free the world; may be called twice. Raises ScriptError."""
+        try:
+            self._clean_up()
+        finally:
+            self.vision.close()
+            self.world.close()
+
+    def _clean_up(self) -> None:
+        if not hasattr(self, "drone"):
+            return
+        try:
+            if self.running:
+                self.running = False
+                self.drone.script.call("cleanup")
+        finally:
+            self.drone.close()
+
+    # ---- stepping
 
     @property
     def time(self) -> float:
@@ -76,10 +137,29 @@ class Simulation:
         self._take_pictures()
         self.drone.script.call("sensing")
 
+    def snapshot(self) -> Snapshot:
+        """Remember the exact dynamic state, the script's variables included, until the next start or stop."""
+        return Snapshot(self.steps, self.world.snapshot(), self.drone.remember(), self._runs)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Bring a snapshot back: the flight goes on as it did from there, to the last bit. May be repeated.
+
+        Raises ValueError for a snapshot of an earlier run.
+        """
+        if snapshot.run != self._runs:
+            raise ValueError("the snapshot is of an earlier run: start and stop forget it")
+        self.world.restore(snapshot.world)
+        self.steps = snapshot.steps
+        self._looked.clear()
+        snapshot.recall()
+
+    # ---- pictures
+
     def _take_pictures(self) -> None:
-        every = {name: camera.every for name, camera in self.parameters.cameras.items()}
         watched = [
-            camera for name, camera in self.cameras.items() if self.steps % every[name] == 0 and camera.watched()
+            camera
+            for camera, settings in zip(self.cameras.values(), self.parameters.cameras.values())
+            if self.steps % settings.every == 0 and camera.watched()
         ]
         if watched:
             self.drone.show_blades()
@@ -95,22 +175,3 @@ class Simulation:
             self.drone.show_blades()
             self._looked[name] = (self.steps, camera.take())
         return self._looked[name][1]
-
-    def close(self) -> None:
-        """Run cleanup once, whatever happened before, and free the world; may be called twice."""
-        try:
-            if self._running:
-                self._running = False
-                self.drone.script.call("cleanup")
-        finally:
-            self.drone.close()
-            self.vision.close()
-            self.world.close()
-
-
-def _build(world: World, scene: SceneParameters) -> None:
-    world.add_floor(scene.floor.size, scene.floor.texture)
-    for one in scene.objects:
-        world.add_shape(
-            Shape(one.shape, one.size, one.position, one.rpy, one.color, one.mass, getattr(one, "file", ""), one.texture)
-        )

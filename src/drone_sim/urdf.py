@@ -18,7 +18,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from drone_sim.frames import IDENTITY, Matrix, from_rpy, multiply, position, transform
+from drone_sim.frames import IDENTITY, Matrix, from_rpy, multiply, position, to_rpy, transform
 from drone_sim.resources import resolve
 
 
@@ -182,15 +182,8 @@ def _moved(element: Xml.Element, pose: Matrix, path: Path) -> Xml.Element:
     place = multiply(pose, _origin(element))
     for origin in moved.findall("origin"):
         moved.remove(origin)
-    Xml.SubElement(moved, "origin", xyz=" ".join(map(repr, position(place))), rpy=" ".join(map(repr, _to_rpy(place))))
+    Xml.SubElement(moved, "origin", xyz=" ".join(map(repr, position(place))), rpy=" ".join(map(repr, to_rpy(place))))
     for mesh in moved.iter("mesh"):
         name = mesh.attrib["filename"]
         mesh.set("filename", str(resolve(name if "://" in name else str(path.parent / name))))
     return moved
-
-
-def _to_rpy(m: Matrix) -> Tuple[float, float, float]:
-    pitch = math.asin(max(-1.0, min(1.0, -m[8])))
-    if abs(m[8]) > 1 - 1e-12:
-        return 0.0, pitch, math.atan2(-m[1], m[5])
-    return math.atan2(m[9], m[10]), pitch, math.atan2(m[4], m[0])

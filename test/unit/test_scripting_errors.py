@@ -1,10 +1,13 @@
 """A broken script gives one line: phase, file, line, message. The next start works."""
 
+import time
+
 import pytest
 
 from drone_sim import parameters
 from drone_sim.scripting.constants import PHASES
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.time_limit import Stopped, TimeLimit
 from drone_sim.simulation import Simulation
 from drone_sim.state import Twist
 
@@ -194,3 +197,25 @@ def test_the_limit_can_be_switched_off(tmp_path):
     path.write_text("import time\ntime.sleep(0.3)", encoding="utf-8")
     simulation = Simulation(parameters.load({"script_time_limit": 0}), script=str(path))
     simulation.close()
+
+
+def test_drawing_a_picture_is_not_the_scripts_time():
+    limit = TimeLimit(0.1)
+
+    def look():
+        with limit.paused():
+            time.sleep(0.3)
+
+    limit.run(look)
+    assert not limit.exceeded()
+
+
+def test_a_late_stop_never_leaves_the_script():
+    """What is raised for a script that returns at the last moment does not strike the simulator."""
+    limit = TimeLimit(0.02)
+    for wait in range(40):
+        try:
+            limit.run(time.sleep, 0.04 + 0.001 * wait)
+        except Stopped:
+            continue
+    time.sleep(0.2)

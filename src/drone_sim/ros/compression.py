@@ -8,10 +8,16 @@ from typing import Any, Dict, Tuple
 import cv2
 import numpy as np
 import rospy
-from dynamic_reconfigure.encoding import extract_params
-from dynamic_reconfigure.parameter_generator_catkin import ParameterGenerator, int_t, str_t
 from dynamic_reconfigure.server import Server
 from sensor_msgs.msg import CompressedImage
+
+
+def _parameter(name: str, kind: str, default: Any, lowest: Any, highest: Any, description: str) -> Dict[str, Any]:
+    return {
+        **{"name": name, "type": kind, "ctype": kind, "cconsttype": f"const {kind}", "default": default},
+        **{"min": lowest, "max": highest, "level": 0, "description": description, "edit_method": ""},
+        **{"srcfile": "", "srcline": 0},
+    }
 
 
 def _plugin_parameters() -> SimpleNamespace:
@@ -19,17 +25,24 @@ def _plugin_parameters() -> SimpleNamespace:
 
     Made at run time: a .cfg file would make the package useless without a build, for three parameters.
     """
-    generator = ParameterGenerator()
-    formats = [generator.const(name, str_t, name, f"{name} compression") for name in ("jpeg", "png")]
-    generator.add(
-        "format", str_t, 0, "compression format", "jpeg", edit_method=generator.enum(formats, "formats to choose from")
-    )
-    generator.add("jpeg_quality", int_t, 0, "JPEG quality in percent", 80, 1, 100)
-    generator.add("png_level", int_t, 0, "PNG compression level", 9, 1, 9)
-    description = generator.group.to_dict()
-    fields = {field: {p["name"]: p[field] for p in extract_params(description)} for field in ("min", "max", "level")}
-    defaults = {p["name"]: p["default"] for p in extract_params(description)}
-    return SimpleNamespace(config_description=description, defaults=defaults, **fields)
+    formats = [
+        {**_parameter(name, "str", name, "", "", f"{name} compression"), "value": name} for name in ("jpeg", "png")
+    ]
+    choice = _parameter("format", "str", "jpeg", "", "", "compression format")
+    choice["edit_method"] = str({"enum": formats, "enum_description": "formats to choose from"})
+    described = [
+        choice,
+        _parameter("jpeg_quality", "int", 80, 1, 100, "JPEG quality in percent"),
+        _parameter("png_level", "int", 9, 1, 9, "PNG compression level"),
+    ]
+    group = {
+        **{"name": "Default", "type": "", "state": True, "cstate": "true", "id": 0, "parent": 0},
+        **{"class": "DEFAULT", "parentclass": "", "parentname": "Default", "field": "default", "upper": "DEFAULT"},
+        **{"lower": "groups", "groups": [], "parameters": described},
+    }
+    fields = {field: {one["name"]: one[field] for one in described} for field in ("min", "max", "level")}
+    defaults = {one["name"]: one["default"] for one in described}
+    return SimpleNamespace(config_description=group, defaults=defaults, **fields)
 
 
 class CompressedPublisher:

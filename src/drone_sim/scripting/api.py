@@ -10,7 +10,6 @@ from __future__ import annotations
 from drone_sim.scripting.api_drawing import Drawing
 from drone_sim.scripting.api_objects import Objects
 from drone_sim.scripting.api_scripts import Scripts
-from drone_sim.scripting.api_signals import Signals
 from drone_sim.scripting.api_vision import VisionSensors
 from drone_sim.scripting.calls import Api, public_functions
 from drone_sim.scripting.constants import CONSTANTS
@@ -23,7 +22,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
     parts = (
         Objects(host),
         Scripts(host, surroundings),
-        Signals(),
+        host.signals,
         VisionSensors(host, surroundings),
     )
     functions = {**public_functions(parts), **Drawing(host).functions()}

@@ -6,13 +6,12 @@ each function.
 
 from __future__ import annotations
 
-import logging
 from typing import Any, Dict, Optional
 
+from drone_sim.scripting.api_scripts import LOG
 from drone_sim.scripting.calls import Function
 from drone_sim.scripting.host import Host
 
-_LOG = logging.getLogger(__name__)
 _MAKERS = ("addDrawingObject", "addParticleObject", "floatingViewAdd", "auxiliaryConsoleOpen", "displayDialog")
 _OTHERS = (
     "addDrawingObjectItem",
@@ -56,7 +55,7 @@ class Drawing:
                 sink(name, arguments, handle)
             elif name not in self._said:
                 self._said[name] = True
-                _LOG.info("sim.%s: there is nothing to draw on; accepted and ignored", name)
+                LOG.info("sim.%s: there is nothing to draw on; accepted and ignored", name)
             return self._made if makes else None
 
         call.__doc__ = "Draw, where there is something to draw on."

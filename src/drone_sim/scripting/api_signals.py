@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, Optional, Type
+import copy
+from typing import Any, Callable, Dict, Optional, Type
 
 from drone_sim.scripting.calls import WrongValue
 
@@ -17,6 +18,15 @@ class Signals:
     def __init__(self) -> None:
         """Start with none."""
         self._values: Dict[Type[Any], Dict[str, Any]] = {float: {}, int: {}, str: {}}
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings the present signals back."""
+        kept = copy.deepcopy(self._values)
+
+        def recall() -> None:
+            self._values = copy.deepcopy(kept)
+
+        return recall
 
     def setFloatSignal(self, name: Name, value: Number) -> None:
         """Set a number."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from drone_sim.frames import Vector
 from drone_sim.objects import ObjectTree
+from drone_sim.scripting.api_signals import Signals
 
 Parameters = Dict[str, Any]
 
@@ -34,6 +35,10 @@ class Host(Protocol):
     @property
     def script_parameters(self) -> Mapping[str, Parameters]:
         """Simulation parameters of the script that is attached to each object, by the object's name."""
+
+    @property
+    def signals(self) -> Signals:
+        """The signals that scripts leave."""
 
     @property
     def own_script(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Mapping, Protocol
+from typing import Any, Callable, Mapping, Protocol
 
 from drone_sim.objects import near_names
 from drone_sim.resources import resolve
@@ -26,6 +26,9 @@ class Script(Protocol):
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message. Raises ScriptError."""
 
+    def remember(self) -> Callable[[], None]:
+        """Return a function that gives the script's variables the values that they have now."""
+
     def close(self) -> None:
         """Free what the script holds; may be called twice."""
 
@@ -38,6 +41,10 @@ class NoScript:
 
     def callback(self, _callback: Callback, _message: Any) -> None:
         """Do nothing."""
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that does nothing."""
+        return lambda: None
 
     def close(self) -> None:
         """Do nothing."""

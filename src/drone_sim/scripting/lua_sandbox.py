@@ -15,6 +15,7 @@ local unpack = table.unpack or unpack
 local concat, byte = table.concat, string.byte
 local load, loadstring = load, loadstring
 local getinfo, sethook = debug.getinfo, debug.sethook
+local getupvalue, setupvalue = debug.getupvalue, debug.setupvalue
 local create, resume, close = coroutine.create, coroutine.resume, coroutine.close
 local global = _G
 local newer = _VERSION ~= 'Lua 5.1'
@@ -98,6 +99,54 @@ local callbacks = {}
 local function callback_number(f)
   callbacks[#callbacks + 1] = f
   return #callbacks
+end
+
+---- snapshots
+
+-- Return a function that gives every variable that the script can reach the value that it has now:
+-- contents of tables, and locals that functions share. Coroutines are left as they are.
+local function remember()
+  local tables, locals, seen = {}, {}, {}
+  local visit
+
+  local function visit_table(t)
+    local copy = {}
+    for key, value in next, t do copy[key] = value end
+    tables[t] = copy
+    for key, value in next, copy do
+      visit(key)
+      visit(value)
+    end
+  end
+
+  local function visit_function(f)
+    if getinfo(f, 'S').what == 'C' then return end
+    for index = 1, 255 do
+      local name, value = getupvalue(f, index)
+      if name == nil then return end
+      locals[#locals + 1] = {f, index, value}
+      visit(value)
+    end
+  end
+
+  function visit(value)
+    local kind = type(value)
+    if seen[value] or (kind ~= 'table' and kind ~= 'function') then return end
+    seen[value] = true
+    if kind == 'table' then visit_table(value) else visit_function(value) end
+  end
+
+  for _, f in next, callbacks do visit(f) end
+  visit(global)
+  return function()
+    for t, copy in next, tables do
+      for key in next, t do
+        if copy[key] == nil then rawset(t, key, nil) end
+      end
+      for key, value in next, copy do rawset(t, key, value) end
+    end
+    for _, kept in next, locals do setupvalue(kept[1], kept[2], kept[3]) end
+  end
 end
 
 local function find(name)
@@ -207,6 +256,6 @@ math.randomseed(1) -- the same flight every time
 
 return {
   run = run, define = define, list = list, items = items, find = find, compile = compile,
-  callback_number = callback_number, modules = modules, globals = global, type = type,
+  callback_number = callback_number, remember = remember, modules = modules, globals = global, type = type,
 }
 """

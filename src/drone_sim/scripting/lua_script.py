@@ -14,7 +14,7 @@ import logging
 import re
 import weakref
 from pathlib import Path
-from typing import Any, Dict, Mapping, Optional, Set
+from typing import Any, Callable, Dict, Mapping, Optional, Set
 
 from drone_sim.objects import near_names
 from drone_sim.scripting.api_scripts import LOG
@@ -96,6 +96,10 @@ class LuaScript:
         if function is None:
             raise ScriptError(str(callback), self._path, 0, f"the script has no function '{callback}' to call back")
         self._run(callback if isinstance(callback, str) else "callback", function, self._values.to_lua(message))
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that gives the script's variables the values that they have now."""
+        return self._sandbox[b"remember"]()
 
     def close(self) -> None:
         """Free the Lua state; the script cannot be called after that."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
+import copy
 import traceback
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Dict, Mapping
+from typing import Any, Callable, Dict, Mapping
 
 from drone_sim.objects import near_names
 from drone_sim.scripting.api_scripts import LOG
@@ -66,6 +67,21 @@ class PythonScript:
             raise ScriptError(str(callback), self._path, 0, f"the script has no function '{callback}' to call back")
         self._run(callback, function, message)
 
+    def remember(self) -> Callable[[], None]:
+        """Return a function that gives `self` and the global variables the values that they have now.
+
+        Values that cannot be copied (open files, modules, API objects) stay as they are.
+        """
+        kept = _copied(self._globals)
+
+        def recall() -> None:
+            fresh = _copied(kept)
+            for name in set(self._globals) - set(fresh) - {"__builtins__"}:
+                del self._globals[name]
+            self._globals.update(fresh)
+
+        return recall
+
     def close(self) -> None:
         """Forget the script; it cannot be called after that."""
         self._globals.clear()
@@ -94,6 +110,24 @@ class PythonScript:
         if isinstance(error, (ApiError, UnknownName)):
             return str(error)
         return f"{type(error).__name__}: {error}"
+
+
+def _copied(variables: Mapping[str, Any]) -> Dict[str, Any]:
+    memo: Dict[int, Any] = {}  # one for all: what is shared stays shared
+    return {name: _copy(value, memo) for name, value in variables.items() if name != "__builtins__"}
+
+
+def _copy(value: Any, memo: Dict[int, Any]) -> Any:
+    if isinstance(value, SimpleNamespace):  # attribute by attribute: one that cannot be copied spoils no other
+        made = memo.setdefault(id(value), SimpleNamespace())
+        made.__dict__.update({name: _copy(one, memo) for name, one in vars(value).items()})
+        return made
+    if isinstance(value, Api):
+        return value
+    try:
+        return copy.deepcopy(value, memo)
+    except Exception:  # whatever a class of the script's raises when it is copied
+        return value
 
 
 def _print(*values: Any, sep: str = " ", file: Any = None, **options: Any) -> None:

@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# Makes every picture of README.md and docs/: docs/make_pictures.sh [SECTION...]   (default: all sections)
+#
+# Needs what ./dev.sh setup installs. A section is a function below, named in `sections`.
+set -eo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+export PYTHONPATH=$PWD/src:$PYTHONPATH
+python=.venv/bin/python
+pictures=docs/pictures
+sections=(cameras plots)
+
+# What the drone's own cameras see.
+cameras() { "$python" docs/take_pictures.py "$pictures"; }
+
+# The flights of docs/tutorial.md, as its commands fly them.
+plots() {
+  plot 1_thrust --duration 12
+  local stage
+  for stage in 2_elevation 3_yaw 4_pitch 5_roll 6_ros; do plot "$stage"; done
+  "$python" scripts/fly --script docs/tutorial/5_roll.py --commands docs/tutorial/stability.yaml \
+    --set "drone.position=[0, 0, 5]" --plot "$pictures/tutorial_stability.png"
+}
+
+plot() { # plot STAGE [OPTION...]
+  "$python" scripts/fly --script "docs/tutorial/$1.py" --commands "docs/tutorial/$1.yaml" \
+    --plot "$pictures/tutorial_$1.png" "${@:2}"
+}
+
+mkdir -p "$pictures"
+for section in "${@:-${sections[@]}}"; do
+  declare -F "$section" >/dev/null || { echo "make_pictures.sh: no section $section; there are: ${sections[*]}" >&2; exit 1; }
+  "$section"
+done

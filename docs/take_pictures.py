@@ -1,0 +1,72 @@
+"""Take the pictures of docs/tutorial.md with the drone's own cameras; needs neither ROS nor a display.
+
+PYTHONPATH=src .venv/bin/python docs/take_pictures.py [FOLDER]
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from matplotlib import image
+
+from drone_sim import parameters
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist, Vector3
+
+DOCS = Path(__file__).resolve().parent
+LEANING = (Twist(Vector3(2, 1.5, 0)), 0.45)  # m/s, s: the body leans forward and to the left
+
+
+def main():
+    """Take every picture."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS / "pictures"
+    folder.mkdir(parents=True, exist_ok=True)
+    image.imsave(folder / "tutorial_scene.png", scene())
+    image.imsave(folder / "tutorial_track_base.png", leaning({}))
+    on_body = parameters.read_yaml(DOCS / "tutorial" / "track_on_body.yaml")
+    image.imsave(folder / "tutorial_track_body.png", leaning(on_body))
+    image.imsave(folder / "tutorial_7_camera.png", published())
+
+
+def scene():
+    """Return the drone at its starting place, from behind."""
+    simulation = Simulation(parameters.load())
+    fly(simulation, 1)
+    return take(simulation, "track")
+
+
+def leaning(overrides):
+    """Return what the tracking camera sees when the drone sets off forward and to the left."""
+    simulation = Simulation(parameters.load(overrides))
+    command, seconds = LEANING
+    simulation.drone.receive(command)
+    fly(simulation, seconds)
+    return take(simulation, "track")
+
+
+def published():
+    """Return the picture that the last stage of the tutorial publishes, among the posts of its scene."""
+    values = parameters.load({"scene_file": str(DOCS / "tutorial" / "7_scene.yaml")})
+    simulation = Simulation(values, script=str(DOCS / "tutorial" / "7_camera.py"))
+    fly(simulation, 1)
+    picture = simulation.drone.bus.published[-1].message
+    simulation.close()
+    return np.frombuffer(picture.data, np.uint8).reshape(picture.height, picture.width, 3)
+
+
+def fly(simulation, seconds):
+    """Run the steps of so many seconds."""
+    for _ in range(round(seconds / simulation.parameters.time_step)):
+        simulation.step()
+
+
+def take(simulation, camera):
+    """Return a camera's picture of now, and end the simulation."""
+    simulation.drone.show_blades()
+    picture = simulation.cameras[camera].take()
+    simulation.close()
+    return picture
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,273 @@
+"""docs/tutorial.md: each stage flies as its text says, its commands print what it shows, its lines are the scripts'."""
+
+import contextlib
+import math
+import re
+import shlex
+import textwrap
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from drone_sim import parameters
+from drone_sim.offline import timeline
+from drone_sim.offline.fly import main as fly_main
+from drone_sim.offline.fly import settings
+from drone_sim.simulation import Simulation
+from drone_sim.state import Pose, Twist, Vector3
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+TEXT = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+STAGES = {path.stem: path for path in sorted((DOCS / "tutorial").glob("[0-9]_*.py"))}
+FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
+RIPPLE = 0.01  # m/s, of vz: particles come whole
+
+
+def blocks(language):
+    return re.findall(rf"^ *```{language}\n(.*?)^ *```$", TEXT, re.MULTILINE | re.DOTALL)
+
+
+@contextlib.contextmanager
+def flying(stage, *assignments):
+    values = parameters.load(settings(assignments))
+    simulation = Simulation(values, script=str(STAGES[stage]) if stage in STAGES else stage)
+    try:
+        yield simulation
+    finally:
+        simulation.close()
+
+
+def fly(simulation, seconds, commands=None):
+    """Return x y z, velocities, yaw and propellers after each step, as arrays by name."""
+    states, yaws, propellers = [], [], []
+    for step in range(round(seconds / simulation.parameters.time_step)):
+        if commands is not None:
+            commands.apply(step, simulation.drone)
+        simulation.step()
+        states.append([number for part in simulation.drone.state for number in part])
+        yaws.append(math.atan2(simulation.drone.matrix[4], simulation.drone.matrix[0]))
+        propellers.append(simulation.drone.particle_velocities)
+    columns = np.array(states).T
+    names = ["x", "y", "z", "qx", "qy", "qz", "qw", "vx", "vy", "vz", "wx", "wy", "wz"]
+    flight = SimpleNamespace(**dict(zip(names, columns)))
+    flight.states, flight.yaw, flight.propellers = np.array(states), np.array(yaws), np.array(propellers)
+    return flight
+
+
+def fly_timeline(stage, name, *assignments, seconds=None):
+    with flying(stage, *assignments) as simulation:
+        commands = timeline.read(str(DOCS / "tutorial" / name), simulation.parameters)
+        return fly(simulation, seconds or commands.end + 5, commands)
+
+
+def at(values, seconds):
+    return values[round(seconds / 0.05) - 1]
+
+
+# ---- the stages
+
+
+def test_there_are_seven_stages():
+    assert [name[0] for name in STAGES] == list("1234567")
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stage_has_the_phases_that_it_needs(stage):
+    text = STAGES[stage].read_text()
+    for phase in ("init", "actuation", "sensing"):
+        assert f"def sysCall_{phase}():" in text
+    assert ("def sysCall_cleanup():" in text) == (stage[0] in "67")
+
+
+def test_constant_thrust_sinks_slowly_slides_on_and_does_not_turn():
+    flight = fly_timeline("1_thrust", "1_thrust.yaml", seconds=12)
+    assert np.all(np.diff(flight.z[::20]) < 0)
+    assert 0.55 < flight.z[-1] < 0.65
+    assert at(flight.vx, 2.5) > 0.15
+    assert flight.vx[-1] == pytest.approx(at(flight.vx, 2.5), abs=1e-9)
+    assert np.allclose([flight.y, flight.yaw, flight.wz], 0, atol=1e-9)
+    assert np.all(flight.propellers == 5.33)
+
+
+def test_the_track_frame_follows_level_and_turned():
+    with flying("1_thrust") as simulation:
+        drone = simulation.drone
+        drone.move(Pose((1, 2, 3), (0.0998334, 0, 0.4794255, 0.8)))
+        simulation.step()
+        base = drone.objects.matrix(drone.objects.handle("Quadricopter_base"))
+        assert drone.track[3::4] == pytest.approx(base[3::4])
+        assert drone.track[8:11] == pytest.approx((0, 0, 1))
+        assert base[10] < 0.99
+        assert math.atan2(drone.track[4], drone.track[0]) > 0.5
+
+
+def test_elevation_climbs_holds_and_returns():
+    flight = fly_timeline("2_elevation", "2_elevation.yaml")
+    assert at(flight.vz, 3) == pytest.approx(0.5, abs=0.03)
+    held = at(flight.z, 6)
+    assert 1.4 < held < 1.6
+    assert at(flight.z, 6.05) == pytest.approx(0.8, abs=0.01)
+    assert at(flight.z, 8) == pytest.approx(held, abs=0.01)
+    assert flight.z[-1] == pytest.approx(held, abs=1e-3)
+    assert np.allclose([flight.x, flight.y, flight.yaw], 0, atol=1e-9)
+
+
+def test_yaw_follows_its_command_and_the_rest_stays():
+    flight = fly_timeline("3_yaw", "3_yaw.yaml")
+    assert at(flight.wz, 1.2) / 0.5 == pytest.approx(2 / 3, abs=0.03)
+    assert at(flight.wz, 4) == pytest.approx(0.5, abs=0.005)
+    assert at(flight.yaw, 6) == pytest.approx(1.5, abs=0.02)
+    assert abs(flight.wz[-1]) < 1e-3
+    assert flight.yaw[-1] > at(flight.yaw, 6) + 0.05  # nobody remembers the heading
+    assert np.allclose([flight.x, flight.y], 0, atol=1e-6)
+    assert np.allclose(flight.z, 0.8, atol=2e-3)
+
+
+@pytest.mark.parametrize("stage, along, across", [("4_pitch", "x", "y"), ("5_roll", "y", "x")])
+def test_a_speed_is_reached_held_and_braked_and_a_gust_is_taken(stage, along, across):
+    flight = fly_timeline(stage, f"{stage}.yaml")
+    speed = getattr(flight, f"v{along}")
+    assert 1.3 < max(speed) < 1.7
+    assert np.allclose(speed[round(5 / 0.05) : round(7 / 0.05)], 1, atol=0.1)
+    assert at(speed, 13.5) == pytest.approx(0, abs=0.03)
+    assert at(speed, 14.2) > 0.3
+    assert abs(speed[-1]) < 0.05
+    assert np.allclose([getattr(flight, across), flight.yaw], 0, atol=1e-6)
+    assert np.allclose(flight.z, 0.8, atol=0.02)
+
+
+def test_the_finished_control_survives_being_thrown_about():
+    flight = fly_timeline("5_roll", "stability.yaml", "drone.position=[0, 0, 5]", seconds=28)
+    for rest in (13.9, 19.9, 28):
+        assert at(flight.z, rest) == pytest.approx(5, abs=0.01)
+        assert np.hypot(at(flight.vx, rest), at(flight.vy, rest)) < 0.05
+        assert abs(at(flight.wz, rest)) < 0.01
+        assert abs(at(flight.vz, rest)) < RIPPLE
+
+
+def test_the_bare_law_falls_where_the_limits_hold():
+    fallen = fly_timeline("5_roll", "fall.yaml", "drone.position=[0, 0, 5]")
+    assert fallen.propellers.min() < 0
+    assert fallen.z[-1] < 2
+    held = fly_timeline("tutorial", "fall.yaml", "drone.position=[0, 0, 5]", seconds=26)
+    assert held.z[-1] == pytest.approx(5, abs=0.01)
+
+
+@pytest.mark.parametrize("stage", ["2_elevation", "3_yaw", "4_pitch", "5_roll"])
+def test_a_stage_before_ros_hears_no_commands(stage):
+    with flying(stage) as simulation:
+        simulation.drone.receive(FORWARD_TURNING)
+        fly(simulation, 0.9)
+        assert simulation.drone.state.position == pytest.approx((0, 0, 0.8), abs=2e-3)
+
+
+@pytest.mark.parametrize("stage", ["6_ros", "7_camera"])
+def test_a_stage_with_ros_answers_a_twist_and_holds_it(stage):
+    with flying(stage, "cameras.front.width=32", "cameras.front.height=24") as simulation:
+        assert np.allclose(fly(simulation, 1).states[:, :2], 0)
+        simulation.drone.bus.post("/drone/cmd_vel", FORWARD_TURNING)
+        flight = fly(simulation, 6)
+    assert flight.wz[-1] == pytest.approx(0.5, abs=0.01)
+    assert flight.vz[-1] == pytest.approx(0.2, abs=0.02)
+    assert np.hypot(flight.vx[-1], flight.vy[-1]) == pytest.approx(1.04, abs=0.15)
+
+
+@pytest.mark.parametrize("stage", ["6_ros", "7_camera"])
+def test_the_last_stages_fly_as_the_built_in_script_to_the_last_bit(stage):
+    small = ("control.thrust_limits=null", "cameras.front.width=32", "cameras.front.height=24")
+    own = fly_timeline(stage, "6_ros.yaml", *small)
+    built_in = fly_timeline("tutorial", "6_ros.yaml", *small)
+    assert np.array_equal(own.states, built_in.states)
+    assert np.array_equal(own.propellers, built_in.propellers)
+
+
+def test_the_camera_stage_publishes_every_step_s_picture():
+    with flying("7_camera", "cameras.front.width=64", f"scene_file={DOCS / 'tutorial' / '7_scene.yaml'}") as simulation:
+        fly(simulation, 0.15)
+        published = list(simulation.drone.bus.published)
+        seen = simulation.cameras["front"].take()
+    assert [one.topic for one in published] == ["/drone/my_front"] * 3
+    assert published[-1].kind == "sensor_msgs/Image"
+    picture = published[-1].message
+    assert (picture.width, picture.height, picture.frame_id) == (64, 480, "front_optical")
+    assert np.array_equal(np.frombuffer(picture.data, np.uint8).reshape(seen.shape), seen)
+    assert seen.reshape(-1, 3).std(axis=0).min() > 10  # there is something to see
+
+
+# ---- the text
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_the_text_names_every_stage(stage):
+    assert f"(tutorial/{stage}.py)" in TEXT
+    assert f"docs/tutorial/{stage}.py" in TEXT
+
+
+@pytest.mark.parametrize("snippet", blocks("python"), ids=lambda snippet: snippet.strip().splitlines()[0])
+def test_lines_shown_are_lines_of_a_script(snippet):
+    wanted = textwrap.dedent(snippet)
+    assert any(wanted in textwrap.dedent(_with_margin(path, snippet)) for path in STAGES.values())
+
+
+def _with_margin(path, snippet):
+    """Return a script without the margin of a snippet, where it has that much."""
+    margin = len(snippet) - len(snippet.lstrip(" "))
+    return "".join(line[margin:] if not line[:margin].strip() else line for line in path.open())
+
+
+def test_links_and_pictures_are_there():
+    for target in re.findall(r"\]\(([^)#]+)\)", TEXT):
+        assert target.startswith("http") or (DOCS / target).exists(), target
+
+
+def test_every_picture_is_made_by_a_command():
+    made = (DOCS / "make_pictures.sh").read_text() + (DOCS / "take_pictures.py").read_text()
+    plots = re.search(r"^plots\(\).*?^\}", made, re.MULTILINE | re.DOTALL).group()
+    for name in re.findall(r"\(pictures/tutorial_([^)]+)\.png\)", TEXT):
+        assert f"tutorial_{name}.png" in made or name in plots.split() or f" {name};" in plots, name
+
+
+def test_the_commands_print_what_the_text_shows(tmp_path, monkeypatch, capsys):
+    (tmp_path / "docs").symlink_to(DOCS)
+    monkeypatch.chdir(tmp_path)  # the commands write their CSV where they stand
+    shown = [pair for block in blocks("console") for pair in commands_in(block)]
+    assert len(shown) > 20
+    for command, output in shown:
+        ran = run(command)
+        printed = capsys.readouterr().out
+        if ran:
+            assert comparable(printed) == comparable(output), command
+        else:
+            assert not output, f"{command}: no test runs it, so the text may not show what it prints"
+
+
+def commands_in(block):
+    """Return the commands of a console block, with the lines shown below each."""
+    parts = re.split(r"^\$ ", textwrap.dedent(block), flags=re.MULTILINE)
+    return [part.partition("\n")[::2] for part in parts[1:]]
+
+
+def run(command):
+    """Run a command of the text that needs no ROS, in this process; return whether it was one."""
+    words = shlex.split(command)
+    if words[:3] == ["rosrun", "drone_sim", "fly"]:
+        drawn = words.index("--plot") if "--plot" in words else len(words)
+        assert fly_main([*words[3:drawn], *words[drawn + 2 :]]) == 0
+    elif words[:2] == ["python3", "-c"]:
+        exec(words[2], {})
+    elif words[0] == "python3":
+        source = Path(words[1]).read_text()
+        names = {"__name__": "imported"}
+        exec(compile(source, words[1], "exec"), names)
+        assert names["main"](words[2:]) == 0
+    else:
+        return False
+    return True
+
+
+def comparable(printed):
+    """Return what a command printed, without how long it took."""
+    return re.sub(r" in [\d.]+ s \(\d+ times real time\)", "", printed).strip().splitlines()
