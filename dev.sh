@@ -14,11 +14,12 @@ packages() {
   local common="python3-venv build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri"
   if [ -f /opt/ros/noetic/setup.bash ]; then
     echo "$common $(printf 'ros-noetic-%s ' catkin rospy roslaunch rostest rosbash cv-bridge tf2-ros robot-state-publisher \
-      rviz dynamic-reconfigure geometry-msgs nav-msgs sensor-msgs std-msgs)"
+      rviz dynamic-reconfigure interactive-markers std-srvs geometry-msgs nav-msgs sensor-msgs std-msgs)"
   else
     echo "$common catkin librostest-dev python3-rospy python3-roslaunch python3-rostest rosbash python3-rostopic \
       python3-rosnode python3-rosmsg python3-rosservice python3-cv-bridge python3-tf2-ros ros-robot-state-publisher rviz python3-dynamic-reconfigure python3-geometry-msgs python3-nav-msgs \
-      python3-sensor-msgs python3-std-msgs python3-yaml"
+      python3-sensor-msgs python3-std-msgs python3-std-srvs python3-interactive-markers \
+      python3-visualization-msgs python3-yaml"
   fi
 }
 

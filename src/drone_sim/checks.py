@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Sequence
+from typing import Sequence, Tuple
 
+from drone_sim.frames import Vector
 from drone_sim.parameters import Parameters
 from drone_sim.state import Pose, Twist, Vector3
 
@@ -15,15 +16,17 @@ class Refused(ValueError):
 
 def twist(linear: Sequence[float], angular: Sequence[float], parameters: Parameters) -> Twist:
     """Return the command (m/s, rad/s); raises Refused beyond cmd_vel_limits."""
-    limits = parameters.cmd_vel_limits
-    for kind, values, limit, unit in (
-        ("linear", linear, limits.linear, "m/s"),
-        ("angular", angular, limits.angular, "rad/s"),
-    ):
-        for axis, value in zip("xyz", values):
-            if not abs(value) <= limit:
-                raise Refused(f"{kind}.{axis} = {value}: must lie within +-{limit} {unit}")
+    _check_within("linear", linear, parameters.cmd_vel_limits.linear, "m/s")
+    _check_within("angular", angular, parameters.cmd_vel_limits.angular, "rad/s")
     return Twist(Vector3(*linear), Vector3(*angular))
+
+
+def push(force: Sequence[float], torque: Sequence[float], parameters: Parameters) -> Tuple[Vector, Vector, float]:
+    """Return force (N), torque (N m) and how long a push lasts (s); raises Refused beyond the limits."""
+    limits = parameters.push
+    _check_within("force", force, limits.force_limit, "N")
+    _check_within("torque", torque, limits.torque_limit, "N m")
+    return (force[0], force[1], force[2]), (torque[0], torque[1], torque[2]), limits.duration
 
 
 def pose(position: Sequence[float], orientation: Sequence[float], parameters: Parameters) -> Pose:
@@ -37,3 +40,9 @@ def pose(position: Sequence[float], orientation: Sequence[float], parameters: Pa
         raise Refused(f"orientation {tuple(orientation)}: must be a unit quaternion, its length is {length:.3g}")
     x, y, z, w = (value / length for value in orientation)
     return Pose((position[0], position[1], position[2]), (x, y, z, w))
+
+
+def _check_within(kind: str, values: Sequence[float], limit: float, unit: str) -> None:
+    for axis, value in zip("xyz", values):
+        if not abs(value) <= limit:  # so written, it refuses NaN
+            raise Refused(f"{kind}.{axis} = {value}: must lie within +-{limit} {unit}")

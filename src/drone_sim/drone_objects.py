@@ -25,6 +25,7 @@ from drone_sim.objects import Body, ObjectTree
 from drone_sim.parameters import CameraParameters, ParameterError
 
 DRONE = "Drone"
+TARGET = "DronePosition"  # the green sphere
 BASE = frames.from_rpy((0.0, 0.0, -0.01), (0.0, 0.0, 0.0))  # Quadricopter_base in the root's frame
 _ALONG_X = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)  # z forward, y up, x left
 OPTICAL_FROM_SENSOR = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # optical frames: y down, x right
@@ -62,7 +63,7 @@ def scene_objects(
     objects.add("Quadricopter_frontCamera", DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera")
     for camera in cameras.values():
         _add_camera(objects, links, camera)
-    objects.add("DronePosition", DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
+    objects.add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
     objects.add("Floor", also=("ResizableFloor_5_25",))
     return objects
 

@@ -63,6 +63,14 @@ class TwistLimits(_Parameters):
     angular: Positive
 
 
+class PushParameters(_Parameters):
+    """How long a push on the topic `push` lasts, and what is a mistake."""
+
+    duration: Positive
+    force_limit: Positive
+    torque_limit: Positive
+
+
 class FloorParameters(_Parameters):
     """A square floor at z = 0, centred on the origin."""
 
@@ -206,6 +214,7 @@ class Parameters(_Parameters):
     cmd_vel_timeout: NonNegative
     cmd_vel_limits: TwistLimits
     position_limit: Positive
+    push: PushParameters
     time_step: Positive
     sub_step: Positive
     gravity: Finite

@@ -1,16 +1,17 @@
 """The node: the simulation at the pace of the clock, with ROS around it.
 
 Parameters (private): every key of config/drone.yaml.
-Topics, in the drone's namespace: see inputs.py and outputs.py. /clock is published with use_sim_time.
+Topics, in the drone's namespace: see inputs.py, outputs.py, cameras.py and markers.py; services: services.py.
+/clock is published with use_sim_time.
 Frames: world -> base_link, world -> Track_base; the rest comes from the URDF.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import sys
 import time
-from typing import List, Union
 
 import rospy
 from rosgraph_msgs.msg import Clock
@@ -20,61 +21,98 @@ from drone_sim.frames import position, to_euler
 from drone_sim.pacing import Pacer
 from drone_sim.parameters import ParameterError, Parameters
 from drone_sim.ros.cameras import CameraOutput
+from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput
+from drone_sim.ros.markers import Handles
 from drone_sim.ros.master_watch import MasterWatch
 from drone_sim.ros.outputs import DroneOutput
-from drone_sim.scripting.python_script import ScriptError
+from drone_sim.ros.player import Player
+from drone_sim.ros.script_topics import RosBackend
+from drone_sim.ros.services import Services
+from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Simulation
 from drone_sim.urdf import UrdfError
+
+_STANDING = 0.2  # s between two messages while the simulation stands still
 
 
 class Node:
     """Steps the simulation in the thread that calls `run`, and no other."""
 
     def __init__(self, parameters: Parameters):
-        """Build the simulation and advertise. Raises what Simulation raises."""
-        self._window = parameters.gui
-        self.simulation = Simulation(parameters, script=parameters.script, gui=parameters.gui)
-        simulation = self.simulation
-        factor = parameters.real_time_factor
-        self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
+        """Build the scene and advertise. Raises what Simulation raises."""
+        self._parameters = parameters
         self._simulated_time = bool(rospy.get_param("/use_sim_time", False))
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if self._simulated_time else None
-        self._input = DroneInput(simulation.drone, parameters)
-        self._outputs: List[Union[DroneOutput, CameraOutput]] = []
-        settings = parameters.cameras
-        mounted = {settings[name].frame: camera for name, camera in simulation.cameras.items() if settings[name].mount}
-        self._outputs.append(DroneOutput(simulation.drone, mounted))
-        for name, camera in simulation.cameras.items():
-            self._outputs.append(CameraOutput(simulation.drone.name, camera, settings[name]))
+        drone = parameters.drone.name
+        images = {rospy.resolve_name(f"{drone}/{camera.topic}") for camera in parameters.cameras.values()}
+        self.simulation = Simulation(
+            parameters, script=parameters.script, gui=parameters.gui, backend=RosBackend(images), started=False
+        )
+        self.player = Player(self.simulation, self._simulated_time)
+        self._inbox = Inbox()
+        self._services = Services(self.player, self._inbox)
+        factor = parameters.real_time_factor
+        self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
+        inputs = DroneInput(self.simulation, self._inbox)
+        self._handles = Handles(self.simulation, inputs, self._inbox)
+        self._cameras = [
+            CameraOutput(drone, camera, parameters.cameras[name]) for name, camera in self.simulation.cameras.items()
+        ]
+        self._output = DroneOutput(self.simulation)
+        for camera in self.simulation.cameras.values():
             camera.take()  # the first picture takes long: compiling shaders must not make a step late
 
     def run(self) -> None:
-        """Step until the node is shut down. Raises ScriptError."""
-        simulation = self.simulation
-        rospy.loginfo(f"drone_sim: flying; commands on {rospy.resolve_name(simulation.drone.name + '/cmd_vel')}")
+        """Start, and step until the node is shut down."""
+        with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
+            self.player.start()
+        commands = rospy.resolve_name(f"{self._parameters.drone.name}/cmd_vel")
+        rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; commands on {commands}")
+        began, steps = time.monotonic(), 0
         self._pacer.restart()
-        began = time.monotonic()
         while not rospy.is_shutdown():
-            late = self._pacer.wait(rospy.is_shutdown)
-            if late:
-                rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
-            self.step()
+            if self.player.playing:
+                self._wait()
+                steps += self.step()
+            else:
+                self._stand()
+                self._pacer.restart()
         seconds = time.monotonic() - began
-        factor = f"{simulation.time / seconds:.2f} times real time" if seconds else "no time"
-        rospy.loginfo(f"drone_sim: flew {simulation.time:.2f} s at {factor}, {self._pacer.overruns} late steps")
+        flown = steps * self._parameters.time_step
+        factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
+        rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {self._pacer.overruns} late steps")
 
-    def step(self) -> None:
-        """Take what has come in, run one step, publish it under one stamp."""
+    def _wait(self) -> None:
+        late = self._pacer.wait(rospy.is_shutdown)
+        if late:
+            rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
+
+    def step(self) -> bool:
+        """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
         stamp = rospy.Time.now()
-        self._input.apply()
-        self.simulation.step()
+        self._inbox.empty()
+        if not self.player.playing or not self.player.step():
+            return False
         if self._clock is not None:
             stamp = rospy.Time.from_sec(self.simulation.time)
             self._clock.publish(stamp)
-        for output in self._outputs:
-            output.publish(stamp)
-        if self._window:
+        self._publish(stamp)
+        return True
+
+    def _stand(self) -> None:
+        """Paused or stopped: wait for something to do, and show what it changed."""
+        self._inbox.wait(_STANDING)
+        self._inbox.empty()
+        if not self._simulated_time:  # in simulated time a second message of one stamp would be an error
+            self._publish(rospy.Time.now())
+
+    def _publish(self, stamp: rospy.Time) -> None:
+        for camera in self._cameras:
+            camera.publish(stamp)
+        self._output.publish(stamp)
+        self._handles.update()
+        if self._parameters.gui:
             track = self.simulation.drone.track
             self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
 

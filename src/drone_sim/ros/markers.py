@@ -1,0 +1,94 @@
+"""Handles in rviz: the green target sphere, and the drone itself, to be dragged with the mouse while it flies."""
+
+from __future__ import annotations
+
+from typing import Set
+
+from geometry_msgs.msg import Point, Pose, Quaternion
+from interactive_markers.interactive_marker_server import InteractiveMarkerServer
+from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback, Marker
+
+from drone_sim import checks, frames
+from drone_sim.drone_objects import TARGET
+from drone_sim.frames import Matrix
+from drone_sim.ros.inbox import Inbox
+from drone_sim.ros.inputs import DroneInput, move_target
+from drone_sim.ros.messages import WORLD
+from drone_sim.simulation import Simulation
+
+_EVERY = 4  # steps between two updates: five a second are enough for handles
+_DRONE = "Drone"
+_UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # a control acts along, about, or across its x axis: turned to z
+
+
+class Handles:
+    """An interactive marker server at `<drone>/markers`."""
+
+    def __init__(self, simulation: Simulation, inputs: DroneInput, inbox: Inbox):
+        """Show both handles."""
+        self._simulation = simulation
+        self._inputs = inputs
+        self._inbox = inbox
+        self._held: Set[str] = set()
+        self._steps = 0
+        self._server = InteractiveMarkerServer(f"{simulation.drone.name}/markers")
+        ball = Marker(type=Marker.SPHERE)
+        ball.scale.x = ball.scale.y = ball.scale.z = 0.12
+        ball.color.g, ball.color.a = 0.8, 0.9
+        disc = Marker(type=Marker.CYLINDER)
+        disc.scale.x, disc.scale.y, disc.scale.z = 0.42, 0.42, 0.004
+        disc.color.r, disc.color.g, disc.color.a = 1.0, 0.6, 0.3
+        for name, look in ((TARGET, ball), (_DRONE, disc)):
+            self._server.insert(_handle(name, look), self._on_feedback)
+        self._server.applyChanges()
+
+    def update(self) -> None:
+        """Let the handles follow what they stand for, unless they are being dragged."""
+        self._steps += 1
+        if self._steps % _EVERY or not self._server.update_pub.get_num_connections():
+            return
+        objects = self._simulation.drone.objects
+        for name in {TARGET, _DRONE} - self._held:
+            matrix = objects.matrix(objects.handle(name))
+            yaw = frames.to_euler(matrix)[2]
+            level = frames.from_euler(frames.position(matrix), (0, 0, yaw))
+            self._server.setPose(name, _pose(level))
+        self._server.applyChanges()
+
+    def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
+        name = feedback.marker_name
+        if feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN:
+            self._held.add(name)
+        elif feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
+            self._held.discard(name)
+        elif feedback.event_type == InteractiveMarkerFeedback.POSE_UPDATE:
+            self._move(name, feedback)
+
+    def _move(self, name: str, feedback: InteractiveMarkerFeedback) -> None:
+        try:
+            pose = self._inputs.checked(feedback.header.frame_id, feedback.pose)
+        except checks.Refused:
+            return  # dragged below the floor, or to the horizon: it stays where it was
+        if name == TARGET:
+            self._inbox.put(lambda: move_target(self._simulation, pose))
+        else:
+            self._inbox.put(lambda: self._simulation.drone.move(pose))
+
+
+def _handle(name: str, look: Marker) -> InteractiveMarker:
+    """Return a handle that slides level when its body is dragged, and has an arrow up and a ring to turn it."""
+    handle = InteractiveMarker(name=name, scale=0.5)
+    handle.header.frame_id = WORLD
+    slide = InteractiveMarkerControl(name="slide", orientation=_UPRIGHT, always_visible=True)
+    slide.interaction_mode = InteractiveMarkerControl.MOVE_PLANE
+    slide.markers.append(look)
+    lift = InteractiveMarkerControl(name="lift", orientation=_UPRIGHT)
+    lift.interaction_mode = InteractiveMarkerControl.MOVE_AXIS
+    turn = InteractiveMarkerControl(name="turn", orientation=_UPRIGHT)
+    turn.interaction_mode = InteractiveMarkerControl.ROTATE_AXIS
+    handle.controls = [slide, lift, turn]
+    return handle
+
+
+def _pose(matrix: Matrix) -> Pose:
+    return Pose(Point(*frames.position(matrix)), Quaternion(*frames.to_quaternion(matrix)))

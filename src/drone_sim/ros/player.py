@@ -1,0 +1,83 @@
+"""Start, stop, pause and step: what V-REP's toolbar does, and what happens when a script fails."""
+
+from __future__ import annotations
+
+from typing import Callable
+
+import rospy
+
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.simulation import Simulation
+
+
+class Player:
+    """Plays a simulation; the thread that owns the simulation calls all of this."""
+
+    def __init__(self, simulation: Simulation, simulated_time: bool):
+        """Begin stopped. `simulated_time`: the node publishes /clock, so that others wait when it stands still."""
+        self.simulation = simulation
+        self.paused = False
+        self._simulated_time = simulated_time
+
+    @property
+    def playing(self) -> bool:
+        """Whether the next step is due when the clock says so."""
+        return self.simulation.running and not self.paused
+
+    def start(self) -> str:
+        """Read scene and script from disk and begin at time 0. Raises ScriptError, after stopping again."""
+        self.paused = False
+        self.attempt(self.simulation.start)
+        rospy.loginfo("started")
+        return "started"
+
+    def stop(self) -> str:
+        """Run the script's cleanup, and restore the initial scene. Raises ScriptError."""
+        if not self.simulation.running:
+            return "is stopped already"
+        self.simulation.stop()
+        self._say_that_the_clock_stands("stopped")
+        return "stopped"
+
+    def pause(self, on: bool) -> str:
+        """Pause or go on. Raises ValueError when stopped."""
+        if not self.simulation.running:
+            raise ValueError("is stopped: start it first")
+        self.paused = on
+        if on:
+            self._say_that_the_clock_stands("paused")
+        else:
+            rospy.loginfo("goes on")
+        return f"{'paused' if on else 'goes on'} at t = {self.simulation.time:.2f} s"
+
+    def one_step(self) -> str:
+        """Run one step while paused. Raises ValueError when it is not, ScriptError."""
+        if not self.simulation.running or not self.paused:
+            raise ValueError("is not paused: one step at a time needs `pause` first")
+        self.attempt(self.simulation.step)
+        return f"t = {self.simulation.time:.2f} s"
+
+    def step(self) -> bool:
+        """Run one step; when the script fails, say so once, stop, and return False."""
+        try:
+            self.attempt(self.simulation.step)
+        except ScriptError:
+            return False
+        return True
+
+    def attempt(self, action: Callable[[], None]) -> None:
+        """Start or step. When the script fails, log its one line, run cleanup, and raise it again."""
+        try:
+            action()
+        except ScriptError as error:
+            rospy.logerr(f"script error: {error}")
+            try:
+                self.simulation.stop()
+            except ScriptError as second:
+                rospy.logerr(f"script error: {second}")
+            self._say_that_the_clock_stands("stopped; `start` runs the edited file")
+            raise
+
+    def _say_that_the_clock_stands(self, state: str) -> None:
+        waits = ": /clock stands still, and whoever waits on simulated time waits with it" if self._simulated_time else ""
+        rospy.loginfo(state + waits)
