@@ -41,7 +41,11 @@ def node(*arguments: str, program: str = "") -> Iterator[List[str]]:
     """Run the simulator, or a python program, on one core until the block ends; yield its lines of output."""
     what = [sys.executable, "-c", program] if program else ["rosrun", "drone_sim", "simulator"]
     process = subprocess.Popen(
-        ["taskset", "-c", CORE, *what, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        ["taskset", "-c", CORE, *what, *arguments],
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
     )
     lines: List[str] = []
     flying = threading.Event()

@@ -33,6 +33,7 @@ class Cameras(unittest.TestCase):
     def setUpClass(cls):
         cls.parameters = parameters.load({"cameras": {"floor": {"every": 3}}})
         cls.node = Node(cls.parameters)
+        cls.node.player.start()
         vision = cls.node.simulation.vision
         picture, cls.pictures = vision.picture, []
 

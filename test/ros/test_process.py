@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The node as a process: wrong parameters, signals, and repeatable flights."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -17,7 +18,8 @@ HANGS = 30.0  # s; nothing here takes nearly as long unless it hangs
 
 def simulator(*arguments):
     command = ["rosrun", "drone_sim", "simulator", *arguments]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
 class Process(unittest.TestCase):

@@ -10,9 +10,13 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import signal
 import sys
+import threading
 import time
+from typing import Callable
 
+import rosgraph
 import rospy
 from rosgraph_msgs.msg import Clock
 
@@ -42,6 +46,7 @@ class Node:
     def __init__(self, parameters: Parameters):
         """Build the scene and advertise. Raises what Simulation raises."""
         self._parameters = parameters
+        logging.getLogger("drone_sim").handlers = [_ToRosout()]
         self._simulated_time = bool(rospy.get_param("/use_sim_time", False))
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if self._simulated_time else None
         drone = parameters.drone.name
@@ -63,17 +68,21 @@ class Node:
         for camera in self.simulation.cameras.values():
             camera.take()  # the first picture takes long: compiling shaders must not make a step late
 
-    def run(self) -> None:
-        """Start, and step until the node is shut down."""
+    def run(self, ending: Callable[[], bool] = lambda: False) -> None:
+        """Start, and step until it is time to end, or ROS shuts the node down."""
+
+        def over() -> bool:
+            return ending() or rospy.is_shutdown()
+
         with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
             self.player.start()
         commands = rospy.resolve_name(f"{self._parameters.drone.name}/cmd_vel")
         rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; commands on {commands}")
         began, steps = time.monotonic(), 0
         self._pacer.restart()
-        while not rospy.is_shutdown():
+        while not over():
             if self.player.playing:
-                self._wait()
+                self._wait(over)
                 steps += self.step()
             else:
                 self._stand()
@@ -83,8 +92,8 @@ class Node:
         factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
         rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {self._pacer.overruns} late steps")
 
-    def _wait(self) -> None:
-        late = self._pacer.wait(rospy.is_shutdown)
+    def _wait(self, over: Callable[[], bool]) -> None:
+        late = self._pacer.wait(over)
         if late:
             rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
 
@@ -130,19 +139,27 @@ class _ToRosout(logging.Handler):
 
 def main() -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
-    rospy.init_node("drone_sim")
-    logging.getLogger("drone_sim").addHandler(_ToRosout())
+    # rospy's own signal handler calls the master from within whatever the signal interrupts, and hangs for
+    # ever where that is a call to the master, too. Ours says that it is time to end, and no more.
+    rospy.init_node("drone_sim", disable_signals=True)
+    ending = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: ending.set())
     node = None
     try:
         node = Node(parameters_module.load(rospy.get_param("~", {})))
         MasterWatch().start()
-        node.run()
+        node.run(ending.is_set)
     except (ParameterError, UrdfError, ScriptError, RuntimeError) as error:
         rospy.logfatal(f"drone_sim: {error}")
+        return 1
+    except (OSError, rosgraph.MasterException):
+        rospy.logfatal(f"drone_sim: no ROS master at {rosgraph.get_master_uri()}: start roscore, or use roslaunch")
         return 1
     finally:
         if node is not None:
             node.close()
+        rospy.signal_shutdown("the node ends")
     return 0
 
 

@@ -1,0 +1,197 @@
+#!/usr/bin/env python3
+"""V-REP's way of working through ROS: start, stop, pause, step, edit the script, save the scene, drag things."""
+
+import sys
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+import yaml
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from listening import Listener, connected
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import InteractiveMarkerFeedback
+
+from drone_sim import parameters
+from drone_sim.ros.node import Node
+
+SCRIPT = """
+def sysCall_init():
+    self.steps = 0
+    self.out = simROS.advertise('/script/steps', 'std_msgs/Float64')
+    simROS.subscribe('/script/bump', 'std_msgs/Float64', 'on_bump')
+
+def on_bump(msg):
+    self.steps += msg.data
+
+def sysCall_sensing():
+    self.steps += 1
+    simROS.publish(self.out, {'data': self.steps})
+
+def sysCall_cleanup():
+    print('cleaned up')
+"""
+
+
+class Toolbar(unittest.TestCase):
+    """A node that runs in this process, as fast as it can, called from beside."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.script, cls.scene = Path(cls.folder.name) / "script.py", Path(cls.folder.name) / "scene.yaml"
+        cls.script.write_text(SCRIPT)
+        settings = {"script": str(cls.script), "real_time_factor": 10.0, "drone": {"position": [0, 0, 900]}}
+        cls.node = Node(parameters.load(settings))
+        cls.log = Listener("/rosout", Log)
+        cls.odometry = Listener("/drone/odom", Odometry)
+        cls.thread = threading.Thread(target=cls.node.run)
+        cls.thread.start()
+        cls.odometry.wait_for()
+
+    @classmethod
+    def tearDownClass(cls):
+        rospy.signal_shutdown("done")
+        cls.thread.join()
+        cls.node.close()
+        cls.folder.cleanup()
+
+    def setUp(self):
+        self.script.write_text(SCRIPT)
+        rospy.set_param("~scene_file", "")
+        self.call("load_scene")
+
+    def call(self, name, expected=True):
+        answer = rospy.ServiceProxy(f"~{name}", Trigger)()
+        self.assertEqual(answer.success, expected, answer.message)
+        return answer.message
+
+    def pause(self, on, expected=True):
+        answer = rospy.ServiceProxy("~pause", SetBool)(on)
+        self.assertEqual(answer.success, expected, answer.message)
+
+    @property
+    def simulation(self):
+        return self.node.simulation
+
+    def test_stop_cleans_up_and_restores_the_scene(self):
+        self.odometry.wait_for(lambda o: o.pose.pose.position.z < 899)  # this script lets it fall
+        self.assertEqual(self.call("stop"), "stopped")
+        self.assertEqual(self.simulation.time, 0.0)
+        self.assertAlmostEqual(self.simulation.drone.state.position[2], 900)
+        self.log.wait_for(lambda m: m.msg == "cleaned up", after=0)
+        self.assertEqual(self.call("stop"), "is stopped already")
+        self.assertEqual(self.call("start"), "started")
+        self.odometry.wait_for(lambda o: o.pose.pose.position.z < 899)
+
+    def test_pause_and_single_steps(self):
+        self.call("step", expected=False)
+        self.pause(True)
+        before = self.simulation.steps
+        self.assertEqual(self.call("step"), f"t = {(before + 1) * 0.05:.2f} s")
+        self.assertEqual(self.call("step"), f"t = {(before + 2) * 0.05:.2f} s")
+        self.assertEqual(self.simulation.steps, before + 2)
+        self.pause(False)
+        self.odometry.wait_for()
+        self.call("stop")
+        self.pause(True, expected=False)
+
+    def test_a_broken_script_stops_and_the_edited_one_starts(self):
+        for broken, message in (
+            ("def sysCall_init(:\n", "[load]"),
+            ("def sysCall_init():\n    sim.getObjectPositon(1)\n", "[init]"),
+            ("def sysCall_actuation():\n    1 / 0\n", "[actuation]"),
+        ):
+            with self.subTest(message):
+                self.script.write_text(broken)
+                errors = len(self.log.messages)
+                rospy.ServiceProxy("~start", Trigger)()
+                said = self.log.wait_for(lambda m, message=message: message in m.msg, after=errors)
+                self.assertIn(str(self.script), said.msg)
+                self.log.wait_for(lambda m: m.msg.startswith("stopped"), after=errors)
+                self.assertFalse(self.simulation.running)
+                self.assertEqual(len([m for m in self.log.messages[errors:] if message in m.msg]), 1)
+                self.script.write_text(SCRIPT)
+                self.assertEqual(self.call("start"), "started")
+
+    def test_a_script_s_topics(self):
+        steps = Listener("/script/steps", Float64)
+        steps.wait_for()
+        connected(rospy.Publisher("/script/bump", Float64, queue_size=1)).publish(1e6)
+        steps.wait_for(lambda m: m.data >= 1e6)
+
+    def test_the_scene_is_saved_and_loaded(self):
+        self.scene.write_text(
+            "objects: [{name: Box, shape: box, size: [1, 1, 1], position: [3, 0, 4], mass: 1}]\n"
+            "drone: {position: [1, 2, 3], yaw: 0.5}\n"
+        )
+        rospy.set_param("~scene_file", str(self.scene))
+        self.assertIn(str(self.scene), self.call("load_scene"))
+        self.odometry.wait_for(lambda o: abs(o.pose.pose.position.y - 2) < 0.1)
+        rospy.rostime.wallsleep(0.2)
+        self.pause(True)
+        self.assertIn(str(self.scene), self.call("save_scene"))
+        saved = yaml.safe_load(self.scene.read_text())
+        box = saved["objects"][0]
+        self.assertEqual((box["name"], box["size"]), ("Box", [1.0, 1.0, 1.0]))
+        self.assertLess(box["position"][2], 4.0)  # it was falling
+        self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
+        self.scene.write_text("object: []\n")
+        self.assertIn("unknown key object; known are drone, floor, objects", self.call("load_scene", expected=False))
+
+    def test_a_snapshot_comes_back(self):
+        self.pause(True)
+        self.call("step")
+        self.call("snapshot")
+        first = [self.call("step") and self.simulation.drone.state for _ in range(5)]
+        self.assertIn("back at", self.call("restore"))
+        again = [self.call("step") and self.simulation.drone.state for _ in range(5)]
+        self.assertEqual(first, again)
+        self.call("stop")
+        self.assertIn("earlier run", self.call("restore", expected=False))
+
+    def test_the_sphere_and_the_drone_are_dragged(self):
+        feedback = connected(rospy.Publisher("/drone/markers/feedback", InteractiveMarkerFeedback, queue_size=10))
+        for name, where in (("DronePosition", (1.0, 2.0, 3.0)), ("Drone", (-1.0, 0.5, 2.0))):
+            message = InteractiveMarkerFeedback(client_id="test", marker_name=name, control_name="slide")
+            message.event_type = InteractiveMarkerFeedback.POSE_UPDATE
+            message.header.frame_id = "world"
+            message.pose.position.x, message.pose.position.y, message.pose.position.z = where
+            message.pose.orientation.w = 1.0
+            feedback.publish(message)
+        self.odometry.wait_for(lambda o: abs(o.pose.pose.position.y - 0.5) < 0.1)
+
+    def test_target_pose_and_push(self):
+        self.pause(True)
+        target = rospy.Publisher("/drone/target_pose", PoseStamped, queue_size=1, latch=True)
+        message = PoseStamped()
+        message.pose.position.x, message.pose.position.z, message.pose.orientation.w = 1.5, 2.0, 1.0
+        target.publish(message)
+        push = rospy.Publisher("/drone/push", WrenchStamped, queue_size=1, latch=True)
+        wrench = WrenchStamped()
+        wrench.wrench.force.x = 1.04
+        push.publish(wrench)
+        connected(target)
+        connected(push)
+        rospy.rostime.wallsleep(0.5)  # both stand in the inbox by now
+        for _ in range(8):
+            self.call("step")
+        objects = self.simulation.drone.objects
+        where = objects.matrix(objects.handle("DronePosition"), objects.handle("Drone"))
+        self.assertGreater(abs(where[3]), 1.0)
+        # 1.04 N on 0.52 kg for the 0.2 s that a push lasts
+        self.assertAlmostEqual(self.simulation.drone.state.linear_velocity[0], 0.4, places=4)
+        wrench.wrench.force.x = float("nan")
+        push.publish(wrench)
+        self.log.wait_for(lambda m: "push refused: force.x = nan" in m.msg)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_toolbar")
+    sys.exit(rostest.rosrun("drone_sim", "toolbar", Toolbar))
