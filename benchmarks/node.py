@@ -126,7 +126,7 @@ def latencies(seconds: float = 20.0) -> List[Row]:
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "delays"
-        with node(str(path), program=PROBE) as lines:
+        with node(str(path), "_real_time_factor:=1", program=PROBE) as lines:
             subscriber = _listen("/drone/front", Image, image)
             publisher = rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
             time.sleep(2.0)

@@ -15,8 +15,8 @@ from drone_sim.objects import near_names
 from drone_sim.parameters import CameraParameters, Parameters
 from drone_sim.propeller import ParticleFan, Wrench
 from drone_sim.scripting import load
-from drone_sim.scripting.api_signals import Signals
 from drone_sim.scripting.api import make_sim, make_sim_ros
+from drone_sim.scripting.api_signals import Signals
 from drone_sim.scripting.host import DrawingSink, Surroundings
 from drone_sim.scripting.messages import MessageBus
 from drone_sim.scripting.time_limit import TimeLimit
@@ -51,6 +51,9 @@ class Drone:
         inertial_from_root = frames.invert(world.inertial_frame(self._id))
         self._links = [self._link(f"propeller_{place}") for place, _ in PROPELLERS]
         self._points = [frames.position(frames.multiply(inertial_from_root, link)) for link in self._links]
+        self._by_axis: Dict[Vector, List[int]] = {}  # propellers that push along the same axis of the body
+        for number, link in enumerate(self._links):
+            self._by_axis.setdefault((link[2], link[6], link[10]), []).append(number)
         shapes = [(respondable(number), link) for number, link in enumerate(self._links, start=1)]
         self._shapes = {name: frames.multiply(inertial_from_root, link) for name, link in [(DRONE, IDENTITY), *shapes]}
         self.script: load.Script = load.NoScript()
@@ -250,12 +253,13 @@ class Drone:
         """Emit a step's particles, use up a step of the pushes; return the body id and the step's wrench."""
         wrench, self._added = self._added, Wrench()
         step = self._parameters.time_step
-        for number, (fan, link, point) in enumerate(zip(self.fans, self._links, self._points)):
-            velocity = self._propellers[number][_PARTICLE_VELOCITY]
-            thrust, torque = fan.emit(velocity)
-            self._blade_turns[number] += velocity * step
-            x, y, z = frames.rotate(self._matrix, (link[2], link[6], link[10]))  # the propeller's +z
-            wrench.add((x * thrust, y * thrust, z * thrust), (x * torque, y * torque, z * torque), point)
+        for axis, propellers in self._by_axis.items():
+            thrusts = []
+            for number in propellers:
+                velocity = self._propellers[number][_PARTICLE_VELOCITY]
+                thrusts.append((*self.fans[number].emit(velocity), self._points[number]))
+                self._blade_turns[number] += velocity * step
+            wrench.add_along(frames.rotate(self._matrix, axis), thrusts)
         for push in self._pushes:
             wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
         self._pushes = [push._replace(steps=push.steps - 1) for push in self._pushes if push.steps > 1]

@@ -8,6 +8,7 @@ step handles a dozen of them and one numpy call costs more than all the arithmet
 from __future__ import annotations
 
 import math
+from math import cos, sin
 from typing import Sequence, Tuple
 
 Vector = Tuple[float, float, float]
@@ -29,7 +30,8 @@ def from_quaternion(position: Sequence[float], quaternion: Sequence[float]) -> M
 
 def from_euler(position: Sequence[float], angles: Sequence[float]) -> Matrix:
     """Return the transform of V-REP's Euler angles, R = Rx(alpha) Ry(beta) Rz(gamma), in radians."""
-    (sa, ca), (sb, cb), (sc, cc) = ((math.sin(angle), math.cos(angle)) for angle in angles)
+    alpha, beta, gamma = angles
+    sa, ca, sb, cb, sc, cc = sin(alpha), cos(alpha), sin(beta), cos(beta), sin(gamma), cos(gamma)
     return (
         cb * cc, -cb * sc, sb, position[0],
         ca * sc + sa * sb * cc, ca * cc - sa * sb * sc, -sa * cb, position[1],
@@ -39,7 +41,8 @@ def from_euler(position: Sequence[float], angles: Sequence[float]) -> Matrix:
 
 def from_rpy(position: Sequence[float], rpy: Sequence[float]) -> Matrix:
     """Return the transform of ROS's roll, pitch, yaw, R = Rz(yaw) Ry(pitch) Rx(roll), in radians."""
-    (sr, cr), (sp, cp), (sy, cy) = ((math.sin(angle), math.cos(angle)) for angle in rpy)
+    roll, pitch, yaw = rpy
+    sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
     return (
         cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, position[0],
         sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, position[1],
@@ -142,6 +145,14 @@ def rotate(m: Sequence[float], vector: Sequence[float]) -> Vector:
         m[4] * x + m[5] * y + m[6] * z,
         m[8] * x + m[9] * y + m[10] * z,
     )
+
+
+def turned(quaternion: Sequence[float], vector: Sequence[float]) -> Vector:
+    """Return the vector turned by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
+    x, y, z, w = quaternion
+    vx, vy, vz = vector
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx
 
 
 def cross(a: Sequence[float], b: Sequence[float]) -> Vector:

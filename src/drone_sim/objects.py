@@ -47,6 +47,9 @@ class SceneObject:
         self.parent = parent
         self.local = local
         self.body = body
+        self._above: Optional[Matrix] = None
+        self._below: Optional[Matrix] = None
+        self._product = IDENTITY
 
     @property
     def name(self) -> str:
@@ -62,7 +65,13 @@ class SceneObject:
         """World from this frame."""
         if self.body is not None:
             return self.body.matrix
-        return self.local if self.parent is None else frames.multiply(self.parent.matrix, self.local)
+        if self.parent is None:
+            return self.local
+        # Scripts ask for the same few frames several times a step: the same two tuples, the same product.
+        above, local = self.parent.matrix, self.local
+        if above is not self._above or local is not self._below:
+            self._above, self._below, self._product = above, local, frames.multiply(above, local)
+        return self._product
 
     @matrix.setter
     def matrix(self, matrix: Matrix) -> None:

@@ -13,7 +13,7 @@ V-REP 3.x keeps the carry (21, 22, 21, ... particles at dt = 0.05 s), CoppeliaSi
 from __future__ import annotations
 
 import math
-from typing import List, Sequence, Tuple
+from typing import Iterable, List, Sequence, Tuple
 
 from drone_sim.frames import Quaternion, Vector
 from drone_sim.parameters import PropellerParameters
@@ -55,7 +55,7 @@ class Wrench:
     sub-step, at a point that moves with the body. For points p_i (inertial frame of the body) and
     forces F_i (world), the torque about the centre of mass under the rotation R is sum (R p_i) x F_i.
     It is linear in R, so nine sums hold it for any number of forces: column c of `moments` is
-    sum p_i F_i[c].
+    sum p_i F_i[c]. Written out without loops: both methods run in every step.
     """
 
     def __init__(self) -> None:
@@ -66,13 +66,46 @@ class Wrench:
 
     def add(self, force: Sequence[float], torque: Sequence[float], point: Sequence[float]) -> None:
         """Add a force (N, world) at a point (m, inertial frame of the body), and a torque (N m, world)."""
-        for axis in range(3):
-            self.force[axis] += force[axis]
-            self.torque[axis] += torque[axis]
-            column = self.moments[axis]
-            column[0] += point[0] * force[axis]
-            column[1] += point[1] * force[axis]
-            column[2] += point[2] * force[axis]
+        fx, fy, fz = force
+        px, py, pz = point
+        total, turning = self.force, self.torque
+        total[0] += fx
+        total[1] += fy
+        total[2] += fz
+        turning[0] += torque[0]
+        turning[1] += torque[1]
+        turning[2] += torque[2]
+        about_x, about_y, about_z = self.moments
+        about_x[0] += px * fx
+        about_x[1] += py * fx
+        about_x[2] += pz * fx
+        about_y[0] += px * fy
+        about_y[1] += py * fy
+        about_y[2] += pz * fy
+        about_z[0] += px * fz
+        about_z[1] += py * fz
+        about_z[2] += pz * fz
+
+    def add_along(self, axis: Vector, thrusts: Iterable[Tuple[float, float, Vector]]) -> None:
+        """Add thrusts (N) and torques (N m) along one axis (unit, world) at points (m, inertial frame).
+
+        Since they are parallel, sum p_i F_i is the one product (sum p_i f_i) axis.
+        """
+        force = torque = px = py = pz = 0.0
+        for thrust, turning, point in thrusts:
+            force += thrust
+            torque += turning
+            px += point[0] * thrust
+            py += point[1] * thrust
+            pz += point[2] * thrust
+        for total, along in ((self.force, force), (self.torque, torque)):
+            total[0] += along * axis[0]
+            total[1] += along * axis[1]
+            total[2] += along * axis[2]
+        for column, share in zip(self.moments, axis):
+            column[0] += px * share
+            column[1] += py * share
+            column[2] += pz * share
 
     def torque_under(self, orientation: Quaternion) -> Vector:
         """Return the torque about the centre of mass (N m, world) while the body has this orientation."""

@@ -1,5 +1,7 @@
 """The simulation: V-REP's phases in V-REP's order, without ROS.
 
+For example:
+
     simulation = Simulation(parameters.load())
     simulation.step()
     print(simulation.drone.state.position)
@@ -85,7 +87,9 @@ class Simulation:
     def _camera(self, parameters: CameraParameters) -> Camera:
         size = (parameters.width, parameters.height)
         intrinsics = Intrinsics(*size, parameters.horizontal_fov, parameters.near, parameters.far)
-        return Camera(parameters.kind, intrinsics, lambda: self.drone.optical(parameters), self.vision)
+        camera = Camera(parameters.kind, intrinsics, lambda: self.drone.optical(parameters), self.vision)
+        camera.every = parameters.every
+        return camera
 
     # ---- start and stop
 
@@ -156,15 +160,14 @@ class Simulation:
     # ---- pictures
 
     def _take_pictures(self) -> None:
-        watched = [
-            camera
-            for camera, settings in zip(self.cameras.values(), self.parameters.cameras.values())
-            if self.steps % settings.every == 0 and camera.watched()
-        ]
-        if watched:
-            self.drone.show_blades()
+        shown = False
         for camera in self.cameras.values():
-            camera.image = camera.take() if camera in watched else None
+            camera.image = None
+            if self.steps % camera.every == 0 and camera.watched():
+                if not shown:
+                    self.drone.show_blades()
+                    shown = True
+                camera.image = camera.take()
 
     def _picture(self, name: str) -> np.ndarray:
         """Return what a camera sees, for the script: the step's picture if there is one, else a new one."""

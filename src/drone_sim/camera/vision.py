@@ -82,6 +82,7 @@ class Camera:
         """Take what it measures ("color" or "depth"), how, from where (world from optical frame), and by what."""
         self.kind = kind
         self.intrinsics = intrinsics
+        self.every = 1  # steps between two pictures
         self.watched: Callable[[], bool] = lambda: False
         self.image: Optional[np.ndarray] = None  # of the last step, if somebody looked
         self.pose = pose

@@ -41,9 +41,7 @@ def create(client: int, shape: Shape) -> int:
         collision, visual = _geometry(shape)
         solid = pybullet.createCollisionShape(physicsClientId=client, **collision)
         seen = pybullet.createVisualShape(rgbaColor=shape.color, physicsClientId=client, **visual)
-        body = pybullet.createMultiBody(
-            shape.mass, solid, seen, shape.position, orientation, physicsClientId=client
-        )
+        body = pybullet.createMultiBody(shape.mass, solid, seen, shape.position, orientation, physicsClientId=client)
     except pybullet.error:
         raise ValueError(f"{shape.kind} {shape.file}: PyBullet cannot read it") from None
     if shape.texture:

@@ -12,13 +12,15 @@ from typing import Dict, List, Mapping, Sequence, Tuple
 import numpy as np
 import pybullet
 
-from drone_sim.frames import Matrix, cross
+from drone_sim.frames import Matrix, cross, multiply_quaternions, turned
 from drone_sim.propeller import Wrench
 from drone_sim.state import Pose, State, compose, inverse
 from drone_sim.urdf import RigidBody
 from drone_sim.visual import Visual
 from drone_sim.world import shapes
 from drone_sim.world.pictures import Pictures
+
+_NO_TURN = (0.0, 0.0, 0.0, 1.0)
 
 
 class World:
@@ -121,11 +123,13 @@ class World:
         """Return pose and velocity of a body's root link."""
         centre, turn = pybullet.getBasePositionAndOrientation(body, self._client)
         linear, angular = pybullet.getBaseVelocity(body, self._client)
-        root = compose(Pose(centre, turn), self._inertial_frames[body][1])
-        arm = (root.position[0] - centre[0], root.position[1] - centre[1], root.position[2] - centre[2])
+        inertial, backwards = self._inertial_frames[body]
+        orientation = turn if backwards.orientation == _NO_TURN else multiply_quaternions(turn, backwards.orientation)
+        arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
+        position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
         swing = cross(angular, arm)
-        velocity = (linear[0] + swing[0], linear[1] + swing[1], linear[2] + swing[2])
-        return State(*root, velocity, angular)
+        velocity = (linear[0] - swing[0], linear[1] - swing[1], linear[2] - swing[2])
+        return State(position, orientation, velocity, angular)
 
     def set_pose(self, body: int, pose: Pose) -> None:
         """Move a body's root link to `pose` and stop it."""
