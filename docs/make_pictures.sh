@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Makes every picture of README.md and docs/: docs/make_pictures.sh [SECTION...]   (default: all sections)
 #
-# Needs what ./dev.sh setup installs. A section is a function below, named in `sections`.
+# Needs what ./dev.sh setup installs; section rviz also the packages xvfb, imagemagick and xdotool. A section is a function below, named in `sections`.
 set -eo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(cameras plots)
+sections=(cameras plots rviz)
 
 # What the drone's own cameras see.
 cameras() { "$python" docs/take_pictures.py "$pictures"; }
@@ -20,6 +20,9 @@ plots() {
   "$python" scripts/fly --script docs/tutorial/5_roll.py --commands docs/tutorial/stability.yaml \
     --set "drone.position=[0, 0, 5]" --plot "$pictures/tutorial_stability.png"
 }
+
+# rviz, as drone.launch shows it, and with the target sphere dragged.
+rviz() { docs/take_rviz_pictures.sh "$pictures"; }
 
 plot() { # plot STAGE [OPTION...]
   "$python" scripts/fly --script "docs/tutorial/$1.py" --commands "docs/tutorial/$1.yaml" \

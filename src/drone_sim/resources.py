@@ -16,12 +16,20 @@ def package_path() -> Path:
     raise FileNotFoundError(f"drone_sim: no config, urdf and package.xml near {_HERE.parent}")
 
 
+def locate(name: str) -> Path:
+    """Return the path behind `package://PACKAGE/...` or `~/...`; any other path as it is.
+
+    Raises FileNotFoundError, in one line, where there is no such package.
+    """
+    return _in_package(name) if name.startswith("package://") else Path(name).expanduser()
+
+
 def resolve(name: str) -> Path:
-    """Return the path behind `package://PACKAGE/...`, or an ordinary path made absolute.
+    """Return the absolute path of a file, given as for `locate`.
 
     Raises FileNotFoundError, in one line, where there is no such package or file.
     """
-    path = _in_package(name) if name.startswith("package://") else Path(name).expanduser()
+    path = locate(name)
     if not path.is_file():
         raise FileNotFoundError(f"no such file: {name}")
     return path.resolve()

@@ -7,10 +7,11 @@ from typing import Any, Dict, List
 
 import yaml
 
-from drone_sim import frames
+from drone_sim import frames, scene_files
 from drone_sim.frames import Matrix
 from drone_sim.objects import ObjectTree
-from drone_sim.parameters import ObjectParameters, SceneParameters
+from drone_sim.parameter_types import ParameterError
+from drone_sim.scene_parameters import ObjectParameters, SceneParameters
 from drone_sim.state import Pose, State
 from drone_sim.world import Shape, World
 
@@ -42,14 +43,20 @@ class Scene:
     """What stands in the world besides the drone."""
 
     def __init__(self, parameters: SceneParameters, world: World):
-        """Put floor and objects into an empty world. Raises ValueError, in one line, for a file nobody can read."""
+        """Put floor and objects into an empty world. Raises ParameterError for a file that cannot be used."""
         self._parameters = parameters
+        scene_files.check(parameters)
         world.add_floor(parameters.floor.size, parameters.floor.texture)
-        self._bodies = [SceneBody(world, world.add_shape(_shape(one))) for one in parameters.objects]
+        try:
+            self._bodies = [SceneBody(world, world.add_shape(_shape(one))) for one in parameters.objects]
+        except ValueError as error:
+            raise ParameterError(str(error)) from None
 
     def name_objects(self, objects: ObjectTree) -> None:
-        """Let scripts find the objects that have a name."""
+        """Let scripts find the objects that have a name. Raises ParameterError for a name that is taken."""
         for one, body in zip(self._parameters.objects, self._bodies):
+            if one.name in objects:
+                raise ParameterError(f"scene: an object named '{one.name}' is there already")
             if one.name:
                 objects.add(one.name, body=body)
 
@@ -75,6 +82,4 @@ class Scene:
 
 
 def _shape(one: ObjectParameters) -> Shape:
-    return Shape(
-        one.shape, one.size, one.position, one.rpy, one.color, one.mass, getattr(one, "file", ""), one.texture
-    )
+    return Shape(one.shape, one.size, one.position, one.rpy, one.color, one.mass, getattr(one, "file", ""), one.texture)

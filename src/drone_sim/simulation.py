@@ -37,7 +37,7 @@ class Simulation:
     """A world, the drone in it, its cameras, and the clock that counts steps.
 
     Not thread-safe: one thread owns it. `drone.bus` alone may be used from others. `drone` and `scene` are
-    new ones after every start and stop.
+    new ones after every start.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Simulation:
         self.world = World(parameters.sub_step, parameters.gravity, gui)
         self.vision = Vision(self.world)
         try:
-            self._build()
+            self._build(parameters)
             self.cameras: Dict[str, Camera] = {name: self._camera(one) for name, one in parameters.cameras.items()}
             if started:
                 self.start()
@@ -72,16 +72,21 @@ class Simulation:
             self.close()
             raise
 
-    def _build(self) -> None:
-        """Put the scene, as its file says now, and a drone without a script into an empty world."""
+    def _build(self, parameters: Parameters) -> None:
+        """Put the scene and a drone without a script into an empty world."""
+        self.parameters = parameters
+        self.world.clear()
+        self.scene = Scene(parameters.scene, self.world)
+        self.drone = Drone(parameters, self.world)
+        self.drone.bus.backend = self._backend
+        self._initial = self.world.snapshot()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Be at time 0 of a new run, in the initial scene."""
         self.steps = 0
         self._runs += 1
         self._looked: Dict[str, Tuple[int, np.ndarray]] = {}  # by camera, step and picture of the script's last look
-        self.parameters = self.parameters.with_scene_read_again()
-        self.world.clear()
-        self.scene = Scene(self.parameters.scene, self.world)
-        self.drone = Drone(self.parameters, self.world)
-        self.drone.bus.backend = self._backend
         self.scene.name_objects(self.drone.objects)
 
     def _camera(self, parameters: CameraParameters) -> Camera:
@@ -93,9 +98,16 @@ class Simulation:
 
     # ---- start and stop
 
-    def start(self) -> None:
-        """Read scene and script from disk, and run the script's init. Raises ParameterError, ScriptError."""
+    def start(self, scene_file: Optional[str] = None) -> None:
+        """Read scene and script from disk, and run the script's init; another scene file may take the last one's place.
+
+        Where scene or drone cannot be read, the last ones stay, stopped. Raises ParameterError, UrdfError,
+        ScriptError.
+        """
         self.stop()
+        parameters = self.parameters.in_scene(self.parameters.scene_file if scene_file is None else scene_file)
+        _try_out(parameters)
+        self._build(parameters)
         self.running = True
         pictures = {name: partial(self._picture, name) for name in self.cameras}
         self.drone.load_script(self.script, lambda: self.time, pictures)
@@ -105,7 +117,9 @@ class Simulation:
         try:
             self._clean_up()
         finally:
-            self._build()
+            self.world.restore(self._initial)
+            self.drone.reset()
+            self._begin()
 
     def close(self) -> None:
         """Run cleanup if it is due, and free the world; may be called twice. Raises ScriptError."""
@@ -157,6 +171,11 @@ class Simulation:
         self._looked.clear()
         snapshot.recall()
 
+    def forget(self, snapshot: Snapshot) -> None:
+        """Free a snapshot; start and stop forget all of theirs."""
+        if snapshot.run == self._runs:
+            self.world.forget(snapshot.world)
+
     # ---- pictures
 
     def _take_pictures(self) -> None:
@@ -178,3 +197,12 @@ class Simulation:
             self.drone.show_blades()
             self._looked[name] = (self.steps, camera.take())
         return self._looked[name][1]
+
+
+def _try_out(parameters: Parameters) -> None:
+    """Build scene and drone in a world of their own: what cannot be built must not replace what stands."""
+    world = World(parameters.sub_step, parameters.gravity)
+    try:
+        Scene(parameters.scene, world).name_objects(Drone(parameters, world).objects)
+    finally:
+        world.close()

@@ -4,64 +4,13 @@ import threading
 
 import cv2
 import numpy as np
-import pybullet
 import pytest
-import trimesh
+from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, looking, reddish
 
 from drone_sim.camera import context
 from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.camera.renderer import Renderer, RendererUnavailable
 from drone_sim.visual import Visual
-
-CAMERA = Intrinsics(320, 240, np.radians(60.0), 0.02, 100.0)
-RED, BLUE, GREY = (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (0.6, 0.6, 0.6, 1.0)
-FLOOR = Visual("floor", "plane", (), GREY, floor=True)
-
-
-@pytest.fixture(scope="module")
-def shared():
-    renderer = Renderer()
-    yield renderer
-    renderer.close()
-
-
-@pytest.fixture()
-def renderer(shared):
-    shared.set_visuals(())
-    return shared
-
-
-def at(x, y, z):
-    pose = np.eye(4)
-    pose[:3, 3] = x, y, z
-    return pose
-
-
-def looking(eye, target):
-    """World-from-optical of a camera at `eye` that looks at `target`, upright."""
-    forward = np.subtract(target, eye).astype(float)
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, (0, 0, 1))
-    right /= np.linalg.norm(right)
-    pose = at(*eye)
-    pose[:3, :3] = np.column_stack([right, np.cross(forward, right), forward])
-    return pose
-
-
-AHEAD = looking((0, 0, 1), (1, 0, 1))
-
-
-def box(key, size, rgba=RED, **kwargs):
-    return Visual(key, "box", size, rgba, **kwargs)
-
-
-def draw(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
-    renderer.set_visuals(visuals)
-    return renderer.render(intrinsics, camera_pose, np.array(poses).reshape(-1, 4, 4))
-
-
-def reddish(picture):
-    return (picture[:, :, 0] > 100) & (picture[:, :, 1] < 40)
 
 
 def test_a_cube_covers_the_predicted_pixels(renderer):
@@ -301,94 +250,3 @@ def test_without_egl_it_says_in_one_line_what_is_missing(monkeypatch):
     with pytest.raises(RendererUnavailable, match="libegl1") as caught:
         Renderer()
     assert "\n" not in str(caught.value)
-
-
-@pytest.fixture()
-def bullet():
-    client = pybullet.connect(pybullet.DIRECT)
-    yield client
-    pybullet.disconnect(client)
-
-
-def bullet_mask(client, camera_pose, intrinsics):
-    """What TinyRenderer takes for the first body, seen by the same camera."""
-    eye_from_world = np.diag([1.0, -1.0, -1.0, 1.0]) @ np.linalg.inv(camera_pose)
-    upright = intrinsics.projection() @ np.diag([1.0, -1.0, -1.0, 1.0])
-    upright[1] *= -1.0
-    segmentation = pybullet.getCameraImage(
-        intrinsics.width,
-        intrinsics.height,
-        viewMatrix=eye_from_world.T.ravel(),
-        projectionMatrix=upright.T.ravel(),
-        renderer=pybullet.ER_TINY_RENDERER,
-        physicsClientId=client,
-    )[4]
-    return np.reshape(segmentation, (intrinsics.height, intrinsics.width)) == 0
-
-
-TURN = (0.2, -0.3, 0.4, 0.8426)
-BIG = Intrinsics(640, 480, np.radians(60.0), 0.05, 50.0)
-
-
-def overlap(renderer, visual, pose, theirs, intrinsics):
-    renderer.set_visuals([visual])
-    ours = renderer.render_labels(intrinsics, AHEAD, pose[None]) == 0
-    assert ours.mean() > 0.08
-    return (ours & theirs).sum() / (ours | theirs).sum()
-
-
-def place(client, **shapes):
-    """The pose of a new body in front of the camera."""
-    body = pybullet.createMultiBody(
-        0, basePosition=(2.2, 0.1, 0.9), baseOrientation=TURN, physicsClientId=client, **shapes
-    )
-    position, turn = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
-    pose = at(*position)
-    pose[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(turn), (3, 3))
-    return pose
-
-
-@pytest.mark.parametrize("shape", ["box", "sphere", "cylinder", "capsule", "mesh"])
-def test_the_silhouette_is_that_of_pybullets_picture(renderer, bullet, tmp_path, shape):
-    """Round shapes go to PyBullet as fine meshes: its own are hulls of 42 directions, a sphere 8 % too small."""
-    size, theirs = {
-        "box": ((0.8, 1.0, 1.2), trimesh.creation.box((0.8, 1.0, 1.2))),
-        "sphere": ((0.6,), trimesh.creation.icosphere(5, 0.6)),
-        "cylinder": ((0.4, 1.0), trimesh.creation.cylinder(0.4, 1.0, sections=128)),
-        "capsule": ((0.3, 0.8), trimesh.creation.capsule(0.8, 0.3, count=[128, 64])),
-        "mesh": ((1.5, 1.0, 1.0), trimesh.creation.torus(0.5, 0.2, major_sections=24, minor_sections=12)),
-    }[shape]
-    path = str(tmp_path / "theirs.obj")
-    theirs.export(path)
-    scale = size if shape == "mesh" else (1.0, 1.0, 1.0)
-    form = {"shapeType": pybullet.GEOM_MESH, "fileName": path, "meshScale": scale}
-    if shape == "box":
-        form = {"shapeType": pybullet.GEOM_BOX, "halfExtents": np.array(size) / 2.0}
-    pose = place(bullet, baseVisualShapeIndex=pybullet.createVisualShape(physicsClientId=bullet, **form))
-    visual = Visual("it", shape, size, RED, file=path if shape == "mesh" else "")
-    assert overlap(renderer, visual, pose, bullet_mask(bullet, AHEAD, BIG), BIG) >= 0.99
-
-
-@pytest.mark.parametrize(
-    ("shape", "size", "kind", "arguments"),
-    [
-        ("box", (0.8, 1.0, 1.2), pybullet.GEOM_BOX, {"halfExtents": (0.4, 0.5, 0.6)}),
-        ("sphere", (0.6,), pybullet.GEOM_SPHERE, {"radius": 0.6}),
-        ("cylinder", (0.4, 1.0), pybullet.GEOM_CYLINDER, {"radius": 0.4, "height": 1.0}),
-        ("capsule", (0.3, 0.8), pybullet.GEOM_CAPSULE, {"radius": 0.3, "height": 0.8}),
-    ],
-)
-def test_the_silhouette_is_that_of_the_body_the_physics_hits(renderer, bullet, shape, size, kind, arguments):
-    """A ray through each pixel's centre, against Bullet's exact shapes."""
-    form = pybullet.createCollisionShape(kind, physicsClientId=bullet, **arguments)
-    pose = place(bullet, baseCollisionShapeIndex=form)
-    columns, rows = np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height))
-    rays = np.stack([(columns - CAMERA.cx) / CAMERA.fx, (rows - CAMERA.cy) / CAMERA.fy, np.ones(rows.shape)], axis=2)
-    ends = (AHEAD[:3, 3] + 5.0 * rays.reshape(-1, 3) @ AHEAD[:3, :3].T).tolist()
-    starts = [AHEAD[:3, 3].tolist()] * len(ends)
-    hits = []
-    for first in range(0, len(ends), 8000):
-        part = slice(first, first + 8000)
-        hits += pybullet.rayTestBatch(starts[part], ends[part], physicsClientId=bullet)
-    theirs = np.reshape([hit[0] == 0 for hit in hits], rows.shape)
-    assert overlap(renderer, Visual("it", shape, size, RED), pose, theirs, CAMERA) >= 0.99

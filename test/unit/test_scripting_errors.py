@@ -134,7 +134,7 @@ LOOP = "while true do end"
         (f"while true do xpcall(function() {LOOP} end, function() {LOOP} end) end", "load", 1),
         (f"while true do coroutine.wrap(function() {LOOP} end)() end", "load", 1),
         (f"while true do coroutine.resume(coroutine.create(function() pcall(load('{LOOP}')) end)) end", "load", 1),
-        ("c = coroutine.wrap(function() while true do coroutine.yield() end end)\nwhile true do c() end", "load", 2),
+        ("c = coroutine.wrap(function() while true do coroutine.yield() end end) while true do c() end", "load", 1),
         (f"table.sort({{3,2,1}}, function() {LOOP} end)", "load", 1),
         (f"local t = setmetatable({{}}, {{__index = function() {LOOP} end}})\nlocal x = t.y", "load", 1),
         (f"print(setmetatable({{}}, {{__tostring = function() {LOOP} end}}))", "load", 1),

@@ -32,7 +32,12 @@ def pictures_of_a_process(folder, **environment):
     file = folder / "pictures.npz"
     command = [sys.executable, "-c", PICTURE.format(scene=SCENE), str(file)]
     ended = subprocess.run(
-        command, env={**os.environ, "PYTHONPATH": SOURCE, **environment}, capture_output=True, text=True, check=False, timeout=100
+        command,
+        env={**os.environ, "PYTHONPATH": SOURCE, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=100,
     )
     assert ended.returncode == 0, ended.stderr
     return dict(np.load(file)), ended.stderr

@@ -65,7 +65,7 @@ def load(visual: Visual) -> Tuple[Mesh, ...]:
         corners = _triangles(trimesh.creation.icosphere(subdivisions=3, radius=_SPHERE * visual.size[0]))
     elif visual.shape == "capsule":
         radius, length = visual.size
-        corners = _triangles(trimesh.creation.capsule(length, _outer(radius), count=[SECTIONS // 2, SECTIONS]))
+        corners = _triangles(trimesh.creation.capsule(length, _outer(radius), count=[SECTIONS, SECTIONS]))
     else:
         raise ValueError(f"visual {visual.key}: unknown shape {visual.shape!r}")
     return (_assemble(corners, uv, WHITE, _read_image(visual.texture)),)
@@ -202,7 +202,12 @@ def _read_file(visual: Visual) -> Iterator[Mesh]:
     for part in _parts(visual.file):
         found = True
         uv, rgba, own = _material(part)
-        corners = _triangles(part) * np.asarray(visual.size)
+        try:
+            corners = _triangles(part) * np.asarray(visual.size)
+        except IndexError:
+            raise ValueError(f"mesh {visual.file}: a face names a vertex that there is not") from None
+        if not np.isfinite(corners).all():
+            raise ValueError(f"mesh {visual.file}: a vertex is not finite")
         if np.prod(visual.size) < 0:
             corners = corners[:, ::-1]  # a mirror image turns the faces inside out
             uv = None if uv is None else uv[:, ::-1]

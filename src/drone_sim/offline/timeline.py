@@ -20,7 +20,8 @@ from typing_extensions import Annotated  # typing has it from Python 3.9 on
 from drone_sim import checks
 from drone_sim.drone import Drone
 from drone_sim.frames import Vector, from_rpy, to_quaternion
-from drone_sim.parameters import NonNegative, Parameters, Positive
+from drone_sim.parameter_types import NonNegative, Positive
+from drone_sim.parameters import Parameters
 from drone_sim.state import Pose, Twist
 
 _ZERO = (0.0, 0.0, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import rospy
 from cv_bridge import CvBridge
 from sensor_msgs.msg import CameraInfo, Image
@@ -40,10 +41,10 @@ class CameraOutput:
             self._info.header.stamp = stamp
             self._info_publisher.publish(self._info)
         if self._camera.image is not None:
-            self._publish_image(stamp)
+            self._publish_image(stamp, self._camera.image)
 
-    def _publish_image(self, stamp: rospy.Time) -> None:
-        image, frame = self._camera.image, self._parameters.frame
+    def _publish_image(self, stamp: rospy.Time, image: np.ndarray) -> None:
+        frame = self._parameters.frame
         if self._image.get_num_connections():
             message = self._bridge.cv2_to_imgmsg(image, _ENCODINGS[self._camera.kind])
             message.header.stamp, message.header.frame_id = stamp, frame

@@ -48,6 +48,8 @@ class Inbox:
 
     def empty(self) -> bool:
         """Carry out all that has come; return whether there was anything. The simulation's thread calls it."""
+        if not self._came.is_set():
+            return False
         self._came.clear()
         found = False
         while True:

@@ -30,6 +30,7 @@ from drone_sim.ros.inputs import DroneInput
 from drone_sim.ros.markers import Handles
 from drone_sim.ros.master_watch import MasterWatch
 from drone_sim.ros.outputs import DroneOutput
+from drone_sim.ros.paths import from_shell
 from drone_sim.ros.player import Player
 from drone_sim.ros.script_topics import RosBackend
 from drone_sim.ros.services import Services
@@ -137,6 +138,14 @@ class _ToRosout(logging.Handler):
         logging.getLogger("rosout").log(record.levelno, record.getMessage())
 
 
+def _parameters() -> Parameters:
+    given = rospy.get_param("~", {})
+    for key in ("script", "scene_file"):
+        if isinstance(given.get(key), str):
+            given[key] = from_shell(given[key])
+    return parameters_module.load(given)
+
+
 def main() -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
     # rospy's own signal handler calls the master from within whatever the signal interrupts, and hangs for
@@ -147,7 +156,7 @@ def main() -> int:
         signal.signal(number, lambda *_: ending.set())
     node = None
     try:
-        node = Node(parameters_module.load(rospy.get_param("~", {})))
+        node = Node(_parameters())
         MasterWatch().start()
         node.run(ending.is_set)
     except (ParameterError, UrdfError, ScriptError, RuntimeError) as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Callable
+from typing import Callable, Optional
 
 import rospy
 
@@ -24,10 +24,10 @@ class Player:
         """Whether the next step is due when the clock says so."""
         return self.simulation.running and not self.paused
 
-    def start(self) -> str:
-        """Read scene and script from disk and begin at time 0. Raises ScriptError, after stopping again."""
+    def start(self, scene_file: Optional[str] = None) -> str:
+        """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
         self.paused = False
-        self.attempt(self.simulation.start)
+        self.attempt(lambda: self.simulation.start(scene_file))
         rospy.loginfo("started")
         return "started"
 
@@ -79,5 +79,6 @@ class Player:
             raise
 
     def _say_that_the_clock_stands(self, state: str) -> None:
-        waits = ": /clock stands still, and whoever waits on simulated time waits with it" if self._simulated_time else ""
-        rospy.loginfo(state + waits)
+        if self._simulated_time:
+            state += ": /clock stands still, and whoever waits on simulated time waits with it"
+        rospy.loginfo(state)

@@ -86,8 +86,9 @@ def _fill(message: genpy.Message, given: Any, path: str) -> genpy.Message:
     if isinstance(given, type(message)):
         return given
     types = dict(zip(message.__slots__, message._slot_types))
-    fields = given if isinstance(given, Mapping) else {name: getattr(given, name) for name in types if hasattr(given, name)}
-    for name, value in fields.items():
+    if not isinstance(given, Mapping):
+        given = {name: getattr(given, name) for name in types if hasattr(given, name)}
+    for name, value in given.items():
         if name not in types:
             raise ValueError(f"{path} has no field '{name}'; it has {', '.join(types)}")
         setattr(message, name, _value(types[name], value, f"{path}.{name}"))

@@ -9,8 +9,9 @@ import rospy
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
 
 from drone_sim.parameters import ParameterError
-from drone_sim.resources import package_path
+from drone_sim.resources import locate, package_path
 from drone_sim.ros.inbox import Inbox
+from drone_sim.ros.paths import from_shell
 from drone_sim.ros.player import Player
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Snapshot
@@ -62,7 +63,8 @@ class Services:
     def save_scene(self) -> str:
         """Write the scene as it stands now. A scene of the package itself is not overwritten."""
         simulation = self._player.simulation
-        path = _scene_file() or _HOME.expanduser()
+        name = _scene_parameter()
+        path = locate(name) if name else _HOME.expanduser()
         if package_path() in path.resolve().parents:
             path = _HOME.expanduser()
         simulation.scene.save(path, simulation.drone.matrix)
@@ -70,14 +72,15 @@ class Services:
 
     def load_scene(self) -> str:
         """Start anew in the scene of `scene_file`."""
-        file = rospy.get_param("~scene_file", "")
-        simulation = self._player.simulation
-        simulation.parameters = simulation.parameters.model_copy(update={"scene_file": file})
-        return f"{self._player.start()} in {file or 'the scene of the parameters'}"
+        file = _scene_parameter()
+        return f"{self._player.start(file)} in {file or 'the scene of the parameters'}"
 
     def snapshot(self) -> str:
         """Remember the exact dynamic state."""
-        self._snapshot = self._player.simulation.snapshot()
+        simulation = self._player.simulation
+        if self._snapshot is not None:
+            simulation.forget(self._snapshot)
+        self._snapshot = simulation.snapshot()
         return f"remembered t = {self._player.simulation.time:.2f} s"
 
     def restore(self) -> str:
@@ -88,8 +91,5 @@ class Services:
         return f"back at t = {self._player.simulation.time:.2f} s"
 
 
-def _scene_file() -> Optional[Path]:
-    name = rospy.get_param("~scene_file", "")
-    if name.startswith("package://drone_sim/"):
-        return package_path() / name[len("package://drone_sim/") :]
-    return Path(name).expanduser() if name else None
+def _scene_parameter() -> str:
+    return from_shell(str(rospy.get_param("~scene_file", "")))

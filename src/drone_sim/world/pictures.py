@@ -38,8 +38,15 @@ class Pictures:
         self._textures[body] = texture
 
     def forget(self, body: int) -> None:
-        """Read a body anew: it has changed, or is gone."""
+        """Read a body anew: it has changed."""
         self._parts.pop(body, None)
+
+    def remove(self, body: int) -> None:
+        """Forget all about a body: it is gone, and PyBullet may give its number to another."""
+        self.forget(body)
+        self._textures.pop(body, None)
+        if body == self._floor:
+            self._floor = -1
 
     def place(self, body: int, places: Mapping[int, Matrix]) -> None:
         """Move some of a body's visuals, by index, to other places in their link's frame."""

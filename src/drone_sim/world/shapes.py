@@ -8,6 +8,7 @@ from typing import Any, Dict, NamedTuple, Sequence, Tuple
 import pybullet
 
 from drone_sim.frames import from_rpy, to_quaternion
+from drone_sim.state import Pose
 
 _FLOOR_TILE = 2.0  # m covered by one floor texture
 _FLOOR_THICKNESS = 0.1  # m, below z = 0
@@ -29,24 +30,31 @@ class Shape(NamedTuple):
     file: str = ""
     texture: str = ""
 
+    @property
+    def pose(self) -> Pose:
+        """Where it stands."""
+        x, y, z = self.position
+        return Pose((x, y, z), to_quaternion(from_rpy((0, 0, 0), self.rpy)))
+
 
 def create(client: int, shape: Shape) -> int:
     """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
-    orientation = to_quaternion(from_rpy((0, 0, 0), shape.rpy))
+    position, orientation = shape.pose
     try:
         if shape.kind == "urdf":
             return pybullet.loadURDF(
-                shape.file, shape.position, orientation, useFixedBase=shape.mass == 0, physicsClientId=client
+                shape.file, position, orientation, useFixedBase=shape.mass == 0, physicsClientId=client
             )
         collision, visual = _geometry(shape)
         solid = pybullet.createCollisionShape(physicsClientId=client, **collision)
         seen = pybullet.createVisualShape(rgbaColor=shape.color, physicsClientId=client, **visual)
-        body = pybullet.createMultiBody(shape.mass, solid, seen, shape.position, orientation, physicsClientId=client)
+        body = pybullet.createMultiBody(shape.mass, solid, seen, position, orientation, physicsClientId=client)
+        if shape.texture:
+            image = pybullet.loadTexture(shape.texture, physicsClientId=client)
+            pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
     except pybullet.error:
-        raise ValueError(f"{shape.kind} {shape.file}: PyBullet cannot read it") from None
-    if shape.texture:
-        image = pybullet.loadTexture(shape.texture, physicsClientId=client)
-        pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
+        files = " ".join(filter(None, (shape.file, shape.texture)))
+        raise ValueError(f"{shape.kind} {files}: PyBullet cannot read it") from None
     return body
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Dict, List, Mapping, Sequence, Tuple
+from typing import Dict, List, Mapping, Sequence, Set, Tuple
 
 import numpy as np
 import pybullet
@@ -35,6 +35,7 @@ class World:
         if self._client < 0:
             raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
         self._sub_step, self._gravity = sub_step, gravity
+        self._snapshots: Set[int] = set()
         self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_")
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
@@ -42,6 +43,9 @@ class World:
 
     def clear(self) -> None:
         """Remove everything."""
+        for number in self._snapshots:  # PyBullet would keep them
+            pybullet.removeState(number, physicsClientId=self._client)
+        self._snapshots.clear()
         pybullet.resetSimulation(self._client)
         pybullet.setGravity(0, 0, self._gravity, self._client)
         pybullet.setTimeStep(self._sub_step, self._client)
@@ -68,6 +72,7 @@ class World:
         """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
         body = shapes.create(self._client, shape)
         self._set_material(body)
+        self.set_pose(body, shape.pose)  # again, for PyBullet reads a URDF's pose in single precision
         if shape.texture:
             self._pictures.set_texture(body, shape.texture)
         return body
@@ -89,7 +94,7 @@ class World:
         """Take a body out of the world."""
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
-        self._pictures.forget(body)
+        self._pictures.remove(body)
 
     def set_color(self, body: int, rgba: Sequence[float]) -> None:
         """Paint all of a body (0..1 each)."""
@@ -157,15 +162,19 @@ class World:
 
     def snapshot(self) -> int:
         """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget`."""
-        return pybullet.saveState(self._client)
+        number = pybullet.saveState(self._client)
+        self._snapshots.add(number)
+        return number
 
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
         pybullet.restoreState(number, physicsClientId=self._client)
 
     def forget(self, number: int) -> None:
-        """Free a snapshot."""
-        pybullet.removeState(number, physicsClientId=self._client)
+        """Free a snapshot; `clear` frees them all."""
+        if number in self._snapshots:
+            self._snapshots.remove(number)
+            pybullet.removeState(number, physicsClientId=self._client)
 
     # ---- pictures
 
@@ -189,4 +198,4 @@ class World:
 
     def look_from_behind(self, position: Sequence[float], yaw: float) -> None:
         """Put the camera of PyBullet's window behind and above a place (m), looking along a yaw (rad)."""
-        pybullet.resetDebugVisualizerCamera(2.0, np.degrees(yaw) - 90, -20, position, self._client)
+        pybullet.resetDebugVisualizerCamera(1.2, np.degrees(yaw) - 90, -20, position, self._client)

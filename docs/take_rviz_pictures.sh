@@ -1,0 +1,108 @@
+#!/usr/bin/env bash
+# Takes the pictures of rviz: docs/take_rviz_pictures.sh FOLDER. `docs/make_pictures.sh rviz` calls it.
+#
+# It works on a display and a ROS master of its own, both of which it ends. A minute.
+set -eo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+folder=$(realpath "$1")
+
+missing=()
+for needed in Xvfb:xvfb import:imagemagick xdotool:xdotool; do
+  command -v "${needed%:*}" >/dev/null || missing+=("${needed#*:}")
+done
+if [ ${#missing[@]} != 0 ]; then
+  echo "take_rviz_pictures.sh: needs apt-get install ${missing[*]}" >&2
+  exit 1
+fi
+if [ ! -f devel/setup.bash ]; then
+  echo "take_rviz_pictures.sh: needs ./dev.sh setup" >&2
+  exit 1
+fi
+source devel/setup.bash
+
+work=$(mktemp -d)
+pids=()
+end() { # end: stop what was started last, and so on back to the first
+  local index
+  for ((index = ${#pids[@]} - 1; index >= 0; index--)); do
+    kill -INT "${pids[index]}" 2>/dev/null || true
+    wait "${pids[index]}" 2>/dev/null || true
+  done
+  pids=()
+}
+trap 'end; if [ -n "$xvfb" ]; then kill "$xvfb"; fi; rm -rf "$work"' EXIT
+
+Xvfb -displayfd 3 -screen 0 1280x800x24 3>"$work/display" 2>"$work/xvfb.log" &
+xvfb=$!
+until [ -s "$work/display" ]; do sleep 0.1; done
+DISPLAY=:$(cat "$work/display")
+export DISPLAY QT_X11_NO_MITSHM=1
+
+start() { # start CONFIG [ROSLAUNCH ARGUMENT...]: the simulation, then rviz with a view
+  local port
+  port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])')
+  export ROS_MASTER_URI=http://localhost:$port
+  roslaunch -p "$port" drone_sim drone.launch rviz:=false "${@:2}" >"$work/launch.log" 2>&1 &
+  pids+=($!)
+  until timeout 20 rostopic echo -n1 /drone/odom >/dev/null 2>&1; do
+    kill -0 "${pids[0]}" 2>/dev/null || { cat "$work/launch.log" >&2; exit 1; }
+    sleep 0.5
+  done
+  rosrun rviz rviz -d "$1" >"$work/rviz.log" 2>&1 &
+  pids+=($!)
+  xdotool search --sync --name RViz >/dev/null
+  sleep 5 # rviz draws itself in its own time
+}
+
+command() { rostopic pub -1 /drone/cmd_vel geometry_msgs/Twist "$1" >/dev/null; }
+place() { timeout 10 rostopic echo -n1 -p /drone/odom/pose/pose/position | tail -n1 | cut -d, -f2-3; }
+
+# The first picture: the view of drone.launch, while the drone flies through the gates.
+flight() {
+  start rviz/drone.rviz scene:="$PWD/config/scenes/gates.yaml"
+  command '{linear: {x: 0.2, y: 0.15, z: 0.1}}'
+  command '{linear: {x: 0.4, y: -0.15}}' &
+  sleep 1.2
+  import -window root "$folder/rviz.png"
+  wait $!
+  end
+}
+
+# The green sphere, dragged with the mouse; the drone follows it.
+target() {
+  # The view of drone.launch, but standing still, with the handles shown and the tool that takes them.
+  python3 - "$work/target.rviz" <<'PYTHON'
+import sys, yaml
+view = yaml.safe_load(open("rviz/drone.rviz"))
+manager = view["Visualization Manager"]
+for display in manager["Displays"]:
+    if display["Name"] == "Handles":
+        display.update(Enabled=True, Value=True)
+    if display["Class"] == "rviz/TF":
+        display.update(Enabled=False, Value=False)
+manager["Tools"].sort(key=lambda tool: tool["Class"] != "rviz/Interact")
+manager["Views"]["Current"] = {
+    **{"Class": "rviz/Orbit", "Name": "Standing still", "Target Frame": "world", "Value": "Orbit (rviz)"},
+    **{"Distance": 2.5, "Pitch": 0.6, "Yaw": 3.14159, "Focal Point": {"X": 0, "Y": 0, "Z": 0.8}},
+}
+yaml.safe_dump(view, open(sys.argv[1], "w"))
+PYTHON
+  start "$work/target.rviz" script:=target
+  # The sphere is in the middle of the view. Its upper half stands out of the drone's own handle, a disc.
+  local before after pixel x=879 y=403
+  before=$(place)
+  xdotool mousemove $x $y sleep 0.5 mousedown 1 sleep 0.3
+  for ((pixel = 10; pixel <= 200; pixel += 10)); do
+    xdotool mousemove $((x - pixel)) $((y - pixel / 4)) sleep 0.02
+  done
+  sleep 0.2
+  import -window root "$folder/rviz_target.png"
+  xdotool mouseup 1
+  sleep 6
+  after=$(place)
+  echo "rviz_target.png: dragged the sphere; the drone flew from x, y = $before to $after" >&2
+  end
+}
+
+flight
+target

@@ -1,0 +1,130 @@
+"""What a scene file may say: floor, objects, and where the drone stands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Dict, List, Literal, Tuple, Union
+
+from pydantic import Field
+from typing_extensions import Annotated
+
+from drone_sim.parameter_types import (
+    Checked,
+    Color,
+    File,
+    NonNegative,
+    OptionalFile,
+    ParameterError,
+    Point,
+    Positive,
+    read_yaml,
+)
+from drone_sim.resources import resolve
+
+
+class FloorParameters(Checked):
+    """A square floor at z = 0, centred on the origin."""
+
+    size: Positive
+    texture: File
+
+
+class _ObjectParameters(Checked):
+    """What the objects of a scene have in common; a mass of 0 stands still."""
+
+    name: str = ""
+    position: Point
+    rpy: Point = (0.0, 0.0, 0.0)
+    mass: NonNegative = 0.0
+    color: Color = (0.7, 0.7, 0.7, 1.0)
+    texture: OptionalFile = ""
+
+
+class BoxParameters(_ObjectParameters):
+    """A box; `size` is its full length, width and height."""
+
+    shape: Literal["box"]
+    size: Tuple[Positive, Positive, Positive]
+
+
+class CylinderParameters(_ObjectParameters):
+    """A cylinder along its z axis; `size` is radius and length."""
+
+    shape: Literal["cylinder"]
+    size: Tuple[Positive, Positive]
+
+
+class SphereParameters(_ObjectParameters):
+    """A sphere; `size` is its radius."""
+
+    shape: Literal["sphere"]
+    size: Tuple[Positive]
+
+
+class MeshParameters(_ObjectParameters):
+    """A mesh file (OBJ, STL, DAE); `size` is its scale along x, y and z."""
+
+    shape: Literal["mesh"]
+    file: File
+    size: Tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
+    color: Color = (1.0, 1.0, 1.0, 1.0)
+
+
+class UrdfParameters(_ObjectParameters):
+    """A URDF, which says itself how it looks; a mass of 0 nails its root link to the world."""
+
+    shape: Literal["urdf"]
+    file: File
+    size: Tuple[()] = ()
+
+
+ObjectParameters = Annotated[
+    Union[BoxParameters, CylinderParameters, SphereParameters, MeshParameters, UrdfParameters],
+    Field(discriminator="shape"),
+]
+
+
+class SceneParameters(Checked):
+    """The world without the drone."""
+
+    floor: FloorParameters
+    objects: List[ObjectParameters]
+
+
+SHAPES = {
+    "box": BoxParameters,
+    "cylinder": CylinderParameters,
+    "sphere": SphereParameters,
+    "mesh": MeshParameters,
+    "urdf": UrdfParameters,
+}
+
+
+def read(file: str) -> Dict[str, Any]:
+    """Return a scene file's floor, objects and drone as they stand among the parameters.
+
+    Its own files (mesh, urdf, texture) are relative to it. Raises ParameterError.
+    """
+    try:
+        path = resolve(file)
+    except FileNotFoundError as error:
+        raise ParameterError(f"parameter scene_file = '{file}': {error}") from None
+    content = read_yaml(path)
+    unknown = set(content) - {"floor", "objects", "drone"}
+    if unknown:
+        raise ParameterError(f"{file}: unknown key {min(map(str, unknown))}; known are drone, floor, objects")
+    scene = {key: content[key] for key in ("floor", "objects") if key in content}
+    for place in (scene.get("floor"), content.get("drone"), *_listed(scene.get("objects"))):
+        _find_files_beside(path.parent, place)
+    return {"scene": scene, "drone": content.get("drone", {})}
+
+
+def _listed(objects: Any) -> List[Any]:
+    return objects if isinstance(objects, list) else []  # what is no list is refused with the other values
+
+
+def _find_files_beside(folder: Path, place: Any) -> None:
+    for key in ("file", "texture", "urdf"):
+        name = place.get(key) if isinstance(place, dict) else None
+        if isinstance(name, str) and name and not name.startswith("package://"):
+            place[key] = str(folder / Path(name).expanduser())

@@ -1,0 +1,45 @@
+"""What the tests of the renderer draw, and from where they look at it."""
+
+import numpy as np
+
+from drone_sim.camera.intrinsics import Intrinsics
+from drone_sim.visual import Visual
+
+CAMERA = Intrinsics(320, 240, np.radians(60.0), 0.02, 100.0)
+RED, BLUE, GREY = (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (0.6, 0.6, 0.6, 1.0)
+FLOOR = Visual("floor", "plane", (), GREY, floor=True)
+
+
+def at(x, y, z):
+    """World from a frame that stands upright there."""
+    pose = np.eye(4)
+    pose[:3, 3] = x, y, z
+    return pose
+
+
+def looking(eye, target):
+    """World-from-optical of a camera at `eye` that looks at `target`, upright."""
+    forward = np.subtract(target, eye).astype(float)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, (0, 0, 1))
+    right /= np.linalg.norm(right)
+    pose = at(*eye)
+    pose[:3, :3] = np.column_stack([right, np.cross(forward, right), forward])
+    return pose
+
+
+AHEAD = looking((0, 0, 1), (1, 0, 1))
+
+
+def box(key, size, rgba=RED, **kwargs):
+    return Visual(key, "box", size, rgba, **kwargs)
+
+
+def draw(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
+    renderer.set_visuals(visuals)
+    return renderer.render(intrinsics, camera_pose, np.array(poses).reshape(-1, 4, 4))
+
+
+def reddish(picture):
+    """Where a picture shows RED."""
+    return (picture[:, :, 0] > 100) & (picture[:, :, 1] < 40)

@@ -1,0 +1,187 @@
+"""Start and stop, again and again; snapshots; what a run leaves behind: nothing."""
+
+import os
+from pathlib import Path
+
+import pybullet
+import pytest
+
+from drone_sim import frames, parameters
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.simulation import Simulation
+from drone_sim.state import Pose, Twist, Vector3
+
+SCRIPTS = Path(__file__).parent / "scripts"
+RUNS = 200
+LEAK = 6 * 2**20  # bytes that 150 runs may add to the process: 40 kB a run; a world that is left behind takes 1 MB
+SMALL = {name: {"width": 16, "height": 12} for name in ("front", "track")}
+CLUTTER = [
+    {"name": "Tower", "shape": "box", "size": [0.3, 0.3, 0.3], "position": [0.0, 0.0, 0.15], "mass": 0.5},
+    {"name": "Top", "shape": "box", "size": [0.2, 0.2, 0.2], "position": [0.05, 0.0, 0.42], "mass": 0.2},
+    {"name": "Ball", "shape": "sphere", "size": [0.1], "position": [0.3, 0.25, 0.9], "mass": 0.1},
+    {"name": "Log", "shape": "cylinder", "size": [0.1, 0.5], "position": [0.6, 0, 0.5], "rpy": [1.4, 0, 0], "mass": 1},
+]
+COUNTING = """
+def sysCall_init(): print('init')
+def sysCall_actuation(): {actuation}
+def sysCall_cleanup(): print('cleanup')
+"""
+
+
+@pytest.fixture(name="simulate")
+def _simulate():
+    made = []
+
+    def simulate(script="", **overrides):
+        made.append(Simulation(parameters.load({"cameras": SMALL, **overrides}), script=str(script)))
+        return made[-1]
+
+    yield simulate
+    for simulation in made:
+        simulation.close()
+
+
+def everything(simulation):
+    """Return the state of all that moves, and the time."""
+    objects = simulation.drone.objects
+    moving = [objects[handle].body.state for handle in objects if objects[handle].body is not None]
+    return [simulation.time, simulation.drone.state, *moving, simulation.drone.command]
+
+
+def fly(simulation, steps):
+    path = []
+    for _ in range(steps):
+        simulation.step()
+        path.append(everything(simulation))
+    return path
+
+
+def maneuver(simulation):
+    simulation.drone.receive(Twist(Vector3(1.0, -0.5, 0.3), Vector3(0, 0, 0.6)))
+    simulation.drone.push((0.4, 0.3, 0.0), (0.0, 0.01, 0.0), 0.4)
+
+
+def resources():
+    """Return resident memory (bytes), and the numbers of open files and of PyBullet's clients."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        resident = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    clients = [client for client in range(100) if pybullet.getConnectionInfo(client)["isConnected"]]
+    return resident, len(os.listdir("/proc/self/fd")), len(clients)
+
+
+def test_200_runs_fly_alike_and_leak_nothing(simulate):
+    simulation = simulate(scene={"objects": CLUTTER})
+    first = None
+    for run in range(RUNS):
+        maneuver(simulation)
+        path = fly(simulation, 5)
+        first = first or path
+        assert path == first
+        simulation.stop()
+        simulation.start()
+        if run == RUNS // 4:  # by then every cache is full
+            before = resources()
+    after = resources()
+    assert after[1:] == before[1:]
+    assert after[0] - before[0] < LEAK
+
+
+@pytest.mark.parametrize("script", ["", SCRIPTS / "tutorial_v3.lua", SCRIPTS / "tutorial_v4.lua"])
+def test_a_snapshot_brings_the_flight_back_bit_for_bit(simulate, script):
+    """In the middle of a manoeuvre, a push under way, things of the scene tumbling."""
+    simulation = simulate(script, scene={"objects": CLUTTER})
+    maneuver(simulation)
+    fly(simulation, 4)
+    snapshot, now = simulation.snapshot(), everything(simulation)
+    path = fly(simulation, 40)
+    assert path[-1][3:] != now[3:], "nothing else moved"
+    for steps in (3, 25, 40):
+        simulation.drone.move(Pose((3, 3, 3), (0, 0, 0, 1)))
+        simulation.drone.push((0, 0, 5), (0, 0, 0), 1.0)
+        simulation.restore(snapshot)
+        assert everything(simulation) == now
+        assert fly(simulation, steps) == path[:steps]
+    simulation.forget(snapshot)
+    simulation.stop()
+    with pytest.raises(ValueError, match="earlier run"):
+        simulation.restore(snapshot)
+
+
+def test_stop_restores_the_initial_scene(simulate):
+    simulation = simulate(scene={"objects": CLUTTER})
+    initial = everything(simulation)
+    target = simulation.drone.objects.matrix(simulation.drone.objects.handle("DronePosition"))
+    maneuver(simulation)
+    fly(simulation, 20)
+    objects = simulation.drone.objects
+    objects.set_matrix(objects.handle("DronePosition"), -1, frames.from_rpy((5, 5, 5), (0, 0, 0)))
+    simulation.stop()
+    assert everything(simulation) == initial
+    objects = simulation.drone.objects
+    assert objects.matrix(objects.handle("DronePosition")) == target
+    assert not simulation.running
+
+
+def test_start_reads_script_and_scene_again(simulate, tmp_path):
+    script, scene = tmp_path / "script.py", tmp_path / "scene.yaml"
+    script.write_text("def sysCall_init(): self.x = sim.getObjectPosition(sim.getObject('/Drone'), -1)[0]\n")
+    scene.write_text("drone: {position: [1, 0, 2]}\nobjects: [{name: A, shape: sphere, size: [1], position: [5, 0, 1]}]")
+    simulation = simulate(script, scene_file=str(scene))
+    assert "A" in simulation.drone.objects
+    script.write_text("def sysCall_init(): sim.setInt32Signal('edited', 1)\n")
+    scene.write_text("drone: {yaw: 0.5}\n")
+    simulation.stop()
+    assert simulation.drone.state.position[0] == 1.0 and "A" in simulation.drone.objects
+    simulation.start()
+    assert simulation.drone.state.position == (0.0, 0.0, 0.8), "what the file no longer says is as without it"
+    assert "A" not in simulation.drone.objects
+    assert simulation.drone.signals.get("edited", int) == 1
+    simulation.start(scene_file="")
+    assert frames.to_euler(simulation.drone.matrix)[2] == 0.0
+
+
+@pytest.mark.parametrize("wrong", ["objects: [{shape: mesh, file: no.obj, position: [0, 0, 0]}]", "drone: [", "x: 1"])
+def test_a_scene_that_cannot_be_read_leaves_the_last_one(simulate, tmp_path, wrong):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("drone: {position: [1, 0, 2]}\nobjects: [{name: A, shape: sphere, size: [1], position: [5, 0, 1]}]")
+    simulation = simulate(scene_file=str(scene))
+    path = fly(simulation, 10)
+    good = scene.read_text()
+    scene.write_text(wrong)
+    with pytest.raises(parameters.ParameterError) as refused:
+        simulation.start()
+    assert str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
+    assert (simulation.running, simulation.time, simulation.drone.state.position) == (False, 0.0, (1.0, 0.0, 2.0))
+    assert simulation.cameras["front"].take().shape == (12, 16, 3)
+    scene.write_text(good)
+    simulation.start()
+    assert fly(simulation, 10) == path
+
+
+@pytest.mark.parametrize("end", ["stop", "close", "start", "error", "close twice", "stop twice"])
+def test_cleanup_runs_once_however_it_ends(simulate, tmp_path, caplog, end):
+    caplog.set_level("INFO")
+    script = tmp_path / "script.py"
+    script.write_text(COUNTING.format(actuation="1 / 0" if end == "error" else "pass"))
+    simulation = simulate(script)
+    if end == "error":
+        with pytest.raises(ScriptError, match="ZeroDivisionError"):
+            simulation.step()
+        simulation.stop()
+    else:
+        simulation.step()
+        for _ in range(2 if "twice" in end else 1):
+            getattr(simulation, end.split()[0])()
+    assert [record.getMessage() for record in caplog.records].count("cleanup") == 1
+
+
+@pytest.mark.parametrize("end", ["stop", "close"])
+def test_cleanup_that_fails_runs_once_too(simulate, tmp_path, caplog, end):
+    caplog.set_level("INFO")
+    script = tmp_path / "script.py"
+    script.write_text("def sysCall_cleanup():\n    print('cleanup')\n    1 / 0\n")
+    simulation = simulate(script)
+    with pytest.raises(ScriptError, match=r"\[cleanup\]"):
+        getattr(simulation, end)()
+    simulation.close()
+    assert [record.getMessage() for record in caplog.records].count("cleanup") == 1
