@@ -60,7 +60,7 @@ place() { timeout 10 rostopic echo -n1 -p /drone/odom/pose/pose/position | tail 
 # The first picture: the view of drone.launch, while the drone flies through the gates.
 flight() {
   start rviz/drone.rviz scene:="$PWD/config/scenes/gates.yaml"
-  command '{linear: {x: 0.2, y: 0.15, z: 0.1}}'
+  command '{linear: {x: 0.2, y: 0.1, z: 0.1}}'
   command '{linear: {x: 0.4, y: -0.15}}' &
   sleep 1.2
   import -window root "$folder/rviz.png"

@@ -33,10 +33,13 @@ class RealTime(unittest.TestCase):
             ]
         first = max(times[0] for times in stamps.values())
         last = min(times[-1] for times in stamps.values())
-        common = {name: [t for t in times if first <= t <= last] for name, times in stamps.items()}
-        for name, times in common.items():
-            self.assertEqual(times, common["odom"], name)
-        self.assertGreater(len(common["odom"]), STEPS / 2)
+        steps = {t for t in stamps["odom"] if first <= t <= last}
+        self.assertGreater(len(steps), STEPS / 2)
+        for name, times in stamps.items():
+            # A busy machine may drop a message of a step; it cannot bring one that is of no step.
+            common = {t for t in times if first <= t <= last}
+            self.assertLessEqual(common, steps, name)
+            self.assertGreater(len(common), len(steps) / 2, name)
 
     def test_static_frames_come_together(self):
         static = Listener("/tf_static", TFMessage).wait_for(after=0)

@@ -1,6 +1,7 @@
 """The drone's URDF as one rigid body: V-REP's numbers, derived."""
 
 import numpy as np
+import pybullet
 import pytest
 
 from drone_sim import frames, urdf
@@ -62,3 +63,12 @@ def test_a_wrong_urdf_gets_one_line(tmp_path, old, new, message):
     assert message in str(refused.value)
     assert str(path) in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_any_pybullet_program_can_load_it():
+    client = pybullet.connect(pybullet.DIRECT)
+    drone = pybullet.loadURDF(str(DRONE), physicsClientId=client)
+    links = range(-1, pybullet.getNumJoints(drone, client))
+    masses = [pybullet.getDynamicsInfo(drone, link, client)[0] for link in links]
+    assert sum(masses) == pytest.approx(0.52)
+    pybullet.disconnect(client)

@@ -9,6 +9,7 @@ import curses
 import math
 import os
 import signal
+import sys
 from typing import Any, List, NamedTuple, Optional
 
 import rospy
@@ -133,7 +134,10 @@ def _fly(screen: Any) -> None:
 
 
 def main() -> int:
-    """Run the node until ESC, q, Ctrl-C, or the terminal closes."""
+    """Run the node until ESC, q, Ctrl-C, or the terminal closes; return its exit status."""
+    if not sys.stdin.isatty() or not sys.stdout.isatty():
+        print("key_teleop: needs a terminal to read keys from", file=sys.stderr)
+        return 1
     # rospy's own handlers would close the topics before the last stop is sent.
     rospy.init_node("key_teleop", anonymous=True, disable_signals=True)
     for number in (signal.SIGTERM, signal.SIGHUP):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Set
 
 from geometry_msgs.msg import Point, Pose, Quaternion
@@ -32,15 +33,8 @@ class Handles:
         self._held: Set[str] = set()
         self._steps = 0
         self._server = InteractiveMarkerServer(f"{simulation.drone.name}/markers")
-        ball = Marker(type=Marker.SPHERE)
-        ball.scale.x = ball.scale.y = ball.scale.z = 0.12
-        ball.color.g, ball.color.a = 0.8, 0.9
-        disc = Marker(type=Marker.CYLINDER)
-        disc.scale.x, disc.scale.y, disc.scale.z = 0.42, 0.42, 0.004
-        disc.color.r, disc.color.g, disc.color.a = 1.0, 0.6, 0.3
-        for name, look in ((TARGET, ball), (_DRONE, disc)):
-            self._server.insert(_handle(name, look), self._on_feedback)
-        self._server.applyChanges()
+        self._looks = {TARGET: _ball(), _DRONE: _ring()}
+        self._shown: Set[str] = set()
 
     def update(self) -> None:
         """Let the handles follow what they stand for, unless they are being dragged."""
@@ -48,12 +42,21 @@ class Handles:
         if self._steps % _EVERY or not self._server.update_pub.get_num_connections():
             return
         objects = self._simulation.drone.objects
-        for name in {TARGET, _DRONE} - self._held:
+        self._show({_DRONE} | ({TARGET} if objects[objects.handle(TARGET)].parent is None else set()))
+        for name in self._shown - self._held:
             matrix = objects.matrix(objects.handle(name))
             yaw = frames.to_euler(matrix)[2]
             level = frames.from_euler(frames.position(matrix), (0, 0, yaw))
             self._server.setPose(name, _pose(level))
         self._server.applyChanges()
+
+    def _show(self, wanted: Set[str]) -> None:
+        """Show these handles: the sphere once a script has taken it off the drone, which it would only hide."""
+        for name in wanted - self._shown:
+            self._server.insert(_handle(name, self._looks[name]), self._on_feedback)
+        for name in self._shown - wanted:
+            self._server.erase(name)
+        self._shown = wanted
 
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
         name = feedback.marker_name
@@ -73,6 +76,26 @@ class Handles:
             self._inbox.put(lambda: move_target(self._simulation, pose))
         else:
             self._inbox.put(lambda: self._simulation.drone.move(pose))
+
+
+def _ball() -> Marker:
+    ball = Marker(type=Marker.SPHERE)
+    ball.scale.x = ball.scale.y = ball.scale.z = 0.12
+    ball.color.g, ball.color.a = 0.8, 0.9
+    return ball
+
+
+def _ring() -> Marker:
+    """Return a flat ring around the drone, wide enough to be caught and not in the way of what is inside it."""
+    ring = Marker(type=Marker.TRIANGLE_LIST)
+    ring.scale.x = ring.scale.y = ring.scale.z = 1.0
+    ring.color.r, ring.color.g, ring.color.a = 1.0, 0.6, 0.5
+    angles = [2 * math.pi * index / 48 for index in range(49)]
+    inner, outer = ([Point(r * math.cos(a), r * math.sin(a), 0.0) for a in angles] for r in (0.22, 0.26))
+    for i, o, next_i, next_o in zip(inner, outer, inner[1:], outer[1:]):
+        ring.points += [i, o, next_o, i, next_o, next_i]
+        ring.points += [i, next_o, o, i, next_i, next_o]  # seen from below, too
+    return ring
 
 
 def _handle(name: str, look: Marker) -> InteractiveMarker:

@@ -79,21 +79,25 @@ class Node:
             self.player.start()
         commands = rospy.resolve_name(f"{self._parameters.drone.name}/cmd_vel")
         rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; commands on {commands}")
-        began, steps = time.monotonic(), 0
+        steps, seconds = 0, 0.0
         self._pacer.restart()
         while not over():
+            began = time.monotonic()
             if self.player.playing:
                 self._wait(over)
                 steps += self.step()
+                seconds += time.monotonic() - began
             else:
                 self._stand()
                 self._pacer.restart()
-        seconds = time.monotonic() - began
         flown = steps * self._parameters.time_step
         factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
         rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {self._pacer.overruns} late steps")
 
     def _wait(self, over: Callable[[], bool]) -> None:
+        if self.player.begun:  # reading scene and script took its time, which no step is late for
+            self.player.begun = False
+            self._pacer.restart()
         late = self._pacer.wait(over)
         if late:
             rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")

@@ -17,6 +17,7 @@ class Player:
         """Begin stopped. `simulated_time`: the node publishes /clock, so that others wait when it stands still."""
         self.simulation = simulation
         self.paused = False
+        self.begun = False  # since this was last set to False
         self._simulated_time = simulated_time
 
     @property
@@ -28,7 +29,9 @@ class Player:
         """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
         self.paused = False
         self.attempt(lambda: self.simulation.start(scene_file))
-        rospy.loginfo("started")
+        self.begun = True
+        scene = self.simulation.parameters.scene_file
+        rospy.loginfo(f"started{f' in {scene}' if scene else ''}")
         return "started"
 
     def stop(self) -> str:

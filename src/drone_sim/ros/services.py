@@ -42,7 +42,9 @@ class Services:
 
     def _answer(self, job: Callable[[], str]) -> tuple[bool, str]:
         try:
-            return True, self._inbox.ask(job)
+            answer = self._inbox.ask(job)
+            rospy.logdebug(answer)
+            return True, answer
         except (ParameterError, ScriptError, ValueError, OSError, RuntimeError) as error:
             return False, " ".join(str(error).split())
 

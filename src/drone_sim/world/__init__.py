@@ -1,6 +1,23 @@
 """The world: bodies, dynamics, and what can be seen of them. The only package that imports pybullet."""
 
-from drone_sim.world.shapes import Shape
-from drone_sim.world.world import World
+import os
+
+
+def _load_pybullet_quietly() -> None:
+    """Import it for the first time without the line that it writes to stderr: when it was compiled."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        import pybullet  # noqa: F401
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+_load_pybullet_quietly()
+
+from drone_sim.world.shapes import Shape  # noqa: E402
+from drone_sim.world.world import World  # noqa: E402
 
 __all__ = ["Shape", "World"]
