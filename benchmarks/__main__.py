@@ -45,7 +45,9 @@ def table(rows: List[Row]) -> str:
 
 
 def _text(value: Any) -> str:
-    return f"{value:.3g}" if isinstance(value, float) and value < 1000 else str(round(value)) if isinstance(value, float) else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:.3g}" if value < 1000 else str(round(value))
 
 
 def main() -> int:

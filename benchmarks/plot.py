@@ -6,7 +6,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from matplotlib import pyplot  # noqa: E402
+from matplotlib import pyplot
 
 
 def draw(results: Dict[str, Any], file: str) -> None:
@@ -29,7 +29,8 @@ def draw(results: Dict[str, Any], file: str) -> None:
 def _bars(axes: Any, rows: Any, key: str, label: str) -> None:
     names = [row["name"] for row in rows]
     values = [row[key] for row in rows]
-    bars = axes.barh(names, values, color=["#c0392b" if "drone_sim" in name or "node" in name else "#7f8c8d" for name in names])
+    colors = ["#7f8c8d" if "PyBullet" in name else "#c0392b" for name in names]
+    bars = axes.barh(names, values, color=colors)
     axes.bar_label(bars, [f"{value:.3g}" for value in values], padding=3)
     axes.invert_yaxis()
     axes.set_xscale("log")

@@ -86,6 +86,18 @@ def test_200_runs_fly_alike_and_leak_nothing(simulate):
     assert after[0] - before[0] < LEAK
 
 
+def test_worlds_beside_each_other_do_not_meddle(simulate):
+    alone = fly(simulate(scene={"objects": CLUTTER}), 20)
+    first, second = simulate(scene={"objects": CLUTTER}), simulate(scene={"objects": CLUTTER})
+    path = fly(first, 10)
+    second.start()
+    fly(second, 7)
+    second.stop()
+    assert path + fly(first, 10) == alone
+    second.start()
+    assert fly(second, 20) == alone
+
+
 @pytest.mark.parametrize("script", ["", SCRIPTS / "tutorial_v3.lua", SCRIPTS / "tutorial_v4.lua"])
 def test_a_snapshot_brings_the_flight_back_bit_for_bit(simulate, script):
     """In the middle of a manoeuvre, a push under way, things of the scene tumbling."""
@@ -125,7 +137,9 @@ def test_stop_restores_the_initial_scene(simulate):
 def test_start_reads_script_and_scene_again(simulate, tmp_path):
     script, scene = tmp_path / "script.py", tmp_path / "scene.yaml"
     script.write_text("def sysCall_init(): self.x = sim.getObjectPosition(sim.getObject('/Drone'), -1)[0]\n")
-    scene.write_text("drone: {position: [1, 0, 2]}\nobjects: [{name: A, shape: sphere, size: [1], position: [5, 0, 1]}]")
+    scene.write_text(
+        "drone: {position: [1, 0, 2]}\nobjects: [{name: A, shape: sphere, size: [1], position: [5, 0, 1]}]"
+    )
     simulation = simulate(script, scene_file=str(scene))
     assert "A" in simulation.drone.objects
     script.write_text("def sysCall_init(): sim.setInt32Signal('edited', 1)\n")
@@ -135,7 +149,7 @@ def test_start_reads_script_and_scene_again(simulate, tmp_path):
     simulation.start()
     assert simulation.drone.state.position == (0.0, 0.0, 0.8), "what the file no longer says is as without it"
     assert "A" not in simulation.drone.objects
-    assert simulation.drone.signals.get("edited", int) == 1
+    assert simulation.drone.signals.getInt32Signal("edited") == 1
     simulation.start(scene_file="")
     assert frames.to_euler(simulation.drone.matrix)[2] == 0.0
 
@@ -143,7 +157,9 @@ def test_start_reads_script_and_scene_again(simulate, tmp_path):
 @pytest.mark.parametrize("wrong", ["objects: [{shape: mesh, file: no.obj, position: [0, 0, 0]}]", "drone: [", "x: 1"])
 def test_a_scene_that_cannot_be_read_leaves_the_last_one(simulate, tmp_path, wrong):
     scene = tmp_path / "scene.yaml"
-    scene.write_text("drone: {position: [1, 0, 2]}\nobjects: [{name: A, shape: sphere, size: [1], position: [5, 0, 1]}]")
+    scene.write_text(
+        "drone: {position: [1, 0, 2]}\nobjects: [{name: A, shape: sphere, size: [1], position: [5, 0, 1]}]"
+    )
     simulation = simulate(scene_file=str(scene))
     path = fly(simulation, 10)
     good = scene.read_text()

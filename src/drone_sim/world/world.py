@@ -46,7 +46,7 @@ class World:
         for number in self._snapshots:  # PyBullet would keep them
             pybullet.removeState(number, physicsClientId=self._client)
         self._snapshots.clear()
-        pybullet.resetSimulation(self._client)
+        pybullet.resetSimulation(physicsClientId=self._client)  # its first argument is another
         pybullet.setGravity(0, 0, self._gravity, self._client)
         pybullet.setTimeStep(self._sub_step, self._client)
         self._inertial_frames: Dict[int, Tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
