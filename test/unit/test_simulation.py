@@ -1,5 +1,6 @@
 """Start and stop, again and again; snapshots; what a run leaves behind: nothing."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -63,6 +64,7 @@ def maneuver(simulation):
 
 def resources():
     """Return resident memory (bytes), and the numbers of open files and of PyBullet's clients."""
+    gc.collect()
     with open("/proc/self/statm", encoding="ascii") as file:
         resident = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     clients = [client for client in range(100) if pybullet.getConnectionInfo(client)["isConnected"]]
@@ -79,6 +81,7 @@ def test_200_runs_fly_alike_and_leak_nothing(simulate):
         assert path == first
         simulation.stop()
         simulation.start()
+        if run % 25 == 0: print(run, resources())
         if run == RUNS // 4:  # by then every cache is full
             before = resources()
     after = resources()
