@@ -35,6 +35,8 @@ class Handles:
         self._server = InteractiveMarkerServer(f"{simulation.drone.name}/markers")
         self._looks = {TARGET: _ball(), _DRONE: _ring()}
         self._shown: Set[str] = set()
+        self._show({_DRONE})
+        self._server.applyChanges()
 
     def update(self) -> None:
         """Let the handles follow what they stand for, unless they are being dragged."""
