@@ -4,6 +4,7 @@
 # Installs what is missing (Debian 12: its own ROS 1; Ubuntu 20.04: /opt/ros/noetic), keeps the pip packages
 # in .venv, and builds into build/ and devel/. What is there already is left alone, so a second run takes seconds.
 set -eo pipefail
+here=$PWD
 cd "$(dirname "${BASH_SOURCE[0]}")"
 root=$PWD
 
@@ -112,7 +113,7 @@ command=${1:-help}
 shift || true
 case "$command" in
   setup) setup; say "ready: source $root/devel/setup.bash" ;;
-  run) setup; exec roslaunch drone_sim drone.launch "$@" ;;
+  run) setup; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   lint) setup; lint ;;
   bench) setup; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;

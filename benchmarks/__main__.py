@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any, Callable, Dict, List
 
 from benchmarks import loop, node, plot, render
+from drone_sim.camera.renderer import Renderer
 
 Row = Dict[str, Any]
+README = Path(__file__).parents[1] / "README.md"
 RESULTS = Path(__file__).parent / "results.json"
 
 
@@ -31,14 +33,17 @@ BENCHMARKS: Dict[str, Callable[[], List[Row]]] = {
 
 
 def machine() -> str:
-    """Name the processor."""
+    """Name the processor, and what draws."""
+    renderer = Renderer()
+    drawn_by = renderer.description
+    renderer.close()
     names = [line.partition(": ")[2] for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line]
-    return f"{(names or [platform.machine()])[0]}, {len(names)} cores"
+    return f"{(names or [platform.machine()])[0]}, {len(names)} cores; OpenGL by {drawn_by}"
 
 
 def table(rows: List[Row]) -> str:
     """Lay rows out in columns; a number gets three digits."""
-    keys = list(dict.fromkeys(key for row in rows for key in row))
+    keys = [key for key in dict.fromkeys(key for row in rows for key in row) if key != "renderer"]
     cells = [keys] + [[_text(row.get(key, "")) for key in keys] for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells)]
     return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip() for line in cells)
@@ -50,10 +55,19 @@ def _text(value: Any) -> str:
     return f"{value:.3g}" if value < 1000 else str(round(value))
 
 
+def _fill_readme(results: Dict[str, Any]) -> None:
+    begin, end = "<!-- benchmarks: begin -->\n", "<!-- benchmarks: end -->"
+    tables = [f"{name}\n{table(results[name])}" for name in BENCHMARKS if name in results]
+    block = "```text\n" + "\n\n".join([f"on {results['machine']}", *tables]) + "\n```\n"
+    before, _, rest = README.read_text().partition(begin)
+    README.write_text(before + begin + block + end + rest.partition(end)[2])
+
+
 def main() -> int:
     """Run the benchmarks named, or all."""
     parser = argparse.ArgumentParser(prog="./dev.sh bench", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(BENCHMARKS)}; all without")
+    parser.add_argument("--readme", action="store_true", help="put the tables into README.md")
     parser.add_argument("--plot", metavar="FILE", help="draw the results to a picture")
     arguments = parser.parse_args()
     unknown = set(arguments.names) - set(BENCHMARKS)
@@ -69,6 +83,8 @@ def main() -> int:
         RESULTS.write_text(json.dumps(results, indent=1) + "\n")
     if arguments.plot:
         plot.draw(results, arguments.plot)
+    if arguments.readme:
+        _fill_readme(results)
     return 0
 
 

@@ -39,7 +39,7 @@ def measure(name: str, draw: Callable[[], Any], seconds: float = 2.0, **facts: A
         draw()
         times.append(1000.0 * (time.perf_counter() - start))
     p10, median, p90 = (float(value) for value in np.percentile(times, [10, 50, 90]))
-    return {"name": name, "median_ms": median, "p10_ms": p10, "p90_ms": p90, "frames": len(times), **facts}
+    return {"name": name, "median_ms": median, "p10_ms": p10, "p90_ms": p90, **facts}
 
 
 def pose(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:

@@ -11,7 +11,7 @@ from drone_sim.parameter_types import ParameterError
 from drone_sim.scene_parameters import MeshParameters, SceneParameters, UrdfParameters
 from drone_sim.visual import Visual
 
-_MESHES = (".obj", ".stl", ".dae")  # what both PyBullet and the renderer read
+_MESHES = (".obj", ".stl")  # what both PyBullet and the renderer read without further packages
 
 
 def check(scene: SceneParameters) -> None:

@@ -62,7 +62,7 @@ class SphereParameters(_ObjectParameters):
 
 
 class MeshParameters(_ObjectParameters):
-    """A mesh file (OBJ, STL, DAE); `size` is its scale along x, y and z."""
+    """A mesh file (OBJ, STL); `size` is its scale along x, y and z."""
 
     shape: Literal["mesh"]
     file: File

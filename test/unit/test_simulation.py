@@ -14,7 +14,7 @@ from drone_sim.state import Pose, Twist, Vector3
 
 SCRIPTS = Path(__file__).parent / "scripts"
 RUNS = 200
-LEAK = 6 * 2**20  # bytes that 150 runs may add to the process: 40 kB a run; a world that is left behind takes 1 MB
+LEAK = 3 * 2**20  # bytes that 150 runs may add to the process: 20 kB a run
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "track")}
 CLUTTER = [
     {"name": "Tower", "shape": "box", "size": [0.3, 0.3, 0.3], "position": [0.0, 0.0, 0.15], "mass": 0.5},
@@ -81,7 +81,6 @@ def test_200_runs_fly_alike_and_leak_nothing(simulate):
         assert path == first
         simulation.stop()
         simulation.start()
-        if run % 25 == 0: print(run, resources())
         if run == RUNS // 4:  # by then every cache is full
             before = resources()
     after = resources()

@@ -1,0 +1,190 @@
+"""Scene files: every shape is read, drawn and hit; saved and loaded again; wrong ones get one line."""
+
+import numpy as np
+import pytest
+import trimesh
+from drawing import CAMERA, looking
+
+from drone_sim import parameters
+from drone_sim.parameters import ParameterError
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist, Vector3
+from drone_sim.world import Shape, World
+
+URDF = """<robot name="barrel"><link name="barrel">
+  <inertial><mass value="2"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
+  <visual><geometry><mesh filename="block.stl"/></geometry></visual>
+  <collision><geometry><box size="0.6 0.6 0.6"/></geometry></collision>
+</link></robot>"""
+BLOCK = "{shape: mesh, file: block.obj, position: [0, 0, 0]}"
+SHAPES = {
+    "box": "{shape: box, size: [0.6, 0.6, 0.6], position: [%s, 0, 0.3], mass: %s}",
+    "cylinder": "{shape: cylinder, size: [0.3, 0.6], position: [%s, 0, 0.3], mass: %s}",
+    "sphere": "{shape: sphere, size: [0.3], position: [%s, 0, 0.3], mass: %s}",
+    "obj": "{shape: mesh, file: block.obj, position: [%s, 0, 0.3], mass: %s}",
+    "stl": "{shape: mesh, file: parts/block.stl, size: [0.5, 0.5, 1], position: [%s, 0, 0.3], mass: %s}",
+    "urdf": "{shape: urdf, file: parts/barrel.urdf, position: [%s, 0, 0.3], mass: %s}",
+}
+
+
+@pytest.fixture(name="write")
+def _write(tmp_path):
+    """Give a function that writes a scene file, with meshes beside and below it; it returns the file's name."""
+    block = trimesh.creation.box((0.6, 0.6, 0.6))
+    (tmp_path / "parts").mkdir()
+    for name in ("block.obj", "block.stl", "parts/block.stl"):
+        block.export(str(tmp_path / name))
+    (tmp_path / "parts" / "barrel.urdf").write_text(URDF, encoding="utf-8")
+    for name in ("nonsense.stl", "nonsense.obj", "nonsense.png", "nonsense.urdf"):
+        (tmp_path / name).write_text("nonsense", encoding="utf-8")
+
+    def write(text):
+        (tmp_path / "scene.yaml").write_text(text, encoding="utf-8")
+        return str(tmp_path / "scene.yaml")
+
+    return write
+
+
+@pytest.fixture(name="simulate")
+def _simulate():
+    made = []
+
+    def simulate(file):
+        made.append(
+            Simulation(parameters.load({"scene_file": file, "cameras": {"front": {"width": 16, "height": 12}}}))
+        )
+        return made[-1]
+
+    yield simulate
+    for simulation in made:
+        simulation.close()
+
+
+def labels(renderer, world, eye=(-3, 0, 1.5), target=(1, 0, 0.3)):
+    """Return what is seen, as indices into the world's visuals."""
+    renderer.set_visuals(world.visuals())
+    return renderer.render_labels(CAMERA, looking(eye, target), world.visual_poses())
+
+
+@pytest.mark.parametrize("mass", [0, 2])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_is_read_drawn_and_hit(write, simulate, renderer, shape, mass):
+    simulation = simulate(write(f"drone: {{position: [1, 0, 3]}}\nobjects: [{SHAPES[shape] % (1, mass)}]"))
+    seen = labels(renderer, simulation.world)
+    things = [index for index, visual in enumerate(simulation.world.visuals()) if visual.key[0] == 1]
+    assert np.isin(seen, things).sum() > 500
+    ball = simulation.world.add_shape(Shape("sphere", (0.05,), (1.0, 0, 0.7), mass=0.1))
+    simulation.world.advance({}, 100)
+    assert simulation.world.state(ball).position[2] == pytest.approx(0.65, abs=0.03), "it lies on top of it"
+
+
+def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
+    objects = "\n".join(f"  - {SHAPES[shape] % (2 * n, n % 2)}" for n, shape in enumerate(SHAPES, start=1))
+    look = "{name: A, shape: box, size: [1, 2, 3], position: [1, -9, 2], rpy: [0.1, 0.2, 0.3], color: [1, 0, 0, 0.5]}"
+    simulation = simulate(write(f"floor: {{size: 33}}\ndrone: {{yaw: 0.3}}\nobjects:\n{objects}\n  - {look}"))
+    simulation.drone.receive(Twist(Vector3(0.5, 0, 0.2)))
+    for _ in range(10):
+        simulation.step()
+    saved = tmp_path / "elsewhere" / "saved.yaml"
+    simulation.scene.save(saved, simulation.drone.matrix)
+    loaded = simulate(str(saved))
+    assert loaded.drone.state.position == simulation.drone.state.position
+    for ours, theirs in zip(simulation.parameters.scene.objects, loaded.parameters.scene.objects):
+        assert ours.model_dump(exclude={"position", "rpy"}) == theirs.model_dump(exclude={"position", "rpy"})
+    assert loaded.parameters.scene.floor == simulation.parameters.scene.floor
+    # The body's own number does not count, nor does where a propeller's blades stand.
+    np.testing.assert_allclose(loaded.world.visual_poses()[:8], simulation.world.visual_poses()[:8], rtol=0, atol=1e-9)
+    looks = [[visual.shape, visual.size, visual.rgba, visual.texture] for visual in simulation.world.visuals()[1:8]]
+    assert [[v.shape, v.size, v.rgba, v.texture] for v in loaded.world.visuals()[1:8]] == looks
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("", "must hold `key: value` lines"),
+        ("objects: [", "scene.yaml: while parsing"),
+        ("boxes: []", "unknown key boxes; known are drone, floor, objects"),
+        ("1: 2", "unknown key 1"),
+        ("objects: {}", "scene/objects = {}: input should be a valid list"),
+        ("objects: [5]", "scene/objects/0 = 5"),
+        ("drone:", "parameter drone = None"),
+        ("drone: {position: [0, 0, .nan]}", "drone/position/2 = nan: input should be a finite number"),
+        ("floor: {size: -1}", "scene/floor/size = -1: input should be greater than 0"),
+        ("floor: {texture: no.png}", "no.png': no such file"),
+        ("floor: {texture: nonsense.png}", "nonsense.png: cannot be read"),
+        ("objects: [{shape: cone, size: [1], position: [0, 0, 0]}]", "'box', 'cylinder', 'sphere', 'mesh', 'urdf'"),
+        ("objects: [{size: [1], position: [0, 0, 0]}]", "discriminator"),
+        ("objects: [{shape: box, size: [1, 1], position: [0, 0, 0]}]", "scene/objects/0/box/size"),
+        ("objects: [{shape: sphere, size: [-1], position: [0, 0, 0]}]", "size/0 = -1: input should be greater than 0"),
+        ("objects: [{shape: sphere, size: [.inf], position: [0, 0, 0]}]", "size/0 = inf: input should be a finite"),
+        ("objects: [{shape: sphere, size: [1], position: [0, 0, 0], mass: -1}]", "mass = -1"),
+        (
+            "objects: [{shape: sphere, size: [1], position: [0, 0, 0], colour: [1, 0, 0, 1]}]",
+            "colour: unknown key; known",
+        ),
+        ("objects: [{shape: box, size: [1, 1, 1], position: [0, 0, 0], texture: nonsense.png}]", "cannot be read"),
+        (f"objects: [{BLOCK.replace('block', 'missing')}]", "missing.obj': no such file"),
+        (f"objects: [{BLOCK.replace('block', 'nonsense')}]", "mesh"),
+        (f"objects: [{BLOCK.replace('block.obj', 'nonsense.stl')}]", "nonsense.stl: "),
+        (f"objects: [{BLOCK.replace('block.obj', 'nonsense.png')}]", "must be one of .obj, .stl"),
+        (f"objects: [{BLOCK.replace('block.obj', 'package://nowhere_at_all/a.obj')}]", "no ROS package nowhere_at_all"),
+        ("objects: [{shape: urdf, file: nonsense.urdf, position: [0, 0, 0]}]", "nonsense.urdf: syntax error"),
+        ("objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 0]}]", "named 'Drone' is there already"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_wrong_scene_gets_one_line(write, text, words):
+    file = write(text)
+    with pytest.raises(ParameterError) as refused:
+        Simulation(parameters.load({"scene_file": file})).close()
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("file", ["no.yaml", "/no/such.yaml", "package://drone_sim/config/scenes/no.yaml", "/tmp"])
+def test_a_scene_that_is_not_there_gets_one_line(file):
+    with pytest.raises(ParameterError, match=f"parameter scene_file = '{file}': no such file") as refused:
+        parameters.load({"scene_file": file})
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["empty", "gates", "room"])
+def test_the_shipped_scenes_load_and_let_the_drone_hover(simulate, name):
+    simulation = simulate(f"package://drone_sim/config/scenes/{name}.yaml")
+    (x, y, z), things = simulation.drone.state.position, simulation.world.visual_poses()[:, :3, 3]
+    for _ in range(100):
+        simulation.step()
+    assert simulation.drone.state.position == pytest.approx((x, y, z), abs=0.002)
+    np.testing.assert_allclose(simulation.world.visual_poses()[:, :3, 3], things, rtol=0, atol=0.005)
+
+
+def test_the_drone_flies_through_the_first_gate(simulate):
+    simulation = simulate("package://drone_sim/config/scenes/gates.yaml")
+    simulation.drone.receive(Twist(Vector3(1.0, 0, 0.05)))
+    for _ in range(100):
+        simulation.step()
+    x, y, _ = simulation.drone.state.position
+    assert x > 4.0 and abs(y) < 1e-6
+
+
+def test_pictures_follow_what_is_added_painted_and_removed(renderer):
+    world = World(0.005, -9.81)
+    red, green = Shape("sphere", (0.5,), (1, 1, 1), color=(1, 0, 0, 1)), Shape("box", (1, 1, 1), (1, -1, 1))
+    view = looking((-3, 0, 1), (1, 0, 1))
+
+    def picture():
+        renderer.set_visuals(world.visuals())
+        return renderer.render(CAMERA, view, world.visual_poses()).astype(int)
+
+    empty = picture()
+    first, second = world.add_shape(red), world.add_shape(green)
+    both = picture()
+    assert (both != empty).any(axis=2)[:, :160].sum() > 500 and (both != empty).any(axis=2)[:, 160:].sum() > 500
+    assert np.argmax(both[120, 100]) == 0
+    world.set_color(first, (0, 0, 1, 1))
+    assert np.argmax(picture()[120, 100]) == 2
+    world.remove(first)
+    np.testing.assert_array_equal(picture()[:, :150], empty[:, :150])
+    world.remove(second)
+    np.testing.assert_array_equal(picture(), empty)
+    world.close()
