@@ -106,7 +106,8 @@ lint() {
 
 run_tests() {
   make_venv requirements-dev.txt
-  CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test
+  # Every core tests; the tests with a master run one after another.
+  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test
 }
 
 command=${1:-help}

@@ -156,7 +156,10 @@ def test_start_reads_script_and_scene_again(simulate, tmp_path):
     assert frames.to_euler(simulation.drone.matrix)[2] == 0.0
 
 
-@pytest.mark.parametrize("wrong", ["objects: [{shape: mesh, file: no.obj, position: [0, 0, 0]}]", "drone: [", "x: 1"])
+MESH = "objects: [{shape: mesh, file: %s, position: [0, 0, 0]}]"
+
+
+@pytest.mark.parametrize("wrong", [MESH % "no.obj", MESH % "scene.yaml", "drone: [", "x: 1"])
 def test_a_scene_that_cannot_be_read_leaves_the_last_one(simulate, tmp_path, wrong):
     scene = tmp_path / "scene.yaml"
     scene.write_text(
