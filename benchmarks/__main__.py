@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Callable, Dict, List
 
 from benchmarks import loop, node, plot, render
+from benchmarks.cores import one_core
 from drone_sim.camera.renderer import Renderer
 
 Row = Dict[str, Any]
@@ -18,7 +19,7 @@ RESULTS = Path(__file__).parent / "results.json"
 
 def _in_a_folder(measure: Callable[[Path], List[Row]]) -> Callable[[], List[Row]]:
     def measured() -> List[Row]:
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder, one_core():
             return measure(Path(folder))
 
     return measured

@@ -1,11 +1,12 @@
 """The simulation's loop without ROS, beside a bare PyBullet loop that only applies the forces and steps."""
 
-import os
+import statistics
 import time
 from typing import Any, Callable, Dict, List
 
 import pybullet
 
+from benchmarks.cores import one_core
 from drone_sim import frames, parameters
 from drone_sim.drone import PROPELLERS
 from drone_sim.simulation import Simulation
@@ -17,23 +18,40 @@ STEP = 0.05  # s
 SUB_STEPS = 10
 
 
-def factor(name: str, step: Callable[[], Any], seconds: float) -> Row:
-    """Time `step` (50 ms of simulated time) for a while; the factor is its share of the median time."""
+def race(steps: Dict[str, Callable[[], Any]], rounds: int, seconds: float) -> List[Row]:
+    """Time each `step` (50 ms of simulated time) by turns: the machine's own ups and downs hit all alike.
+
+    The factor is from the median time; `of_bare` is the median, over the rounds, of the share of the first one.
+    """
+    times: Dict[str, List[float]] = {name: [] for name in steps}
+    shares: Dict[str, List[float]] = {name: [] for name in steps}
+    for _ in range(rounds):
+        medians = {name: _times(step, seconds) for name, step in steps.items()}
+        first = statistics.median(next(iter(medians.values())))
+        for name, some in medians.items():
+            times[name] += some
+            shares[name].append(first / statistics.median(some))
+    return [_row(name, sorted(times[name]), statistics.median(shares[name])) for name in steps]
+
+
+def _times(step: Callable[[], Any], seconds: float) -> List[float]:
     times = []
-    for _ in range(5):
-        step()
     end = time.perf_counter() + seconds
     while time.perf_counter() < end:
         start = time.perf_counter()
         step()
         times.append(time.perf_counter() - start)
-    times.sort()
-    median, low, high = (times[int(len(times) * share)] for share in (0.5, 0.1, 0.9))
-    return {"name": name, "factor": STEP / median, "p10": STEP / high, "p90": STEP / low, "step_us": 1e6 * median}
+    return times
 
 
-def bare(seconds: float) -> Row:
-    """The floor of any PyBullet drone: the same body and floor, four thrusts and torques, a step; nothing read."""
+def _row(name: str, times: List[float], share: float) -> Row:
+    median, low, high = (times[int(len(times) * part)] for part in (0.5, 0.1, 0.9))
+    spread = {"p10": STEP / high, "p90": STEP / low, "step_us": 1e6 * median}
+    return {"name": name, "factor": STEP / median, **spread, "of_bare": share}
+
+
+def bare() -> Callable[[], None]:
+    """Return a step of the floor of any PyBullet drone: the same body and floor, four thrusts and torques, a step; nothing read."""
     world = World(STEP / SUB_STEPS, -9.81)
     settings = parameters.load()
     world.add_floor(settings.scene.floor.size, settings.scene.floor.texture)
@@ -51,34 +69,24 @@ def bare(seconds: float) -> Row:
                 pybullet.applyExternalTorque(body, -1, [0, 0, turn * 0.01], pybullet.LINK_FRAME, client)
             pybullet.stepSimulation(client)
 
-    row = factor("bare PyBullet: forces and steps", step, seconds)
-    world.close()
-    return row
+    return step
 
 
-def ours(name: str, seconds: float, cameras: List[str]) -> Row:
-    """The whole loop: script, propellers, dynamics, sensing, and the pictures of the cameras named."""
+def ours(*cameras: str) -> Callable[[], None]:
+    """Return a step of the whole loop: script, propellers, dynamics, sensing, and the pictures of the cameras named."""
     simulation = Simulation(parameters.load())
     for camera in cameras:
         simulation.cameras[camera].watched = lambda: True
-    row = factor(name, simulation.step, seconds)
-    simulation.close()
-    return row
+    return simulation.step
 
 
-def compare(seconds: float = 3.0) -> List[Row]:
+def compare(rounds: int = 10, seconds: float = 0.4) -> List[Row]:
     """Return the rows, measured on one core."""
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(cores)})
-    try:
-        floor = bare(seconds)
-        rows = [
-            ours("drone_sim, no camera", seconds, []),
-            ours("drone_sim, front camera", seconds, ["front"]),
-            ours("drone_sim, front and track camera", seconds, ["front", "track"]),
-        ]
-    finally:
-        os.sched_setaffinity(0, cores)
-    for row in [floor, *rows]:
-        row["of_bare"] = row["factor"] / floor["factor"]
-    return [floor, *rows]
+    with one_core():
+        steps = {
+            "bare PyBullet: forces and steps": bare(),
+            "drone_sim, no camera": ours(),
+            "drone_sim, front camera": ours("front"),
+            "drone_sim, front and track camera": ours("front", "track"),
+        }
+        return race(steps, rounds, seconds)

@@ -1,4 +1,4 @@
-"""Take the pictures of docs/tutorial.md with the drone's own cameras; needs neither ROS nor a display.
+"""Take the pictures of docs/tutorial.md and README.md with the drone's own cameras; needs neither ROS nor a display.
 
 PYTHONPATH=src .venv/bin/python docs/take_pictures.py [FOLDER]
 """
@@ -26,6 +26,7 @@ def main():
     on_body = parameters.read_yaml(DOCS / "tutorial" / "track_on_body.yaml")
     image.imsave(folder / "tutorial_track_body.png", leaning(on_body))
     image.imsave(folder / "tutorial_7_camera.png", published())
+    image.imsave(folder / "cameras.png", cameras())
 
 
 def scene():
@@ -52,6 +53,18 @@ def published():
     picture = simulation.drone.bus.published[-1].message
     simulation.close()
     return np.frombuffer(picture.data, np.uint8).reshape(picture.height, picture.width, 3)
+
+
+def cameras():
+    """Return what front, track and depth camera see at one moment, side by side; the farther, the darker."""
+    simulation = Simulation(parameters.load({"scene_file": "package://drone_sim/config/scenes/gates.yaml"}))
+    simulation.drone.receive(Twist(Vector3(0.6, 0, 0)))
+    fly(simulation, 1.5)
+    simulation.drone.show_blades()
+    front, track, depth = (simulation.cameras[name].take() for name in ("front", "track", "depth"))
+    simulation.close()
+    near = np.uint8(255 / (1 + np.nan_to_num(depth, nan=np.inf) / 2))
+    return np.hstack([front, track, np.dstack([near] * 3)])
 
 
 def fly(simulation, seconds):

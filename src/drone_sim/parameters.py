@@ -130,6 +130,7 @@ class Parameters(Checked):
     drone: DroneParameters
     propellers: PropellerParameters
     control: ControlParameters
+    samples: Literal[0, 2, 4, 8]
     cameras: Dict[Name, CameraParameters]
     _given: Dict[str, Any] = PrivateAttr(default_factory=dict)  # what stands without the scene file
 

@@ -62,7 +62,7 @@ class Simulation:
         self._backend = backend
         self._runs = 0
         self.world = World(parameters.sub_step, parameters.gravity, gui)
-        self.vision = Vision(self.world)
+        self.vision = Vision(self.world, parameters.samples)
         try:
             self._build(parameters)
             self.cameras: Dict[str, Camera] = {name: self._camera(one) for name, one in parameters.cameras.items()}

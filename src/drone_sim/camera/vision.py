@@ -34,9 +34,13 @@ class Scene(Protocol):
 class Vision:
     """Takes pictures of a scene: with OpenGL where EGL is to be had, with the scene's own renderer elsewhere."""
 
-    def __init__(self, scene: Scene):
-        """Make the renderer when the first picture is asked for: not every run needs one."""
+    def __init__(self, scene: Scene, samples: int = 0):
+        """Make the renderer when the first picture is asked for: not every run needs one.
+
+        `samples` per pixel smooth the edges, as far as the renderer can.
+        """
         self._scene = scene
+        self._samples = samples
         self._renderer: Optional[Renderer] = None
         self._fallback = False
 
@@ -63,7 +67,7 @@ class Vision:
 
     def _open(self) -> None:
         try:
-            self._renderer = Renderer()
+            self._renderer = Renderer(samples=self._samples)
         except RendererUnavailable as error:
             self._fallback = True
             _LOG.warning("%s; pictures come from PyBullet's TinyRenderer, at a few frames per second", error)

@@ -23,7 +23,7 @@ from rosgraph_msgs.msg import Clock
 from drone_sim import parameters as parameters_module
 from drone_sim.frames import position, to_euler
 from drone_sim.pacing import Pacer
-from drone_sim.parameters import ParameterError, Parameters
+from drone_sim.parameters import Parameters
 from drone_sim.ros.cameras import CameraOutput
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput
@@ -36,7 +36,6 @@ from drone_sim.ros.script_topics import RosBackend
 from drone_sim.ros.services import Services
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Simulation
-from drone_sim.urdf import UrdfError
 
 _STANDING = 0.2  # s between two messages while the simulation stands still
 
@@ -163,7 +162,7 @@ def main() -> int:
         node = Node(_parameters())
         MasterWatch().start()
         node.run(ending.is_set)
-    except (ParameterError, UrdfError, ScriptError, RuntimeError) as error:
+    except (ValueError, ScriptError, RuntimeError) as error:  # each says in one line what is wrong
         rospy.logfatal(f"drone_sim: {error}")
         return 1
     except (OSError, rosgraph.MasterException):
