@@ -51,7 +51,7 @@ def _row(name: str, times: List[float], share: float) -> Row:
 
 
 def bare() -> Callable[[], None]:
-    """Return a step of the floor of any PyBullet drone: the same body and floor, four thrusts and torques, a step; nothing read."""
+    """Return a step of the floor of any PyBullet drone: same body, four thrusts and torques, a step; nothing read."""
     world = World(STEP / SUB_STEPS, -9.81)
     settings = parameters.load()
     world.add_floor(settings.scene.floor.size, settings.scene.floor.texture)
