@@ -16,6 +16,8 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
+from drone_sim.ros.master_watch import master_is_there
+
 _STEP = 0.1  # m/s, per key press
 _TURN_STEP = 0.2  # rad/s, per key press
 _PERIOD = 0.1  # s between read-outs
@@ -137,6 +139,8 @@ def main() -> int:
     """Run the node until ESC, q, Ctrl-C, or the terminal closes; return its exit status."""
     if not sys.stdin.isatty() or not sys.stdout.isatty():
         print("key_teleop: needs a terminal to read keys from", file=sys.stderr)
+        return 1
+    if not master_is_there():
         return 1
     # rospy's own handlers would close the topics before the last stop is sent.
     rospy.init_node("key_teleop", anonymous=True, disable_signals=True)

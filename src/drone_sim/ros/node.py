@@ -28,7 +28,7 @@ from drone_sim.ros.cameras import CameraOutput
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput
 from drone_sim.ros.markers import Handles
-from drone_sim.ros.master_watch import MasterWatch
+from drone_sim.ros.master_watch import MasterWatch, master_is_there
 from drone_sim.ros.outputs import DroneOutput
 from drone_sim.ros.paths import from_shell
 from drone_sim.ros.player import Player
@@ -151,6 +151,8 @@ def _parameters() -> Parameters:
 
 def main() -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
+    if not master_is_there():
+        return 1
     # rospy's own signal handler calls the master from within whatever the signal interrupts, and hangs for
     # ever where that is a call to the master, too. Ours says that it is time to end, and no more.
     rospy.init_node("drone_sim", disable_signals=True)
@@ -166,7 +168,7 @@ def main() -> int:
         rospy.logfatal(f"drone_sim: {error}")
         return 1
     except (OSError, rosgraph.MasterException):
-        rospy.logfatal(f"drone_sim: no ROS master at {rosgraph.get_master_uri()}: start roscore, or use roslaunch")
+        rospy.logfatal(f"drone_sim: the ROS master at {rosgraph.get_master_uri()} has gone")
         return 1
     finally:
         if node is not None:
