@@ -3,7 +3,7 @@
 Parameters (private): every key of config/drone.yaml.
 Topics, in the drone's namespace: see inputs.py, outputs.py, cameras.py and markers.py; services: services.py.
 /clock is published with use_sim_time.
-Frames: world -> base_link, world -> Track_base; the rest comes from the URDF.
+Frames: world -> base_link, Track_base, and the cameras that have a `mount`; the rest comes from the URDF.
 """
 
 from __future__ import annotations
