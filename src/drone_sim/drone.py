@@ -13,7 +13,7 @@ from drone_sim.drone_objects import DRONE, joint, respondable
 from drone_sim.frames import IDENTITY, Matrix, Vector
 from drone_sim.objects import near_names
 from drone_sim.parameters import CameraParameters, Parameters
-from drone_sim.propeller import ParticleFan, Wrench
+from drone_sim.propeller import Propellers, Wrench
 from drone_sim.scripting import load
 from drone_sim.scripting.api import make_sim, make_sim_ros
 from drone_sim.scripting.api_signals import Signals
@@ -51,9 +51,7 @@ class Drone:
         inertial_from_root = frames.invert(world.inertial_frame(self._id))
         self._links = [self._link(f"propeller_{place}") for place, _ in PROPELLERS]
         self._points = [frames.position(frames.multiply(inertial_from_root, link)) for link in self._links]
-        self._by_axis: Dict[Vector, List[int]] = {}  # propellers that push along the same axis of the body
-        for number, link in enumerate(self._links):
-            self._by_axis.setdefault((link[2], link[6], link[10]), []).append(number)
+        self._axes = [(link[2], link[6], link[10]) for link in self._links]
         shapes = [(respondable(number), link) for number, link in enumerate(self._links, start=1)]
         self._shapes = {name: frames.multiply(inertial_from_root, link) for name, link in [(DRONE, IDENTITY), *shapes]}
         self.script: load.Script = load.NoScript()
@@ -65,9 +63,9 @@ class Drone:
         self.close()
         self._world.set_pose(self._id, self._start)
         self.refresh()
-        step = self._parameters.time_step
-        self.fans = [ParticleFan(self._parameters.propellers, turn, step) for _, turn in PROPELLERS]
-        self._blade_turns = [0.0] * len(PROPELLERS)
+        rotations = [rotation for _, rotation in PROPELLERS]
+        law, step = self._parameters.propellers, self._parameters.time_step
+        self._propellers = Propellers(law, self._axes, self._points, rotations, step)
         self.command = Twist()
         self._command_age = 0.0
         self._pushes: List[_Push] = []
@@ -77,7 +75,7 @@ class Drone:
         self.objects = drone_objects.scene_objects(self, self.body.links, self._links, cameras)
         self.signals = Signals()
         self.script_parameters = self._script_parameters()
-        self._propellers = [self.script_parameters[respondable(number)] for number in (1, 2, 3, 4)]
+        self._commanded = [self.script_parameters[respondable(number)] for number in (1, 2, 3, 4)]
 
     def _script_parameters(self) -> Dict[str, Dict[str, Any]]:
         """Return what V-REP's scripts have as simulation parameters, and the gains of control."""
@@ -107,16 +105,6 @@ class Drone:
     # ---- state
 
     @property
-    def state(self) -> State:
-        """Pose and velocity of the root link (base_link) after the last step, or the last move."""
-        return self._state
-
-    @property
-    def matrix(self) -> Matrix:
-        """World from base_link."""
-        return self._matrix
-
-    @property
     def track(self) -> Matrix:
         """World from Track_base: at the drone, level, turned by its yaw."""
         return self.objects.matrix(self.objects.handle("Track_base"))
@@ -124,7 +112,13 @@ class Drone:
     @property
     def particle_velocities(self) -> Tuple[float, ...]:
         """What the script commands: m/s, propellers 1 to 4."""
-        return tuple(propeller[_PARTICLE_VELOCITY] for propeller in self._propellers)
+        first, second, third, fourth = self._commanded
+        return (
+            first[_PARTICLE_VELOCITY],
+            second[_PARTICLE_VELOCITY],
+            third[_PARTICLE_VELOCITY],
+            fourth[_PARTICLE_VELOCITY],
+        )
 
     @property
     def blade_angles(self) -> Dict[str, float]:
@@ -145,7 +139,7 @@ class Drone:
         if angle is not None:
             self._joint_angles[name] = angle
         number = names.index(name)
-        return self._joint_angles.get(name, -PROPELLERS[number][1] * _BLADE_TURN * self._blade_turns[number])
+        return self._joint_angles.get(name, -PROPELLERS[number][1] * _BLADE_TURN * self._propellers.air[number])
 
     def show_blades(self) -> None:
         """Turn the blades in the world's pictures to where they are."""
@@ -158,8 +152,8 @@ class Drone:
 
     def refresh(self) -> None:
         """Read the state back from the world."""
-        self._state = self._world.state(self._id)
-        self._matrix = self._state.matrix
+        self.state: State = self._world.state(self._id)  # of base_link, after the last step or move
+        self.matrix: Matrix = self.state.matrix  # world from base_link
 
     def move(self, pose: Pose) -> None:
         """Put the drone somewhere else, at rest."""
@@ -173,17 +167,14 @@ class Drone:
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back all that the drone's body is not: propellers, objects, script."""
-        own = (self.command, self._command_age, list(self._pushes), list(self._blade_turns), dict(self._joint_angles))
-        carries = [fan.carry for fan in self.fans]
+        own = (self.command, self._command_age, list(self._pushes), dict(self._joint_angles))
         parameters = copy.deepcopy(self.script_parameters)
-        others = [self.objects.remember(), self.signals.remember(), self.script.remember()]
+        others = [one.remember() for one in (self._propellers, self.objects, self.signals, self.script)]
 
         def recall() -> None:
-            self.command, self._command_age, pushes, turns, angles = own
-            self._pushes, self._blade_turns, self._joint_angles = list(pushes), list(turns), dict(angles)
+            self.command, self._command_age, pushes, angles = own
+            self._pushes, self._joint_angles = list(pushes), dict(angles)
             self._added = Wrench()
-            for fan, carry in zip(self.fans, carries):
-                fan.carry = carry
             for name, values in copy.deepcopy(parameters).items():
                 self.script_parameters[name].clear()
                 self.script_parameters[name].update(values)
@@ -249,18 +240,12 @@ class Drone:
         self.bus.deliver(self.script.callback)
         self.script.call("actuation")
 
-    def wrench(self) -> Tuple[int, Wrench]:
-        """Emit a step's particles, use up a step of the pushes; return the body id and the step's wrench."""
+    def wrenches(self) -> Dict[int, Wrench]:
+        """Emit a step's particles, use up a step of the pushes; return the step's wrench on each body, by its id."""
         wrench, self._added = self._added, Wrench()
-        step = self._parameters.time_step
-        for axis, propellers in self._by_axis.items():
-            thrusts = []
-            for number in propellers:
-                velocity = self._propellers[number][_PARTICLE_VELOCITY]
-                thrusts.append((*self.fans[number].emit(velocity), self._points[number]))
-                self._blade_turns[number] += velocity * step
-            wrench.add_along(frames.rotate(self._matrix, axis), thrusts)
-        for push in self._pushes:
-            wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
-        self._pushes = [push._replace(steps=push.steps - 1) for push in self._pushes if push.steps > 1]
-        return self._id, wrench
+        self._propellers.blow(self.particle_velocities, self.matrix, wrench)
+        if self._pushes:
+            for push in self._pushes:
+                wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
+            self._pushes = [push._replace(steps=push.steps - 1) for push in self._pushes if push.steps > 1]
+        return {self._id: wrench}

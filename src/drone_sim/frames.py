@@ -7,8 +7,7 @@ step handles a dozen of them and one numpy call costs more than all the arithmet
 
 from __future__ import annotations
 
-import math
-from math import cos, sin
+from math import asin, atan2, copysign, cos, sin, sqrt
 from typing import Sequence, Tuple
 
 Vector = Tuple[float, float, float]
@@ -22,9 +21,9 @@ def from_quaternion(position: Sequence[float], quaternion: Sequence[float]) -> M
     """Return the transform of a unit quaternion (x, y, z, w) and a position in metres."""
     x, y, z, w = quaternion
     return (
-        1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), position[0],
-        2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), position[1],
-        2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), position[2],
+        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w), position[0],
+        2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w), position[1],
+        2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y), position[2],
     )  # fmt: skip
 
 
@@ -55,18 +54,16 @@ def to_euler(m: Sequence[float]) -> Vector:
 
     At beta = +-pi/2 only a combination of alpha and gamma is defined: gamma is then 0.
     """
-    beta = math.asin(max(-1.0, min(1.0, m[2])))
     if abs(m[2]) > 1 - 1e-12:
-        return math.atan2(m[9], m[5]), beta, 0.0
-    return math.atan2(-m[6], m[10]), beta, math.atan2(-m[1], m[0])
+        return atan2(m[9], m[5]), asin(max(-1.0, min(1.0, m[2]))), 0.0
+    return atan2(-m[6], m[10]), asin(m[2]), atan2(-m[1], m[0])
 
 
 def to_rpy(m: Sequence[float]) -> Vector:
     """Return ROS's roll, pitch and yaw of a transform, in radians; at pitch = +-pi/2 roll is 0."""
-    pitch = math.asin(max(-1.0, min(1.0, -m[8])))
     if abs(m[8]) > 1 - 1e-12:
-        return 0.0, pitch, math.atan2(-m[1], m[5])
-    return math.atan2(m[9], m[10]), pitch, math.atan2(m[4], m[0])
+        return 0.0, asin(max(-1.0, min(1.0, -m[8]))), atan2(-m[1], m[5])
+    return atan2(m[9], m[10]), asin(-m[8]), atan2(m[4], m[0])
 
 
 def to_quaternion(m: Sequence[float]) -> Quaternion:
@@ -81,7 +78,7 @@ def to_quaternion(m: Sequence[float]) -> Quaternion:
         (m[2] + m[8], m[6] + m[9], squares[2], m[4] - m[1]),
         (m[9] - m[6], m[2] - m[8], m[4] - m[1], squares[3]),
     )
-    scale = math.copysign(0.5 / math.sqrt(squares[largest]), rows[largest][3])
+    scale = copysign(0.5 / sqrt(squares[largest]), rows[largest][3])
     x, y, z, w = rows[largest]
     return x * scale, y * scale, z * scale, w * scale
 
@@ -127,6 +124,21 @@ def invert(m: Sequence[float]) -> Matrix:
     )  # fmt: skip
 
 
+def relative(a: Sequence[float], b: Sequence[float]) -> Matrix:
+    """Return the rigid transform b, given in the frame that a is given in, in the frame a: the inverse of a times b."""
+    a0, a1, a2, x, a4, a5, a6, y, a8, a9, a10, z = a
+    b0, b1, b2, b3, b4, b5, b6, b7, b8, b9, b10, b11 = b
+    b3, b7, b11 = b3 - x, b7 - y, b11 - z
+    return (
+        a0 * b0 + a4 * b4 + a8 * b8, a0 * b1 + a4 * b5 + a8 * b9,
+        a0 * b2 + a4 * b6 + a8 * b10, a0 * b3 + a4 * b7 + a8 * b11,
+        a1 * b0 + a5 * b4 + a9 * b8, a1 * b1 + a5 * b5 + a9 * b9,
+        a1 * b2 + a5 * b6 + a9 * b10, a1 * b3 + a5 * b7 + a9 * b11,
+        a2 * b0 + a6 * b4 + a10 * b8, a2 * b1 + a6 * b5 + a10 * b9,
+        a2 * b2 + a6 * b6 + a10 * b10, a2 * b3 + a6 * b7 + a10 * b11,
+    )  # fmt: skip
+
+
 def transform(m: Sequence[float], point: Sequence[float]) -> Vector:
     """Return the point m·p (simMultiplyVector)."""
     x, y, z = point
@@ -151,7 +163,7 @@ def turned(quaternion: Sequence[float], vector: Sequence[float]) -> Vector:
     """Return the vector turned by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
     x, y, z, w = quaternion
     vx, vy, vz = vector
-    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
     return vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx
 
 

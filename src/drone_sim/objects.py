@@ -9,7 +9,8 @@ from drone_sim import frames
 from drone_sim.frames import IDENTITY, Matrix, Vector
 from drone_sim.state import Pose, State
 
-WORLD = -1  # V-REP's handle for the world, where an object or a parent is expected
+# V-REP's handles that are no object's: the world, and the parent of the object that is spoken of.
+WORLD, PARENT = -1, -11
 
 
 class Body(Protocol):
@@ -90,12 +91,10 @@ class SceneObject:
             if carrier.parent is None:
                 return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
             carrier = carrier.parent
-        state = carrier.body.state
-        here = frames.position(self.matrix)
-        arm = tuple(a - b for a, b in zip(here, state.position))
-        swing = frames.cross(state.angular_velocity, arm)
-        linear = state.linear_velocity
-        return (linear[0] + swing[0], linear[1] + swing[1], linear[2] + swing[2]), state.angular_velocity
+        (x, y, z), _, linear, angular = carrier.body.state
+        m, (wx, wy, wz) = self.matrix, angular
+        x, y, z = m[3] - x, m[7] - y, m[11] - z  # from the body's frame to this one
+        return (linear[0] + wy * z - wz * y, linear[1] + wz * x - wx * z, linear[2] + wx * y - wy * x), angular
 
 
 class ObjectTree:
@@ -183,17 +182,20 @@ class ObjectTree:
         return recall
 
     def matrix(self, handle: int, relative_to: int = WORLD) -> Matrix:
-        """Return the transform of an object relative to another, or to the world."""
-        matrix = self[handle].matrix
+        """Return the transform of an object relative to another, to its PARENT, or to the WORLD."""
+        moved = self[handle]
         if relative_to == WORLD:
-            return matrix
-        return frames.multiply(frames.invert(self[relative_to].matrix), matrix)
+            return moved.matrix
+        reference = moved.parent if relative_to == PARENT else self[relative_to]
+        return moved.matrix if reference is None else frames.relative(reference.matrix, moved.matrix)
 
     def set_matrix(self, handle: int, relative_to: int, matrix: Matrix) -> None:
-        """Put an object at a transform relative to another, or to the world."""
+        """Put an object at a transform relative to another, to its PARENT, or to the WORLD."""
+        moved = self[handle]
         if relative_to != WORLD:
-            matrix = frames.multiply(self[relative_to].matrix, matrix)
-        self[handle].matrix = matrix
+            reference = moved.parent if relative_to == PARENT else self[relative_to]
+            matrix = matrix if reference is None else frames.multiply(reference.matrix, matrix)
+        moved.matrix = matrix
 
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Hang an object on another (WORLD for none): it stays where it is, or keeps its local transform.

@@ -13,39 +13,29 @@ V-REP 3.x keeps the carry (21, 22, 21, ... particles at dt = 0.05 s), CoppeliaSi
 from __future__ import annotations
 
 import math
-from typing import Iterable, List, Sequence, Tuple
+from typing import Callable, Dict, List, Sequence, Tuple
 
-from drone_sim.frames import Quaternion, Vector
+from drone_sim.frames import Matrix, Quaternion, Vector, rotate
 from drone_sim.parameters import PropellerParameters
 
 
-class ParticleFan:
-    """One propeller: counts its particles, turns its particle velocity into thrust and torque."""
+class ParticleLaw:
+    """Counts the particles of a step, which are as many for every propeller."""
 
-    def __init__(self, parameters: PropellerParameters, rotation: int, time_step: float):
-        """Take the law's constants, the sense of rotation (+1 or -1) and the step in seconds."""
+    def __init__(self, parameters: PropellerParameters, time_step: float):
+        """Take the law's constants, and the step in seconds."""
         self._rate = parameters.particles_per_second * time_step
         self._keeps_carry = parameters.law == "3.x"
         volume = math.pi * parameters.particle_size**3 / 6
         self._newtons = parameters.particle_density * volume / time_step
-        self._newton_metres = rotation * parameters.torque_per_velocity
-        self._carry = 0.0
+        self.carry = 0.0  # the fraction of a particle left over by the last step
 
-    def emit(self, velocity: float) -> Tuple[float, float]:
-        """Emit one step's particles at `velocity` (m/s); return thrust (N) and reaction torque (N m)."""
-        particles = math.floor(self._rate + self._carry)
+    def emit(self) -> float:
+        """Emit one step's particles; return the thrust in newtons per m/s of their velocity."""
+        particles = math.floor(self._rate + self.carry)
         if self._keeps_carry:
-            self._carry += self._rate - particles
-        return particles * self._newtons * velocity, self._newton_metres * velocity
-
-    @property
-    def carry(self) -> float:
-        """The fraction of a particle left over by the last step (for snapshots)."""
-        return self._carry
-
-    @carry.setter
-    def carry(self, value: float) -> None:
-        self._carry = value
+            self.carry += self._rate - particles
+        return particles * self._newtons
 
 
 class Wrench:
@@ -54,70 +44,94 @@ class Wrench:
     V-REP turns each force into the world once per step and re-applies that world vector in every
     sub-step, at a point that moves with the body. For points p_i (inertial frame of the body) and
     forces F_i (world), the torque about the centre of mass under the rotation R is sum (R p_i) x F_i.
-    It is linear in R, so nine sums hold it for any number of forces: column c of `moments` is
-    sum p_i F_i[c]. Written out without loops: both methods run in every step.
+    Parallel forces F_i = f_i a have one lever in common, l = sum p_i f_i, and one torque (R l) x a. With the
+    unit quaternion (q, w) of R it is l x a + (w t + q x t) x a, where t = 2 q x l.
     """
 
     def __init__(self) -> None:
         """Start with no force at all."""
-        self.force = [0.0, 0.0, 0.0]
-        self.torque = [0.0, 0.0, 0.0]
-        self.moments: List[List[float]] = [[0.0, 0.0, 0.0] for _ in range(3)]
+        self.force: Vector = (0.0, 0.0, 0.0)
+        self._torque: Vector = (0.0, 0.0, 0.0)  # what does not depend on R: the torques, and every l x a
+        self._levers: List[Tuple[Vector, Vector]] = []  # (2 l, a)
 
-    def add(self, force: Sequence[float], torque: Sequence[float], point: Sequence[float]) -> None:
+    def add(self, force: Vector, torque: Vector, point: Vector) -> None:
         """Add a force (N, world) at a point (m, inertial frame of the body), and a torque (N m, world)."""
-        fx, fy, fz = force
-        px, py, pz = point
-        total, turning = self.force, self.torque
-        total[0] += fx
-        total[1] += fy
-        total[2] += fz
-        turning[0] += torque[0]
-        turning[1] += torque[1]
-        turning[2] += torque[2]
-        about_x, about_y, about_z = self.moments
-        about_x[0] += px * fx
-        about_x[1] += py * fx
-        about_x[2] += pz * fx
-        about_y[0] += px * fy
-        about_y[1] += py * fy
-        about_y[2] += pz * fy
-        about_z[0] += px * fz
-        about_z[1] += py * fz
-        about_z[2] += pz * fz
+        self.add_parallel(force, torque, point, force)
 
-    def add_along(self, axis: Vector, thrusts: Iterable[Tuple[float, float, Vector]]) -> None:
-        """Add thrusts (N) and torques (N m) along one axis (unit, world) at points (m, inertial frame).
+    def add_parallel(self, force: Vector, torque: Vector, lever: Vector, axis: Vector) -> None:
+        """Add forces along one axis (world) by their sum (N), and torques by theirs (N m).
 
-        Since they are parallel, sum p_i F_i is the one product (sum p_i f_i) axis.
+        `lever` is sum p_i f_i (inertial frame of the body) over the points p_i where forces f_i times the axis act.
         """
-        force = torque = px = py = pz = 0.0
-        for thrust, turning, point in thrusts:
-            force += thrust
-            torque += turning
-            px += point[0] * thrust
-            py += point[1] * thrust
-            pz += point[2] * thrust
-        for total, along in ((self.force, force), (self.torque, torque)):
-            total[0] += along * axis[0]
-            total[1] += along * axis[1]
-            total[2] += along * axis[2]
-        for column, share in zip(self.moments, axis):
-            column[0] += px * share
-            column[1] += py * share
-            column[2] += pz * share
+        (fx, fy, fz), (tx, ty, tz), (lx, ly, lz), (ax, ay, az) = self.force, self._torque, lever, axis
+        self.force = fx + force[0], fy + force[1], fz + force[2]
+        self._torque = (
+            tx + torque[0] + ly * az - lz * ay,
+            ty + torque[1] + lz * ax - lx * az,
+            tz + torque[2] + lx * ay - ly * ax,
+        )
+        self._levers.append(((2.0 * lx, 2.0 * ly, 2.0 * lz), axis))
 
     def torque_under(self, orientation: Quaternion) -> Vector:
         """Return the torque about the centre of mass (N m, world) while the body has this orientation."""
+        # Written out, without a loop but the one over directions: this runs in every sub-step.
         x, y, z, w = orientation
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = self.moments
-        r01, r02 = 2 * (x * y - z * w), 2 * (x * z + y * w)
-        r10, r12 = 2 * (x * y + z * w), 2 * (y * z - x * w)
-        r20, r21 = 2 * (x * z - y * w), 2 * (y * z + x * w)
-        r00, r11, r22 = 1 - 2 * (y * y + z * z), 1 - 2 * (x * x + z * z), 1 - 2 * (x * x + y * y)
-        torque = self.torque
-        return (
-            torque[0] + (r10 * cx + r11 * cy + r12 * cz) - (r20 * bx + r21 * by + r22 * bz),
-            torque[1] + (r20 * ax + r21 * ay + r22 * az) - (r00 * cx + r01 * cy + r02 * cz),
-            torque[2] + (r00 * bx + r01 * by + r02 * bz) - (r10 * ax + r11 * ay + r12 * az),
-        )
+        sum_x, sum_y, sum_z = self._torque
+        for (lx, ly, lz), (ax, ay, az) in self._levers:
+            tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
+            ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
+            sum_x += uy * az - uz * ay
+            sum_y += uz * ax - ux * az
+            sum_z += ux * ay - uy * ax
+        return sum_x, sum_y, sum_z
+
+
+class Propellers:
+    """A drone's propellers: what they blow, and how far their blades have gone with it."""
+
+    def __init__(
+        self,
+        parameters: PropellerParameters,
+        axes: Sequence[Vector],
+        points: Sequence[Vector],
+        rotations: Sequence[int],
+        time_step: float,
+    ):
+        """Take where each pushes along (unit, root link's frame) and acts (m, inertial frame), and its sense (+-1)."""
+        self.air = [0.0] * len(axes)  # m of it that went through each
+        self._law = ParticleLaw(parameters, time_step)
+        self._time_step = time_step
+        self._by_axis: Dict[Vector, List[Tuple[int, Vector, float]]] = {}
+        for number, (axis, point, rotation) in enumerate(zip(axes, points, rotations)):
+            self._by_axis.setdefault(axis, []).append((number, point, rotation * parameters.torque_per_velocity))
+
+    def blow(self, velocities: Sequence[float], body: Matrix, wrench: Wrench) -> None:
+        """Emit a step's particles at these velocities (m/s) from a body there; add to its wrench."""
+        newtons, air, time_step = self._law.emit(), self.air, self._time_step
+        for axis, members in self._by_axis.items():
+            force = torque = x = y = z = 0.0
+            for number, (px, py, pz), newton_metres in members:
+                velocity = velocities[number]
+                thrust = newtons * velocity
+                force += thrust
+                torque += newton_metres * velocity
+                x += px * thrust
+                y += py * thrust
+                z += pz * thrust
+                air[number] += velocity * time_step
+            along_x, along_y, along_z = along = rotate(body, axis)
+            wrench.add_parallel(
+                (along_x * force, along_y * force, along_z * force),
+                (along_x * torque, along_y * torque, along_z * torque),
+                (x, y, z),
+                along,
+            )
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back the fraction of a particle and the blades' way."""
+        carry, air = self._law.carry, list(self.air)
+
+        def recall() -> None:
+            self._law.carry, self.air = carry, list(air)
+
+        return recall

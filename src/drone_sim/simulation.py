@@ -75,6 +75,7 @@ class Simulation:
     def _build(self, parameters: Parameters) -> None:
         """Put the scene and a drone without a script into an empty world."""
         self.parameters = parameters
+        self._sub_steps = parameters.sub_steps
         self.world.clear()
         self.scene = Scene(parameters.scene, self.world)
         self.drone = Drone(parameters, self.world)
@@ -149,7 +150,7 @@ class Simulation:
     def step(self) -> None:
         """Run one simulation step: actuation, dynamics, vision, sensing. Raises ScriptError."""
         self.drone.actuation()
-        self.world.advance(dict([self.drone.wrench()]), self.parameters.sub_steps)
+        self.world.advance(self.drone.wrenches(), self._sub_steps)
         self.drone.refresh()
         self.steps += 1
         self._take_pictures()

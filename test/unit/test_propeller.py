@@ -8,18 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drone_sim import frames, parameters
-from drone_sim.propeller import ParticleFan, Wrench
+from drone_sim.propeller import ParticleLaw, Propellers, Wrench
 
 NEWTONS_PER_PARTICLE = 8500 * math.pi * 0.005**3 / (6 * 0.05)  # per m/s, at dt = 0.05 s
 
 
-def fan(law="3.x", rotation=1):
-    return ParticleFan(parameters.load({"propellers": {"law": law}}).propellers, rotation, 0.05)
+def law(name="3.x"):
+    return ParticleLaw(parameters.load({"propellers": {"law": name}}).propellers, 0.05)
 
 
-def particles(law, steps):
-    one = fan(law)
-    return [one.emit(1.0)[0] / NEWTONS_PER_PARTICLE for _ in range(steps)]
+def particles(name, steps):
+    one = law(name)
+    return [one.emit() / NEWTONS_PER_PARTICLE for _ in range(steps)]
 
 
 def test_3x_carries_the_fraction_of_a_particle():
@@ -30,17 +30,31 @@ def test_4x_drops_the_fraction_of_a_particle():
     assert particles("4.x", 6) == pytest.approx([21] * 6)
 
 
-@pytest.mark.parametrize("law, newtons, hover", [("3.x", 0.23922, 5.331), ("4.x", 0.23366, 5.458)])
-def test_thrust_per_velocity_and_hover(law, newtons, hover):
-    one = fan(law)
-    mean = sum(one.emit(1.0)[0] for _ in range(200)) / 200
+@pytest.mark.parametrize("name, newtons, hover", [("3.x", 0.23922, 5.331), ("4.x", 0.23366, 5.458)])
+def test_thrust_per_velocity_and_hover(name, newtons, hover):
+    one = law(name)
+    mean = sum(one.emit() for _ in range(200)) / 200
     assert mean == pytest.approx(newtons, abs=5e-6)
     assert 0.52 * 9.81 / (4 * mean) == pytest.approx(hover, abs=5e-4)
 
 
-def test_reaction_torque_has_the_sense_of_the_propeller():
-    assert fan(rotation=-1).emit(5.0)[1] == pytest.approx(-0.002 * 5.0)
-    assert fan(rotation=+1).emit(5.0)[1] == pytest.approx(+0.002 * 5.0)
+@given(st.lists(st.floats(-10, 10), min_size=4, max_size=4), st.tuples(*[st.floats(-3, 3)] * 3))
+def test_propellers_push_along_their_axes_and_turn_against_their_rotation(velocities, angles):
+    """Two upright propellers, one that leans to the front, one to the side."""
+    axes = [(0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, 0.6, 0.8)]
+    points = [(0.1, 0.1, 0.0), (-0.1, 0.1, 0.01), (-0.1, -0.1, 0.0), (0.1, -0.1, 0.02)]
+    rotations = [-1, 1, -1, 1]
+    body = frames.from_euler((0, 0, 0), angles)
+    wrench = Wrench()
+    Propellers(parameters.load().propellers, axes, points, rotations, 0.05).blow(velocities, body, wrench)
+    force, torque = np.zeros(3), np.zeros(3)
+    for velocity, axis, point, rotation in zip(velocities, axes, points, rotations):
+        thrust = np.multiply(frames.rotate(body, axis), 21 * NEWTONS_PER_PARTICLE * velocity)
+        force += thrust
+        torque += np.multiply(frames.rotate(body, axis), rotation * 0.002 * velocity)
+        torque += np.cross(frames.rotate(body, point), thrust)
+    assert wrench.force == pytest.approx(tuple(force), abs=1e-9)
+    assert wrench.torque_under(frames.to_quaternion(body)) == pytest.approx(tuple(torque), abs=1e-9)
 
 
 vectors = st.tuples(*[st.floats(-5, 5)] * 3)
@@ -55,5 +69,5 @@ def test_wrench_is_the_sum_of_forces_at_points_that_turn_with_the_body(forces, a
         wrench.add(f, t, point)
         force += f
         torque += np.add(t, np.cross(frames.rotate(turn, point), f))
-    assert wrench.force == pytest.approx(list(force), abs=1e-9)
+    assert wrench.force == pytest.approx(tuple(force), abs=1e-9)
     assert wrench.torque_under(frames.to_quaternion(turn)) == pytest.approx(tuple(torque), abs=1e-9)

@@ -2,7 +2,8 @@
 
 Positions are [x, y, z] in metres, orientations V-REP's Euler angles [alpha, beta, gamma] in radians
 (R = Rx Ry Rz), matrices 12 numbers, velocities world-frame. `relativeTo` is a handle, -1 the world.
-A wrong name, number or kind of values raises ApiError with one line that names the function.
+A wrong name, number or kind of values raises ValueError or TypeError; where the script does not catch it, the
+log names the function, what it got, and what it takes.
 """
 
 from __future__ import annotations

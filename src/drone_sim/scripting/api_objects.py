@@ -8,7 +8,6 @@ from drone_sim import frames
 from drone_sim.objects import WORLD
 from drone_sim.scripting import object_paths
 from drone_sim.scripting.calls import WrongValue, numbers
-from drone_sim.scripting.constants import CONSTANTS
 from drone_sim.scripting.host import Host
 
 # The names by which messages say what is expected.
@@ -19,8 +18,6 @@ FourNumbers = Sequence[float]
 SevenNumbers = Sequence[float]
 TwelveNumbers = Sequence[float]
 Number = float
-
-_PARENT = CONSTANTS["handle_parent"]
 
 
 class Objects:
@@ -76,52 +73,53 @@ class Objects:
 
     def getObjectPosition(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
         """Return the position of an object."""
-        return list(frames.position(self._objects.matrix(handle, self._frame(handle, relativeTo))))
+        m = self._objects.matrix(handle, relativeTo)
+        return [m[3], m[7], m[11]]
 
     def setObjectPosition(self, handle: Handle, relativeTo: Handle, position: ThreeNumbers = ()) -> None:
         """Move an object: (handle, relativeTo, position), or (handle, position, relativeTo) as in 4.x."""
-        frame, place = self._frame_and_values(handle, relativeTo, position, 3)
-        m = list(self._objects.matrix(handle, frame))
-        m[3], m[7], m[11] = place
-        self._objects.set_matrix(handle, frame, tuple(m))
+        frame, place = _frame_and_values(relativeTo, position, 3)
+        m0, m1, m2, _, m4, m5, m6, _, m8, m9, m10, _ = self._objects.matrix(handle, frame)
+        x, y, z = place
+        self._objects.set_matrix(handle, frame, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
 
     def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
         """Return the Euler angles of an object."""
-        return list(frames.to_euler(self._objects.matrix(handle, self._frame(handle, relativeTo))))
+        return list(frames.to_euler(self._objects.matrix(handle, relativeTo)))
 
     def setObjectOrientation(self, handle: Handle, relativeTo: Handle, angles: ThreeNumbers = ()) -> None:
         """Turn an object: (handle, relativeTo, angles), or (handle, angles, relativeTo) as in 4.x."""
-        frame, turn = self._frame_and_values(handle, relativeTo, angles, 3)
-        place = frames.position(self._objects.matrix(handle, frame))
-        self._objects.set_matrix(handle, frame, frames.from_euler(place, turn))
+        frame, turn = _frame_and_values(relativeTo, angles, 3)
+        m = self._objects.matrix(handle, frame)
+        self._objects.set_matrix(handle, frame, frames.from_euler((m[3], m[7], m[11]), turn))
 
     def getObjectQuaternion(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
         """Return the quaternion (x, y, z, w) of an object."""
-        return list(frames.to_quaternion(self._objects.matrix(handle, self._frame(handle, relativeTo))))
+        return list(frames.to_quaternion(self._objects.matrix(handle, relativeTo)))
 
     def setObjectQuaternion(self, handle: Handle, relativeTo: Handle, quaternion: FourNumbers = ()) -> None:
         """Turn an object to a quaternion (x, y, z, w); the arguments in either order."""
-        frame, turn = self._frame_and_values(handle, relativeTo, quaternion, 4)
-        place = frames.position(self._objects.matrix(handle, frame))
-        self._objects.set_matrix(handle, frame, frames.from_quaternion(place, _unit(turn)))
+        frame, turn = _frame_and_values(relativeTo, quaternion, 4)
+        m = self._objects.matrix(handle, frame)
+        self._objects.set_matrix(handle, frame, frames.from_quaternion((m[3], m[7], m[11]), _unit(turn)))
 
     def getObjectPose(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
         """Return position and quaternion of an object, 7 numbers."""
-        m = self._objects.matrix(handle, self._frame(handle, relativeTo))
+        m = self._objects.matrix(handle, relativeTo)
         return [*frames.position(m), *frames.to_quaternion(m)]
 
     def setObjectPose(self, handle: Handle, relativeTo: Handle, pose: SevenNumbers = ()) -> None:
         """Move and turn an object to a position and a quaternion; the arguments in either order."""
-        frame, place = self._frame_and_values(handle, relativeTo, pose, 7)
+        frame, place = _frame_and_values(relativeTo, pose, 7)
         self._objects.set_matrix(handle, frame, frames.from_quaternion(place[:3], _unit(place[3:])))
 
     def getObjectMatrix(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
         """Return the 12 numbers of an object's transform."""
-        return list(self._objects.matrix(handle, self._frame(handle, relativeTo)))
+        return list(self._objects.matrix(handle, relativeTo))
 
     def setObjectMatrix(self, handle: Handle, relativeTo: Handle, matrix: TwelveNumbers = ()) -> None:
         """Move and turn an object to a transform; the arguments in either order."""
-        frame, place = self._frame_and_values(handle, relativeTo, matrix, 12)
+        frame, place = _frame_and_values(relativeTo, matrix, 12)
         self._objects.set_matrix(handle, frame, place)
 
     # ---- how they move
@@ -186,19 +184,16 @@ class Objects:
         """Return the inverse of a transform (3.x)."""
         return list(frames.invert(numbers(matrix, 12)))
 
-    # ---- arguments
 
-    def _frame(self, handle: int, relative_to: int) -> int:
-        return relative_to if relative_to != _PARENT else self.getObjectParent(handle)
-
-    def _frame_and_values(self, handle: int, first: Any, second: Any, count: int) -> Tuple[int, Tuple[float, ...]]:
-        if isinstance(first, (int, float)):
-            return self._frame(handle, int(first)), numbers(second, count)
-        if isinstance(second, (int, float)):
-            return self._frame(handle, int(second)), numbers(first, count)
-        if second != ():
-            raise WrongValue(f"a handle and {count} numbers are expected")
-        return WORLD, numbers(first, count)
+def _frame_and_values(first: Any, second: Any, count: int) -> Tuple[int, Tuple[float, ...]]:
+    """Tell a handle and values apart, which come in either order, or the values alone."""
+    if isinstance(first, (int, float)):
+        return int(first), numbers(second, count)
+    if isinstance(second, (int, float)):
+        return int(second), numbers(first, count)
+    if second != ():
+        raise WrongValue(f"a handle and {count} numbers are expected")
+    return WORLD, numbers(first, count)
 
 
 def _vector(values: Sequence[float]) -> frames.Vector:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, Optional, Tuple
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import object_paths
@@ -29,7 +29,7 @@ class Scripts:
         """Take the drone whose scripts they are, and the clock."""
         self._host = host
         self._names = list(host.script_parameters)
-        self._parameters: List[Parameters] = list(host.script_parameters.values())
+        self._parameters: Dict[int, Parameters] = dict(enumerate(host.script_parameters.values()))
         self._own = self._names.index(host.own_script)
         self._clock = surroundings.clock
         self._time_step = surroundings.time_step
@@ -89,11 +89,14 @@ class Scripts:
         With sim.handle_tree it is set in this script and those below.
         """
         if script == _TREE:
-            for parameters in self._parameters:
+            for parameters in self._parameters.values():
                 parameters[name] = _stored(value, parameters.get(name))
             return
-        parameters = self._parameters[self._index(script)]
-        parameters[name] = _stored(value, parameters.get(name))
+        parameters = self._parameters.get(script) or self._parameters[self._index(script)]
+        if type(value) is float and math.isfinite(value):  # four times a step, so at once
+            parameters[name] = value
+        else:
+            parameters[name] = _stored(value, parameters.get(name))
 
     def _index(self, script: int) -> int:
         if script == _SELF:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import inspect
 import math
-from typing import Any, Callable, Dict, Iterable, Mapping, Sequence, Tuple
+import sys
+import traceback
+from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Sequence, Tuple
 
 from drone_sim.objects import near_names
-from drone_sim.scripting.errors import ApiError, UnknownName
+from drone_sim.scripting.errors import UnknownName
 
 Function = Callable[..., Any]
 _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError)
 _SHOWN = 60  # characters of a value
+_NAME_IN_ERRORS = "__qualname__" if sys.version_info >= (3, 10) else "__name__"  # of a call with wrong arguments
 
 
 class Api:
@@ -20,7 +23,7 @@ class Api:
     def __init__(self, name: str, functions: Mapping[str, Function], constants: Mapping[str, Any]):
         """Take what it is called, and what it has."""
         self.__dict__.update(constants)
-        self.__dict__.update({known: guarded(f"{name}.{known}", function) for known, function in functions.items()})
+        self.__dict__.update(functions)
         # Kept out of sight: whatever else is an attribute is the script's to use.
         self.__dict__["_api"] = (name, dict(functions), dict(constants))
 
@@ -31,7 +34,7 @@ class Api:
 
 
 def contents(api: Api) -> Tuple[str, Dict[str, Function], Dict[str, Any]]:
-    """Return name, functions (not guarded) and constants of an API."""
+    """Return name, functions and constants of an API."""
     name, functions, constants = api.__dict__["_api"]
     return name, functions, constants
 
@@ -46,18 +49,25 @@ def public_functions(parts: Iterable[object]) -> Dict[str, Function]:
     }
 
 
-def guarded(name: str, function: Function) -> Function:
-    """Return the function with its errors turned into ApiError."""
+def mistake(error: BaseException, apis: Iterable[Api]) -> Optional[str]:
+    """Return one line on an error that a call of an API raised in a Python script; None for any other error.
 
-    def call(*arguments: Any, **named: Any) -> Any:
-        try:
-            return function(*arguments, **named)
-        except _MISTAKES as error:
-            raise ApiError(explain(name, function, (*arguments, *named.values()), error)) from error
-
-    call.__name__ = name.rpartition(".")[2]
-    call.__doc__ = function.__doc__
-    return call
+    Looked up afterwards, in the traceback: a guard around every function would cost every call.
+    """
+    if not isinstance(error, _MISTAKES):
+        return None
+    functions = [(f"{contents(api)[0]}.{known}", one) for api in apis for known, one in contents(api)[1].items()]
+    by_code = {one.__code__: (name, one) for name, one in reversed(functions)}
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        if frame.f_code in by_code:
+            name, function = by_code[frame.f_code]
+            parameters = inspect.signature(function).parameters.values()
+            given = [frame.f_locals[one.name] for one in parameters if one.kind is not one.VAR_POSITIONAL]
+            return explain(name, function, given, error)
+    for name, function in functions:
+        if str(error).startswith(f"{getattr(function, _NAME_IN_ERRORS)}() "):  # never got inside
+            return f"{name}: wrong number of values, expected ({_expected(inspect.signature(function))})"
+    return None
 
 
 def explain(name: str, function: Function, arguments: Sequence[Any], error: Exception) -> str:
@@ -104,6 +114,13 @@ class WrongValue(TypeError):
 
 def numbers(values: Sequence[float], count: int) -> Tuple[float, ...]:
     """Return `count` finite numbers; raises WrongValue."""
+    if type(values) is list and len(values) == count:  # most often what another call returned
+        try:
+            total = sum(values)
+        except TypeError:
+            total = None
+        if type(total) is float and math.isfinite(total):
+            return tuple(values)
     try:
         found = tuple(map(float, values))
     except (TypeError, ValueError):

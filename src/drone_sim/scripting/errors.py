@@ -15,9 +15,5 @@ class ScriptError(Exception):
         self.line = line
 
 
-class ApiError(ValueError):
-    """A script called the API wrongly; the message names the function."""
-
-
 class UnknownName(AttributeError):
     """A script asked for a function or constant that the API does not have."""

@@ -195,13 +195,10 @@ class MessageBus:
 
     def deliver(self, call: Callable[[Callback, Any], None]) -> None:
         """Hand every waiting message to `call(callback, message)`, oldest first."""
-        if not self._subscriptions:
-            return
         waiting: List[Tuple[Callback, Any]] = []
-        with self._lock:
-            for subscription in self._subscriptions.values():
-                while subscription.messages:
-                    waiting.append((subscription.callback, subscription.messages.popleft()))
+        for _, callback, messages, _ in self._subscriptions.values():  # which no other thread changes
+            while messages:
+                waiting.append((callback, messages.popleft()))
         for callback, message in waiting:
             call(callback, message)
 

@@ -11,9 +11,9 @@ from typing import Any, Callable, Dict, Mapping
 
 from drone_sim.objects import near_names
 from drone_sim.scripting.api_scripts import LOG
-from drone_sim.scripting.calls import Api
+from drone_sim.scripting.calls import Api, mistake
 from drone_sim.scripting.constants import PHASES
-from drone_sim.scripting.errors import ApiError, ScriptError, UnknownName
+from drone_sim.scripting.errors import ScriptError, UnknownName
 from drone_sim.scripting.messages import Callback
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
 
@@ -95,7 +95,7 @@ class PythonScript:
 
     def _require(self, name: str) -> Api:
         if name not in self._modules:
-            raise ApiError(f"no module '{name}'; {near_names(str(name), self._modules)}")
+            raise UnknownName(f"no module '{name}'; {near_names(str(name), self._modules)}")
         return self._modules[name]
 
     def _error(self, phase: str, error: BaseException) -> ScriptError:
@@ -107,9 +107,9 @@ class PythonScript:
     def _message(self, error: BaseException) -> str:
         if isinstance(error, Stopped):
             return str(self._limit)
-        if isinstance(error, (ApiError, UnknownName)):
+        if isinstance(error, UnknownName):
             return str(error)
-        return f"{type(error).__name__}: {error}"
+        return mistake(error, self._modules.values()) or f"{type(error).__name__}: {error}"
 
 
 def _copied(variables: Mapping[str, Any]) -> Dict[str, Any]:

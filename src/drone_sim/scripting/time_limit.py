@@ -10,7 +10,8 @@ import contextlib
 import ctypes
 import threading
 import time
-from typing import Any, Callable, Dict, Iterator, Optional
+import weakref
+from typing import Any, Callable, Iterator, Optional
 
 _POLL = 0.05  # s between two looks of the watchdog
 _AGAIN = 0.25  # s after which a script that swallowed the exception gets another
@@ -31,10 +32,12 @@ class TimeLimit:
         """Take the limit in seconds of real time; 0 means none."""
         self.seconds = seconds
         self._deadline = 0.0
+        self._thread = 0
+        # The script's thread writes `armed` and then reads `fired`, the watchdog the other way round: so one
+        # of the two sees the other, without a lock in every call.
         self._armed = False
         self._fired = False
-        self._thread = 0
-        self._lock = threading.Lock()
+        self._firing = threading.Lock()
 
     def __str__(self) -> str:
         """Say what was exceeded."""
@@ -61,59 +64,67 @@ class TimeLimit:
 
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a Python function; raises Stopped where it does not return in time."""
-        if self.seconds <= 0:
-            return function(*arguments)
-        self.start()
+        if not self._thread:
+            _watch(self)
         self._thread = threading.get_ident()
-        _running[self._thread] = self
-        if _watchdog is None:
-            _start_watchdog()
+        self._deadline = time.monotonic() + self.seconds
         try:
             try:
                 self._armed = True
                 return function(*arguments)
             finally:
-                self._disarm()
+                self._armed = False
+                if self._fired:
+                    self._take_back()
         except Stopped:
             # It may have struck between the end of the function and the beginning of `finally`.
-            self._disarm()
+            self._armed = False
+            self._take_back()
             raise
 
-    def _disarm(self) -> None:
+    def _take_back(self) -> None:
+        """Drop an exception that is still on its way."""
         while True:
             try:
-                with self._lock:
-                    self._armed = False
-                if self._fired:
+                with self._firing:
                     self._fired = False
-                    _raise_in_thread(self._thread, _NOTHING)  # drops an exception that is still on its way
+                    _raise_in_thread(self._thread, _NOTHING)
                 return
             except Stopped:
                 continue
 
-    def _fire_if_late(self) -> None:
+    def fire_if_late(self) -> None:
         """Raise Stopped in the script's thread; the watchdog calls it."""
         if not (self._armed and self.exceeded()):
             return
-        with self._lock:
+        with self._firing:
+            self._fired = True
             if self._armed and self.exceeded():
-                self._fired = True
                 self._deadline = time.monotonic() + _AGAIN
                 _raise_in_thread(self._thread, Stopped)
+            else:
+                self._fired = False
 
 
-_running: Dict[int, TimeLimit] = {}  # by thread, the limit that it ran under last
+_watched: weakref.WeakSet[TimeLimit] = weakref.WeakSet()
+_watching = threading.Lock()
 _watchdog: Optional[threading.Thread] = None
 
 
-def _start_watchdog() -> None:
+def _watch(limit: TimeLimit) -> None:
+    """Let the watchdog, which starts with the first one, look after a limit for as long as it exists."""
     global _watchdog
-    _watchdog = threading.Thread(target=_keep_watch, name="script time limit", daemon=True)
-    _watchdog.start()
+    with _watching:
+        _watched.add(limit)
+        if _watchdog is None:
+            _watchdog = threading.Thread(target=_keep_watch, name="script time limit", daemon=True)
+            _watchdog.start()
 
 
 def _keep_watch() -> None:
     while True:
         time.sleep(_POLL)
-        for limit in list(_running.values()):
-            limit._fire_if_late()
+        with _watching:
+            limits = list(_watched)
+        for limit in limits:
+            limit.fire_if_late()

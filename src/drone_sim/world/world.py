@@ -12,7 +12,7 @@ from typing import Dict, List, Mapping, Sequence, Set, Tuple
 import numpy as np
 import pybullet
 
-from drone_sim.frames import Matrix, cross, multiply_quaternions, turned
+from drone_sim.frames import Matrix, Quaternion, Vector, cross, multiply_quaternions, turned
 from drone_sim.propeller import Wrench
 from drone_sim.state import Pose, State, compose, inverse
 from drone_sim.urdf import RigidBody
@@ -50,6 +50,7 @@ class World:
         pybullet.setGravity(0, 0, self._gravity, self._client)
         pybullet.setTimeStep(self._sub_step, self._client)
         self._inertial_frames: Dict[int, Tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
+        self._centres: Dict[int, Tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
         self._pictures = Pictures(self._client)
 
     def close(self) -> None:
@@ -94,6 +95,7 @@ class World:
         """Take a body out of the world."""
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
+        self._centres.pop(body, None)
         self._pictures.remove(body)
 
     def set_color(self, body: int, rgba: Sequence[float]) -> None:
@@ -126,20 +128,20 @@ class World:
 
     def state(self, body: int) -> State:
         """Return pose and velocity of a body's root link."""
-        centre, turn = pybullet.getBasePositionAndOrientation(body, self._client)
-        linear, angular = pybullet.getBaseVelocity(body, self._client)
+        centre, turn = self._centres[body] = pybullet.getBasePositionAndOrientation(body, self._client)
+        (vx, vy, vz), angular = pybullet.getBaseVelocity(body, self._client)
         inertial, backwards = self._inertial_frames[body]
         orientation = turn if backwards.orientation == _NO_TURN else multiply_quaternions(turn, backwards.orientation)
         arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
+        sx, sy, sz = cross(angular, arm)
         position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
-        swing = cross(angular, arm)
-        velocity = (linear[0] - swing[0], linear[1] - swing[1], linear[2] - swing[2])
-        return State(position, orientation, velocity, angular)
+        return State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
 
     def set_pose(self, body: int, pose: Pose) -> None:
         """Move a body's root link to `pose` and stop it."""
         inertial = self._inertial_frames[body][0]
         centre, turn = compose(pose, inertial)
+        self._centres.pop(body, None)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
 
@@ -153,12 +155,16 @@ class World:
             pybullet.applyExternalTorque,
             pybullet.stepSimulation,
         )
+        known = self._centres  # in the first sub-step
+        loads = [(body, wrench.force, wrench.torque_under) for body, wrench in wrenches.items()]
         for _ in range(sub_steps):
-            for body, wrench in wrenches.items():
-                centre, orientation = where(body, client)
-                push(body, -1, wrench.force, centre, in_world, client)
-                turn(body, -1, wrench.torque_under(orientation), in_world, client)
+            for body, force, torque_under in loads:
+                centre, orientation = known.get(body) or where(body, client)
+                push(body, -1, force, centre, in_world, client)
+                turn(body, -1, torque_under(orientation), in_world, client)
             step(client)
+            known = {}
+        self._centres.clear()
 
     def snapshot(self) -> int:
         """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget`."""
@@ -168,6 +174,7 @@ class World:
 
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
+        self._centres.clear()
         pybullet.restoreState(number, physicsClientId=self._client)
 
     def forget(self, number: int) -> None:
