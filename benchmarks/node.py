@@ -84,7 +84,8 @@ def real_time_factors(seconds: float = 6.0) -> List[Row]:
         flew = re.search(r"flew ([\d.]+) s at ([\d.]+) times real time", "".join(lines))
         if flew is None:
             raise RuntimeError("the node said nothing of its flight:\n" + "".join(lines))
-        rows.append({"name": name, "factor": float(flew.group(2))})
+        factor = float(flew.group(2))
+        rows.append({"name": name, "factor": factor, "step_ms": 50 / factor})
     return rows
 
 

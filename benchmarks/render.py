@@ -138,7 +138,7 @@ def compare(folder: Path, seconds: float = 2.0) -> List[Row]:
             rows.append(measure(name, bullet_draw(client, renderer=kind, **bare), seconds))
         finally:
             pybullet.disconnect(client)
-    return rows
+    return [{**row, "of_ours": row["median_ms"] / rows[0]["median_ms"]} for row in rows]
 
 
 def _load_plugin(client: int) -> bool:

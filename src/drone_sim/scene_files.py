@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Iterator
+from typing import Iterator, Sequence
 from xml.etree import ElementTree as Xml
 
 from drone_sim.camera import mesh
@@ -11,7 +11,8 @@ from drone_sim.parameter_types import ParameterError
 from drone_sim.scene_parameters import MeshParameters, SceneParameters, UrdfParameters
 from drone_sim.visual import Visual
 
-_MESHES = (".obj", ".stl")  # what both PyBullet and the renderer read without further packages
+_MESHES = (".obj", ".stl")  # what PyBullet makes a body of by itself
+_IN_URDF = (*_MESHES, ".dae")
 
 
 def check(scene: SceneParameters) -> None:
@@ -20,19 +21,20 @@ def check(scene: SceneParameters) -> None:
         mesh.load(Visual("floor", "plane", (), mesh.WHITE, texture=scene.floor.texture))
         for one in scene.objects:
             if isinstance(one, MeshParameters):
-                _check_mesh(one.file, one.texture)
+                _check_mesh(one.file, _MESHES, one.texture)
             elif isinstance(one, UrdfParameters):
                 for file in _meshes(Path(one.file)):
-                    _check_mesh(file)
+                    _check_mesh(file, _IN_URDF)
             elif one.texture:
                 mesh.load(Visual("box", "box", (1.0, 1.0, 1.0), mesh.WHITE, texture=one.texture))
     except ValueError as error:
         raise ParameterError(" ".join(str(error).split())) from None
 
 
-def _check_mesh(file: str, texture: str = "") -> None:
-    if Path(file).suffix.lower() not in _MESHES:
-        raise ValueError(f"mesh {file}: must be one of {', '.join(_MESHES)}")
+def _check_mesh(file: str, kinds: Sequence[str], texture: str = "") -> None:
+    if Path(file).suffix.lower() not in kinds:
+        elsewhere = "; in a URDF, .dae too" if kinds is _MESHES else ""
+        raise ValueError(f"mesh {file}: must be one of {', '.join(kinds)}{elsewhere}")
     mesh.load(Visual("mesh", "mesh", (1.0, 1.0, 1.0), mesh.WHITE, file=file, texture=texture))
 
 

@@ -95,6 +95,18 @@ def test_an_stl_file_is_white_keeps_its_edges_and_mirrors_inside_in(tmp_path):
         np.testing.assert_allclose(extents(mesh), np.abs(scale), atol=1e-6)
 
 
+def test_a_collada_file_has_its_own_unit_and_colour(tmp_path):
+    box = trimesh.creation.box((10, 20, 30))
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=(255, 0, 0, 255))
+    box.visual = trimesh.visual.TextureVisuals(material=material)
+    box.vertex_normals = np.zeros_like(box.vertices)  # what is not asked for: trimesh would want scipy for them
+    text = trimesh.exchange.dae.export_collada(box).decode()
+    (tmp_path / "box.dae").write_text(text.replace("<up_axis>", '<unit name="centimeter" meter="0.01"/><up_axis>'))
+    (mesh,) = load(visual("mesh", file=tmp_path / "box.dae"))
+    np.testing.assert_allclose(extents(mesh), (0.1, 0.2, 0.3), atol=1e-6)
+    assert mesh.rgba == (1.0, 0.0, 0.0, 1.0) and mesh.closed
+
+
 @pytest.mark.parametrize("name", ["missing.obj", "garbage.stl", "empty.obj", "picture.png", "broken.dae"])
 def test_a_file_that_cannot_be_read_is_named_in_one_line(tmp_path, name):
     if name != "missing.obj":

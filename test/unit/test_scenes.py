@@ -24,6 +24,7 @@ SHAPES = {
     "obj": "{shape: mesh, file: block.obj, position: [%s, 0, 0.3], mass: %s}",
     "stl": "{shape: mesh, file: parts/block.stl, size: [0.5, 0.5, 1], position: [%s, 0, 0.3], mass: %s}",
     "urdf": "{shape: urdf, file: parts/barrel.urdf, position: [%s, 0, 0.3], mass: %s}",
+    "collada": "{shape: urdf, file: parts/collada.urdf, position: [%s, 0, 0.3], mass: %s}",
 }
 
 
@@ -32,9 +33,10 @@ def _write(tmp_path):
     """Give a function that writes a scene file, with meshes beside and below it; it returns the file's name."""
     block = trimesh.creation.box((0.6, 0.6, 0.6))
     (tmp_path / "parts").mkdir()
-    for name in ("block.obj", "block.stl", "parts/block.stl"):
+    for name in ("block.obj", "block.stl", "parts/block.stl", "parts/block.dae"):
         block.export(str(tmp_path / name))
     (tmp_path / "parts" / "barrel.urdf").write_text(URDF, encoding="utf-8")
+    (tmp_path / "parts" / "collada.urdf").write_text(URDF.replace(".stl", ".dae"), encoding="utf-8")
     for name in ("nonsense.stl", "nonsense.obj", "nonsense.png", "nonsense.urdf"):
         (tmp_path / name).write_text("nonsense", encoding="utf-8")
 
@@ -126,7 +128,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         (f"objects: [{BLOCK.replace('block', 'missing')}]", "missing.obj': no such file"),
         (f"objects: [{BLOCK.replace('block', 'nonsense')}]", "mesh"),
         (f"objects: [{BLOCK.replace('block.obj', 'nonsense.stl')}]", "nonsense.stl: "),
-        (f"objects: [{BLOCK.replace('block.obj', 'nonsense.png')}]", "must be one of .obj, .stl"),
+        (f"objects: [{BLOCK.replace('block.obj', 'nonsense.png')}]", "must be one of .obj, .stl; in a URDF, .dae too"),
         (f"objects: [{BLOCK.replace('block.obj', 'package://nowhere_at_all/a.obj')}]", "no ROS package nowhere_at_all"),
         ("objects: [{shape: urdf, file: nonsense.urdf, position: [0, 0, 0]}]", "nonsense.urdf: syntax error"),
         ("objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 0]}]", "named 'Drone' is there already"),

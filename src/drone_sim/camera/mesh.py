@@ -228,12 +228,14 @@ def _parts(path: str) -> Iterator[trimesh.Trimesh]:
         return
     if not isinstance(loaded, trimesh.Scene):
         return  # points or lines: nothing that covers a pixel
+    metres = trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else 1.0  # COLLADA has units
     for node in loaded.graph.nodes_geometry:
         transform, name = loaded.graph[node]
         part = loaded.geometry[name]
         if isinstance(part, trimesh.Trimesh) and len(part.faces):
             part = part.copy()
             part.apply_transform(transform)
+            part.apply_scale(metres)
             yield part
 
 
