@@ -15,12 +15,15 @@ def draw(results: Dict[str, Any], file: str) -> None:
     _bars(left, results.get("render", []), "median_ms", "frame, 640 x 480 [ms]")
     factors = results.get("loop", []) + [row for row in results.get("node", []) if "factor" in row]
     _bars(middle, factors, "factor", "simulated seconds per second")
+    middle.set_xscale("log")
+    middle.set_xlim(left=1, right=3000)
     for name, key in (("size", "pixels"), ("bodies", "bodies"), ("triangles", "triangles")):
         rows = [row for row in results.get("growth", []) if row["name"] == name]
         amounts = [row.get(key, row.get("width", 0) * row.get("height", 0)) for row in rows]
         right.loglog(amounts, [row["median_ms"] for row in rows], "o-", label=f"number of {key}")
     right.set_ylabel("frame [ms]")
-    right.legend()
+    right.legend(loc="upper left")
+    right.margins(y=0.4)  # room for the legend
     right.grid(alpha=0.3)
     figure.suptitle(results.get("machine", ""))
     figure.savefig(file, dpi=90)
@@ -33,6 +36,5 @@ def _bars(axes: Any, rows: Any, key: str, label: str) -> None:
     bars = axes.barh(names, values, color=colors)
     axes.bar_label(bars, [f"{value:.3g}" for value in values], padding=3)
     axes.invert_yaxis()
-    axes.set_xscale("log")
-    axes.set_xlim(right=max(values, default=1) * 3)
+    axes.set_xlim(0, max(values, default=1) * 1.3)
     axes.set_xlabel(label)
