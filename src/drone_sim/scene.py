@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Dict, List
+from typing import Any, Dict, List, Tuple
 
+import numpy as np
 import yaml
 
 from drone_sim import frames, scene_files
@@ -13,6 +14,7 @@ from drone_sim.objects import ObjectTree
 from drone_sim.parameter_types import ParameterError
 from drone_sim.scene_parameters import ObjectParameters, SceneParameters
 from drone_sim.state import Pose, State
+from drone_sim.visual import Visual
 from drone_sim.world import Shape, World
 
 
@@ -46,11 +48,13 @@ class Scene:
         """Put floor and objects into an empty world. Raises ParameterError for a file that cannot be used."""
         self._parameters = parameters
         scene_files.check(parameters)
+        self._world = world
         world.add_floor(parameters.floor.size, parameters.floor.texture)
         try:
-            self._bodies = [SceneBody(world, world.add_shape(_shape(one))) for one in parameters.objects]
+            self._numbers = [world.add_shape(_shape(one)) for one in parameters.objects]
         except ValueError as error:
             raise ParameterError(str(error)) from None
+        self._bodies = [SceneBody(world, number) for number in self._numbers]
 
     def name_objects(self, objects: ObjectTree) -> None:
         """Let scripts find the objects that have a name. Raises ParameterError for a name that is taken."""
@@ -59,6 +63,10 @@ class Scene:
                 raise ParameterError(f"scene: an object named '{one.name}' is there already")
             if one.name:
                 objects.add(one.name, body=body)
+
+    def visuals(self) -> Tuple[List[Visual], np.ndarray]:
+        """Return how the objects look, floor and drone aside, and the poses world from visual, (N, 4, 4)."""
+        return self._world.visuals(self._numbers), self._world.visual_poses(self._numbers)
 
     def save(self, path: Path, drone: Matrix) -> None:
         """Write floor, objects and drone as they stand now, as a scene file. Raises OSError."""

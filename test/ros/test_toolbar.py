@@ -9,6 +9,7 @@ from pathlib import Path
 
 import rospy
 import rostest
+import trimesh
 import yaml
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from listening import Listener, connected
@@ -16,7 +17,7 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
-from visualization_msgs.msg import InteractiveMarkerFeedback
+from visualization_msgs.msg import InteractiveMarkerFeedback, Marker, MarkerArray
 
 from drone_sim import parameters
 from drone_sim.ros.node import Node
@@ -144,6 +145,31 @@ class Toolbar(unittest.TestCase):
         self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
         self.scene.write_text("object: []\n")
         self.assertIn("unknown key object; known are drone, floor, objects", self.call("load_scene", expected=False))
+
+    def test_rviz_sees_the_objects_and_where_they_go(self):
+        trimesh.creation.box().export(str(self.scene.parent / "one.stl"))
+        self.scene.write_text(
+            "objects:\n"
+            "  - {shape: box, size: [1, 2, 3], position: [30, 0, 400], color: [1, 0, 0, 0.5], mass: 1}\n"
+            "  - {shape: sphere, size: [0.5], position: [0, 4, 1], rpy: [0, 0, 1.5707963267948966]}\n"
+            "  - {shape: cylinder, size: [0.1, 2], position: [0, 5, 1]}\n"
+            "  - {shape: mesh, file: one.stl, size: [1, 1, 2], position: [0, 6, 1]}\n"
+        )
+        rospy.set_param("~scene_file", str(self.scene))
+        self.call("load_scene")
+        scene = Listener("/drone/scene", MarkerArray)
+        _, box, sphere, cylinder, mesh = scene.wait_for(lambda m: len(m.markers) == 5, after=0).markers
+        kinds = [Marker.CUBE, Marker.SPHERE, Marker.CYLINDER, Marker.MESH_RESOURCE]
+        self.assertEqual([marker.type for marker in (box, sphere, cylinder, mesh)], kinds)
+        self.assertEqual((box.scale.x, box.scale.y, box.scale.z), (1, 2, 3))
+        self.assertEqual((box.color.r, box.color.g, box.color.b, box.color.a), (1, 0, 0, 0.5))
+        self.assertEqual((sphere.scale.x, cylinder.scale.y, cylinder.scale.z, mesh.scale.z), (1, 0.2, 2, 2))
+        self.assertAlmostEqual(sphere.pose.orientation.z, 0.5**0.5)
+        self.assertEqual(mesh.mesh_resource, f"file://{self.scene.parent}/one.stl")
+        self.assertEqual({marker.header.frame_id for marker in (box, sphere, cylinder, mesh)}, {"world"})
+        scene.wait_for(lambda m: m.markers[1].pose.position.z < box.pose.position.z - 1, after=0)
+        self.call("stop")  # nothing moves, so nothing is sent, but whoever comes late is told
+        Listener("/drone/scene", MarkerArray).wait_for(lambda m: len(m.markers) == 5, after=0)
 
     def test_a_snapshot_comes_back(self):
         self.pause(True)

@@ -35,6 +35,7 @@ def _write(tmp_path):
     (tmp_path / "parts").mkdir()
     for name in ("block.obj", "block.stl", "parts/block.stl", "parts/block.dae"):
         block.export(str(tmp_path / name))
+    block.export(str(tmp_path / "text.stl"), file_type="stl_ascii")
     (tmp_path / "parts" / "barrel.urdf").write_text(URDF, encoding="utf-8")
     (tmp_path / "parts" / "collada.urdf").write_text(URDF.replace(".stl", ".dae"), encoding="utf-8")
     for name in ("nonsense.stl", "nonsense.obj", "nonsense.png", "nonsense.urdf"):
@@ -128,6 +129,10 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         (f"objects: [{BLOCK.replace('block', 'missing')}]", "missing.obj': no such file"),
         (f"objects: [{BLOCK.replace('block', 'nonsense')}]", "mesh"),
         (f"objects: [{BLOCK.replace('block.obj', 'nonsense.stl')}]", "nonsense.stl: "),
+        (
+            f"objects: [{BLOCK.replace('block.obj', 'text.stl')}]",
+            "PyBullet cannot read it; of STL files, it reads binary",
+        ),
         (f"objects: [{BLOCK.replace('block.obj', 'nonsense.png')}]", "must be one of .obj, .stl; in a URDF, .dae too"),
         (f"objects: [{BLOCK.replace('block.obj', 'package://nowhere_at_all/a.obj')}]", "no ROS package nowhere_at_all"),
         ("objects: [{shape: urdf, file: nonsense.urdf, position: [0, 0, 0]}]", "nonsense.urdf: syntax error"),

@@ -32,6 +32,7 @@ from drone_sim.ros.master_watch import MasterWatch, master_is_there
 from drone_sim.ros.outputs import DroneOutput
 from drone_sim.ros.paths import from_shell
 from drone_sim.ros.player import Player
+from drone_sim.ros.scene_markers import SceneMarkers
 from drone_sim.ros.script_topics import RosBackend
 from drone_sim.ros.services import Services
 from drone_sim.scripting.errors import ScriptError
@@ -61,6 +62,7 @@ class Node:
         self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
         inputs = DroneInput(self.simulation, self._inbox)
         self._handles = Handles(self.simulation, inputs, self._inbox)
+        self._scene_markers = SceneMarkers(self.simulation)
         self._cameras = [
             CameraOutput(drone, camera, parameters.cameras[name]) for name, camera in self.simulation.cameras.items()
         ]
@@ -125,6 +127,7 @@ class Node:
             camera.publish(stamp)
         self._output.publish(stamp)
         self._handles.update()
+        self._scene_markers.update()
         if self._parameters.gui:
             track = self.simulation.drone.track
             self.simulation.world.look_from_behind(position(track), to_euler(track)[2])

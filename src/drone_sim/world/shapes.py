@@ -54,7 +54,8 @@ def create(client: int, shape: Shape) -> int:
             pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
     except pybullet.error:
         files = " ".join(filter(None, (shape.file, shape.texture)))
-        raise ValueError(f"{shape.kind} {files}: PyBullet cannot read it") from None
+        hint = "; of STL files, it reads binary ones" if shape.file.lower().endswith(".stl") else ""
+        raise ValueError(f"{shape.kind} {files}: PyBullet cannot read it{hint}") from None
     return body
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Dict, List, Mapping, Sequence, Set, Tuple
+from typing import Dict, List, Mapping, Optional, Sequence, Set, Tuple
 
 import numpy as np
 import pybullet
@@ -185,13 +185,14 @@ class World:
 
     # ---- pictures
 
-    def visuals(self) -> List[Visual]:
-        """Return everything that can be drawn, in the order of `visual_poses`."""
-        return self._pictures.visuals(self._inertial_frames)
+    def visuals(self, bodies: Optional[Sequence[int]] = None) -> List[Visual]:
+        """Return what can be drawn of these bodies, or of all, in the order of `visual_poses`."""
+        return self._pictures.visuals(self._inertial_frames if bodies is None else bodies)
 
-    def visual_poses(self) -> np.ndarray:
-        """Return the poses world from visual, (N, 4, 4)."""
-        return self._pictures.poses({body: frame[1] for body, frame in self._inertial_frames.items()})
+    def visual_poses(self, bodies: Optional[Sequence[int]] = None) -> np.ndarray:
+        """Return the poses world from visual, (N, 4, 4), of these bodies, or of all."""
+        chosen = self._inertial_frames if bodies is None else bodies
+        return self._pictures.poses({body: self._inertial_frames[body][1] for body in chosen})
 
     def place_visuals(self, body: int, places: Mapping[int, Matrix]) -> None:
         """Move some of a body's visuals, by index, to other places in its root link's frame."""

@@ -1,0 +1,76 @@
+"""The scene's objects in rviz, which knows the robot alone: `<drone>/scene`, a latched MarkerArray."""
+
+from __future__ import annotations
+
+from typing import List, Optional, Sequence, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from drone_sim import frames
+from drone_sim.ros.messages import WORLD
+from drone_sim.simulation import Simulation
+from drone_sim.visual import Visual
+
+_EVERY = 4  # steps between two looks at what has moved
+_FLAT = 1e-3  # m, thickness of a plane
+_WIDE = 200.0  # m, its side
+_FROM_ITS_FILE = (0.0, 0.0, 0.0, 0.0)  # the color by which rviz keeps a mesh's own
+
+
+class SceneMarkers:
+    """Shows the objects of the scene as they stand. The floor is left to rviz's grid."""
+
+    def __init__(self, simulation: Simulation):
+        """Advertise in the drone's namespace."""
+        self._simulation = simulation
+        self._steps = 0
+        self._shown: Optional[Tuple[List[Visual], np.ndarray]] = None
+        name = f"{simulation.drone.name}/scene"
+        self._publisher = rospy.Publisher(name, MarkerArray, queue_size=1, latch=True)
+
+    def update(self) -> None:
+        """Publish what has moved, come or gone, if anybody listens."""
+        self._steps += 1
+        if self._steps % _EVERY or not self._publisher.get_num_connections():
+            return
+        visuals, poses = self._simulation.scene.visuals()
+        if self._shown and visuals == self._shown[0] and np.array_equal(poses, self._shown[1]):
+            return
+        self._shown = visuals, poses
+        markers = [Marker(action=Marker.DELETEALL)]
+        for visual, pose in zip(visuals, poses):
+            markers += _markers(visual, tuple(pose[:3].ravel().tolist()))
+        for number, marker in enumerate(markers):
+            marker.header.frame_id, marker.ns, marker.id = WORLD, "scene", number
+            marker.frame_locked = True
+        self._publisher.publish(MarkerArray(markers))
+
+
+def _markers(visual: Visual, matrix: frames.Matrix) -> Sequence[Marker]:
+    """Return what rviz makes of one visual: one marker, three for a capsule."""
+    size, rgba = visual.size, visual.rgba
+    if visual.shape == "box":
+        return [_marker(Marker.CUBE, matrix, size, rgba)]
+    if visual.shape == "plane":
+        return [_marker(Marker.CUBE, matrix, (_WIDE, _WIDE, _FLAT), rgba)]
+    if visual.shape == "mesh":
+        mesh = _marker(Marker.MESH_RESOURCE, matrix, size, _FROM_ITS_FILE if rgba == (1, 1, 1, 1) else rgba)
+        mesh.mesh_resource, mesh.mesh_use_embedded_materials = f"file://{visual.file}", True
+        return [mesh]
+    wide = 2 * size[0]
+    if visual.shape == "sphere":
+        return [_marker(Marker.SPHERE, matrix, (wide, wide, wide), rgba)]
+    tube = _marker(Marker.CYLINDER, matrix, (wide, wide, size[1]), rgba)
+    if visual.shape == "cylinder":
+        return [tube]
+    ends = [frames.multiply(matrix, frames.from_rpy((0, 0, sign * size[1] / 2), (0, 0, 0))) for sign in (-1, 1)]
+    return [tube, *(_marker(Marker.SPHERE, end, (wide, wide, wide), rgba) for end in ends)]
+
+
+def _marker(kind: int, matrix: frames.Matrix, size: Sequence[float], rgba: Sequence[float]) -> Marker:
+    pose = Pose(Point(*frames.position(matrix)), Quaternion(*frames.to_quaternion(matrix)))
+    return Marker(type=kind, pose=pose, scale=Vector3(*size), color=ColorRGBA(*rgba))
