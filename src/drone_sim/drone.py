@@ -17,7 +17,8 @@ from drone_sim.propeller import Propellers, Wrench
 from drone_sim.scripting import load
 from drone_sim.scripting.api import make_sim, make_sim_ros
 from drone_sim.scripting.api_signals import Signals
-from drone_sim.scripting.host import DrawingSink, Surroundings
+from drone_sim.scripting.drawings import Drawings
+from drone_sim.scripting.host import Surroundings
 from drone_sim.scripting.messages import MessageBus
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.state import Pose, State, Twist
@@ -55,7 +56,7 @@ class Drone:
         shapes = [(respondable(number), link) for number, link in enumerate(self._links, start=1)]
         self._shapes = {name: frames.multiply(inertial_from_root, link) for name, link in [(DRONE, IDENTITY), *shapes]}
         self.script: load.Script = load.NoScript()
-        self.drawing: Optional[DrawingSink] = None
+        self.drawings: Optional[Drawings] = None
         self.reset()
 
     def reset(self) -> None:

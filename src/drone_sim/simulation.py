@@ -20,6 +20,7 @@ from drone_sim.camera.vision import Camera, Vision
 from drone_sim.drone import Drone
 from drone_sim.parameters import CameraParameters, Parameters
 from drone_sim.scene import Scene
+from drone_sim.scripting.drawings import Drawings
 from drone_sim.scripting.messages import Backend
 from drone_sim.world import World
 
@@ -47,12 +48,13 @@ class Simulation:
         script: str = "",
         gui: bool = False,
         backend: Optional[Backend] = None,
+        drawings: Optional[Drawings] = None,
         started: bool = True,
     ):
         """Build the scene and, if `started`, run the init of the child script ('' is the tutorial's).
 
         `backend` carries what the script subscribes to and publishes; without it the messages stay in
-        `drone.bus`.
+        `drone.bus`. `drawings` takes what the script draws; without it that is ignored.
 
         Raises ParameterError, UrdfError, ScriptError, and RuntimeError where `gui` finds no display.
         """
@@ -60,6 +62,7 @@ class Simulation:
         self.script = script
         self.running = False
         self._backend = backend
+        self._drawings = drawings
         self._runs = 0
         self.world = World(parameters.sub_step, parameters.gravity, gui)
         self.vision = Vision(self.world, parameters.samples)
@@ -80,6 +83,7 @@ class Simulation:
         self.scene = Scene(parameters.scene, self.world)
         self.drone = Drone(parameters, self.world)
         self.drone.bus.backend = self._backend
+        self.drone.drawings = self._drawings
         self._initial = self.world.snapshot()
         self._begin()
 
@@ -89,6 +93,8 @@ class Simulation:
         self._runs += 1
         self._looked: Dict[str, Tuple[int, np.ndarray]] = {}  # by camera, step and picture of the script's last look
         self.scene.name_objects(self.drone.objects)
+        if self._drawings is not None:
+            self._drawings.clear()
 
     def _camera(self, parameters: CameraParameters) -> Camera:
         size = (parameters.width, parameters.height)

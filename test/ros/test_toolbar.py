@@ -39,6 +39,18 @@ def sysCall_cleanup():
     print('cleaned up')
 """
 
+DRAWS = """
+def sysCall_init():
+    self.path = sim.addDrawingObject(sim.drawing_linestrip, 2, 0, -1, 100, [1, 0, 0])
+    self.ball = sim.addDrawingObject(sim.drawing_spherepoints | sim.drawing_cyclic, 0.5)
+    self.x = -1
+
+def sysCall_sensing():
+    self.x += 1
+    sim.addDrawingObjectItem(self.path, [self.x, 0, 1])
+    sim.addDrawingObjectItem(self.ball, [self.x, 0, 1])
+"""
+
 
 class Toolbar(unittest.TestCase):
     """A node that runs in this process, as fast as it can, called from beside."""
@@ -170,6 +182,20 @@ class Toolbar(unittest.TestCase):
         scene.wait_for(lambda m: m.markers[1].pose.position.z < box.pose.position.z - 1, after=0)
         self.call("stop")  # nothing moves, so nothing is sent, but whoever comes late is told
         Listener("/drone/scene", MarkerArray).wait_for(lambda m: len(m.markers) == 5, after=0)
+
+    def test_rviz_sees_what_a_script_draws(self):
+        self.script.write_text(DRAWS)
+        self.call("start")
+        drawing = Listener("/drone/drawing", MarkerArray)
+        _, path, ball = drawing.wait_for(
+            lambda m: len(m.markers) == 3 and len(m.markers[1].points) > 5, after=0
+        ).markers
+        self.assertEqual((path.type, ball.type), (Marker.LINE_STRIP, Marker.SPHERE_LIST))
+        self.assertEqual([point.x for point in path.points[:6]], [0, 1, 2, 3, 4, 5])
+        self.assertEqual((path.color.r, path.color.g, path.color.b, path.color.a), (1, 0, 0, 1))
+        self.assertEqual((ball.scale.x, len(ball.points), ball.header.frame_id), (0.5, 1, "world"))
+        self.call("stop")
+        drawing.wait_for(lambda m: len(m.markers) == 1, after=0)
 
     def test_a_snapshot_comes_back(self):
         self.pause(True)

@@ -7,6 +7,7 @@ import pytest
 
 from drone_sim import frames, parameters
 from drone_sim.scripting.api import make_sim
+from drone_sim.scripting.drawings import Drawings
 from drone_sim.scripting.errors import UnknownName
 from drone_sim.scripting.host import Surroundings
 from drone_sim.simulation import Simulation
@@ -178,16 +179,52 @@ def test_what_cannot_be_drawn_is_said_once(sim, caplog):
     assert [line.partition(":")[0] for line in said] == ["sim.addDrawingObject", "sim.addDrawingObjectItem"]
 
 
-def test_a_sink_gets_what_is_drawn(simulation, sim, caplog):
-    drawn = []
-    simulation.drone.drawing = lambda function, arguments, handle: drawn.append((function, arguments, handle))
-    handle = sim.addParticleObject(sim.particle_points1, 1)
-    sim.addParticleObjectItem(handle, [1, 2, 3, 4, 5, 6])
-    assert drawn == [
-        ("addParticleObject", (0, 1), handle),
-        ("addParticleObjectItem", (handle, [1, 2, 3, 4, 5, 6]), handle),
-    ]
+@pytest.fixture(name="drawings")
+def _drawings(simulation):
+    simulation.drone.drawings = Drawings()
+    return simulation.drone.drawings
+
+
+def test_what_is_drawn_is_kept(drawings, sim, caplog):
+    path = sim.addDrawingObject(sim.drawing_linestrip + sim.drawing_50percenttransparency, 2, 0, -1, 3, [1, 0, 0])
+    for x in range(5):
+        sim.addDrawingObjectItem(path, [x, 0, 1])
+    assert drawings.objects[path].kind == "linestrip" and drawings.objects[path].rgba == (1, 0, 0, 0.5)
+    assert list(drawings.objects[path].items) == [(0, 0, 1), (1, 0, 1), (2, 0, 1)], "full is full"
+    sim.addDrawingObjectItem(path, None)
+    assert not drawings.objects[path].items
+    last = sim.addDrawingObject(sim.drawing_discpoints | sim.drawing_cyclic | sim.drawing_itemsizes, 0.2, 0.1, -1, 2)
+    for x in (0, 0.01, 1, 2):
+        sim.addDrawingObjectItem(last, [x, 0, 0.002, 0, 0, 1, 0.2])
+    assert list(drawings.objects[last].items) == [(1, 0, 0.002), (2, 0, 0.002)], "the oldest goes"
+    sim.removeDrawingObject(path)
+    assert list(drawings.objects) == [last]
     assert not caplog.records
+    sim.addParticleObject(sim.particle_points1, 1)
+    assert "accepted and ignored" in caplog.text
+
+
+def test_what_cannot_be_drawn_is_refused(drawings, sim):
+    lines = sim.addDrawingObject(sim.drawing_lines, 1, 0, -1, 10)
+    with pytest.raises(ValueError, match="an item of lines has 6 numbers, not 3"):
+        sim.addDrawingObjectItem(lines, [1, 2, 3])
+    with pytest.raises(TypeError, match="finite numbers are expected"):
+        sim.addDrawingObjectItem(lines, [float("nan")] * 6)
+    with pytest.raises(ValueError, match="no drawing object has the handle 99"):
+        sim.addDrawingObjectItem(99, [1, 2, 3])
+    with pytest.raises(ValueError, match="no drawing object has the type 31; known are"):
+        sim.addDrawingObject(31, 1)
+
+
+def test_the_next_run_begins_with_nothing_drawn(tmp_path):
+    script = tmp_path / "draws.py"
+    script.write_text("p = sim.addDrawingObject(sim.drawing_points, 1)\nsim.addDrawingObjectItem(p, [1, 2, 3])")
+    drawings = Drawings()
+    simulation = Simulation(parameters.load(), script=str(script), drawings=drawings)
+    assert len(drawings.objects) == 1
+    simulation.stop()
+    assert not drawings.objects
+    simulation.close()
 
 
 def test_unknown_functions_and_constants_list_the_near_ones(sim):

@@ -25,6 +25,7 @@ from drone_sim.frames import position, to_euler
 from drone_sim.pacing import Pacer
 from drone_sim.parameters import Parameters
 from drone_sim.ros.cameras import CameraOutput
+from drone_sim.ros.drawing_markers import DrawingMarkers
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput
 from drone_sim.ros.markers import Handles
@@ -35,6 +36,7 @@ from drone_sim.ros.player import Player
 from drone_sim.ros.scene_markers import SceneMarkers
 from drone_sim.ros.script_topics import RosBackend
 from drone_sim.ros.services import Services
+from drone_sim.scripting.drawings import Drawings
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Simulation
 
@@ -52,8 +54,14 @@ class Node:
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if self._simulated_time else None
         drone = parameters.drone.name
         images = {rospy.resolve_name(f"{drone}/{camera.topic}") for camera in parameters.cameras.values()}
+        drawings = Drawings()
         self.simulation = Simulation(
-            parameters, script=parameters.script, gui=parameters.gui, backend=RosBackend(images), started=False
+            parameters,
+            script=parameters.script,
+            gui=parameters.gui,
+            backend=RosBackend(images),
+            drawings=drawings,
+            started=False,
         )
         self.player = Player(self.simulation, self._simulated_time)
         self._inbox = Inbox()
@@ -62,7 +70,7 @@ class Node:
         self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
         inputs = DroneInput(self.simulation, self._inbox)
         self._handles = Handles(self.simulation, inputs, self._inbox)
-        self._scene_markers = SceneMarkers(self.simulation)
+        self._markers = (SceneMarkers(self.simulation), DrawingMarkers(drone, drawings))
         self._cameras = [
             CameraOutput(drone, camera, parameters.cameras[name]) for name, camera in self.simulation.cameras.items()
         ]
@@ -127,7 +135,8 @@ class Node:
             camera.publish(stamp)
         self._output.publish(stamp)
         self._handles.update()
-        self._scene_markers.update()
+        for markers in self._markers:
+            markers.update()
         if self._parameters.gui:
             track = self.simulation.drone.track
             self.simulation.world.look_from_behind(position(track), to_euler(track)[2])

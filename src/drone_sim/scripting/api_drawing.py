@@ -1,21 +1,25 @@
 """`sim`: what only changes what one sees: drawing objects, particles, floating views, dialogs.
 
-Drawn where the drone has a DrawingSink, accepted and ignored elsewhere, which the log says once for
-each function.
+Drawing objects are shown where the drone has Drawings; everything else is accepted and ignored, which the
+log says once for each function.
 """
 
 from __future__ import annotations
 
-from typing import Any, Dict, Optional
+from typing import Any, Dict, Optional, Sequence, Set
 
+from drone_sim.objects import WORLD
 from drone_sim.scripting.api_scripts import LOG
-from drone_sim.scripting.calls import Function
+from drone_sim.scripting.calls import Function, numbers
 from drone_sim.scripting.host import Host
 
-_MAKERS = ("addDrawingObject", "addParticleObject", "floatingViewAdd", "auxiliaryConsoleOpen", "displayDialog")
+Handle = int
+Number = float
+ThreeNumbers = Sequence[float]
+Numbers = Sequence[float]
+
+_MAKERS = ("addParticleObject", "floatingViewAdd", "auxiliaryConsoleOpen", "displayDialog")
 _OTHERS = (
-    "addDrawingObjectItem",
-    "removeDrawingObject",
     "addParticleObjectItem",
     "removeParticleObject",
     "floatingViewRemove",
@@ -29,34 +33,76 @@ _OTHERS = (
     "setThreadSwitchTiming",
     "setThreadAutomaticSwitch",
 )
+_GREY = (0.5, 0.5, 0.5)
 
 
 class Drawing:
-    """Hands calls to the sink, and handles to the script."""
+    """The functions that draw."""
 
     def __init__(self, host: Host):
-        """Take the drone that may have a sink."""
-        self._host = host
+        """Take the drone, and whether its drawings are shown."""
+        self._drawings = host.drawings
         self._made = 0
-        self._said: Dict[str, bool] = {}
+        self._said: Set[str] = set()
 
     def functions(self) -> Dict[str, Function]:
         """Return every function, by name."""
-        makers = {name: self._function(name, makes=True) for name in _MAKERS}
-        return {**makers, **{name: self._function(name, makes=False) for name in _OTHERS}}
+        makers = {name: self._ignored(name, makes=True) for name in _MAKERS}
+        others = {name: self._ignored(name, makes=False) for name in _OTHERS}
+        real = (self.addDrawingObject, self.addDrawingObjectItem, self.removeDrawingObject)
+        return {**makers, **others, **{one.__name__: one for one in real}}
 
-    def _function(self, name: str, makes: bool) -> Function:
-        def call(*arguments: Any) -> Optional[int]:
+    def addDrawingObject(
+        self,
+        objectType: int,
+        size: Number,
+        duplicateTolerance: Number = 0.0,
+        parent: Handle = WORLD,
+        maxItemCount: int = 1,
+        color: Optional[ThreeNumbers] = None,
+        *_shine: Any,
+    ) -> int:
+        """Make a drawing object that holds up to `maxItemCount` items; return its handle.
+
+        `size` is in px for points and lines, else in m. Items stay where they are in the world: a parent does not
+        carry them.
+        """
+        self._made += 1
+        rgb = numbers(color, 3) if color else _GREY
+        if self._drawings is None:
+            self._say("addDrawingObject", "there is nothing to draw on; accepted and ignored")
+        else:
+            if parent != WORLD:
+                self._say("addDrawingObject", "the parent is ignored: items stay where they are drawn")
+            self._drawings.make(
+                self._made, int(objectType), float(size), float(duplicateTolerance), int(maxItemCount), rgb
+            )
+        return self._made
+
+    def addDrawingObjectItem(self, handle: Handle, item: Optional[Numbers] = None) -> None:
+        """Draw one more item, its points one after the other (m, world); without an item, remove all of them."""
+        values = None if item is None else numbers(item, len(item))
+        if self._drawings is None:
+            self._say("addDrawingObjectItem", "there is nothing to draw on; accepted and ignored")
+        else:
+            self._drawings.add(handle, values)
+
+    def removeDrawingObject(self, handle: Handle) -> None:
+        """Remove a drawing object."""
+        if self._drawings is not None:
+            self._drawings.remove(handle)
+
+    def _ignored(self, name: str, makes: bool) -> Function:
+        def call(*_arguments: Any) -> Optional[int]:
             if makes:
                 self._made += 1
-            handle = self._made if makes else arguments[0] if arguments else 0
-            sink = self._host.drawing
-            if sink is not None:
-                sink(name, arguments, handle)
-            elif name not in self._said:
-                self._said[name] = True
-                LOG.info("sim.%s: there is nothing to draw on; accepted and ignored", name)
+            self._say(name, "there is nothing to draw on; accepted and ignored")
             return self._made if makes else None
 
-        call.__doc__ = "Draw, where there is something to draw on."
+        call.__doc__ = "Do nothing."
         return call
+
+    def _say(self, name: str, what: str) -> None:
+        if name not in self._said:
+            self._said.add(name)
+            LOG.info("sim.%s: %s", name, what)

@@ -3,26 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Callable, ContextManager, Dict, Mapping, Optional, Protocol, Sequence
+from typing import Any, Callable, ContextManager, Dict, Mapping, Optional, Protocol
 
 import numpy as np
 
 from drone_sim.frames import Vector
 from drone_sim.objects import ObjectTree
 from drone_sim.scripting.api_signals import Signals
+from drone_sim.scripting.drawings import Drawings
 
 Parameters = Dict[str, Any]
-
-
-class DrawingSink(Protocol):
-    """Draws what a script asks for."""
-
-    def __call__(self, function: str, arguments: Sequence[Any], handle: int) -> None:
-        """Take a call such as ("addDrawingObjectItem", (1, [x, y, z]), 1).
-
-        `handle` is what the script gets back from a function that makes something (addDrawingObject,
-        addParticleObject, floatingViewAdd), and the first argument of every other function.
-        """
 
 
 class Host(Protocol):
@@ -45,7 +35,7 @@ class Host(Protocol):
         """Name of the object that this script is attached to."""
 
     @property
-    def drawing(self) -> Optional[DrawingSink]:
+    def drawings(self) -> Optional[Drawings]:
         """Where to draw, if anywhere."""
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
