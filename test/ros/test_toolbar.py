@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """V-REP's way of working through ROS: start, stop, pause, step, edit the script, save the scene, drag things."""
 
+import math
 import sys
 import tempfile
 import threading
@@ -42,6 +43,8 @@ def sysCall_cleanup():
 DRAWS = """
 def sysCall_init():
     self.path = sim.addDrawingObject(sim.drawing_linestrip, 2, 0, -1, 100, [1, 0, 0])
+    self.disc = sim.addDrawingObject(sim.drawing_discpoints | sim.drawing_50percenttransparency, 0.4)
+    sim.addDrawingObjectItem(self.disc, [1, 2, 3, 0, 0, 1])
     self.ball = sim.addDrawingObject(sim.drawing_spherepoints | sim.drawing_cyclic, 0.5)
     self.x = -1
 
@@ -187,13 +190,15 @@ class Toolbar(unittest.TestCase):
         self.script.write_text(DRAWS)
         self.call("start")
         drawing = Listener("/drone/drawing", MarkerArray)
-        _, path, ball = drawing.wait_for(
-            lambda m: len(m.markers) == 3 and len(m.markers[1].points) > 5, after=0
-        ).markers
+        message = drawing.wait_for(lambda m: len(m.markers) == 4 and len(m.markers[1].points) > 5, after=0)
+        _, path, disc, ball = message.markers
         self.assertEqual((path.type, ball.type), (Marker.LINE_STRIP, Marker.SPHERE_LIST))
         self.assertEqual([point.x for point in path.points[:6]], [0, 1, 2, 3, 4, 5])
         self.assertEqual((path.color.r, path.color.g, path.color.b, path.color.a), (1, 0, 0, 1))
         self.assertEqual((ball.scale.x, len(ball.points), ball.header.frame_id), (0.5, 1, "world"))
+        self.assertEqual((disc.type, disc.color.a), (Marker.TRIANGLE_LIST, 0.5))
+        self.assertEqual({round(math.hypot(p.x - 1, p.y - 2), 6) for p in disc.points}, {0.0, 0.2})
+        self.assertEqual({p.z for p in disc.points}, {3.0})
         self.call("stop")
         drawing.wait_for(lambda m: len(m.markers) == 1, after=0)
 

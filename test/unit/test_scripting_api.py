@@ -196,7 +196,7 @@ def test_what_is_drawn_is_kept(drawings, sim, caplog):
     last = sim.addDrawingObject(sim.drawing_discpoints | sim.drawing_cyclic | sim.drawing_itemsizes, 0.2, 0.1, -1, 2)
     for x in (0, 0.01, 1, 2):
         sim.addDrawingObjectItem(last, [x, 0, 0.002, 0, 0, 1, 0.2])
-    assert list(drawings.objects[last].items) == [(1, 0, 0.002), (2, 0, 0.002)], "the oldest goes"
+    assert list(drawings.objects[last].items) == [(1, 0, 0.002, 0, 0, 1), (2, 0, 0.002, 0, 0, 1)], "the oldest goes"
     sim.removeDrawingObject(path)
     assert list(drawings.objects) == [last]
     assert not caplog.records

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
+from typing import List, Sequence
+
+import numpy as np
 import rospy
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.ros.messages import WORLD
-from drone_sim.scripting.drawings import DrawingObject, Drawings
+from drone_sim.scripting.drawings import DrawingObject, Drawings, Item
 
 _EVERY = 2  # steps between two looks at what was drawn
 _PIXEL = 0.005  # m; rviz measures points and lines in the world
-_FLAT = 0.001  # m
 _KINDS = {
     "points": Marker.POINTS,
     "lines": Marker.LINE_LIST,
-    "triangles": Marker.TRIANGLE_LIST,
-    "trianglepoints": Marker.CUBE_LIST,
-    "quadpoints": Marker.CUBE_LIST,
-    "discpoints": Marker.SPHERE_LIST,
-    "cubepoints": Marker.CUBE_LIST,
-    "spherepoints": Marker.SPHERE_LIST,
     "linestrip": Marker.LINE_STRIP,
+    "spherepoints": Marker.SPHERE_LIST,
+    "cubepoints": Marker.CUBE_LIST,  # level, whatever their normal is
+    "triangles": Marker.TRIANGLE_LIST,
 }
-_LEVEL = ("trianglepoints", "quadpoints", "discpoints")  # drawn flat, as if their normal were up
+_CORNERS = {"trianglepoints": 3, "quadpoints": 4, "discpoints": 24}  # of what rviz has only as triangles
 
 
 class DrawingMarkers:
@@ -49,16 +48,39 @@ class DrawingMarkers:
 
 
 def _marker(handle: int, drawn: DrawingObject) -> Marker:
-    marker = Marker(type=_KINDS[drawn.kind], ns="drawing", id=handle, frame_locked=True)
+    marker = Marker(type=_KINDS.get(drawn.kind, Marker.TRIANGLE_LIST), ns="drawing", id=handle, frame_locked=True)
     marker.header.frame_id = WORLD
     marker.pose.orientation.w = 1.0
     marker.color = ColorRGBA(*drawn.rgba)
-    size = drawn.size
-    if drawn.kind in ("points", "lines", "linestrip"):
-        size *= _PIXEL
-    marker.scale.x = marker.scale.y = marker.scale.z = 1.0 if drawn.kind == "triangles" else size
-    if drawn.kind in _LEVEL:
-        marker.scale.z = _FLAT
-    for item in drawn.items:
-        marker.points += [Point(*item[first : first + 3]) for first in range(0, len(item), 3)]
+    if marker.type == Marker.TRIANGLE_LIST:
+        scale = 1.0
+    else:
+        scale = drawn.size * (_PIXEL if drawn.kind in ("points", "lines", "linestrip") else 1.0)
+    marker.scale = Vector3(scale, scale, scale)
+    marker.points = [Point(*point) for item in drawn.items for point in _points(drawn, item)]
     return marker
+
+
+def _points(drawn: DrawingObject, item: Item) -> List[Sequence[float]]:
+    if drawn.kind in _CORNERS:
+        return _polygon(item, drawn.size / 2, _CORNERS[drawn.kind])
+    points: List[Sequence[float]] = [item[first : first + 3] for first in range(0, len(item), 3)]
+    return points[:1] if drawn.kind == "cubepoints" else points
+
+
+def _polygon(item: Item, radius: float, corners: int) -> List[Sequence[float]]:
+    """Return the triangles of a regular polygon about a point, across a normal."""
+    middle, normal = np.array(item[:3]), _unit(np.array(item[3:]))
+    aside = radius * _unit(np.cross(normal, [1.0, 0.0, 0.0] if abs(normal[0]) < 0.9 else [0.0, 1.0, 0.0]))
+    up = np.cross(normal, aside)
+    angles = 2 * np.pi * np.arange(corners) / corners
+    rim = (middle + np.outer(np.cos(angles), aside) + np.outer(np.sin(angles), up)).tolist()
+    centre = middle.tolist()
+    triangles: List[Sequence[float]] = []
+    for one, other in zip(rim, [*rim[1:], rim[0]]):
+        triangles += [centre, one, other]
+    return triangles
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / max(float(np.linalg.norm(vector)), 1e-9)

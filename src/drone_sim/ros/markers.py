@@ -96,7 +96,6 @@ def _ring() -> Marker:
     inner, outer = ([Point(r * math.cos(a), r * math.sin(a), 0.0) for a in angles] for r in (0.22, 0.26))
     for i, o, next_i, next_o in zip(inner, outer, inner[1:], outer[1:]):
         ring.points += [i, o, next_o, i, next_o, next_i]
-        ring.points += [i, next_o, o, i, next_i, next_o]  # seen from below, too
     return ring
 
 

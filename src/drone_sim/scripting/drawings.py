@@ -12,15 +12,15 @@ from drone_sim.scripting.constants import CONSTANTS
 MOST = 10000  # items of one object: what rviz draws without effort
 
 _KIND = 0x1F  # the bits of an object's type that say what its items are; the others say how they look
-# Numbers that make one item: the points of it; its normal may follow, and is not needed.
+# Numbers that make one item: its points, or its middle and its normal. A size or a color of its own may follow.
 _NUMBERS = {
     "points": 3,
     "lines": 6,
     "triangles": 9,
-    "trianglepoints": 3,
-    "quadpoints": 3,
-    "discpoints": 3,
-    "cubepoints": 3,
+    "trianglepoints": 6,
+    "quadpoints": 6,
+    "discpoints": 6,
+    "cubepoints": 6,
     "spherepoints": 3,
     "linestrip": 3,
 }
