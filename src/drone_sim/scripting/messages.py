@@ -11,6 +11,8 @@ import threading
 from collections import deque
 from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Protocol, Tuple, Union
 
+import numpy as np
+
 from drone_sim.scripting.calls import Function, WrongValue
 
 # The names by which messages say what is expected.
@@ -176,7 +178,7 @@ class MessageBus:
         row, rows = 3 * int(width), int(height)
         if len(pixels) != row * rows:
             raise ValueError(f"an image of {width} x {height} has {row * rows} bytes, not {len(pixels)}")
-        top_first = b"".join(pixels[start : start + row] for start in range(row * (rows - 1), -1, -row))
+        top_first = b"".join(np.frombuffer(pixels, np.uint8).reshape(rows, row)[::-1])
         self._send(self._publisher(handle), Image(top_first, int(width), rows, frame_id))
 
     def imageTransportShutdownPublisher(self, handle: Handle) -> None:
