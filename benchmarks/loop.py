@@ -5,6 +5,7 @@ import time
 from typing import Any, Callable, Dict, List
 
 import pybullet
+from tqdm import tqdm
 
 from benchmarks.cores import one_core
 from drone_sim import frames, parameters
@@ -25,7 +26,7 @@ def race(steps: Dict[str, Callable[[], Any]], rounds: int, seconds: float) -> Li
     """
     times: Dict[str, List[float]] = {name: [] for name in steps}
     shares: Dict[str, List[float]] = {name: [] for name in steps}
-    for _ in range(rounds):
+    for _ in tqdm(range(rounds), desc="  rounds", leave=False):
         medians = {name: _times(step, seconds) for name, step in steps.items()}
         first = statistics.median(next(iter(medians.values())))
         for name, some in medians.items():

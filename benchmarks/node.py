@@ -75,6 +75,7 @@ def real_time_factors(seconds: float = 6.0) -> List[Row]:
 
     rows = []
     for name, topics in (("node, nobody listens", []), ("node, front camera published", ["/drone/front"])):
+        print(f"  {name}", file=sys.stderr, flush=True)
         with node("_real_time_factor:=0") as lines:
             listening = [_listen(topic, Image) for topic in topics]
             time.sleep(seconds)
@@ -125,6 +126,7 @@ def latencies(seconds: float = 20.0) -> List[Row]:
         came.append(now)
         ages.append(now - message.header.stamp.to_sec())
 
+    print(f"  latencies, for {seconds:g} s of real time", file=sys.stderr, flush=True)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "delays"
         with node(str(path), "_real_time_factor:=1", program=PROBE) as lines:

@@ -4,6 +4,7 @@ Every function returns rows: ``{"name": ..., "median_ms": ..., "p10_ms": ..., "p
 """
 
 import importlib.util
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -30,6 +31,8 @@ ARM = 0.13  # metres from the middle to a propeller
 
 def measure(name: str, draw: Callable[[], Any], seconds: float = 2.0, **facts: Any) -> Row:
     """Time `draw` until `seconds` are over, at least five times after two for warming up."""
+    amounts = ", ".join(f"{key} {value}" for key, value in facts.items() if key != "renderer")
+    print(f"  {amounts or name}", file=sys.stderr, flush=True)
     times: List[float] = []
     for _ in range(2):
         draw()
