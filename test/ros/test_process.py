@@ -10,8 +10,11 @@ import threading
 import unittest
 from pathlib import Path
 
+import rosnode
 import rospy
 import rostest
+from listening import Listener
+from nav_msgs.msg import Odometry
 
 HANGS = 30.0  # s; nothing here takes nearly as long unless it hangs
 
@@ -44,20 +47,30 @@ class Process(unittest.TestCase):
                 self.assertEqual(len([line for line in output.splitlines() if "FATAL" in line]), 1, output)
         rospy.delete_param("/drone_sim")
 
+    def assert_ends_cleanly(self, end):
+        """Let it fly as fast as it can, with somebody listening, and end it by `end(process)`."""
+        node = simulator("_real_time_factor:=0")
+        watchdog = threading.Timer(HANGS, node.kill)
+        watchdog.start()
+        odometry, lines = Listener("/drone/odom", Odometry), []
+        for line in node.stdout:
+            lines.append(line)
+            if "flying" in line:
+                odometry.wait_for()
+                end(node)
+        self.assertEqual(node.wait(), 0, "".join(lines))
+        watchdog.cancel()
+        odometry.close()
+        self.assertNotIn("Traceback", "".join(lines))
+        self.assertNotIn("/drone_sim", rosnode.get_node_names())
+
     def test_signals_end_it_cleanly(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             with self.subTest(number):
-                node = simulator()
-                watchdog = threading.Timer(HANGS, node.kill)
-                watchdog.start()
-                lines = []
-                for line in node.stdout:
-                    lines.append(line)
-                    if "flying" in line:
-                        node.send_signal(number)
-                self.assertEqual(node.wait(), 0, "".join(lines))
-                watchdog.cancel()
-                self.assertNotIn("Traceback", "".join(lines))
+                self.assert_ends_cleanly(lambda node, number=number: node.send_signal(number))
+
+    def test_rosnode_kill_ends_it_cleanly(self):
+        self.assert_ends_cleanly(lambda _: rosnode.kill_nodes(["/drone_sim"]))
 
     def test_two_processes_fly_alike_to_the_last_bit(self):
         with tempfile.TemporaryDirectory() as folder:

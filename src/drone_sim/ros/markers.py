@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Set
+from typing import Any, Set
 
+import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer
 from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback, Marker
@@ -32,7 +33,7 @@ class Handles:
         self._inbox = inbox
         self._held: Set[str] = set()
         self._steps = 0
-        self._server = InteractiveMarkerServer(f"{simulation.drone.name}/markers")
+        self._server = _Server(f"{simulation.drone.name}/markers")
         self._looks = {TARGET: _ball(), _DRONE: _ring()}
         self._shown: Set[str] = set()
         self._show({_DRONE})
@@ -78,6 +79,18 @@ class Handles:
             self._inbox.put(lambda: move_target(self._simulation, pose))
         else:
             self._inbox.put(lambda: self._simulation.drone.move(pose))
+
+
+class _Server(InteractiveMarkerServer):
+    """Its timer may still publish while rospy closes the topic, as the node ends; there is nobody left to tell."""
+
+    def publish(self, update: Any) -> None:
+        """Publish, or not any more."""
+        try:
+            super().publish(update)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():
+                raise
 
 
 def _ball() -> Marker:

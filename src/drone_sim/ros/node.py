@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import signal
 import sys
-import threading
 import time
 from typing import Callable
 
@@ -26,6 +24,7 @@ from drone_sim.pacing import Pacer
 from drone_sim.parameters import Parameters
 from drone_sim.ros.cameras import CameraOutput
 from drone_sim.ros.drawing_markers import DrawingMarkers
+from drone_sim.ros.ending import Ending
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput
 from drone_sim.ros.markers import Handles
@@ -165,17 +164,13 @@ def main() -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
     if not master_is_there():
         return 1
-    # rospy's own signal handler calls the master from within whatever the signal interrupts, and hangs for
-    # ever where that is a call to the master, too. Ours says that it is time to end, and no more.
     rospy.init_node("drone_sim", disable_signals=True)
-    ending = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: ending.set())
+    ending = Ending()
     node = None
     try:
         node = Node(_parameters())
         MasterWatch().start()
-        node.run(ending.is_set)
+        node.run(ending.asked)
     except (ValueError, ScriptError, RuntimeError) as error:  # each says in one line what is wrong
         rospy.logfatal(f"drone_sim: {error}")
         return 1
@@ -185,7 +180,7 @@ def main() -> int:
     finally:
         if node is not None:
             node.close()
-        rospy.signal_shutdown("the node ends")
+        ending.complete()
     return 0
 
 
