@@ -200,6 +200,8 @@ def test_what_is_drawn_is_kept(drawings, sim, caplog):
     sim.removeDrawingObject(path)
     assert list(drawings.objects) == [last]
     assert not caplog.records
+    sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 10**9)
+    assert "1000000000 items are too many: 2000 are kept" in caplog.text
     sim.addParticleObject(sim.particle_points1, 1)
     assert "accepted and ignored" in caplog.text
 

@@ -11,6 +11,7 @@ from typing import Any, Dict, Optional, Sequence, Set
 from drone_sim.objects import WORLD
 from drone_sim.scripting.api_scripts import LOG
 from drone_sim.scripting.calls import Function, numbers
+from drone_sim.scripting.drawings import MOST
 from drone_sim.scripting.host import Host
 
 Handle = int
@@ -74,6 +75,8 @@ class Drawing:
         else:
             if parent != WORLD:
                 self._say("addDrawingObject", "the parent is ignored: items stay where they are drawn")
+            if maxItemCount > MOST:
+                self._say("addDrawingObject", f"{maxItemCount} items are too many: {MOST} are kept")
             self._drawings.make(
                 self._made, int(objectType), float(size), float(duplicateTolerance), int(maxItemCount), rgb
             )

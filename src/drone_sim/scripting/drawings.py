@@ -9,7 +9,7 @@ from typing import Deque, Dict, Optional, Tuple
 
 from drone_sim.scripting.constants import CONSTANTS
 
-MOST = 10000  # items of one object: what rviz draws without effort
+MOST = 2000  # items of one object: as many as can be sent to rviz ten times a second beside the flight
 
 _KIND = 0x1F  # the bits of an object's type that say what its items are; the others say how they look
 # Numbers that make one item: its points, or its middle and its normal. A size or a color of its own may follow.
