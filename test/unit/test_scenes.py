@@ -8,7 +8,7 @@ from drawing import CAMERA, looking
 from drone_sim import parameters
 from drone_sim.parameters import ParameterError
 from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
+from drone_sim.state import Pose, Twist, Vector3
 from drone_sim.world import Shape, World
 
 URDF = """<robot name="barrel"><link name="barrel">
@@ -174,7 +174,7 @@ def test_the_drone_flies_through_the_first_gate(simulate):
     assert x > 4.0 and abs(y) < 1e-6
 
 
-def test_pictures_follow_what_is_added_painted_and_removed(renderer):
+def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
     world = World(0.005, -9.81)
     red, green = Shape("sphere", (0.5,), (1, 1, 1), color=(1, 0, 0, 1)), Shape("box", (1, 1, 1), (1, -1, 1))
     view = looking((-3, 0, 1), (1, 0, 1))
@@ -190,6 +190,11 @@ def test_pictures_follow_what_is_added_painted_and_removed(renderer):
     assert np.argmax(both[120, 100]) == 0
     world.set_color(first, (0, 0, 1, 1))
     assert np.argmax(picture()[120, 100]) == 2
+    painted, snapshot = picture(), world.snapshot()
+    world.set_pose(first, Pose((1, 9, 1)))
+    np.testing.assert_array_equal(picture()[:, :150], empty[:, :150])
+    world.restore(snapshot)
+    np.testing.assert_array_equal(picture(), painted)
     world.remove(first)
     np.testing.assert_array_equal(picture()[:, :150], empty[:, :150])
     world.remove(second)

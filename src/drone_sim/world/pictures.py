@@ -27,6 +27,7 @@ class Pictures:
         self._floor = -1
         self._textures: Dict[int, str] = {}
         self._parts: Dict[int, List[_Part]] = {}
+        self._standing: Dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
 
     def set_floor(self, body: int, texture: str) -> None:
         """Say which body receives the shadows, and its texture."""
@@ -40,6 +41,15 @@ class Pictures:
     def forget(self, body: int) -> None:
         """Read a body anew: it has changed."""
         self._parts.pop(body, None)
+        self._standing.pop(body, None)
+
+    def moved(self, body: int) -> None:
+        """Look anew where a body stands: it has been put somewhere."""
+        self._standing.pop(body, None)
+
+    def all_moved(self) -> None:
+        """Look anew where everything stands."""
+        self._standing.clear()
 
     def remove(self, body: int) -> None:
         """Forget all about a body: it is gone, and PyBullet may give its number to another."""
@@ -51,6 +61,7 @@ class Pictures:
     def place(self, body: int, places: Mapping[int, Matrix]) -> None:
         """Move some of a body's visuals, by index, to other places in their link's frame."""
         parts = self._of(body)
+        self.moved(body)
         for index, place in places.items():
             parts[index] = parts[index]._replace(local=place)
 
@@ -62,6 +73,9 @@ class Pictures:
         """Return the poses world from visual, (N, 4, 4), of bodies given with the inverse of their inertial frame."""
         poses = [np.empty((0, 4, 4))]
         for body, inverse in root_from_inertial.items():
+            if body in self._standing:
+                poses.append(self._standing[body])
+                continue
             centre = Pose(*pybullet.getBasePositionAndOrientation(body, self._client))
             root = compose(centre, inverse).matrix
             links = {-1: root}
@@ -73,7 +87,13 @@ class Pictures:
                 [multiply(links[part.link], part.local) for part in self._of(body)] or np.empty(0), (-1, 3, 4)
             )
             poses.append(local)
+            if self._stands(body):
+                self._standing[body] = local
         return np.concatenate(poses)
+
+    def _stands(self, body: int) -> bool:
+        mass = pybullet.getDynamicsInfo(body, -1, self._client)[0]
+        return mass == 0 and pybullet.getNumJoints(body, self._client) == 0
 
     def _link(self, body: int, link: int) -> Matrix:
         state = pybullet.getLinkState(body, link, 0, 1, self._client)

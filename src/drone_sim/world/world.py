@@ -142,6 +142,7 @@ class World:
         inertial = self._inertial_frames[body][0]
         centre, turn = compose(pose, inertial)
         self._centres.pop(body, None)
+        self._pictures.moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
 
@@ -175,6 +176,7 @@ class World:
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
         self._centres.clear()
+        self._pictures.all_moved()
         pybullet.restoreState(number, physicsClientId=self._client)
 
     def forget(self, number: int) -> None:
