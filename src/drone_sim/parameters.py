@@ -197,8 +197,12 @@ def _one_line(error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         return f"parameter {key}: unknown key{_near(first['loc'])}"
     message = first["msg"].replace("Value error, ", "")
+    if not first["loc"]:  # of several keys at once: it names them itself
+        return message
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    return f"parameter {key} = {first['input']!r}: {message[0].lower()}{message[1:]}{more}"
+    value = first["input"]
+    shown = repr(value) if isinstance(value, str) else f"{value!r:.60}"
+    return f"parameter {key} = {shown}: {message[0].lower()}{message[1:]}{more}"
 
 
 def _near(location: Tuple[Union[int, str], ...]) -> str:
