@@ -52,7 +52,7 @@ class DroneParameters(Checked):
 
     name: Name
     urdf: File
-    position: Point
+    position: Tuple[Finite, Finite, NonNegative]
     yaw: Finite
 
 

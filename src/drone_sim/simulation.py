@@ -20,7 +20,9 @@ from drone_sim.camera.vision import Camera, Vision
 from drone_sim.drone import Drone
 from drone_sim.parameters import CameraParameters, Parameters
 from drone_sim.scene import Scene
+from drone_sim.scripting.api_scripts import LOG
 from drone_sim.scripting.drawings import Drawings
+from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.messages import Backend
 from drone_sim.world import World
 
@@ -72,7 +74,10 @@ class Simulation:
             if started:
                 self.start()
         except BaseException:
-            self.close()
+            try:
+                self.close()
+            except ScriptError as second:  # in cleanup; the first one is what the caller is told
+                LOG.error("%s", second)
             raise
 
     def _build(self, parameters: Parameters) -> None:

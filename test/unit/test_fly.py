@@ -210,6 +210,14 @@ def sysCall_cleanup():
     assert [row[0] for row in read_csv(out)[1]] == pytest.approx([step * 0.05 for step in range(11)])
 
 
+def test_an_error_in_init_is_not_hidden_by_one_in_cleanup(script, capsys):
+    file = script("def sysCall_init():\n    first\n\ndef sysCall_cleanup():\n    second\n")
+    assert main(["--script", file, "--duration", "1"]) == 1
+    said = capsys.readouterr()
+    assert "[init]" in said.err and "'first'" in said.err
+    assert "[cleanup]" in said.out and "'second'" in said.out
+
+
 def test_an_error_in_cleanup_is_told_too(script, capsys):
     assert main(["--script", script("def sysCall_cleanup():\n    undefined\n"), "--duration", "1"]) == 1
     assert "NameError" in capsys.readouterr().err

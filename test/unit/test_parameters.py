@@ -18,6 +18,7 @@ from drone_sim import parameters
         ({"drone": {"urdf": "package://nowhere_at_all/x.urdf"}}, "no ROS package nowhere_at_all"),
         ({"control": {"thrust_limits": [8, 3]}}, "must be [lowest, highest] with lowest < highest"),
         ({"propellers": {"law": "5.x"}}, "parameter propellers/law = '5.x': input should be '3.x' or '4.x'"),
+        ({"drone": {"position": [0, 0, -1]}}, "parameter drone/position/2 = -1: input should be greater than or equal"),
         ({"colour": "red"}, "parameter colour: unknown key"),
     ],
 )

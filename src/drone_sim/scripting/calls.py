@@ -121,12 +121,13 @@ def numbers(values: Sequence[float], count: int) -> Tuple[float, ...]:
             total = None
         if type(total) is float and math.isfinite(total):
             return tuple(values)
+    expected = f"{count} numbers are expected" if count != 1 else "a number is expected"
     try:
         found = tuple(map(float, values))
     except (TypeError, ValueError):
-        raise WrongValue(f"{count} numbers are expected") from None
+        raise WrongValue(expected) from None
     if len(found) != count:
-        raise WrongValue(f"{count} numbers are expected, not {len(found)}")
+        raise WrongValue(f"{expected}, not {len(found)}")
     if not math.isfinite(sum(found)):
         raise WrongValue("finite numbers are expected")
     return found
