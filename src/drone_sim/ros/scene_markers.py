@@ -11,6 +11,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim import frames
+from drone_sim.camera.mesh import WHITE
 from drone_sim.ros.messages import WORLD
 from drone_sim.simulation import Simulation
 from drone_sim.visual import Visual
@@ -58,8 +59,9 @@ def _markers(visual: Visual, matrix: frames.Matrix) -> Sequence[Marker]:
     if visual.shape == "plane":
         return [_marker(Marker.CUBE, matrix, (_WIDE, _WIDE, _FLAT), rgba)]
     if visual.shape == "mesh":
-        mesh = _marker(Marker.MESH_RESOURCE, matrix, size, _FROM_ITS_FILE if rgba == (1, 1, 1, 1) else rgba)
-        mesh.mesh_resource, mesh.mesh_use_embedded_materials = f"file://{visual.file}", True
+        own = rgba == WHITE
+        mesh = _marker(Marker.MESH_RESOURCE, matrix, size, _FROM_ITS_FILE if own else rgba)
+        mesh.mesh_resource, mesh.mesh_use_embedded_materials = f"file://{visual.file}", own
         return [mesh]
     wide = 2 * size[0]
     if visual.shape == "sphere":
