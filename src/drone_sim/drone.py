@@ -113,13 +113,8 @@ class Drone:
     @property
     def particle_velocities(self) -> Tuple[float, ...]:
         """What the script commands: m/s, propellers 1 to 4."""
-        first, second, third, fourth = self._commanded
-        return (
-            first[_PARTICLE_VELOCITY],
-            second[_PARTICLE_VELOCITY],
-            third[_PARTICLE_VELOCITY],
-            fourth[_PARTICLE_VELOCITY],
-        )
+        (first, second, third, fourth), key = self._commanded, _PARTICLE_VELOCITY
+        return first[key], second[key], third[key], fourth[key]
 
     @property
     def blade_angles(self) -> Dict[str, float]:

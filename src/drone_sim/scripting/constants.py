@@ -7,17 +7,19 @@ from __future__ import annotations
 
 from typing import Dict
 
+from drone_sim.objects import PARENT, WORLD
+
 PHASES = ("init", "actuation", "sensing", "cleanup")
 
 _HANDLES = {
-    "handle_world": -1,
+    "handle_world": WORLD,
     "handle_all": -2,
     "handle_all_except_explicit": -3,
     "handle_self": -4,
     "handle_tree": -6,
     "handle_chain": -7,
     "handle_single": -8,
-    "handle_parent": -11,
+    "handle_parent": PARENT,
     "handle_scene": -12,
 }
 _DRAWING = {
