@@ -3,7 +3,9 @@
 
 import math
 import sys
+import threading
 import unittest
+from unittest import mock
 
 import cv2
 import numpy as np
@@ -134,7 +136,29 @@ class Cameras(unittest.TestCase):
         self.assert_like_raw(compressed, raw, "rgb8; jpeg compressed bgr8", tolerance=120)
         client.close()
 
+    def test_a_slow_encoder_holds_up_no_step(self):
+        """It is stopped in the middle of a picture; the steps go on, and of what they made the last is sent."""
+        compressed = self.listen("/drone/front/compressed", CompressedImage)
+        self.step_until(lambda: compressed.messages)
+        stopped, go_on, encode = threading.Event(), threading.Event(), cv2.imencode
+
+        def slow(*arguments):
+            stopped.set()
+            assert go_on.wait(20)
+            return encode(*arguments)
+
+        with mock.patch.object(cv2, "imencode", slow):
+            self.step_until(stopped.is_set)
+            for second in (1, 2, 3, 4, 5):
+                with mock.patch.object(rospy.Time, "now", return_value=rospy.Time(second)):
+                    self.node.step()
+            go_on.set()
+            compressed.wait_for(lambda m: m.header.stamp == rospy.Time(5), after=0)
+        self.assertFalse({rospy.Time(second) for second in (1, 2, 3, 4)} & stamps_of(compressed))
+
     def assert_like_raw(self, compressed, raw, encoding, tolerance):
+        # A picture that is being encoded while the format changes still comes in the old one.
+        self.step_until(lambda: compressed.messages[-1].format == encoding)
         for listener in (compressed, raw):
             listener.messages.clear()
         self.step_until(lambda: common_stamp(compressed, raw))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+from collections import deque
 from types import SimpleNamespace
-from typing import Any, Dict, Tuple
+from typing import Any, Deque, Dict, NamedTuple
 
 import cv2
 import numpy as np
@@ -45,8 +47,18 @@ def _plugin_parameters() -> SimpleNamespace:
     return SimpleNamespace(config_description=group, defaults=defaults, **fields)
 
 
+class _Picture(NamedTuple):
+    stamp: rospy.Time
+    frame: str
+    image: np.ndarray
+
+
 class CompressedPublisher:
-    """Publishes `<base>/compressed` (sensor_msgs/CompressedImage); its parameters live beside it."""
+    """Publishes `<base>/compressed` (sensor_msgs/CompressedImage); its parameters live beside it.
+
+    A thread of its own encodes: PNG at the plugin's default level takes longer than a step. Pictures that come
+    while it is busy are left out, but for the latest.
+    """
 
     def __init__(self, base: str):
         """Advertise, and open the dynamic_reconfigure server at `<base>/compressed`."""
@@ -54,6 +66,9 @@ class CompressedPublisher:
         self._publisher = rospy.Publisher(topic, CompressedImage, queue_size=1)
         self._settings: Dict[str, Any] = {}
         self._server = Server(_plugin_parameters(), self._keep, topic)
+        self._waiting: Deque[_Picture] = deque(maxlen=1)
+        self._came = threading.Event()
+        threading.Thread(target=self._work, name=f"{topic} encoder", daemon=True).start()
 
     def _keep(self, settings: Dict[str, Any], _level: int) -> Dict[str, Any]:
         if settings["format"] not in ("jpeg", "png"):
@@ -67,17 +82,30 @@ class CompressedPublisher:
         return self._publisher.get_num_connections()
 
     def publish(self, stamp: rospy.Time, frame: str, image: np.ndarray) -> None:
-        """Publish an RGB picture (height, width, 3) if somebody listens."""
-        if not self.get_num_connections():
-            return
-        message = CompressedImage()
-        message.header.stamp, message.header.frame_id = stamp, frame
-        message.format = f"rgb8; {self._settings['format']} compressed bgr8"
-        extension, options = self._encoding()
-        message.data = cv2.imencode(extension, cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)[1].tobytes()
-        self._publisher.publish(message)
+        """Have an RGB picture (height, width, 3) encoded and published if somebody listens; it must not change."""
+        if self.get_num_connections():
+            self._waiting.append(_Picture(stamp, frame, image))
+            self._came.set()
 
-    def _encoding(self) -> Tuple[str, Tuple[int, int]]:
-        if self._settings["format"] == "png":
-            return ".png", (cv2.IMWRITE_PNG_COMPRESSION, self._settings["png_level"])
-        return ".jpg", (cv2.IMWRITE_JPEG_QUALITY, self._settings["jpeg_quality"])
+    def _work(self) -> None:
+        while True:
+            self._came.wait()
+            self._came.clear()
+            while self._waiting:
+                message = _encoded(self._waiting.popleft(), self._settings)
+                try:
+                    self._publisher.publish(message)
+                except rospy.ROSException:  # the node ends, and has closed the topic
+                    return
+
+
+def _encoded(picture: _Picture, settings: Dict[str, Any]) -> CompressedImage:
+    message = CompressedImage()
+    message.header.stamp, message.header.frame_id = picture.stamp, picture.frame
+    message.format = f"rgb8; {settings['format']} compressed bgr8"
+    if settings["format"] == "png":
+        extension, options = ".png", (cv2.IMWRITE_PNG_COMPRESSION, settings["png_level"])
+    else:
+        extension, options = ".jpg", (cv2.IMWRITE_JPEG_QUALITY, settings["jpeg_quality"])
+    message.data = cv2.imencode(extension, cv2.cvtColor(picture.image, cv2.COLOR_RGB2BGR), options)[1].tobytes()
+    return message
