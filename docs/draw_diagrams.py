@@ -16,6 +16,7 @@ INK, GREY, LIGHT = "#222222", "#707070", "#f3f4f6"
 COMMAND, MEASURED, GAIN = "#d9730d", "#2c8a57", "#1f5fa8"  # what is asked for; what is; the numbers that you choose
 RED = "#a8325e"
 DPI = 120
+MINUS = "\N{MINUS SIGN}"
 
 rcParams["mathtext.fontset"] = "dejavusans"
 
@@ -81,8 +82,15 @@ def loops():
     axes.set_ylim(0, 80.5)
     for y, height, name in ((67.1, 23.8, "elevation"), (49.1, 10.2, "yaw"), (36.2, 13, "pitch"), (20.7, 13, "roll")):
         axes.add_patch(
-            FancyBboxPatch((11.2, y - height / 2), 65.3, height, boxstyle="round,pad=0,rounding_size=1", fc="#fafafa",
-                           ec="#d0d0d0", zorder=0)
+            FancyBboxPatch(
+                (11.2, y - height / 2),
+                65.3,
+                height,
+                boxstyle="round,pad=0,rounding_size=1",
+                fc="#fafafa",
+                ec="#d0d0d0",
+                zorder=0,
+            )
         )
         write(axes, 12.4, y + height / 2 - 1.9, name, GREY, 11, ha="left", style="italic")
     _tall(axes, 6, 5, "cmd_vel, or the flight plan", edgecolor=COMMAND)
@@ -180,7 +188,7 @@ def _command(axes, x, y, text):
 def _measured(axes, x, y, text, gain=""):
     """Draw what is subtracted at a sum, from below."""
     arrow(axes, (x, y - 4.2), (x, y - SUM), MEASURED)
-    write(axes, x - 0.9, y - 2.6, "−", MEASURED, 12, ha="right")
+    write(axes, x - 0.9, y - 2.6, MINUS, MEASURED, 12, ha="right")
     if gain:
         write(axes, x + 0.9, y - 3, gain, GAIN, ha="left", weight="bold")
     write(axes, x, y - 5.3, text, MEASURED, 11)
@@ -210,15 +218,18 @@ def propellers():
     reach = 0.55 * ARM
     line(axes, (-reach, -reach), (reach, reach), color=GREY, width=5, zorder=2)
     line(axes, (-reach, reach), (reach, -reach), color=GREY, width=5, zorder=2)
-    axes.add_patch(FancyBboxPatch((-0.013, -0.15), 0.026, 0.3, boxstyle="round,pad=0,rounding_size=0.01", fc="white",
-                                  ec=INK, zorder=3))
+    axes.add_patch(
+        FancyBboxPatch(
+            (-0.013, -0.15), 0.026, 0.3, boxstyle="round,pad=0,rounding_size=0.01", fc="white", ec=INK, zorder=3
+        )
+    )
     axes.add_patch(Polygon([(-0.013, 0.135), (0.013, 0.135), (0, 0.162)], fc=RED, ec=RED, zorder=4))
     # number, name, place across (right) and along (forward), clockwise, signs of pitch, roll, yaw
     for number, name, right, forward, clockwise, signs in (
-        (1, "front left", -1, 1, False, "−−−"),
-        (2, "back left", -1, -1, True, "+−+"),
-        (3, "back right", 1, -1, False, "++−"),
-        (4, "front right", 1, 1, True, "−++"),
+        (1, "front left", -1, 1, False, "---"),
+        (2, "back left", -1, -1, True, "+-+"),
+        (3, "back right", 1, -1, False, "++-"),
+        (4, "front right", 1, 1, True, "-++"),
     ):
         x, y = right * ARM, forward * ARM
         axes.add_patch(Circle((x, y), RADIUS, fc=LIGHT, ec=GREY, zorder=1))
@@ -227,7 +238,7 @@ def propellers():
         edge = right * (ARM + RADIUS + 0.014)
         side = "left" if right > 0 else "right"
         write(axes, edge, y + 0.052, name, size=12, weight="bold", ha=side)
-        for row, (sign, what) in enumerate(zip(signs, ("pitch_corr", "roll_corr", "yaw_corr"))):
+        for row, (sign, what) in enumerate(zip(signs.replace("-", MINUS), ("pitch_corr", "roll_corr", "yaw_corr"))):
             color = (GAIN, COMMAND, MEASURED)[row]
             write(axes, edge, y + 0.018 - 0.032 * row, f"{sign} {what}", color, 12, ha=side, family="monospace")
     arrow(axes, (0, 0.165), (0, 0.225), RED, 2)
@@ -264,7 +275,7 @@ def _on(x, y, radius, angle):
 
 
 def frames():
-    """Return Track_base beside the body's frame: from the side, where it stays level, and from above, where it turns."""
+    """Return Track_base beside the body's frame, from the side (it stays level) and from above (it turns)."""
     figure, (side, above) = sheet(9.6, 4.4, columns=2)
     for axes, title in ((side, "from the side"), (above, "from above")):
         axes.set_xlim(-2.4, 2.4)

@@ -21,11 +21,12 @@ COLUMNS = ("too fast by", "90 % after", "leans", "sags", "swings back", "propell
 def main(arguments=None):
     """Print a line for the gains as they are, and one for each change; return the exit status."""
     options = _parser().parse_args(arguments)
+    always = ["control.thrust_limits=null", f"drone.position=[0, 0, {HEIGHT}]"]
     print("".join([f"{'gain':>14}", *(f"{title:>13}" for title in COLUMNS)]))
     for change in ("as it is", *options.changes):
         try:
             changed = [] if change == "as it is" else [f"control.{change}"]
-            values = parameters.load(settings([*changed, "control.thrust_limits=null", f"drone.position=[0,0,{HEIGHT}]"]))
+            values = parameters.load(settings([*changed, *always]))
         except parameters.ParameterError as error:
             print(f"gains.py: {error}", file=sys.stderr)
             return 1
@@ -62,8 +63,8 @@ def _told(flown, speed):
     sag = HEIGHT - min(row[3] for row in flown)
     back = -min(row[1] for row in flown)
     blown = [velocity for row in flown for velocity in row[4]]
-    cells = (f"{100 * (fast / speed - 1):.0f} %", f"{there:.2f} s", f"{lean:.2f} rad", f"{sag:.2f} m", f"{back:.2f} m/s")
-    return "".join(f"{cell:>13}" for cell in (*cells, f"{min(blown):.1f} .. {max(blown):.1f}"))
+    flight = f"{fast / speed - 1:.0%}", f"{there:.2f} s", f"{lean:.2f} rad", f"{sag:.2f} m", f"{back:.2f} m/s"
+    return "".join(f"{cell:>13}" for cell in (*flight, f"{min(blown):.1f} .. {max(blown):.1f}"))
 
 
 def _parser():

@@ -1,71 +1,24 @@
 """docs/tutorial.md: each stage flies as its text says, its commands print what it shows, its lines are the scripts'."""
 
-import contextlib
-import difflib
 import math
 import re
 import shlex
 import textwrap
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
 
-from drone_sim import parameters
-from drone_sim.offline import timeline
 from drone_sim.offline.fly import main as fly_main
-from drone_sim.offline.fly import settings
-from drone_sim.simulation import Simulation
 from drone_sim.state import Pose, Twist, Vector3
 
-ROOT = Path(__file__).resolve().parents[2]
-DOCS = ROOT / "docs"
-TEXT = (DOCS / "tutorial.md").read_text(encoding="utf-8")
-STAGES = {path.stem: path for path in sorted((DOCS / "tutorial").glob("[0-9]_*.py"))}
 FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
 RIPPLE = 0.01  # m/s, of vz: particles come whole
 
 
 def blocks(language):
     return re.findall(rf"^ *```{language}\n(.*?)^ *```$", TEXT, re.MULTILINE | re.DOTALL)
-
-
-@contextlib.contextmanager
-def flying(stage, *assignments):
-    values = parameters.load(settings(assignments))
-    simulation = Simulation(values, script=str(STAGES[stage]) if stage in STAGES else stage)
-    try:
-        yield simulation
-    finally:
-        simulation.close()
-
-
-def fly(simulation, seconds, commands=None):
-    """Return x y z, velocities, yaw and propellers after each step, as arrays by name."""
-    states, yaws, propellers = [], [], []
-    for step in range(round(seconds / simulation.parameters.time_step)):
-        if commands is not None:
-            commands.apply(step, simulation.drone)
-        simulation.step()
-        states.append([number for part in simulation.drone.state for number in part])
-        yaws.append(math.atan2(simulation.drone.matrix[4], simulation.drone.matrix[0]))
-        propellers.append(simulation.drone.particle_velocities)
-    columns = np.array(states).T
-    names = ["x", "y", "z", "qx", "qy", "qz", "qw", "vx", "vy", "vz", "wx", "wy", "wz"]
-    flight = SimpleNamespace(**dict(zip(names, columns)))
-    flight.states, flight.yaw, flight.propellers = np.array(states), np.array(yaws), np.array(propellers)
-    return flight
-
-
-def fly_timeline(stage, name, *assignments, seconds=None):
-    with flying(stage, *assignments) as simulation:
-        commands = timeline.read(str(DOCS / "tutorial" / name), simulation.parameters)
-        return fly(simulation, seconds or commands.end + 5, commands)
-
-
-def at(values, seconds):
-    return values[round(seconds / 0.05) - 1]
 
 
 # ---- the stages
@@ -196,189 +149,6 @@ def test_the_camera_stage_publishes_every_step_s_picture():
     assert (picture.width, picture.height, picture.frame_id) == (64, 480, "front_optical")
     assert np.array_equal(np.frombuffer(picture.data, np.uint8).reshape(seen.shape), seen)
     assert seen.reshape(-1, 3).std(axis=0).min() > 10  # there is something to see
-
-
-# ---- what the text says of watching it in rviz
-
-
-def push(drone, force=(0, 0, 0), torque=(0, 0, 0)):
-    drone.push(force, torque, 0.2)
-
-
-def test_pushed_constant_thrust_slides_level_and_later_lies_on_the_floor():
-    with flying("1_thrust") as simulation:
-        push(simulation.drone, (1, 0, 0))
-        flight = fly(simulation, 27)
-    assert at(flight.vx, 20) == pytest.approx(0.385, abs=0.001)
-    assert np.allclose(flight.qy[: round(20 / 0.05)], 0, atol=1e-9)
-    assert at(flight.z, 22) > 0.1
-    assert at(flight.z, 26) < 0.03
-
-
-def test_elevation_comes_back_from_half_a_metre_and_slides_after_a_push():
-    with flying("2_elevation") as simulation:
-        fly(simulation, 8)
-        simulation.drone.move(Pose((0, 0, 0.5)))
-        flight = fly(simulation, 2)
-        assert flight.z[0] == pytest.approx(0.5, abs=0.02)
-        assert flight.z[-1] == pytest.approx(1.521, abs=0.01)
-        push(simulation.drone, (0, 1, 0))
-        flight = fly(simulation, 5)
-    assert at(flight.vy, 5) == pytest.approx(0.385, abs=0.001)
-    assert np.allclose(flight.z, 1.521, atol=0.01)
-
-
-def test_a_spin_is_stopped_within_a_second_and_leaves_a_new_heading():
-    with flying("3_yaw") as simulation:
-        before = fly(simulation, 7).yaw[-1]
-        push(simulation.drone, torque=(0, 0, 0.05))
-        flight = fly(simulation, 2)
-    assert abs(at(flight.wz, 1.2)) < 0.01
-    assert flight.yaw[-1] - before == pytest.approx(0.234, abs=0.002)
-
-
-def test_pitch_answers_a_push_from_behind_and_none_from_the_side():
-    with flying("4_pitch") as simulation:
-        before = fly(simulation, 16)
-        push(simulation.drone, (1, 0, 0))
-        flight = fly(simulation, 8)
-        assert flight.qy.min() < -0.03  # nose up
-        assert 0.05 < flight.x[-1] - before.x[-1] < 0.15
-        assert abs(flight.vx[-1]) < 0.02
-        push(simulation.drone, (0, 1, 0))
-        assert fly(simulation, 8).vy[-1] == pytest.approx(0.385, abs=0.01)
-
-
-def test_roll_answers_a_push_from_the_right():
-    with flying("5_roll") as simulation:
-        before = fly(simulation, 16)
-        push(simulation.drone, (0, 2, 0))
-        flight = fly(simulation, 8)
-    assert flight.qx.max() > 0.05  # to the right
-    assert abs(flight.vy[-1]) < 0.05
-    assert flight.y[-1] - before.y[-1] > 0.1
-
-
-def test_a_turn_to_the_left_moves_the_posts_to_the_right():
-    scene = f"scene_file={DOCS / 'tutorial' / '7_scene.yaml'}"
-    with flying("7_camera", "cameras.front.width=160", "cameras.front.height=120", scene) as simulation:
-        fly(simulation, 0.5)
-        before = orange(simulation.cameras["front"].take())
-        simulation.drone.bus.post("/drone/cmd_vel", Twist(Vector3(), Vector3(0, 0, 0.3)))
-        fly(simulation, 0.8)
-        assert orange(simulation.cameras["front"].take()) > before + 10
-
-
-def orange(picture):
-    """Return the mean column (px) of the posts."""
-    red, _, blue = np.moveaxis(picture.astype(int), -1, 0)
-    return np.nonzero(red > blue + 80)[1].mean()
-
-
-# ---- the solutions
-
-
-SOLUTIONS = {path.stem: path for path in sorted((DOCS / "tutorial" / "solutions").glob("*.py"))}
-STAGE_OF = {name: next(stage for stage in STAGES if stage[0] == name[0]) for name in SOLUTIONS}
-
-
-def fly_solution(name, commands=None, *assignments, seconds=None):
-    with flying(str(SOLUTIONS[name]), *assignments) as simulation:
-        if commands is None:
-            return fly(simulation, seconds)
-        planned = timeline.read(str(DOCS / "tutorial" / commands), simulation.parameters)
-        return fly(simulation, seconds or planned.end + 5, planned)
-
-
-def test_every_exercise_links_its_solution():
-    linked = re.findall(r"\(tutorial/solutions/(\w+)\.py\)", TEXT)
-    assert sorted(linked) == sorted(SOLUTIONS)
-    exercises = re.findall(r"^> \*\*Exercise\.\*\*.*?(?:\n(?!>)|\Z)", TEXT, re.MULTILINE | re.DOTALL)
-    assert len(exercises) >= 9
-    assert all("tutorial/solutions/" in exercise for exercise in exercises)
-
-
-@pytest.mark.parametrize("name", SOLUTIONS)
-def test_a_solution_is_its_stage_with_a_few_lines_changed(name):
-    stage, solution = (path.read_text().splitlines() for path in (STAGES[STAGE_OF[name]], SOLUTIONS[name]))
-    changes = [line for line in difflib.ndiff(stage, solution) if line[0] in "+-"]
-    assert 3 <= len(changes) <= 30
-
-
-def test_solution_a_frame_that_nobody_moves_stays():
-    with flying(str(SOLUTIONS["1_frame"])) as simulation:
-        fly(simulation, 0.05)
-        before = simulation.drone.track
-        push(simulation.drone, (1, 0, 0))
-        assert fly(simulation, 5).x[-1] > 1.5
-        assert simulation.drone.track == before
-
-
-def test_solution_a_thrust_hangs_for_a_minute():
-    assert fly_solution("1_thrust", seconds=60).z[-1] == pytest.approx(0.8, abs=0.01)
-
-
-def test_solution_half_the_damping_overshoots():
-    halved = fly_solution("2_elevation", "2_elevation.yaml").z[round(6.1 / 0.05) :]
-    assert 0.15 < halved.max() - halved[-1] < 0.17
-    whole = fly_timeline("2_elevation", "2_elevation.yaml").z[round(6.1 / 0.05) :]
-    assert whole.max() - whole[-1] < 0.01
-
-
-@pytest.mark.parametrize("start", [0, 1.7])  # 1.7: the spin goes past pi
-def test_solution_the_heading_is_held_the_short_way_round(start):
-    flight = fly_solution("3_yaw", "3_yaw.yaml", f"drone.yaw={start}", seconds=16)
-    yaw = np.unwrap(flight.yaw)
-    assert at(yaw, 5.9) - start == pytest.approx(1.384, abs=0.02)
-    assert at(yaw, 6.4) - start > 1.384 + 0.07
-    assert yaw[-1] - start == pytest.approx(1.384, abs=0.002)
-    assert (flight.yaw.min() < 0) == (start > 0)
-
-
-def test_solution_a_gentler_outer_loop_overshoots_less_and_needs_longer():
-    gentle, given = fly_solution("4_pitch", "4_pitch.yaml"), fly_timeline("4_pitch", "4_pitch.yaml")
-    assert gentle.vx.max() < 1.3 < 1.5 < given.vx.max()
-    assert np.argmax(gentle.vx > 0.9) > np.argmax(given.vx > 0.9) + 8
-
-
-@pytest.mark.parametrize(
-    "name, rests", [("5_square", (10.9, 20.9, 30.9, 40.9)), ("5_square_turning", (10.4, 29, 47.5, 66))]
-)
-def test_solution_a_square_has_its_corners(name, rests):
-    flight = fly_solution(name, seconds=75)
-    corners = [(at(flight.x, rest), at(flight.y, rest)) for rest in rests]
-    assert np.allclose(corners, [(4, 0), (4, 4), (0, 4), (0, 0)], atol=0.06)
-    turned = np.unwrap(flight.yaw)[-1]
-    assert turned == pytest.approx(2 * math.pi if "turning" in name else 0, abs=0.01)
-
-
-def test_solution_the_guard_catches_the_fall():
-    flight = fly_solution("5_guard", "fall.yaml", "drone.position=[0, 0, 5]", seconds=26)
-    assert flight.z[-1] == pytest.approx(5, abs=0.01)
-    assert np.hypot(flight.vx[-1], flight.vy[-1]) < 0.05
-
-
-def test_solution_a_turn_without_slip():
-    with_slip, without = fly_timeline("6_ros", "6_ros.yaml"), fly_solution("6_ros", "6_ros.yaml")
-    assert sideways(with_slip, 19.9) == pytest.approx(-1 * 0.5 / 9.81 / 0.5, abs=0.01)  # -v w / g / Kvcorr
-    assert sideways(without, 19.9) == pytest.approx(0, abs=0.01)
-
-
-def sideways(flight, seconds):
-    yaw = at(flight.yaw, seconds)
-    return -math.sin(yaw) * at(flight.vx, seconds) + math.cos(yaw) * at(flight.vy, seconds)
-
-
-def test_solution_every_fourth_picture_has_no_red():
-    with flying(str(SOLUTIONS["7_camera"]), "cameras.front.width=64", "cameras.front.height=48") as simulation:
-        fly(simulation, 0.6)
-        published = list(simulation.drone.bus.published)
-        seen = simulation.cameras["front"].take()
-    assert len(published) == 3
-    picture = np.frombuffer(published[-1].message.data, np.uint8).reshape(seen.shape)
-    assert not picture[..., 0].any()
-    assert np.array_equal(picture[..., 1:], seen[..., 1:])
-
 
 
 # ---- the text

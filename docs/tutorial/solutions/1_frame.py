@@ -1,4 +1,7 @@
-"""Stage 1, the frame left where it was: the tracking camera stays there, too."""
+"""Stage 1, the frame left where it was.
+
+It stays where the drone began, and with it the tracking camera and the view of rviz: they see the drone slide away.
+"""
 
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
 

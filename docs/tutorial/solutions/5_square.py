@@ -1,4 +1,7 @@
-"""Stage 5: a square, the nose pointing forward all the time."""
+"""Stage 5: a square, the nose pointing forward all the time.
+
+Without a law for the place, the times have to be found by trying.
+"""
 
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
 

@@ -1,4 +1,7 @@
-"""Stage 5: a square, the nose pointing along each side."""
+"""Stage 5: a square, the nose pointing along each side.
+
+In its own frame the drone does the same four times over: one time does for all sides.
+"""
 
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
 
