@@ -208,6 +208,12 @@ def _out(axes, x, y, name):
 
 ARM = 0.09192  # m, from the middle of the drone to a propeller's, along x and along y
 RADIUS = 0.0796  # m
+PROPELLERS = (  # number, name, place to the right and forward, whether clockwise from above, signs of pitch, roll, yaw
+    (1, "front left", -1, 1, False, "---"),
+    (2, "back left", -1, -1, True, "+-+"),
+    (3, "back right", 1, -1, False, "++-"),
+    (4, "front right", 1, 1, True, "-++"),
+)
 
 
 def propellers():
@@ -215,7 +221,7 @@ def propellers():
     figure, (axes,) = sheet(8.4, 5.9)
     axes.set_xlim(-0.36, 0.36)
     axes.set_ylim(-0.262, 0.2437)
-    reach = 0.55 * ARM
+    reach = 0.75 * ARM
     line(axes, (-reach, -reach), (reach, reach), color=GREY, width=5, zorder=2)
     line(axes, (-reach, reach), (reach, -reach), color=GREY, width=5, zorder=2)
     axes.add_patch(
@@ -224,17 +230,11 @@ def propellers():
         )
     )
     axes.add_patch(Polygon([(-0.013, 0.135), (0.013, 0.135), (0, 0.162)], fc=RED, ec=RED, zorder=4))
-    # number, name, place across (right) and along (forward), clockwise, signs of pitch, roll, yaw
-    for number, name, right, forward, clockwise, signs in (
-        (1, "front left", -1, 1, False, "---"),
-        (2, "back left", -1, -1, True, "+-+"),
-        (3, "back right", 1, -1, False, "++-"),
-        (4, "front right", 1, 1, True, "-++"),
-    ):
+    for number, name, right, forward, clockwise, signs in PROPELLERS:
         x, y = right * ARM, forward * ARM
         axes.add_patch(Circle((x, y), RADIUS, fc=LIGHT, ec=GREY, zorder=1))
         write(axes, x, y, str(number), size=22, weight="bold")
-        _spin(axes, x, y, clockwise)
+        _spin(axes, x, y, forward, clockwise)
         edge = right * (ARM + RADIUS + 0.014)
         side = "left" if right > 0 else "right"
         write(axes, edge, y + 0.052, name, size=12, weight="bold", ha=side)
@@ -258,12 +258,14 @@ def propellers():
     return figure
 
 
-def _spin(axes, x, y, clockwise):
-    """Draw which way the blades turn, as seen from above."""
-    radius, end = 0.058, 30 if clockwise else 150
-    axes.add_patch(Arc((x, y), 2 * radius, 2 * radius, theta1=30, theta2=150, color=INK, linewidth=1.6, zorder=3))
-    before = math.radians(end + (6 if clockwise else -6))
-    tip = math.radians(end + (-7 if clockwise else 7))
+def _spin(axes, x, y, outer, clockwise):
+    """Draw which way the blades turn, as seen from above, on the side away from the arms."""
+    radius, middle = 0.058, 90 * outer
+    end = middle + (-60 if clockwise else 60)
+    axes.add_patch(
+        Arc((x, y), 2 * radius, 2 * radius, theta1=middle - 60, theta2=middle + 60, color=INK, linewidth=1.6, zorder=3)
+    )
+    before, tip = (math.radians(end + (turn if clockwise else -turn)) for turn in (6, -7))
     arrow(axes, _on(x, y, radius, before), _on(x, y, radius * 0.97, tip), INK, 1.6)
 
 

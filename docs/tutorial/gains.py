@@ -20,7 +20,10 @@ COLUMNS = ("too fast by", "90 % after", "leans", "sags", "swings back", "propell
 
 def main(arguments=None):
     """Print a line for the gains as they are, and one for each change; return the exit status."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if not 0 < options.speed <= 20:
+        parser.error(f"--speed {options.speed:g}: must be above 0 and at most 20 m/s")
     always = ["control.thrust_limits=null", f"drone.position=[0, 0, {HEIGHT}]"]
     print("".join([f"{'gain':>14}", *(f"{title:>13}" for title in COLUMNS)]))
     for change in ("as it is", *options.changes):

@@ -1,5 +1,6 @@
 """docs/tutorial.md: each stage flies as its text says, its commands print what it shows, its lines are the scripts'."""
 
+import ast
 import math
 import re
 import shlex
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
 
+from drone_sim.drone import PROPELLERS
 from drone_sim.offline.fly import main as fly_main
 from drone_sim.state import Pose, Twist, Vector3
 
@@ -152,6 +154,17 @@ def test_the_camera_stage_publishes_every_step_s_picture():
 
 
 # ---- the text
+
+
+def test_the_propellers_are_drawn_as_they_are():
+    source = (DOCS / "draw_diagrams.py").read_text()
+    drawn = ast.literal_eval(re.search(r"^PROPELLERS = (\(.*?^\))", source, re.MULTILINE | re.DOTALL).group(1))
+    script = STAGES["1_thrust"].read_text()
+    for (_, name, _, _, clockwise, signs), (known, rotation) in zip(drawn, PROPELLERS):
+        assert name == known.replace("_", " ")
+        assert clockwise == (rotation > 0)  # the blades turn against the torque that they leave
+        mixing = " ".join(f"{sign} self.{what}_corr" for sign, what in zip(signs, ("pitch", "roll", "yaw")))
+        assert f"prop_{known} = self.thrust * (1 {mixing})" in script
 
 
 @pytest.mark.parametrize("stage", STAGES)

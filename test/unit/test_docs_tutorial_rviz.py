@@ -1,10 +1,21 @@
 """docs/tutorial.md: what its stages tell to do in rviz has the effect that is told."""
 
+import re
+
 import numpy as np
 import pytest
-from tutorial_flights import DOCS, at, fly, flying, push
+from tutorial_flights import DOCS, TEXT, at, fly, flying, push
 
 from drone_sim.state import Pose, Twist, Vector3
+
+
+def test_every_stage_tells_what_to_see():
+    stages = re.findall(r"^## Stage \d.*?(?=^## )", TEXT, re.MULTILINE | re.DOTALL)
+    assert len(stages) == 7
+    for stage in stages:
+        watch = stage[stage.index("*Now watch it") :]
+        assert "1$ roslaunch drone_sim drone.launch script:=" in watch
+        assert "ou should see" in watch
 
 
 def test_pushed_constant_thrust_slides_level_and_later_lies_on_the_floor():
