@@ -99,6 +99,7 @@ def _listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
 # The node with a clock at its ear: a command says, in a field that the drone does not use, when it was sent.
 PROBE = """
 import sys, time
+from drone_sim.guardian import Guardian
 from drone_sim.ros import inputs, node
 delays = []
 heard = inputs.DroneInput._on_twist
@@ -107,7 +108,7 @@ def probe(self, message):
     heard(self, message)
 inputs.DroneInput._on_twist = probe
 path, sys.argv[1:] = sys.argv[1], sys.argv[2:]
-node.main()
+node.main(Guardian("drone_sim"))
 open(path, "w").write("\\n".join(map(repr, delays)))
 """
 

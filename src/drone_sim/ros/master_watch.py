@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 
 import rosgraph
 import rospy
 
 _PERIOD = 2.0  # s
-
-
-def master_is_there() -> bool:
-    """Tell whether there is a master; say in one line when there is none. rospy itself would wait, with tracebacks."""
-    there = rosgraph.is_master_online()
-    if not there:
-        line = f"drone_sim: no ROS master at {rosgraph.get_master_uri()}: start roscore, or use roslaunch"
-        print(line, file=sys.stderr)
-    return there
 
 
 class MasterWatch(threading.Thread):
