@@ -106,7 +106,8 @@ class Node:
                 self._pacer.restart()
         flown = steps * self._parameters.time_step
         factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
-        rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {self._pacer.overruns} late steps")
+        late = f"{self._pacer.overruns} late steps, by {self._pacer.worst * 1e3:.0f} ms at most"
+        rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {late}")
 
     def _wait(self, over: Callable[[], bool]) -> None:
         if self.player.begun:  # reading scene and script took its time, which no step is late for
