@@ -192,7 +192,7 @@ def latencies(seconds: float = 20.0) -> List[Row]:
 
 
 def late_steps(seconds: float = 60.0) -> List[Row]:
-    """At real time, the launch file with the front camera heard and a bag of everything; with rviz where it is there."""
+    """At real time, the launch file with the front camera heard and a bag of everything; with rviz if it is there."""
     rows = []
     for rviz in (False, True):
         name = f"drone.launch {'with' if rviz else 'without'} rviz, camera, bag"
@@ -210,7 +210,9 @@ def _recorded(argument: str, folder: str, seconds: float) -> "re.Match[str]":
     from sensor_msgs.msg import Image
 
     with launched(argument) as lines:
-        recorder = subprocess.Popen(["rosbag", "record", "-a", "-q", "-O", f"{folder}/all.bag"], stdout=subprocess.DEVNULL)
+        recorder = subprocess.Popen(
+            ["rosbag", "record", "-a", "-q", "-O", f"{folder}/all.bag"], stdout=subprocess.DEVNULL
+        )
         subscriber = _listen("/drone/front", Image)
         time.sleep(seconds)
         subscriber.unregister()

@@ -77,9 +77,7 @@ class Standing(unittest.TestCase):
         for listener in (self.odometry, self.front):
             listener.wait_for(lambda m: m.header.stamp == expected[-1], after=before[listener])
         self.clock.wait_for(lambda c: c.clock == expected[-1], after=before[self.clock])
-        self.transforms.wait_for(
-            lambda m: m.transforms[0].header.stamp == expected[-1], after=before[self.transforms]
-        )
+        self.transforms.wait_for(lambda m: m.transforms[0].header.stamp == expected[-1], after=before[self.transforms])
         since = {listener: listener.messages[count:] for listener, count in before.items()}
         self.assertEqual([c.clock for c in since[self.clock] if c.clock >= expected[0]], expected)
         self.assertEqual([o.header.stamp for o in since[self.odometry] if o.header.stamp >= expected[0]], expected)

@@ -153,7 +153,7 @@ class Node:
         self._show_to_eyes()
 
     def _show_at_the_same_time(self) -> None:
-        """Show what has changed under a stamp that was used before: no transforms, of which tf2 refuses a second one."""
+        """Show what has changed under a stamp that was used before: no transforms, which tf2 takes only once."""
         self._time.end(at_once=True)
         if self.simulation.world.changes != self._shown:
             self.simulation.look()
