@@ -9,7 +9,7 @@ from pydantic import Field
 from typing_extensions import Annotated, Literal
 
 from drone_sim.frames import Matrix, from_rpy, multiply
-from drone_sim.parameter_types import Angles, Checked, Finite, Name, ParameterError, Point, Within
+from drone_sim.parameter_types import Angles, Checked, Finite, Label, Name, ParameterError, Point, Within
 
 MAX_CAMERAS = 16
 MAX_PIXELS = 4096 * 4096  # of all cameras together
@@ -23,7 +23,7 @@ RESERVED_TOPICS = (
 class MountParameters(Checked):
     """Where a camera sits that has no link in the URDF: in the frame of an object, looking along its +x."""
 
-    parent: Annotated[str, Field(max_length=256)]
+    parent: Label
     position: Point
     rpy: Angles
 

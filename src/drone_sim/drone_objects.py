@@ -23,7 +23,6 @@ from drone_sim import frames
 from drone_sim.frames import Matrix
 from drone_sim.objects import Body, ObjectTree
 from drone_sim.parameters import CameraParameters, ParameterError
-from drone_sim.resources import shown
 
 DRONE = "Drone"
 TARGET = "DronePosition"  # the green sphere
@@ -77,7 +76,7 @@ def _add_camera(objects: ObjectTree, links: Mapping[str, Matrix], camera: Camera
     else:
         parent, optical = camera.mount.parent, camera.mount.matrix
         if parent not in objects:
-            raise ParameterError(f"camera frame {camera.frame}: no object is named {shown(parent)}")
+            raise ParameterError(f"camera frame {camera.frame}: no object is named {parent}")
     if camera.object in objects:
         raise ParameterError(f"camera frame {camera.frame}: an object named '{camera.object}' is there already")
     objects.add(camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR))

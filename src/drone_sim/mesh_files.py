@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 from pathlib import Path
@@ -22,7 +23,11 @@ MAX_TRIANGLES = 200_000  # of a file
 MAX_PARTS = 256  # materials, or nodes of a COLLADA scene
 MAX_COORDINATE = 1e6  # m from the mesh's origin
 WHITE = (1.0, 1.0, 1.0, 1.0)
-_MANY_NODES = 16  # <instance_node> of a COLLADA file, each of which may double what is drawn
+# How often a word may stand in a file; each <instance_node> may double what is drawn.
+_MOST = {
+    ".obj": {rb"usemtl": MAX_PARTS, rb"\nf": MAX_TRIANGLES},
+    ".dae": {rb"<(?:\w+:)?instance_node": 16, rb"<(?:\w+:)?instance_geometry": MAX_PARTS},
+}
 _HULL = 256  # corners that a hull may have
 _Colour = Tuple[float, float, float, float]
 
@@ -57,7 +62,7 @@ def triangles(path: str) -> int:
 
 
 def reach(path: str) -> np.ndarray:
-    """Return how far a mesh file's vertices are from its origin along x, y and z, (3,), m. Raises what `read` raises."""
+    """Return how far a mesh file's vertices are from its origin along x, y and z, (3,), m; raises what `read` does."""
     return np.max([np.abs(part.vertices).max(axis=0) for part in read(path)], axis=0)
 
 
@@ -104,10 +109,8 @@ class _Beside(Resolver):
         self.files.append(str(path))
         try:
             content = read_bytes(path, MAX_SIZE)
-            try:
+            with contextlib.suppress(Image.UnidentifiedImageError):  # a list of materials
                 images.check(content)
-            except Image.UnidentifiedImageError:
-                pass  # a list of materials
         except FileNotFoundError:
             raise
         except Exception as error:  # kept, for trimesh goes on without the file
@@ -151,20 +154,14 @@ def _read(path: str) -> Reading:
 
 def _check_text(content: bytes, kind: str) -> None:
     """Refuse what would keep trimesh busy before it can be counted."""
-    if kind == ".obj":
-        if content.count(b"usemtl") > MAX_PARTS:
-            raise ValueError(f"more than {MAX_PARTS} changes of material")
-        if content.count(b"\nf") > MAX_TRIANGLES:
-            raise ValueError(f"more than {MAX_TRIANGLES} faces")
     if kind == ".dae":
-        if not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
-            raise ValueError("is no XML")
-        if b"<!DOCTYPE" in content or b"\0" in content:
-            raise ValueError("must be UTF-8 without a DOCTYPE")
-        if len(re.findall(rb"<(?:\w+:)?instance_node", content)) > _MANY_NODES:
-            raise ValueError(f"more than {_MANY_NODES} instance_node")
-        if len(re.findall(rb"<(?:\w+:)?instance_geometry", content)) > MAX_PARTS:
-            raise ValueError(f"more than {MAX_PARTS} instance_geometry")
+        if not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") or b"\0" in content:
+            raise ValueError("must be XML in UTF-8")
+        if b"<!DOCTYPE" in content:
+            raise ValueError("must have no DOCTYPE")
+    for word, most in _MOST.get(kind, {}).items():
+        if len(re.findall(word, content)) > most:
+            raise ValueError(f"more than {most} times `{word.rpartition(b')?')[2].decode().strip()}`")
 
 
 def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:

@@ -113,6 +113,13 @@ class Parameters(Checked):
     cameras: Annotated[Dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
     _given: Dict[str, Any] = PrivateAttr(default_factory=dict)  # what stands without the scene file
 
+    _drone_in_scene: Tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def drone_in_scene(self) -> Tuple[str, ...]:
+        """The keys of `drone` that the scene file gives."""
+        return self._drone_in_scene
+
     @property
     def sub_steps(self) -> int:
         """Number of Bullet steps in a simulation step."""
@@ -191,6 +198,8 @@ def _checked(given: Dict[str, Any], file: Any, scene: Dict[str, Any]) -> Paramet
         from_scene = scene and error.errors()[0]["loc"][:1] in (("scene",), ("drone",))
         raise ParameterError(f"{file}: {_one_line(error)}" if from_scene else _one_line(error)) from None
     parameters._given = given
+    drone = scene.get("drone")
+    parameters._drone_in_scene = tuple(drone) if isinstance(drone, dict) else ()
     return parameters
 
 

@@ -137,20 +137,18 @@ def crease_normals(corners: np.ndarray, crease: float = float(CREASE)) -> np.nda
     """
     area = _areas(corners)
     unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-30)
-    face = np.repeat(np.arange(len(corners)), 3)
-    share = unit[face] * _angles(corners).reshape(-1, 1)
     point = _points(corners).ravel()
     order = np.argsort(point, kind="stable")  # the corners at one point stand beside each other
-    count = np.bincount(point)
-    start = (np.cumsum(count) - count)[point[order]]
-    count = count[point[order]]
-    total = share[order]
-    rank = np.arange(len(order)) - start
-    for shift in range(1, min(int(count.max(initial=0)), MOST_FACES + 1)):
-        here = np.flatnonzero((count > shift) & (count <= MOST_FACES))
-        other = order[start[here] + (rank[here] + shift) % count[here]]
-        near = np.einsum("ij,ij->i", unit[face[order[here]]], unit[face[other]]) > np.cos(crease)
-        total[here[near]] += share[other[near]]
+    unit = np.repeat(unit, 3, axis=0)[order]
+    share = unit * _angles(corners).reshape(-1, 1)[order]
+    many = np.bincount(point)
+    count, start = many[point[order]], (np.cumsum(many) - many)[point[order]]
+    total, here = share.copy(), np.flatnonzero(count <= MOST_FACES)
+    rank, near = np.arange(len(order)) - start, np.cos(crease)
+    for shift in range(1, MOST_FACES):
+        here = here[count[here] > shift]
+        other = start[here] + (rank[here] + shift) % count[here]
+        total[here] += share[other] * (np.einsum("ij,ij->i", unit[here], unit[other]) > near)[:, None]
     normals = np.empty_like(total)
     normals[order] = total
     length = np.linalg.norm(normals, axis=1, keepdims=True)

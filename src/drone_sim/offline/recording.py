@@ -26,10 +26,14 @@ class Recording:
     base_link in the world frame, the command is in the track frame, propellers are particle velocities.
     """
 
-    def __init__(self, file: Optional[TextIO] = None):
-        """Take the CSV file, if there is to be one, and write its header. Raises OSError."""
+    def __init__(self, file: Optional[TextIO] = None, keep: bool = True):
+        """Take the CSV file, if there is to be one, and write its header. Raises OSError.
+
+        Without `keep`, `rows` holds the last one alone: a long flight must not fill the memory.
+        """
         self.rows: List[Tuple[float, ...]] = []
         self._file = file
+        self._keep = keep
         self._write(COLUMNS)
 
     def add(self, simulation: Simulation) -> None:
@@ -38,6 +42,8 @@ class Recording:
         position, orientation, linear, angular = drone.state
         command = (*drone.command.linear, drone.command.angular.z)
         row = (simulation.time, *position, *orientation, *linear, *angular, *command, *drone.particle_velocities)
+        if not self._keep:
+            self.rows.clear()
         self.rows.append(row)
         # 17 digits bring every float back to the last bit.
         self._write(f"{value:.17g}" for value in row)

@@ -154,8 +154,8 @@ class _ToRosout(logging.Handler):
 
 def _parameters() -> Parameters:
     given = rospy.get_param("~", {})
-    for key in ("script", "scene_file"):
-        if isinstance(given.get(key), str):
+    for key in ("config", "script", "scene_file"):
+        if isinstance(given, dict) and isinstance(given.get(key), str):
             given[key] = from_shell(given[key])
     return parameters_module.load(given)
 

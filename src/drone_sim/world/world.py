@@ -5,9 +5,8 @@ One thread owns it. Every call names its client, so several worlds can live in o
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import Dict, List, Mapping, Optional, Sequence, Set, Tuple
+from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pybullet
@@ -18,6 +17,7 @@ from drone_sim.state import Pose, State, compose, inverse
 from drone_sim.urdf import RigidBody
 from drone_sim.visual import Visual
 from drone_sim.world import shapes
+from drone_sim.world.own_files import OwnFiles
 from drone_sim.world.pictures import Pictures
 
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -31,12 +31,13 @@ class World:
 
         Raises RuntimeError where `gui` finds no display.
         """
+        self._files = OwnFiles()
         self._client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
         self._sub_step, self._gravity = sub_step, gravity
         self._snapshots: Set[int] = set()
-        self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_")
+        self._gui = gui
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
         self.clear()
@@ -51,27 +52,31 @@ class World:
         pybullet.setTimeStep(self._sub_step, self._client)
         self._inertial_frames: Dict[int, Tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: Dict[int, Tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
-        self._pictures = Pictures(self._client)
+        self._files.clear()
+        self._pictures = Pictures(self._client, self._files.origin)
+        self._undressed: Dict[int, str] = {}  # bodies whose texture PyBullet has not been given
 
     def close(self) -> None:
         """Free the world; may be called twice."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
-            self._folder.cleanup()
+            self._files.close()
 
     # ---- building
 
     def add_floor(self, size: float, texture: str) -> int:
         """Add a square floor with its top at z = 0, `size` metres a side; return its body id."""
-        body = shapes.create_floor(self._client, Path(self._folder.name), size, texture)
+        body = shapes.create_floor(self._client, self._files, size)
+        self._cover(body, texture)
         self._set_material(body)
         self._pictures.set_floor(body, texture)
         return body
 
     def add_shape(self, shape: shapes.Shape) -> int:
         """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
-        body = shapes.create(self._client, shape)
+        body = shapes.create(self._client, shape, self._files)
+        self._cover(body, shape.texture)
         self._set_material(body)
         self.set_pose(body, shape.pose)  # again, for PyBullet reads a URDF's pose in single precision
         if shape.texture:
@@ -80,21 +85,31 @@ class World:
 
     def add_rigid_body(self, body: RigidBody, pose: Pose) -> int:
         """Add a merged URDF with its root link at `pose`, at rest; return its body id."""
-        path = Path(self._folder.name) / "body.urdf"
-        path.write_text(body.xml, encoding="utf-8")
+        path = self._files.urdf(Xml.fromstring(body.xml))
         # The merged inertia is right; what PyBullet would derive from the collision shapes' bounds is not.
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-        number = pybullet.loadURDF(
-            str(path), pose.position, pose.orientation, flags=flags, physicsClientId=self._client
-        )
+        number = pybullet.loadURDF(path, pose.position, pose.orientation, flags=flags, physicsClientId=self._client)
         self._set_material(number)
         self.set_pose(number, pose)  # again, for PyBullet reads a URDF's pose in single precision
         return number
+
+    def _cover(self, body: int, texture: str) -> None:
+        if texture:
+            self._undressed[body] = texture
+        if self._gui:
+            self._dress()
+
+    def _dress(self) -> None:
+        """Give PyBullet the textures, which only its window and its own renderer show."""
+        while self._undressed:
+            body, texture = self._undressed.popitem()
+            shapes.dress(self._client, body, self._files.texture(texture))
 
     def remove(self, body: int) -> None:
         """Take a body out of the world."""
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
+        self._undressed.pop(body, None)
         self._centres.pop(body, None)
         self._pictures.remove(body)
 
@@ -136,6 +151,11 @@ class World:
         sx, sy, sz = cross(angular, arm)
         position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
         return State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
+
+    def is_finite(self) -> bool:
+        """Whether every body is somewhere, and as fast as numbers go."""
+        states = [self.state(body) for body in self._inertial_frames]
+        return bool(np.isfinite([number for state in states for part in state for number in part]).all())
 
     def set_pose(self, body: int, pose: Pose) -> None:
         """Move a body's root link to `pose` and stop it."""
@@ -204,6 +224,7 @@ class World:
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
     ) -> Tuple[np.ndarray, np.ndarray]:
         """Return RGB and depth of PyBullet's software renderer: see Pictures.tiny."""
+        self._dress()
         return self._pictures.tiny(camera, (width, height), vertical_fov, (near, far))
 
     def look_from_behind(self, position: Sequence[float], yaw: float) -> None:
