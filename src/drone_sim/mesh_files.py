@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import re
 from pathlib import Path
@@ -109,8 +108,10 @@ class _Beside(Resolver):
         self.files.append(str(path))
         try:
             content = read_bytes(path, MAX_SIZE)
-            with contextlib.suppress(Image.UnidentifiedImageError):  # a list of materials
+            try:
                 images.check(content)
+            except Image.UnidentifiedImageError:  # a list of materials
+                content = _utf8(content)
         except FileNotFoundError:
             raise
         except Exception as error:  # kept, for trimesh goes on without the file
@@ -139,6 +140,8 @@ def _read(path: str) -> Reading:
     try:
         content = read_bytes(path, MAX_SIZE)
         _check_text(content, kind)
+        if kind == ".obj":
+            content = _utf8(content)
         loaded = trimesh.load(io.BytesIO(content), file_type=kind[1:], resolver=beside, process=False)
         parts = tuple(_part(one) for one in _placed(loaded))
         if beside.problem:
@@ -147,9 +150,16 @@ def _read(path: str) -> Reading:
     except (MemoryError, RecursionError):
         raise ValueError(f"mesh {path}: cannot be read (too large)") from None
     except Exception as error:  # trimesh's readers raise whatever their parser raised
-        said = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        said = str(getattr(error, "strerror", None) or error)
+        if not isinstance(error, (ValueError, OSError, IndexError)):
+            said = "it is broken"
         raise ValueError(f"mesh {path}: cannot be read ({' '.join(said.split()):.200})") from error
     return Reading(parts, sum(part.nbytes for part in parts), beside.files)
+
+
+def _utf8(text: bytes) -> bytes:
+    """Return a text that trimesh reads without guessing at its encoding: names may be in any, numbers are not."""
+    return text.decode("utf-8", errors="replace").encode()
 
 
 def _check_text(content: bytes, kind: str) -> None:

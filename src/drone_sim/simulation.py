@@ -106,7 +106,7 @@ class Simulation:
             self.vision.look_at(self.world)
         self.drone.bus.backend = self._backend
         self.drone.drawings = self._drawings
-        self._initial = self.world.snapshot()
+        self.world.keep_beginning()
         self._begin()
 
     def _begin(self) -> None:
@@ -148,7 +148,7 @@ class Simulation:
         try:
             self._clean_up()
         finally:
-            self.world.restore(self._initial)
+            self.world.begin_anew()
             self.drone.reset()
             self.scene.name_objects(self.drone.objects)
             self._begin()

@@ -141,7 +141,6 @@ def _one_link(
     inertial: Tuple[float, np.ndarray, np.ndarray],
 ) -> str:
     merged = Xml.Element("robot", name=robot.get("name", "drone"))
-    merged.extend(copy.deepcopy(robot.findall("material")))
     link = Xml.SubElement(merged, "link", name=root)
     _write_inertial(link, *inertial)
     for kind in ("collision", "visual"):

@@ -46,6 +46,7 @@ class _Numbers(NamedTuple):
 
 
 _Attributes = Mapping[str, _Numbers]
+_Colors = Mapping[Optional[str], Optional[Xml.Element]]
 _LENGTH = {"low": 1e-6, "high": 1e4}
 _MOMENT = _Numbers(1, 1e-12, 1e9, or_zero=True, default="0")
 _PRODUCT = _Numbers(1, -1e9, 1e9, default="0")
@@ -100,12 +101,13 @@ def read(path: str, kinds: Sequence[str] = JOINTS) -> Xml.Element:
     if robot.tag != "robot":
         raise ValueError(f"its outermost element must be <robot>, not <{robot.tag:.60}>")
     links, joints = robot.findall("link"), robot.findall("joint")
+    if len(robot.findall("link/*/geometry")) > MAX_SHAPES:
+        raise ValueError(f"more than {MAX_SHAPES} visuals and collisions")
     _check_tree(links, joints, kinds)
     clean = Xml.Element("robot", name="robot")
-    for material in robot.findall("material"):
-        _within(_called(material), _add_material, material, clean)
+    colors = {material.get("name"): material.find("color") for material in robot.findall("material")}
     for link in links:
-        _within(_called(link), _add_link, link, clean, Path(path).parent)
+        _within(_called(link), _add_link, link, clean, Path(path).parent, colors)
     for joint in joints:
         _within(_called(joint), _add_joint, joint, clean)
     return clean
@@ -130,6 +132,8 @@ def _check_tree(links: Sequence[Xml.Element], joints: Sequence[Xml.Element], kin
         raise ValueError(f"{len(links)} links and {len(joints)} joints; at most {MAX_LINKS} are allowed")
     names = _names(links)
     _names(joints)
+    if not names:
+        raise ValueError("must have at least one link")
     parents: Dict[str, str] = {}
     for joint in joints:
         kind = joint.get("type")
@@ -155,15 +159,15 @@ def _check_way_to_the_root(name: str, parents: Mapping[str, str]) -> None:
 
 
 def _names(elements: Sequence[Xml.Element]) -> List[str]:
-    names: List[str] = []
+    names: Dict[str, None] = {}
     for element in elements:
         name = element.get("name", "")
         if not name or len(name) > MAX_NAME or not name.isprintable():
             raise ValueError(f"{element.tag} name={shown(name)}: must be a name of 1 to {MAX_NAME} characters")
         if name in names:
             raise ValueError(f"{element.tag} {name}: comes twice")
-        names.append(name)
-    return names
+        names[name] = None
+    return list(names)
 
 
 def _end(joint: Xml.Element, end: str, links: Sequence[str]) -> str:
@@ -192,12 +196,17 @@ def _add(element: Optional[Xml.Element], attributes: _Attributes, parent: Xml.El
             raise ValueError(f"{tag} {name} = {error}") from None
 
 
-def _add_material(material: Xml.Element, parent: Xml.Element) -> None:
-    copied = Xml.SubElement(parent, "material", name=material.get("name", "")[:MAX_NAME])
-    _add(material.find("color"), {"rgba": _Numbers(4, 0, 1)}, copied, "color")
+def _add_material(material: Xml.Element, parent: Xml.Element, colors: _Colors) -> None:
+    """Add its colour, under a name that no other colour has; its texture is left out, for it shows nowhere."""
+    color = material.find("color")
+    color = colors.get(material.get("name")) if color is None else color
+    if color is not None:
+        copied = Xml.SubElement(parent, "material")
+        _add(color, {"rgba": _Numbers(4, 0, 1)}, copied, "color")
+        copied.set("name", copied[0].get("rgba", ""))
 
 
-def _add_link(link: Xml.Element, robot: Xml.Element, folder: Path) -> None:
+def _add_link(link: Xml.Element, robot: Xml.Element, folder: Path, colors: _Colors) -> None:
     copied = Xml.SubElement(robot, "link", name=link.get("name", ""))
     inertial = link.find("inertial")
     if inertial is not None:
@@ -205,7 +214,8 @@ def _add_link(link: Xml.Element, robot: Xml.Element, folder: Path) -> None:
         _add(inertial.find("origin"), _ORIGIN, own, "origin")
         mass = _check_mass(inertial.find("mass"))
         Xml.SubElement(own, "mass", value=repr(mass))
-        _add(inertial.find("inertia"), _INERTIA, own, "inertia")
+        inertia = inertial.find("inertia")
+        _add(Xml.Element("inertia") if inertia is None else inertia, _INERTIA, own, "inertia")
     contact = link.find("contact")
     if contact is not None:
         own = Xml.SubElement(copied, "contact")
@@ -214,8 +224,9 @@ def _add_link(link: Xml.Element, robot: Xml.Element, folder: Path) -> None:
     for kind in ("visual", "collision"):
         for shape in link.findall(kind):
             _within(kind, _add_shape, shape, copied, folder)
-    if sum(1 for _ in robot.iter("geometry")) > MAX_SHAPES:
-        raise ValueError(f"more than {MAX_SHAPES} visuals and collisions")
+            material = shape.find("material")
+            if material is not None and kind == "visual":
+                _within(kind, _add_material, material, copied[-1], colors)
 
 
 def _check_mass(element: Optional[Xml.Element]) -> float:
@@ -243,9 +254,6 @@ def _add_shape(shape: Xml.Element, link: Xml.Element, folder: Path) -> None:
         _check_scale(own[0].get("scale", ""))
     if kinds[0].tag == "plane" and not any(float(word) for word in own[0].get("normal", "").split()):
         raise ValueError("plane normal: must not be 0 0 0")
-    material = shape.find("material")
-    if material is not None and shape.tag == "visual":
-        _add_material(material, copied)
 
 
 def _check_scale(text: str) -> None:

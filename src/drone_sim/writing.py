@@ -21,11 +21,11 @@ def replacing(path: Union[str, Path], binary: bool = False) -> Iterator[IO[Any]]
     options: Any = {"mode": "xb"} if binary else {"mode": "x", "encoding": "utf-8", "newline": "\n"}
     with _named(path):
         check(path)
-        target = os.path.realpath(path)  # a link stays a link
-        if os.path.exists(target) and not os.path.isfile(target):
-            with open(target, **{**options, "mode": options["mode"].replace("x", "w")}) as file:
+        if _is_special(path):
+            with open(path, **{**options, "mode": options["mode"].replace("x", "w")}) as file:
                 yield file
             return
+        target = os.path.realpath(path)  # a link stays a link
         folder, name = os.path.split(target)
         temporary = os.path.join(folder, f".{name:.100}.{secrets.token_hex(4)}")
         try:
@@ -56,10 +56,16 @@ def check(path: Union[str, Path]) -> None:
         if os.path.isdir(path):
             raise IsADirectoryError(0, "is a folder")
         folder = os.path.dirname(os.path.realpath(path))
-        if not os.path.isdir(folder):
+        if not _is_special(path) and not os.path.isdir(folder):
             raise FileNotFoundError(0, f"no such folder: {folder}")
         if os.path.exists(path) and not os.access(path, os.W_OK):
             raise PermissionError(0, "must not be written to")
+
+
+def _is_special(path: Union[str, Path]) -> bool:
+    # /dev/stdout may lead to a regular file, to which somebody else writes, too.
+    named = os.path.abspath(path).startswith(("/dev/", "/proc/"))
+    return named or (os.path.exists(path) and not os.path.isfile(path))
 
 
 def _finish(file: IO[Any], temporary: str, target: str) -> None:
@@ -82,7 +88,7 @@ def _named(path: Union[str, Path]) -> Iterator[None]:
     except OSError as error:
         if str(path) in str(error):
             raise
-        raise type(error)(f"{path}: {error.strerror or error}") from None
+        raise OSError(f"{path}: {error.strerror or error}") from None
     except ValueError as error:
         if "null byte" not in str(error):
             raise

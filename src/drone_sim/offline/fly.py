@@ -16,7 +16,7 @@ from drone_sim import parameters as parameters_module
 from drone_sim import writing, yaml_files
 from drone_sim.frames import to_euler
 from drone_sim.offline import timeline as timeline_module
-from drone_sim.offline.recording import Recording
+from drone_sim.offline.recording import Recording, TableError
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
 from drone_sim.parameters import ParameterError
 from drone_sim.resources import shown
@@ -155,6 +155,8 @@ def _status_of(action: Callable[[], Optional[int]]) -> int:
         return action() or 0
     except KeyboardInterrupt:
         return _INTERRUPTED
+    except TableError:  # ends the writing of the table, which then says so
+        raise
     except _EXPECTED as error:
         print(f"fly: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
         return _FAILED

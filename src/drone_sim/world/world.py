@@ -52,6 +52,7 @@ class World:
         pybullet.setTimeStep(self._sub_step, self._client)
         self._inertial_frames: Dict[int, Tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: Dict[int, Tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
+        self._beginning: Dict[int, Tuple[Vector, Quaternion, List[float]]] = {}
         self._files.clear()
         self._pictures = Pictures(self._client, self._files.origin)
         self._undressed: Dict[int, str] = {}  # bodies whose texture PyBullet has not been given
@@ -186,6 +187,24 @@ class World:
             step(client)
             known = {}
         self._centres.clear()
+
+    def keep_beginning(self) -> None:
+        """Remember where everything stands, at rest, for `begin_anew`: a snapshot would copy every mesh."""
+        for body in self._inertial_frames:
+            joints = range(pybullet.getNumJoints(body, self._client))
+            angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in joints]
+            self._beginning[body] = (*pybullet.getBasePositionAndOrientation(body, self._client), angles)
+        self.begin_anew()  # so that the first time is like every other, to the last bit
+
+    def begin_anew(self) -> None:
+        """Put everything where it stood, at rest."""
+        self._centres.clear()
+        self._pictures.all_moved()
+        for body, (centre, turn, angles) in self._beginning.items():
+            pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
+            pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
+            for joint, angle in enumerate(angles):
+                pybullet.resetJointState(body, joint, angle, 0, self._client)
 
     def snapshot(self) -> int:
         """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget`."""
