@@ -61,10 +61,10 @@ def scene_objects(
     objects.add("Quadricopter_floorCamera", DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera")
     front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
     objects.add("Quadricopter_frontCamera", DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera")
-    for camera in cameras.values():
-        _add_camera(objects, links, camera)
     objects.add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
     objects.add("Floor", also=("ResizableFloor_5_25",))
+    for camera in cameras.values():
+        _add_camera(objects, links, camera)
     return objects
 
 
@@ -77,4 +77,6 @@ def _add_camera(objects: ObjectTree, links: Mapping[str, Matrix], camera: Camera
         parent, optical = camera.mount.parent, camera.mount.matrix
         if parent not in objects:
             raise ParameterError(f"camera frame {camera.frame}: no object is named {parent}")
+    if camera.object in objects:
+        raise ParameterError(f"camera frame {camera.frame}: an object named '{camera.object}' is there already")
     objects.add(camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR))

@@ -2,30 +2,73 @@
 
 from __future__ import annotations
 
+import math
+import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, Optional, Tuple, Union
+from typing import Any, Callable, Dict, Iterator, Optional, Tuple, Union
 
-import yaml
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from annotated_types import Ge, GroupedMetadata, Le
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+)
 from typing_extensions import Annotated
 
-from drone_sim.resources import resolve
+from drone_sim import yaml_files
+from drone_sim.resources import resolve, shown
+
+MAX_NAME = 64  # characters
+MAX_FILE_NAME = 4096  # characters
+_EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$")
 
 
 class ParameterError(ValueError):
     """A parameter is wrong; the message is one line that names key, value and what is allowed."""
 
 
-def _existing_file(name: str) -> str:
-    try:
-        return str(resolve(name))
-    except FileNotFoundError as error:
-        raise ValueError(str(error)) from None
+# ---- numbers
 
 
-def _none_from_word(value: Any) -> Any:
-    # ROS's parameter server cannot hold YAML's null.
-    return None if value in ("none", "null", "", []) else value
+def numeric(value: Any) -> Any:
+    """Let nothing but a number be one. YAML 1.1, which rosparam reads, takes `1e3` for a text."""
+    if isinstance(value, str) and _EXPONENT.match(value) and len(value) < MAX_NAME:
+        return float(value)
+    if isinstance(value, (bool, str)):
+        raise ValueError("input should be a valid number")
+    if isinstance(value, int) and abs(value) > 1e300:
+        return math.copysign(1e300, value)  # beyond every range, and still a float
+    return value
+
+
+@dataclass(frozen=True)
+class Within(GroupedMetadata):
+    """Beside `float` or `int` in Annotated: a finite number from `low` to `high`, or also 0."""
+
+    low: float
+    high: float
+    or_zero: bool = False
+
+    def __iter__(self) -> Iterator[Any]:
+        """Give what pydantic is to check."""
+        if self.or_zero:
+            yield Ge(0)
+            yield AfterValidator(self._check)
+        else:
+            yield Ge(self.low)
+            yield Le(self.high)
+        yield BeforeValidator(numeric)
+
+    def _check(self, value: float) -> float:
+        if value != 0 and not self.low <= value <= self.high:
+            raise ValueError(f"must be 0, or from {self.low:g} to {self.high:g}")
+        return value
 
 
 def _increasing(pair: Optional[Tuple[float, float]]) -> Optional[Tuple[float, float]]:
@@ -34,19 +77,84 @@ def _increasing(pair: Optional[Tuple[float, float]]) -> Optional[Tuple[float, fl
     return pair
 
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Point = Tuple[Finite, Finite, Finite]
-Fraction = Annotated[float, Field(ge=0, le=1)]
+def _none_from_word(value: Any) -> Any:
+    # ROS's parameter server cannot hold YAML's null.
+    return None if isinstance(value, (str, list)) and value in ("none", "null", "", []) else value
+
+
+Finite = Annotated[float, AllowInfNan(False)]
+Coordinate = Annotated[Finite, Within(-1e5, 1e5)]  # m
+Angle = Annotated[Finite, Within(-1e3, 1e3)]  # rad
+Length = Annotated[Finite, Within(1e-4, 1e4)]  # m, of a thing
+Mass = Annotated[Finite, Within(1e-6, 1e6, or_zero=True)]  # kg
+Gain = Annotated[Finite, Within(0, 1e4)]
+Velocity = Annotated[Finite, Within(-1e4, 1e4)]  # m/s
+Point = Tuple[Coordinate, Coordinate, Coordinate]
+Angles = Tuple[Angle, Angle, Angle]
+Fraction = Annotated[Finite, Within(0, 1)]
 Color = Tuple[Fraction, Fraction, Fraction, Fraction]
-File = Annotated[str, AfterValidator(_existing_file)]
-OptionalFile = Annotated[str, AfterValidator(lambda name: _existing_file(name) if name else "")]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
-AngleOrNone = Annotated[
-    Optional[Annotated[float, Field(gt=0, lt=3.14, allow_inf_nan=False)]], BeforeValidator(_none_from_word)
-]
-Limits = Annotated[Optional[Tuple[Finite, Finite]], BeforeValidator(_none_from_word), AfterValidator(_increasing)]
+MarginOrNone = Annotated[Optional[Annotated[Finite, Within(1e-3, 1)]], BeforeValidator(_none_from_word)]  # rad
+Limits = Annotated[Optional[Tuple[Velocity, Velocity]], BeforeValidator(_none_from_word), AfterValidator(_increasing)]
+Switch = Annotated[bool, Field(strict=True)]
+
+# ---- words
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=MAX_NAME)]
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be printable")
+    return text
+
+
+Label = Annotated[str, Field(max_length=MAX_NAME), AfterValidator(_printable)]
+FileName = Annotated[str, Field(max_length=MAX_FILE_NAME), AfterValidator(_printable)]
+
+
+class FoundFile(str):
+    """The absolute path of a file that is there; `given` is its name as the user wrote it, seen from `folder`."""
+
+    given: str
+    folder: str
+
+    def seen_from(self, folder: Path) -> str:
+        """Return the name by which a file in `folder` can name it: as it was given, where that leads to it."""
+        absolute = self.given.startswith(("package://", "~", "/"))
+        return self.given if absolute or Path(self.folder or ".").resolve() == folder.resolve() else str(self)
+
+
+def named_in(folder: Path, name: str) -> FoundFile:
+    """Return a file's name that was found in a file in `folder`; not yet looked for."""
+    absolute = name.startswith(("package://", "~", "/"))
+    found = FoundFile(name if absolute else folder / name)
+    found.given, found.folder = name, str(folder)
+    return found
+
+
+def _existing_file(allow_none: bool) -> Callable[[Any], str]:
+    def check(value: Any) -> str:
+        if not isinstance(value, str):
+            raise ValueError("input should be a valid string")
+        if len(value) > MAX_FILE_NAME:
+            raise ValueError(f"must have at most {MAX_FILE_NAME} characters")
+        if allow_none and not value:
+            return ""
+        try:
+            found = FoundFile(resolve(value))
+        except FileNotFoundError as error:
+            raise ValueError(str(error)) from None
+        found.given, found.folder = getattr(value, "given", str(value)), getattr(value, "folder", "")
+        return found
+
+    return check
+
+
+File = Annotated[str, PlainValidator(_existing_file(False)), PlainSerializer(str)]
+OptionalFile = Annotated[str, PlainValidator(_existing_file(True)), PlainSerializer(str)]
+
+
+# ---- mappings
 
 
 class Checked(BaseModel):
@@ -58,9 +166,14 @@ class Checked(BaseModel):
 def read_yaml(path: Union[str, Path]) -> Dict[str, Any]:
     """Return the mapping in a YAML file; raises ParameterError, in one line, where there is none."""
     try:
-        values = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ParameterError(f"{path}: {' '.join(str(error).split())}") from None
+        values = yaml_files.read(path)
+    except yaml_files.YamlError as error:
+        raise ParameterError(str(error)) from None
     if not isinstance(values, dict):
         raise ParameterError(f"{path}: must hold `key: value` lines, not {type(values).__name__}")
     return values
+
+
+def readable_key(location: Tuple[Union[int, str], ...]) -> str:
+    """Return the path to a value as a message shows it: cut, and on one line."""
+    return "/".join(part if part.isprintable() and len(part) < 80 else shown(part) for part in map(str, location))

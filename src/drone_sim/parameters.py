@@ -6,46 +6,53 @@ No value is defined here: config/drone.yaml holds every default, this module say
 from __future__ import annotations
 
 import difflib
-import math
+from pathlib import Path
 from typing import Any, Dict, Literal, Mapping, Optional, Tuple, Union
 
-from pydantic import Field, PrivateAttr, ValidationError
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError
 from typing_extensions import Annotated
 
 from drone_sim import scene_parameters
-from drone_sim.frames import Matrix, from_rpy, multiply
+from drone_sim.camera_parameters import MAX_CAMERAS, CameraParameters, check_together
 from drone_sim.parameter_types import (
-    AngleOrNone,
+    Angle,
     Checked,
+    Coordinate,
     File,
+    FileName,
     Finite,
+    Gain,
     Limits,
+    MarginOrNone,
     Name,
-    NonNegative,
     ParameterError,
-    Point,
-    Positive,
+    Switch,
+    Within,
+    numeric,
     read_yaml,
+    readable_key,
 )
-from drone_sim.resources import package_path
+from drone_sim.resources import package_path, resolve, shown
 from drone_sim.scene_parameters import SHAPES, SceneParameters
 
 __all__ = ["CameraParameters", "ParameterError", "Parameters", "load", "read_yaml"]
+
+MAX_SUB_STEPS = 1000
 
 
 class TwistLimits(Checked):
     """Beyond these a command is a mistake."""
 
-    linear: Positive
-    angular: Positive
+    linear: Annotated[Finite, Within(1e-6, 1e3)]
+    angular: Annotated[Finite, Within(1e-6, 1e3)]
 
 
 class PushParameters(Checked):
     """How long a push on the topic `push` lasts, and what is a mistake."""
 
-    duration: Positive
-    force_limit: Positive
-    torque_limit: Positive
+    duration: Annotated[Finite, Within(1e-4, 1e4)]
+    force_limit: Annotated[Finite, Within(1e-6, 1e6)]
+    torque_limit: Annotated[Finite, Within(1e-6, 1e6)]
 
 
 class DroneParameters(Checked):
@@ -53,90 +60,69 @@ class DroneParameters(Checked):
 
     name: Name
     urdf: File
-    position: Tuple[Finite, Finite, NonNegative]
-    yaw: Finite
+    position: Tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]]
+    yaw: Angle
 
 
 class PropellerParameters(Checked):
     """V-REP's particle law; see propeller.py."""
 
     law: Literal["3.x", "4.x"]
-    particles_per_second: Positive
-    particle_density: Positive
-    particle_size: Positive
-    torque_per_velocity: NonNegative
+    particles_per_second: Annotated[Finite, Within(1e-3, 1e6)]
+    particle_density: Annotated[Finite, Within(1e-3, 1e6)]
+    particle_size: Annotated[Finite, Within(1e-6, 1)]
+    torque_per_velocity: Annotated[Finite, Within(0, 1e3)]
     velocity_limits: Limits
 
 
 class ControlParameters(Checked):
     """The tutorial's gains; a child script reads them by name with getScriptSimulationParameter."""
 
-    thrust_gravity: Positive
+    thrust_gravity: Annotated[Finite, Within(1e-3, 1e4)]
     thrust_limits: Limits
-    Dthrust: NonNegative
-    Kzref: NonNegative
-    Dzref: NonNegative
-    Dyaw: NonNegative
-    angle_min: NonNegative
-    angle_max: NonNegative
-    Pangle: NonNegative
-    Dangle: NonNegative
-    Kvcorr: NonNegative
-    recovery_margin: AngleOrNone
-    Precovery: NonNegative
-
-
-class MountParameters(Checked):
-    """Where a camera sits that has no link in the URDF: in the frame of an object, looking along its +x."""
-
-    parent: str
-    position: Point
-    rpy: Point
-
-    @property
-    def matrix(self) -> Matrix:
-        """Parent from optical frame (z forward, x right, y down)."""
-        return multiply(from_rpy(self.position, self.rpy), from_rpy((0, 0, 0), (-math.pi / 2, 0, -math.pi / 2)))
-
-
-class CameraParameters(Checked):
-    """A vision sensor: where it sits, what it sees."""
-
-    object: Name
-    topic: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_/]*$")]
-    kind: Literal["color", "depth"]
-    frame: Name
-    mount: Optional[MountParameters] = None
-    every: Annotated[int, Field(ge=1)]
-    width: Annotated[int, Field(ge=1, le=8192)]
-    height: Annotated[int, Field(ge=1, le=8192)]
-    horizontal_fov: Annotated[float, Field(gt=0, lt=3.14)]
-    near: Positive
-    far: Positive
+    Dthrust: Gain
+    Kzref: Gain
+    Dzref: Gain
+    Dyaw: Gain
+    angle_min: Gain
+    angle_max: Gain
+    Pangle: Gain
+    Dangle: Gain
+    Kvcorr: Gain
+    recovery_margin: MarginOrNone
+    Precovery: Gain
 
 
 class Parameters(Checked):
     """Everything in config/drone.yaml."""
 
-    gui: bool
-    script: str
-    script_time_limit: NonNegative
-    real_time_factor: NonNegative
-    cmd_vel_timeout: NonNegative
+    config: FileName
+    gui: Switch
+    script: FileName
+    script_time_limit: Annotated[Finite, Within(0.01, 1e4, or_zero=True)]
+    real_time_factor: Annotated[Finite, Within(1e-3, 1e3, or_zero=True)]
+    cmd_vel_timeout: Annotated[Finite, Within(1e-4, 1e6, or_zero=True)]
     cmd_vel_limits: TwistLimits
-    position_limit: Positive
+    position_limit: Annotated[Finite, Within(1e-3, 1e5)]
     push: PushParameters
-    time_step: Positive
-    sub_step: Positive
-    gravity: Finite
-    scene_file: str
+    time_step: Annotated[Finite, Within(1e-4, 1)]
+    sub_step: Annotated[Finite, Within(1e-5, 1)]
+    gravity: Annotated[Finite, Within(-100, 100)]
+    scene_file: FileName
     scene: SceneParameters
     drone: DroneParameters
     propellers: PropellerParameters
     control: ControlParameters
-    samples: Literal[0, 2, 4, 8]
-    cameras: Dict[Name, CameraParameters]
+    samples: Annotated[Literal[0, 2, 4, 8], BeforeValidator(numeric)]
+    cameras: Annotated[Dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
     _given: Dict[str, Any] = PrivateAttr(default_factory=dict)  # what stands without the scene file
+
+    _drone_in_scene: Tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def drone_in_scene(self) -> Tuple[str, ...]:
+        """The keys of `drone` that the scene file gives."""
+        return self._drone_in_scene
 
     @property
     def sub_steps(self) -> int:
@@ -150,39 +136,74 @@ class Parameters(Checked):
         """
         return _in_scene(self._given, file)
 
+    def check_scene(self, content: Dict[str, Any], file: Path) -> None:
+        """Raise ParameterError where a scene file with this content could not be loaded."""
+        _checked(self._given, str(file), scene_parameters.from_content(content, file.parent, str(file)))
+
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several keys at once."""
-        if self.sub_steps < 1 or abs(self.sub_steps * self.sub_step - self.time_step) > 1e-9 * self.time_step:
+        steps = self.sub_steps
+        if steps < 1 or abs(steps * self.sub_step - self.time_step) > 1e-9 * self.time_step:
             raise ParameterError(
                 f"parameter time_step = {self.time_step}: must be a whole multiple of sub_step = {self.sub_step}"
             )
-        for name, camera in self.cameras.items():
-            if camera.near >= camera.far:
-                raise ParameterError(
-                    f"parameter cameras/{name}/near = {camera.near}: must be less than far = {camera.far}"
-                )
+        if steps > MAX_SUB_STEPS:
+            raise ParameterError(
+                f"parameter sub_step = {self.sub_step}: makes {steps} of a time_step of {self.time_step} s; "
+                f"at most {MAX_SUB_STEPS} are allowed"
+            )
+        check_together(self.cameras)
 
 
 def load(overrides: Optional[Mapping[str, Any]] = None) -> Parameters:
-    """Return config/drone.yaml with `overrides` (a nested mapping of the same shape) laid over it.
+    """Return config/drone.yaml with a file and `overrides` (nested mappings of the same shape) laid over it.
 
-    Raises ParameterError.
+    The file is named by the overrides' key `config`; '' is none. What it names is relative to where the process
+    runs, as in `overrides`. Raises ParameterError.
     """
-    given = _merge(read_yaml(package_path() / "config" / "drone.yaml"), overrides or {})
+    overrides = {} if overrides is None else overrides
+    if not isinstance(overrides, Mapping):
+        raise ParameterError(f"parameters = {shown(overrides)}: must be a mapping of the keys of config/drone.yaml")
+    given = read_yaml(package_path() / "config" / "drone.yaml")
+    config = overrides.get("config") or ""
+    if not isinstance(config, str):
+        raise ParameterError(f"parameter config = {shown(config)}: must be the name of a file")
+    if config:
+        given = _merge(given, _config(config))
+        try:
+            _checked(given, "", {})
+        except ParameterError as error:
+            raise ParameterError(f"{config}: {error}") from None
+    given = _merge(given, overrides)
     return _in_scene(given, given["scene_file"])
 
 
+def _config(name: str) -> Dict[str, Any]:
+    try:
+        values = read_yaml(resolve(name))
+    except FileNotFoundError as error:
+        raise ParameterError(f"parameter config = {shown(name)}: {error}") from None
+    if "config" in values:
+        raise ParameterError(f"{name}: a config file names no other `config`")
+    return values
+
+
 def _in_scene(given: Dict[str, Any], file: Any) -> Parameters:
-    values = {**given, "scene_file": file}
     in_file = isinstance(file, str) and bool(file)
-    if in_file:
-        values = _merge(values, scene_parameters.read(file))
+    return _checked(given, file, scene_parameters.read(file) if in_file else {})
+
+
+def _checked(given: Dict[str, Any], file: Any, scene: Dict[str, Any]) -> Parameters:
+    """Return the parameters with what a scene file says; `file` is its name, '' where there is none."""
+    values = _merge({**given, "scene_file": file}, scene)
     try:
         parameters = Parameters.model_validate(values)
     except ValidationError as error:
-        from_scene = in_file and error.errors()[0]["loc"][0] in ("scene", "drone")
+        from_scene = scene and error.errors()[0]["loc"][:1] in (("scene",), ("drone",))
         raise ParameterError(f"{file}: {_one_line(error)}" if from_scene else _one_line(error)) from None
     parameters._given = given
+    drone = scene.get("drone")
+    parameters._drone_in_scene = tuple(drone) if isinstance(drone, dict) else ()
     return parameters
 
 
@@ -197,16 +218,14 @@ def _merge(base: Any, overrides: Any) -> Any:
 
 def _one_line(error: ValidationError) -> str:
     first = error.errors()[0]
-    key = "/".join(str(part) for part in first["loc"])
+    key = readable_key(first["loc"])
     if first["type"] == "extra_forbidden":
         return f"parameter {key}: unknown key{_near(first['loc'])}"
     message = first["msg"].replace("Value error, ", "")
-    if not first["loc"]:  # of several keys at once: it names them itself
+    if message.startswith("parameter "):  # of several keys at once: it names them itself
         return message
     more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    value = first["input"]
-    shown = repr(value) if isinstance(value, str) else f"{value!r:.60}"
-    return f"parameter {key} = {shown}: {message[0].lower()}{message[1:]}{more}"
+    return f"parameter {key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}{more}"
 
 
 def _near(location: Tuple[Union[int, str], ...]) -> str:
@@ -215,5 +234,5 @@ def _near(location: Tuple[Union[int, str], ...]) -> str:
         fields = getattr(model, "model_fields", {})
         model = fields[part].annotation if part in fields else SHAPES.get(str(part))
     known = list(getattr(model, "model_fields", {}))
-    near = difflib.get_close_matches(str(location[-1]), known, n=3) or known
+    near = difflib.get_close_matches(str(location[-1])[:80], known, n=3) or known
     return f"; known are {', '.join(near)}" if near else ""

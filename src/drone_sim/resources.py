@@ -1,10 +1,27 @@
-"""Where the files of the package lie: in the source tree, or installed under share/."""
+"""Where the files of the package lie, in the source tree or installed under share/; and how a file is read."""
 
 from __future__ import annotations
 
+import os
+import reprlib
+import stat
 from pathlib import Path
+from typing import Any, Union
 
 _HERE = Path(__file__).resolve()
+MEBIBYTE = 2**20
+_SHORT = reprlib.Repr()
+_SHORT.maxstring, _SHORT.maxother, _SHORT.maxlevel = 300, 60, 3
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it: on one line and short, however large it is."""
+    if isinstance(value, str):
+        return _SHORT.repr(value)
+    try:
+        return f"{_SHORT.repr(value):.60}"
+    except Exception:  # an int of more digits than Python writes, a __repr__ that fails
+        return f"(a {type(value).__name__})"
 
 
 def package_path() -> Path:
@@ -19,29 +36,55 @@ def package_path() -> Path:
 def locate(name: str) -> Path:
     """Return the path behind `package://PACKAGE/...` or `~/...`; any other path as it is.
 
-    Raises FileNotFoundError, in one line, where there is no such package.
+    Raises FileNotFoundError, in one line, where there is no such package or home.
     """
-    return _in_package(name) if name.startswith("package://") else Path(name).expanduser()
+    if name.startswith("package://"):
+        return _in_package(name)
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        raise FileNotFoundError(f"no such home: {shown(name)}") from None
 
 
 def resolve(name: str) -> Path:
-    """Return the absolute path of a file, given as for `locate`.
+    """Return the absolute path of a regular file, given as for `locate`.
 
     Raises FileNotFoundError, in one line, where there is no such package or file.
     """
     path = locate(name)
-    if not path.is_file():
-        raise FileNotFoundError(f"no such file: {name}")
+    try:
+        found = path.is_file()
+    except (OSError, ValueError):  # too long a name, a NUL in it
+        found = False
+    if not found:
+        raise FileNotFoundError(f"no such file: {name}" if name.isprintable() and len(name) < 300 else "no such file")
     return path.resolve()
+
+
+def read_bytes(path: Union[str, Path], limit: int) -> bytes:
+    """Return what a file holds. It must be a regular one, not larger than `limit` bytes.
+
+    Raises OSError and, in one line without the file's name, ValueError.
+    """
+    # A FIFO without a writer would hold up a plain open().
+    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise ValueError("must be a regular file")
+        content = file.read(limit + 1) or b""
+    if len(content) > limit:
+        raise ValueError(f"larger than {limit / MEBIBYTE:g} MiB, the most that is read of such a file")
+    return content
 
 
 def _in_package(name: str) -> Path:
     package, _, rest = name[len("package://") :].partition("/")
     if package == "drone_sim":
         return package_path() / rest
-    import rospkg  # only other packages need the ROS environment
-
     try:
+        import rospkg  # only other packages need the ROS environment
+
         return Path(rospkg.RosPack().get_path(package)) / rest
+    except ImportError:
+        raise FileNotFoundError(f"finding a ROS package needs ROS (in {shown(name)})") from None
     except rospkg.ResourceNotFound:
-        raise FileNotFoundError(f"no ROS package {package} (in {name})") from None
+        raise FileNotFoundError(f"no ROS package {package:.60} (in {shown(name)})") from None

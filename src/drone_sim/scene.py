@@ -8,11 +8,12 @@ from typing import Any, Dict, List, Tuple
 import numpy as np
 import yaml
 
-from drone_sim import frames, scene_files
+from drone_sim import frames, scene_files, writing, yaml_files
 from drone_sim.frames import Matrix
 from drone_sim.objects import ObjectTree
-from drone_sim.parameter_types import ParameterError
-from drone_sim.scene_parameters import ObjectParameters, SceneParameters
+from drone_sim.parameter_types import Checked, FoundFile, ParameterError
+from drone_sim.parameters import Parameters
+from drone_sim.scene_parameters import ObjectParameters
 from drone_sim.state import Pose, State
 from drone_sim.visual import Visual
 from drone_sim.world import Shape, World
@@ -44,14 +45,15 @@ class SceneBody:
 class Scene:
     """What stands in the world besides the drone."""
 
-    def __init__(self, parameters: SceneParameters, world: World):
+    def __init__(self, parameters: Parameters, world: World):
         """Put floor and objects into an empty world. Raises ParameterError for a file that cannot be used."""
-        self._parameters = parameters
-        scene_files.check(parameters)
+        self._all = parameters
+        self._parameters = parameters.scene
+        scene_files.check(parameters.scene)
         self._world = world
-        world.add_floor(parameters.floor.size, parameters.floor.texture)
+        world.add_floor(parameters.scene.floor.size, parameters.scene.floor.texture)
         try:
-            self._numbers = [world.add_shape(_shape(one)) for one in parameters.objects]
+            self._numbers = [world.add_shape(_shape(one)) for one in parameters.scene.objects]
         except ValueError as error:
             raise ParameterError(str(error)) from None
         self._bodies = [SceneBody(world, number) for number in self._numbers]
@@ -69,24 +71,50 @@ class Scene:
         return self._world.visuals(self._numbers), self._world.visual_poses(self._numbers)
 
     def save(self, path: Path, drone: Matrix) -> None:
-        """Write floor, objects and drone as they stand now, as a scene file. Raises OSError."""
+        """Write floor, objects and drone as they stand now, as a scene file. Its own files keep their names.
+
+        Raises ParameterError where that would be no scene that can be loaded, such as with the drone below the
+        floor, and OSError; what was in the file is then still there.
+        """
         x, y, z = frames.position(drone)
         content: Dict[str, Any] = {
-            "floor": self._parameters.floor.model_dump(),
-            "drone": {"position": [x, y, z], "yaw": frames.to_euler(drone)[2]},
-            "objects": self._objects(),
+            "floor": self._plain(self._parameters.floor, path.parent),
+            "drone": {**self._named(path.parent), "position": [x, y, z], "yaw": frames.to_rpy(drone)[2]},
+            "objects": self._objects(path.parent),
         }
+        text = "# metres, radians\n" + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+        try:
+            self._all.check_scene(yaml_files.parse(text), path)
+        except ValueError as error:
+            raise ParameterError(f"the scene as it stands cannot be saved: {error}") from None
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("# metres, radians\n" + yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+        writing.write(path, text)
 
-    def _objects(self) -> List[Dict[str, Any]]:
+    def _named(self, folder: Path) -> Dict[str, Any]:
+        """Return what the last scene file said of the drone, place aside."""
+        own = {key: getattr(self._all.drone, key) for key in self._all.drone_in_scene if key in ("name", "urdf")}
+        return {key: _file_name(value, folder) for key, value in own.items()}
+
+    def _objects(self, folder: Path) -> List[Dict[str, Any]]:
         saved = []
         for one, body in zip(self._parameters.objects, self._bodies):
-            values = one.model_dump(mode="json", exclude_defaults=True)
+            values = self._plain(one, folder)
             values["position"] = list(body.state.position)
             values["rpy"] = list(frames.to_rpy(body.matrix))
             saved.append(values)
         return saved
+
+    def _plain(self, values: Checked, folder: Path) -> Dict[str, Any]:
+        """Return them as YAML has them, their files named as a scene file in `folder` can name them."""
+        plain = values.model_dump(mode="json", exclude_defaults=True)
+        for key in ("file", "texture"):
+            if plain.get(key):
+                plain[key] = _file_name(getattr(values, key), folder)
+        return plain
+
+
+def _file_name(value: str, folder: Path) -> str:
+    return value.seen_from(folder) if isinstance(value, FoundFile) else value
 
 
 def _shape(one: ObjectParameters) -> Shape:

@@ -9,33 +9,41 @@ from pydantic import Field
 from typing_extensions import Annotated
 
 from drone_sim.parameter_types import (
+    Angles,
     Checked,
     Color,
     File,
-    NonNegative,
+    Finite,
+    Label,
+    Length,
+    Mass,
     OptionalFile,
     ParameterError,
     Point,
-    Positive,
+    Within,
+    named_in,
     read_yaml,
 )
-from drone_sim.resources import resolve
+from drone_sim.resources import resolve, shown
+
+MAX_OBJECTS = 1000
+_Scale = Annotated[Finite, Within(1e-6, 1e6)]
 
 
 class FloorParameters(Checked):
     """A square floor at z = 0, centred on the origin."""
 
-    size: Positive
+    size: Annotated[Finite, Within(0.01, 1e4)]
     texture: File
 
 
 class _ObjectParameters(Checked):
     """What the objects of a scene have in common; a mass of 0 stands still."""
 
-    name: str = ""
+    name: Label = ""
     position: Point
-    rpy: Point = (0.0, 0.0, 0.0)
-    mass: NonNegative = 0.0
+    rpy: Angles = (0.0, 0.0, 0.0)
+    mass: Mass = 0.0
     color: Color = (0.7, 0.7, 0.7, 1.0)
     texture: OptionalFile = ""
 
@@ -44,29 +52,29 @@ class BoxParameters(_ObjectParameters):
     """A box; `size` is its full length, width and height."""
 
     shape: Literal["box"]
-    size: Tuple[Positive, Positive, Positive]
+    size: Tuple[Length, Length, Length]
 
 
 class CylinderParameters(_ObjectParameters):
     """A cylinder along its z axis; `size` is radius and length."""
 
     shape: Literal["cylinder"]
-    size: Tuple[Positive, Positive]
+    size: Tuple[Length, Length]
 
 
 class SphereParameters(_ObjectParameters):
     """A sphere; `size` is its radius."""
 
     shape: Literal["sphere"]
-    size: Tuple[Positive]
+    size: Tuple[Length]
 
 
 class MeshParameters(_ObjectParameters):
-    """A mesh file (OBJ, STL); `size` is its scale along x, y and z."""
+    """A mesh file (OBJ, STL, COLLADA); `size` is its scale along x, y and z."""
 
     shape: Literal["mesh"]
     file: File
-    size: Tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
+    size: Tuple[_Scale, _Scale, _Scale] = (1.0, 1.0, 1.0)
     color: Color = (1.0, 1.0, 1.0, 1.0)
 
 
@@ -88,7 +96,15 @@ class SceneParameters(Checked):
     """The world without the drone."""
 
     floor: FloorParameters
-    objects: List[ObjectParameters]
+    objects: Annotated[List[ObjectParameters], Field(max_length=MAX_OBJECTS)]
+
+    def model_post_init(self, _context: Any) -> None:
+        """Check what concerns several objects at once."""
+        names = set()
+        for index, one in enumerate(self.objects):
+            if one.name and one.name in names:
+                raise ParameterError(f"parameter scene/objects/{index}/name = '{one.name}': comes twice")
+            names.add(one.name)
 
 
 SHAPES = {
@@ -108,14 +124,18 @@ def read(file: str) -> Dict[str, Any]:
     try:
         path = resolve(file)
     except FileNotFoundError as error:
-        raise ParameterError(f"parameter scene_file = '{file}': {error}") from None
-    content = read_yaml(path)
+        raise ParameterError(f"parameter scene_file = {shown(file)}: {error}") from None
+    return from_content(read_yaml(path), path.parent, file)
+
+
+def from_content(content: Dict[str, Any], folder: Path, file: str) -> Dict[str, Any]:
+    """Return what `read` does, of a scene file's content. Raises ParameterError."""
     unknown = set(content) - {"floor", "objects", "drone"}
     if unknown:
-        raise ParameterError(f"{file}: unknown key {min(map(str, unknown))}; known are drone, floor, objects")
+        raise ParameterError(f"{file}: unknown key {min(unknown):.80}; known are drone, floor, objects")
     scene = {key: content[key] for key in ("floor", "objects") if key in content}
     for place in (scene.get("floor"), content.get("drone"), *_listed(scene.get("objects"))):
-        _find_files_beside(path.parent, place)
+        _find_files_beside(folder, place)
     return {"scene": scene, "drone": content.get("drone", {})}
 
 
@@ -126,5 +146,5 @@ def _listed(objects: Any) -> List[Any]:
 def _find_files_beside(folder: Path, place: Any) -> None:
     for key in ("file", "texture", "urdf"):
         name = place.get(key) if isinstance(place, dict) else None
-        if isinstance(name, str) and name and not name.startswith("package://"):
-            place[key] = str(folder / Path(name).expanduser())
+        if isinstance(name, str) and name and not hasattr(name, "given"):  # an alias is the same mapping once more
+            place[key] = named_in(folder, name)

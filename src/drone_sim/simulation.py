@@ -18,13 +18,20 @@ import numpy as np
 from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.camera.vision import Camera, Vision
 from drone_sim.drone import Drone
-from drone_sim.parameters import CameraParameters, Parameters
+from drone_sim.parameters import CameraParameters, ParameterError, Parameters
 from drone_sim.scene import Scene
+from drone_sim.scripting import load
 from drone_sim.scripting.api_scripts import LOG
 from drone_sim.scripting.drawings import Drawings
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.messages import Backend
 from drone_sim.world import World
+
+_NOWHERE = 1e9  # m, m/s and rad/s, summed
+
+
+class Diverged(RuntimeError):
+    """The dynamics has ended in numbers that mean nothing; one line that says when."""
 
 
 class Snapshot(NamedTuple):
@@ -66,13 +73,14 @@ class Simulation:
         self._backend = backend
         self._drawings = drawings
         self._runs = 0
-        self.world = World(parameters.sub_step, parameters.gravity, gui)
-        self.vision = Vision(self.world, parameters.samples)
+        self._gui = gui
+        load.script_path(script)  # one that is not there needs no world
+        self._build(parameters)
         try:
-            self._build(parameters)
+            self.vision = Vision(self.world, parameters.samples)
             self.cameras: Dict[str, Camera] = {name: self._camera(one) for name, one in parameters.cameras.items()}
             if started:
-                self.start()
+                self._run()
         except BaseException:
             try:
                 self.close()
@@ -81,22 +89,30 @@ class Simulation:
             raise
 
     def _build(self, parameters: Parameters) -> None:
-        """Put the scene and a drone without a script into an empty world."""
+        """Put the scene and a drone without a script into a new world, which then takes the last one's place."""
+        stands = hasattr(self, "world")
+        if stands and self._gui:  # there is one window: what cannot be built must not replace what it shows
+            _Built(parameters, World(parameters.sub_step, parameters.gravity)).world.close()
+            self.world.clear()
+            built = _Built(parameters, self.world)
+        else:
+            built = _Built(parameters, World(parameters.sub_step, parameters.gravity, self._gui))
+        if stands and not self._gui:
+            self.world.close()
         self.parameters = parameters
         self._sub_steps = parameters.sub_steps
-        self.world.clear()
-        self.scene = Scene(parameters.scene, self.world)
-        self.drone = Drone(parameters, self.world)
+        self.world, self.scene, self.drone = built.world, built.scene, built.drone
+        if stands:
+            self.vision.look_at(self.world)
         self.drone.bus.backend = self._backend
         self.drone.drawings = self._drawings
-        self._initial = self.world.snapshot()
+        self.world.keep_beginning()
         self._begin()
 
     def _begin(self) -> None:
         """Be at time 0 of a new run, in the initial scene."""
         self.steps = 0
         self._runs += 1
-        self.scene.name_objects(self.drone.objects)
         if self._drawings is not None:
             self._drawings.clear()
 
@@ -117,8 +133,11 @@ class Simulation:
         """
         self.stop()
         parameters = self.parameters.in_scene(self.parameters.scene_file if scene_file is None else scene_file)
-        _try_out(parameters)
         self._build(parameters)
+        self._run()
+
+    def _run(self) -> None:
+        """Load the script and run its init."""
         self.running = True
         pictures = {name: partial(self._look, camera) for name, camera in self.cameras.items()}
         self.drone.load_script(self.script, lambda: self.time, pictures)
@@ -128,8 +147,9 @@ class Simulation:
         try:
             self._clean_up()
         finally:
-            self.world.restore(self._initial)
+            self.world.begin_anew()
             self.drone.reset()
+            self.scene.name_objects(self.drone.objects)
             self._begin()
 
     def close(self) -> None:
@@ -158,14 +178,23 @@ class Simulation:
         return self.steps * self.parameters.time_step
 
     def step(self) -> None:
-        """Run one simulation step: actuation, dynamics, vision, sensing. Raises ScriptError."""
+        """Run one simulation step: actuation, dynamics, vision, sensing. Raises ScriptError and Diverged."""
         self.drone.actuation()
         self.world.advance(self.drone.wrenches(), self._sub_steps)
         self.drone.refresh()
         self.steps += 1
+        self._check_state()
         for camera in self.cameras.values():
             camera.image = self._look(camera) if self.steps % camera.every == 0 and camera.watched() else None
         self.drone.script.call("sensing")
+
+    def _check_state(self) -> None:
+        """Raise Diverged where the drone is nowhere any more."""
+        (x, y, z), _, (vx, vy, vz), (wx, wy, wz) = self.drone.state
+        # Of a NaN no comparison is true. One sum, since this runs in every step.
+        if not -_NOWHERE < x + y + z + vx + vy + vz + wx + wy + wz < _NOWHERE:
+            where = f"position {x:g} {y:g} {z:g} m, velocity {vx:g} {vy:g} {vz:g} m/s"
+            raise Diverged(f"the simulation has diverged at t = {self.time:.2f} s: {where}; `start` begins anew")
 
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the script's variables included, until the next start or stop."""
@@ -199,10 +228,18 @@ class Simulation:
         return camera.look()
 
 
-def _try_out(parameters: Parameters) -> None:
-    """Build scene and drone in a world of their own: what cannot be built must not replace what stands."""
-    world = World(parameters.sub_step, parameters.gravity)
-    try:
-        Scene(parameters.scene, world).name_objects(Drone(parameters, world).objects)
-    finally:
-        world.close()
+class _Built:
+    """A scene and a drone in a world; where they cannot be built, the world is closed again."""
+
+    def __init__(self, parameters: Parameters, world: World):
+        """Fill an empty world. Raises ParameterError and UrdfError."""
+        self.world = world
+        try:
+            self.scene = Scene(parameters, world)
+            self.drone = Drone(parameters, world)
+            self.scene.name_objects(self.drone.objects)
+            if not world.is_finite():
+                raise ParameterError("the scene as it begins: a position or a velocity is not finite")
+        except BaseException:
+            world.close()
+            raise

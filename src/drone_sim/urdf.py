@@ -10,16 +10,14 @@ merged here, by the parallel axis theorem:
 from __future__ import annotations
 
 import copy
-import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from drone_sim import urdf_files
 from drone_sim.frames import IDENTITY, Matrix, from_rpy, multiply, position, to_rpy, transform
-from drone_sim.resources import resolve
 
 
 class UrdfError(ValueError):
@@ -50,21 +48,19 @@ class RigidBody:
 def read(path: str) -> RigidBody:
     """Return the URDF at `path` as one rigid body; raises UrdfError."""
     try:
-        robot = Xml.parse(path).getroot()
-        return _merge(robot, Path(path))
-    except (Xml.ParseError, OSError, KeyError, ValueError) as error:
-        reason = f"missing {error}" if isinstance(error, KeyError) else str(error)
-        raise UrdfError(f"{path}: {' '.join(reason.split())}") from None
+        return _merge(urdf_files.read(path, kinds=("fixed", "continuous")))
+    except OSError as error:
+        raise UrdfError(f"{path}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise UrdfError(f"{path}: {' '.join(str(error).split())}") from None
 
 
-def _merge(robot: Xml.Element, path: Path) -> RigidBody:
+def _merge(robot: Xml.Element) -> RigidBody:
     links = {link.attrib["name"]: link for link in robot.findall("link")}
-    joints = {_child(joint): joint for joint in robot.findall("joint")}
+    joints = {_end(joint, "child"): joint for joint in robot.findall("joint")}
     poses = {name: _pose(name, joints) for name in links}
     roots = [name for name in links if name not in joints]
-    if len(roots) != 1:
-        raise ValueError(f"must have one root link, has {roots or 'none'}")
-    masses = {name: _mass(name, link) for name, link in links.items()}
+    masses = {name: _mass(link) for name, link in links.items()}
     mass = sum(masses.values())
     if not mass > 0:
         raise ValueError(f"total mass {mass} kg: must be greater than 0")
@@ -81,17 +77,8 @@ def _merge(robot: Xml.Element, path: Path) -> RigidBody:
         inertia=inertia,
         links=poses,
         blades=tuple(_blades(visuals, joints, poses)),
-        xml=_one_link(robot, path, roots[0], poses, (mass, centre, inertia)),
+        xml=_one_link(robot, roots[0], poses, (mass, centre, inertia)),
     )
-
-
-def _child(joint: Xml.Element) -> str:
-    if joint.attrib["type"] not in ("fixed", "continuous"):
-        raise ValueError(f"joint {joint.attrib['name']}: type {joint.attrib['type']}: must be fixed or continuous")
-    child = joint.find("child")
-    if child is None:
-        raise ValueError(f"joint {joint.attrib['name']}: no child")
-    return child.attrib["link"]
 
 
 def _pose(link: str, joints: Dict[str, Xml.Element]) -> Matrix:
@@ -99,40 +86,36 @@ def _pose(link: str, joints: Dict[str, Xml.Element]) -> Matrix:
     while link in joints:
         joint = joints[link]
         pose = multiply(_origin(joint), pose)
-        parent = joint.find("parent")
-        if parent is None:
-            raise ValueError(f"joint {joint.attrib['name']}: no parent")
-        link = parent.attrib["link"]
+        link = _end(joint, "parent")
     return pose
 
 
-def _numbers(text: str, count: int = 3) -> Tuple[float, ...]:
-    numbers = tuple(float(word) for word in text.split())
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise ValueError(f"'{text}': must be {count} finite numbers")
-    return numbers
+def _end(joint: Xml.Element, end: str) -> str:
+    element = joint.find(end)
+    return "" if element is None else element.attrib["link"]
+
+
+def _numbers(text: str) -> Tuple[float, ...]:
+    return tuple(map(float, text.split()))
 
 
 def _origin(element: Optional[Xml.Element]) -> Matrix:
     origin = None if element is None else element.find("origin")
     if origin is None:
         return IDENTITY
-    return from_rpy(_numbers(origin.get("xyz", "0 0 0")), _numbers(origin.get("rpy", "0 0 0")))
+    return from_rpy(_numbers(origin.attrib["xyz"]), _numbers(origin.attrib["rpy"]))
 
 
-def _mass(name: str, link: Xml.Element) -> float:
+def _mass(link: Xml.Element) -> float:
     element = link.find("inertial/mass")
-    mass = 0.0 if element is None else _numbers(element.attrib["value"], 1)[0]
-    if mass < 0:
-        raise ValueError(f"link {name}: mass {mass} kg: must not be negative")
-    return mass
+    return 0.0 if element is None else float(element.attrib["value"])
 
 
 def _inertia(link: Xml.Element, pose: Matrix) -> np.ndarray:
     element = link.find("inertial/inertia")
     if element is None:
         return np.zeros((3, 3))
-    xx, xy, xz, yy, yz, zz = (float(element.get(key, "0")) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    xx, xy, xz, yy, yz, zz = (float(element.attrib[key]) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     turn = np.array(multiply(pose, _origin(link.find("inertial")))).reshape(3, 4)[:, :3]
     return turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
 
@@ -153,19 +136,17 @@ def _blades(
 
 def _one_link(
     robot: Xml.Element,
-    path: Path,
     root: str,
     poses: Dict[str, Matrix],
     inertial: Tuple[float, np.ndarray, np.ndarray],
 ) -> str:
     merged = Xml.Element("robot", name=robot.get("name", "drone"))
-    merged.extend(copy.deepcopy(robot.findall("material")))
     link = Xml.SubElement(merged, "link", name=root)
     _write_inertial(link, *inertial)
     for kind in ("collision", "visual"):
         for source in robot.findall("link"):
             for element in source.findall(kind):
-                link.append(_moved(element, poses[source.attrib["name"]], path))
+                link.append(_moved(element, poses[source.attrib["name"]]))
     return Xml.tostring(merged, encoding="unicode")
 
 
@@ -177,13 +158,10 @@ def _write_inertial(link: Xml.Element, mass: float, centre: np.ndarray, inertia:
     Xml.SubElement(inertial, "inertia", {key: repr(float(inertia[at])) for key, at in upper.items()})
 
 
-def _moved(element: Xml.Element, pose: Matrix, path: Path) -> Xml.Element:
+def _moved(element: Xml.Element, pose: Matrix) -> Xml.Element:
     moved = copy.deepcopy(element)
     place = multiply(pose, _origin(element))
     for origin in moved.findall("origin"):
         moved.remove(origin)
     Xml.SubElement(moved, "origin", xyz=" ".join(map(repr, position(place))), rpy=" ".join(map(repr, to_rpy(place))))
-    for mesh in moved.iter("mesh"):
-        name = mesh.attrib["filename"]
-        mesh.set("filename", str(resolve(name if "://" in name else str(path.parent / name))))
     return moved

@@ -165,9 +165,9 @@ def test_settings_are_what_is_flown(tmp_path):
     [
         (["--set", "control.Kzre=3"], "parameter control/Kzre: unknown key"),
         (["--set", "gravity"], "--set gravity: must be KEY=VALUE"),
-        (["--duration", "nan"], "nan: must be a number of seconds"),
-        (["--duration", "-1"], "-1: must be a number of seconds"),
-        (["--duration", "long"], "long: must be a number of seconds"),
+        (["--duration", "nan"], "nan: must be a number of seconds, from 0 to 1e+06"),
+        (["--duration", "-1"], "-1: must be a number of seconds, from 0 to 1e+06"),
+        (["--duration", "long"], "long: must be a number of seconds, from 0 to 1e+06"),
         (["--commands", "nowhere.yaml"], "nowhere.yaml"),
         (["--csv", "nowhere/out.csv"], "nowhere/out.csv"),
         (["--plot", "nowhere/out.png"], "nowhere/out.png"),

@@ -10,7 +10,7 @@ from drone_sim import parameters
     [
         ({"control": {"Kzreff": 4}}, "parameter control/Kzreff: unknown key; known are Kzref"),
         ({"time_step": 0.012}, "parameter time_step = 0.012: must be a whole multiple of sub_step = 0.005"),
-        ({"time_step": 0}, "parameter time_step = 0: input should be greater than 0"),
+        ({"time_step": 0}, "parameter time_step = 0: input should be greater than or equal to 0.0001"),
         ({"cameras": {"front": {"width": 0}}}, "parameter cameras/front/width = 0"),
         ({"cameras": {"front": {"near": 200}}}, "parameter cameras/front/near = 200.0: must be less than far = 100.0"),
         ({"real_time_factor": float("nan")}, "parameter real_time_factor = nan: input should be a finite number"),

@@ -1,21 +1,22 @@
-"""Triangles with normals and materials for every shape a Visual can have; meshes are read by trimesh."""
+"""Triangles with normals and materials for every shape a Visual can have."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Iterator, Optional, Tuple
+from typing import Iterator, Optional, Tuple
 
-import cv2
 import numpy as np
 import trimesh
 
+from drone_sim import images, mesh_files
+from drone_sim.mesh_files import WHITE
 from drone_sim.visual import Visual
 
 SECTIONS = 24  # of a cylinder or capsule around its axis
 PLANE_HALF_SIZE = 200.0  # metres; a plane is infinite, a camera sees 100 m
 CREASE = np.radians(40.0)  # faces that meet more sharply than this keep an edge
+MOST_FACES = 32  # at a point; where more meet, as in the middle of a disc, each keeps its own normal
 _SPHERE = 1.0029  # radius of the polyhedron of 1280 faces that has the volume of the unit sphere
-WHITE = (1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def load(visual: Visual) -> Tuple[Mesh, ...]:
         corners = _triangles(trimesh.creation.capsule(length, _outer(radius), count=[SECTIONS, SECTIONS]))
     else:
         raise ValueError(f"visual {visual.key}: unknown shape {visual.shape!r}")
-    return (_assemble(corners, uv, WHITE, _read_image(visual.texture)),)
+    return (_assemble(corners, uv, WHITE, images.read(visual.texture) if visual.texture else None),)
 
 
 def _outer(radius: float) -> float:
@@ -107,19 +108,20 @@ def _assemble(
     texture: Optional[np.ndarray],
 ) -> Mesh:
     """Index the corners (m, 3, 3) of loose triangles, with normals, merging those that are alike."""
-    table = np.hstack([corners.reshape(-1, 3), crease_normals(corners).reshape(-1, 3)])
+    normals = crease_normals(corners).reshape(-1, 3)
+    table, alike = [corners.reshape(-1, 3), normals], [_points(corners).ravel(), _numbered(normals)]
     if uv is None or texture is None:
         uv = texture = None
     else:
-        table = np.hstack([table, uv.reshape(-1, 2)])
-    table = table.astype(np.float32)
-    _, first, inverse = np.unique(table.round(5), axis=0, return_index=True, return_inverse=True)
-    table = table[first]
+        table.append(uv.reshape(-1, 2))
+        alike.append(_numbered(uv.reshape(-1, 2)))
+    first, inverse = trimesh.grouping.unique_rows(np.column_stack(alike))
+    merged = [np.ascontiguousarray(column[first], dtype=np.float32) for column in table]
     return Mesh(
-        vertices=np.ascontiguousarray(table[:, :3]),
-        normals=np.ascontiguousarray(table[:, 3:6]),
+        vertices=merged[0],
+        normals=merged[1],
         faces=inverse.reshape(-1, 3).astype(np.uint32),
-        uv=None if uv is None else np.ascontiguousarray(table[:, 6:8]),
+        uv=None if uv is None else merged[2],
         rgba=rgba,
         texture=texture,
         closed=is_closed(corners),
@@ -136,19 +138,21 @@ def crease_normals(corners: np.ndarray, crease: float = float(CREASE)) -> np.nda
     area = _areas(corners)
     unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-30)
     point = _points(corners).ravel()
-    order = np.argsort(point, kind="stable")
-    count = np.bincount(point)
-    start = np.cumsum(count) - count
-    repeats = count[point]
-    corner = np.repeat(np.arange(len(repeats)), repeats)
-    within = np.arange(len(corner)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-    neighbour = order[start[point[corner]] + within]
-    near = np.einsum("ij,ij->i", unit[corner // 3], unit[neighbour // 3]) > np.cos(crease)
-    corner, neighbour = corner[near], neighbour[near]
-    share = unit[neighbour // 3] * _angles(corners).ravel()[neighbour, None]
-    total = np.stack([np.bincount(corner, share[:, k], minlength=len(repeats)) for k in range(3)], axis=1)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.where(length > 0, total / np.maximum(length, 1e-30), [0.0, 0.0, 1.0]).reshape(-1, 3, 3)
+    order = np.argsort(point, kind="stable")  # the corners at one point stand beside each other
+    unit = np.repeat(unit, 3, axis=0)[order]
+    share = unit * _angles(corners).reshape(-1, 1)[order]
+    many = np.bincount(point)
+    count, start = many[point[order]], (np.cumsum(many) - many)[point[order]]
+    total, here = share.copy(), np.flatnonzero(count <= MOST_FACES)
+    rank, near = np.arange(len(order)) - start, np.cos(crease)
+    for shift in range(1, MOST_FACES):
+        here = here[count[here] > shift]
+        other = start[here] + (rank[here] + shift) % count[here]
+        total[here] += share[other] * (np.einsum("ij,ij->i", unit[here], unit[other]) > near)[:, None]
+    normals = np.empty_like(total)
+    normals[order] = total
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.where(length > 0, normals / np.maximum(length, 1e-30), [0.0, 0.0, 1.0]).reshape(-1, 3, 3)
 
 
 def _areas(corners: np.ndarray) -> np.ndarray:
@@ -166,8 +170,13 @@ def _angles(corners: np.ndarray) -> np.ndarray:
 def _points(corners: np.ndarray) -> np.ndarray:
     """A number (m, 3) for each corner, the same where corners meet."""
     extent = max(float(np.ptp(corners)), 1e-30)
-    _, point = np.unique((corners.reshape(-1, 3) / extent).round(6), axis=0, return_inverse=True)
-    return point.reshape(-1, 3)
+    return _numbered(corners.reshape(-1, 3) / extent, 6).reshape(-1, 3)
+
+
+def _numbered(rows: np.ndarray, digits: int = 5) -> np.ndarray:
+    """A number (n,) for each row of numbers, the same for rows that agree to so many digits."""
+    numbers: np.ndarray = trimesh.grouping.unique_rows(rows, digits=digits)[1]
+    return numbers.ravel()
 
 
 def is_closed(corners: np.ndarray) -> bool:
@@ -178,97 +187,19 @@ def is_closed(corners: np.ndarray) -> bool:
     """
     point = _points(corners)
     point = point[(point != np.roll(point, 1, axis=1)).all(axis=1)]  # slivers have no area to see
-    there = np.vstack([point[:, [0, 1]], point[:, [1, 2]], point[:, [2, 0]]])
-    once, count = np.unique(there, axis=0, return_counts=True)
-    back = np.unique(there[:, ::-1], axis=0)
+    watertight, alike = trimesh.graph.is_watertight(trimesh.geometry.faces_to_edges(point)) if len(point) else (0, 0)
     volume = np.einsum("ij,ij->", corners[:, 0] - corners[0, 0], _areas(corners))
-    return bool(count.max(initial=0) == 1 and np.array_equal(once, back) and volume > 0)
-
-
-def _read_image(path: str) -> Optional[np.ndarray]:
-    if not path:
-        return None
-    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
-    if image is None or image.dtype != np.uint8:
-        raise ValueError(f"texture {path}: cannot be read as an 8-bit image")
-    if image.ndim == 2:
-        return cv2.cvtColor(image, cv2.COLOR_GRAY2RGB)
-    return cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA if image.shape[2] == 4 else cv2.COLOR_BGR2RGB)
+    return bool(watertight and alike and volume > 0)
 
 
 def _read_file(visual: Visual) -> Iterator[Mesh]:
-    texture = _read_image(visual.texture)
-    found = False
-    for part in _parts(visual.file):
-        found = True
-        uv, rgba, own = _material(part)
-        try:
-            corners = _triangles(part) * np.asarray(visual.size)
-        except IndexError:
-            raise ValueError(f"mesh {visual.file}: a face names a vertex that there is not") from None
-        if not np.isfinite(corners).all():
-            raise ValueError(f"mesh {visual.file}: a vertex is not finite")
+    texture = images.read(visual.texture) if visual.texture else None
+    for part in mesh_files.read(visual.file):
+        faces = part.faces
         if np.prod(visual.size) < 0:
-            corners = corners[:, ::-1]  # a mirror image turns the faces inside out
-            uv = None if uv is None else uv[:, ::-1]
-        yield _assemble(corners, uv, rgba if texture is None else WHITE, own if texture is None else texture)
-    if not found:
-        raise ValueError(f"mesh {visual.file}: holds no triangles")
-
-
-def _parts(path: str) -> Iterator[trimesh.Trimesh]:
-    """The file's meshes, placed as its scene graph says."""
-    try:
-        loaded: Any = trimesh.load(path, process=False)
-    except Exception as error:  # trimesh's readers raise whatever their parser raised
-        raise ValueError(f"mesh {path}: cannot be read ({' '.join(str(error).split())})") from error
-    if isinstance(loaded, trimesh.Trimesh):
-        if len(loaded.faces):
-            yield loaded
-        return
-    if not isinstance(loaded, trimesh.Scene):
-        return  # points or lines: nothing that covers a pixel
-    metres = trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else 1.0  # COLLADA has units
-    for node in loaded.graph.nodes_geometry:
-        transform, name = loaded.graph[node]
-        part = loaded.geometry[name]
-        if isinstance(part, trimesh.Trimesh) and len(part.faces):
-            part = part.copy()
-            part.apply_transform(transform)
-            part.apply_scale(metres)
-            yield part
-
-
-def _material(part: Any) -> Tuple[Optional[np.ndarray], Tuple[float, float, float, float], Optional[np.ndarray]]:
-    """Corner uv (m, 3, 2) or None, base colour and texture of a trimesh part, as far as it has them."""
-    kind = getattr(part.visual, "kind", None)
-    if kind in ("vertex", "face"):
-        return None, _colour(part.visual.main_color), None
-    if kind != "texture":
-        return None, WHITE, None
-    uv = part.visual.uv
-    uv = None if uv is None else np.asarray(uv, dtype=np.float64)[np.asarray(part.faces)]
-    material = part.visual.material
-    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    if image is None or uv is None:
-        return uv, _base_colour(material), None
-    texture = np.array(image.convert("RGBA" if "A" in image.getbands() else "RGB"))
-    return uv, _base_colour(material), texture
-
-
-def _base_colour(material: Any) -> Tuple[float, float, float, float]:
-    factor = getattr(material, "baseColorFactor", None)
-    if factor is None:
-        factor = getattr(material, "diffuse", None)
-    if factor is None:
-        return WHITE
-    red, green, blue, alpha = _colour(factor)
-    opacity = (getattr(material, "kwargs", None) or {}).get("d")  # MTL's dissolve; trimesh leaves it unread
-    return (red, green, blue, float(opacity[0]) if opacity else alpha)
-
-
-def _colour(values: Any) -> Tuple[float, float, float, float]:
-    values = np.asarray(values)
-    scaled = values / 255.0 if values.dtype == np.uint8 else values.astype(float)
-    red, green, blue, alpha = (float(value) for value in scaled[:4])
-    return (red, green, blue, alpha)
+            faces = faces[:, ::-1]  # a mirror image turns the faces inside out
+        corners = (part.vertices * np.asarray(visual.size))[faces]
+        uv = None if part.uv is None else part.uv[faces]
+        yield _assemble(
+            corners, uv, part.rgba if texture is None else WHITE, part.texture if texture is None else texture
+        )

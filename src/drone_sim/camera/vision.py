@@ -48,6 +48,10 @@ class Vision:
         self._renderer: Optional[Renderer] = None
         self._fallback = False
 
+    def look_at(self, scene: Scene) -> None:
+        """Take the pictures of another scene from now on."""
+        self._scene = scene
+
     def picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
         """Return the picture from `pose` (4, 4), world from optical frame.
 

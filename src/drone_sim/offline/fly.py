@@ -11,22 +11,24 @@ import sys
 import time
 from typing import Any, Callable, ContextManager, Dict, Iterator, NoReturn, Optional, Sequence, TextIO
 
-import yaml
 from tqdm import tqdm
 
 from drone_sim import parameters as parameters_module
+from drone_sim import writing, yaml_files
 from drone_sim.frames import to_euler
 from drone_sim.guardian import Guardian
 from drone_sim.offline import timeline as timeline_module
-from drone_sim.offline.recording import Recording
-from drone_sim.offline.timeline import Timeline, first_step
+from drone_sim.offline.recording import Recording, TableError
+from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
 from drone_sim.parameters import ParameterError
+from drone_sim.resources import shown
 from drone_sim.scripting.api_scripts import LOG as SCRIPT_LOG
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Simulation
 
 _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
+_PLOTTED = 500_000  # steps
 _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
 _FAILED, _SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
 _EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
@@ -54,11 +56,11 @@ def settings(assignments: Sequence[str]) -> Dict[str, Any]:
         key, equals, text = assignment.partition("=")
         *parents, last = key.split(".")
         if not equals or not all((*parents, last)):
-            raise ParameterError(f"--set {assignment}: must be KEY=VALUE, such as control.Kzref=4")
+            raise ParameterError(f"--set {_shown(assignment)}: must be KEY=VALUE, such as control.Kzref=4")
         try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise ParameterError(f"--set {assignment}: {' '.join(str(error).split())}") from None
+            value = yaml_files.parse(text)
+        except yaml_files.YamlError as error:
+            raise ParameterError(f"--set {_shown(assignment)}: {error}") from None
         place = nested
         for parent in parents:
             if not isinstance(place.get(parent), dict):
@@ -68,20 +70,28 @@ def settings(assignments: Sequence[str]) -> Dict[str, Any]:
     return nested
 
 
+def _shown(assignment: str) -> str:
+    return assignment if assignment.isprintable() and len(assignment) < 200 else shown(assignment)
+
+
 def _run(options: argparse.Namespace, guardian: Optional[Guardian]) -> int:
     parameters = parameters_module.load(settings(options.set))
     timeline = Timeline((), parameters.time_step)
     if options.commands:
         timeline = timeline_module.read(options.commands, parameters)
     steps = first_step(_duration(options, timeline), parameters.time_step)
+    if options.plot:
+        _check_plot(options.plot, steps)
     with _csv(options.csv) as file:
-        recording = Recording(file)
+        recording = Recording(file, keep=bool(options.plot))
         simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
         began = time.perf_counter()
-        flown = _status_of(lambda: _fly(simulation, timeline, steps, recording, guardian))
-        took = time.perf_counter() - began
-        # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
-        closed = _status_of(simulation.close)
+        try:
+            flown = _status_of(lambda: _fly(simulation, timeline, steps, recording, guardian))
+        finally:
+            took = time.perf_counter() - began
+            # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
+            closed = _status_of(simulation.close)
     if guardian is not None:
         guardian.stand_down()  # no script runs any more, and a plot takes its time
     print(_summary(recording, took), flush=True)
@@ -90,8 +100,16 @@ def _run(options: argparse.Namespace, guardian: Optional[Guardian]) -> int:
     return flown or closed or drawn
 
 
+def _check_plot(path: str, steps: int) -> None:
+    from drone_sim.offline import plot
+
+    plot.check(path)
+    if steps > _PLOTTED:
+        raise ValueError(f"--plot: {steps} steps; at most {_PLOTTED} are drawn")
+
+
 def _csv(path: Optional[str]) -> ContextManager[Optional[TextIO]]:
-    return open(path, "w", encoding="utf-8", newline="\n") if path else contextlib.nullcontext()
+    return writing.replacing(path) if path else contextlib.nullcontext()
 
 
 @contextlib.contextmanager
@@ -151,6 +169,8 @@ def _status_of(action: Callable[[], Optional[int]]) -> int:
         return action() or 0
     except KeyboardInterrupt:
         return _SIGNALLED + signal.SIGINT
+    except TableError:  # ends the writing of the table, which then says so
+        raise
     except _EXPECTED as error:
         print(f"fly: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
         return _FAILED
@@ -193,8 +213,8 @@ def _seconds(text: str) -> float:
         seconds = float(text)
     except ValueError:
         seconds = math.nan
-    if not 0 <= seconds < math.inf:
-        raise argparse.ArgumentTypeError(f"{text}: must be a number of seconds, 0 or more")
+    if not 0 <= seconds <= MAX_TIME:
+        raise argparse.ArgumentTypeError(f"{text:.60}: must be a number of seconds, from 0 to {MAX_TIME:g}")
     return seconds
 
 

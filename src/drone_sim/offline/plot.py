@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from drone_sim import frames
+from drone_sim import frames, writing
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import Push, Timeline
 from drone_sim.state import Twist
@@ -18,6 +19,15 @@ _GREY, _GRID, _SHADE = "#707070", "#e4e4e4", "#f2c9c4"
 _PROPELLERS = (("1 front left", _BLUE), ("2 back left", _ORANGE), ("3 back right", _GREEN), ("4 front right", _RED))
 _VELOCITIES = ("forward $v_x$ [m/s]", "left $v_y$ [m/s]", "up $v_z$ [m/s]", "yaw rate $w_z$ [rad/s]")
 _SMALLEST_RANGE = 0.05  # of an axis, in its unit: less would blow a ripple up to look like a manoeuvre
+
+
+def check(path: str) -> None:
+    """Raise OSError where `path` cannot be written, and ValueError for a format that matplotlib does not have."""
+    writing.check(path)
+    known = Figure().canvas.get_supported_filetypes()
+    ending = Path(path).suffix[1:].lower()
+    if ending and ending not in known:
+        raise ValueError(f"{path}: matplotlib does not write .{ending}; it writes {', '.join(sorted(known))}")
 
 
 def save(path: str, recording: Recording, timeline: Timeline) -> None:
@@ -39,7 +49,8 @@ def save(path: str, recording: Recording, timeline: Timeline) -> None:
     for ax in axes[-1]:
         ax.set_xlabel("simulated time [s]")
         ax.set_xlim(0, max(rows[-1, 0], 1e-3))
-    figure.savefig(path, dpi=120)
+    with writing.replacing(path, binary=True) as file:
+        figure.savefig(file, dpi=120, format=Path(path).suffix[1:] or "png")
 
 
 def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> Tuple[float, ...]:

@@ -19,6 +19,10 @@ COLUMNS = (
 )
 
 
+class TableError(OSError):
+    """The table cannot be written on; what there is of it is not kept."""
+
+
 class Recording:
     """A row per step: the state after it, and the command and the propellers that led there.
 
@@ -26,18 +30,24 @@ class Recording:
     base_link in the world frame, the command is in the track frame, propellers are particle velocities.
     """
 
-    def __init__(self, file: Optional[TextIO] = None):
-        """Take the CSV file, if there is to be one, and write its header. Raises OSError."""
+    def __init__(self, file: Optional[TextIO] = None, keep: bool = True):
+        """Take the CSV file, if there is to be one, and write its header. Raises TableError.
+
+        Without `keep`, `rows` holds the last one alone: a long flight must not fill the memory.
+        """
         self.rows: List[Tuple[float, ...]] = []
         self._file = file
+        self._keep = keep
         self._write(COLUMNS)
 
     def add(self, simulation: Simulation) -> None:
-        """Add a row: now. Raises OSError where the disk is full."""
+        """Add a row: now. Raises TableError where the disk is full."""
         drone = simulation.drone
         position, orientation, linear, angular = drone.state
         command = (*drone.command.linear, drone.command.angular.z)
         row = (simulation.time, *position, *orientation, *linear, *angular, *command, *drone.particle_velocities)
+        if not self._keep:
+            self.rows.clear()
         self.rows.append(row)
         # 17 digits bring every float back to the last bit.
         self._write(f"{value:.17g}" for value in row)
@@ -49,4 +59,7 @@ class Recording:
 
     def _write(self, fields: Iterable[str]) -> None:
         if self._file is not None:
-            self._file.write(",".join(fields) + "\n")  # at once: Ctrl-C leaves no half row
+            try:
+                self._file.write(",".join(fields) + "\n")  # at once: Ctrl-C leaves no half row
+            except OSError as error:
+                raise TableError(error.errno, error.strerror) from None

@@ -10,20 +10,20 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any, Dict, Iterable, List, NamedTuple, Type, Union
 
-import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from typing_extensions import Annotated  # typing has it from Python 3.9 on
 
-from drone_sim import checks
+from drone_sim import checks, yaml_files
 from drone_sim.drone import Drone
 from drone_sim.frames import Vector, from_rpy, to_quaternion
-from drone_sim.parameter_types import NonNegative, Positive
+from drone_sim.parameter_types import Finite, Within, numeric, readable_key
 from drone_sim.parameters import Parameters
+from drone_sim.resources import shown
 from drone_sim.state import Pose, Twist
 
+MAX_TIME = 1e6  # s, the longest flight
 _ZERO = (0.0, 0.0, 0.0)
 _TOLERANCE = 1e-6  # of a step: decimal times are not exact multiples of a binary step
 
@@ -90,11 +90,11 @@ def first_step(time: float, time_step: float) -> int:
 def read(path: str, parameters: Parameters) -> Timeline:
     """Return the timeline in a YAML file; raises TimelineError."""
     try:
-        rows = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as error:
-        raise TimelineError(f"{path}: {' '.join(str(error).split())}") from None
+        rows = yaml_files.read(path)
+    except yaml_files.YamlError as error:
+        raise TimelineError(str(error)) from None
     if not isinstance(rows, list):
-        raise TimelineError(f"{path}: must be a list of `- {{at: 1.0, twist: ...}}` entries, not {rows!r:.60}")
+        raise TimelineError(f"{path}: must be a list of `- {{at: 1.0, twist: ...}}` entries, not {shown(rows)}")
     entries = []
     for number, row in enumerate(rows, start=1):
         try:
@@ -109,10 +109,10 @@ def read(path: str, parameters: Parameters) -> Timeline:
 
 def _vector(value: Any) -> Vector:
     try:
-        x, y, z = (float(number) for number in value)
+        x, y, z = (float(numeric(number)) for number in value)
     except (TypeError, ValueError):
         x = y = z = math.nan
-    if isinstance(value, str) or not math.isfinite(x + y + z):
+    if isinstance(value, (str, dict)) or not math.isfinite(x + y + z):
         raise ValueError("must be three finite numbers, such as [1, 0, 0]")
     return x, y, z
 
@@ -125,7 +125,7 @@ class _Model(BaseModel):
 
 
 class _Time(_Model):
-    at: NonNegative
+    at: Annotated[Finite, Within(0, MAX_TIME)]
 
 
 class _Twist(_Model):
@@ -147,10 +147,11 @@ class _Pose(_Model):
 class _Push(_Model):
     force: _Vector = _ZERO
     torque: _Vector = _ZERO
-    duration: Positive
+    duration: Annotated[Finite, Within(1e-4, MAX_TIME)]
 
-    def checked(self, _parameters: Parameters) -> Push:
-        return Push(self.force, self.torque, self.duration)
+    def checked(self, parameters: Parameters) -> Push:
+        force, torque, _ = checks.push(self.force, self.torque, parameters)
+        return Push(force, torque, self.duration)
 
 
 _KINDS: Dict[str, Type[Union[_Twist, _Pose, _Push]]] = {"twist": _Twist, "pose": _Pose, "push": _Push}
@@ -158,10 +159,10 @@ _KINDS: Dict[str, Type[Union[_Twist, _Pose, _Push]]] = {"twist": _Twist, "pose":
 
 def _entry(row: Any, parameters: Parameters) -> Entry:
     if not isinstance(row, dict):
-        raise ValueError(f"{row!r:.60}: must be a mapping such as {{at: 1.0, twist: ...}}")
+        raise ValueError(f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}")
     for key in row:
         if key != "at" and key not in _KINDS:
-            raise ValueError(f"{key}: unknown key; known are at, {', '.join(_KINDS)}")
+            raise ValueError(f"{readable_key((key,))}: unknown key; known are at, {', '.join(_KINDS)}")
     kinds = [kind for kind in _KINDS if kind in row]
     if len(kinds) != 1:
         raise ValueError(f"must hold one of {', '.join(_KINDS)}; it holds {' and '.join(kinds) or 'none'}")
@@ -182,13 +183,13 @@ def _checked(model: Type[Any], values: Any, prefix: str) -> Any:
 
 def _one_line(error: ValidationError, model: Type[BaseModel], prefix: str) -> str:
     first = error.errors()[0]
-    key = (prefix + ".".join(str(part) for part in first["loc"])).rstrip(".")
+    key = (prefix + readable_key(first["loc"]).replace("/", ".")).rstrip(".")
     known = ", ".join(model.model_fields)
     if first["type"] == "extra_forbidden":
         return f"{key}: unknown key; known are {known}"
     if first["type"] == "missing":
         return f"{key}: missing; it is a number of seconds"
     if first["type"] == "model_type":
-        return f"{key} = {first['input']!r:.60}: must be a mapping of {known}"
+        return f"{key} = {shown(first['input'])}: must be a mapping of {known}"
     message = first["msg"].replace("Value error, ", "")
-    return f"{key} = {first['input']!r:.60}: {message[0].lower()}{message[1:]}"
+    return f"{key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}"

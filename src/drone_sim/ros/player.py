@@ -7,7 +7,7 @@ from typing import Callable, Optional
 import rospy
 
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.simulation import Simulation
+from drone_sim.simulation import Diverged, Simulation
 
 
 class Player:
@@ -66,19 +66,19 @@ class Player:
         return f"t = {self.simulation.time:.2f} s"
 
     def step(self) -> bool:
-        """Run one step; when the script fails, say so once, stop, and return False."""
+        """Run one step; when the script fails or the dynamics diverges, say so once, stop, and return False."""
         try:
             self.attempt(self._step)
-        except ScriptError:
+        except (ScriptError, Diverged):
             return False
         return True
 
     def attempt(self, action: Callable[[], None]) -> None:
-        """Start or step. When the script fails, log its one line, run cleanup, and raise it again."""
+        """Start or step. When script or dynamics fails, log its one line, run cleanup, and raise it again."""
         try:
             action()
-        except ScriptError as error:
-            rospy.logerr(f"script error: {error}")
+        except (ScriptError, Diverged) as error:
+            rospy.logerr(f"script error: {error}" if isinstance(error, ScriptError) else str(error))
             try:
                 self.simulation.stop()
             except ScriptError as second:

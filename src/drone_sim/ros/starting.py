@@ -89,7 +89,7 @@ def read_parameters() -> Parameters:
     if not isinstance(given, dict):
         name = rospy.get_name()
         raise ParameterError(f"parameter {name} = {str(given)[:80]}: must hold parameters, such as {name}/script")
-    for key in ("script", "scene_file"):
+    for key in ("config", "script", "scene_file"):
         if isinstance(given.get(key), str):
             given[key] = from_shell(given[key])
     parameters = parameters_module.load(given)

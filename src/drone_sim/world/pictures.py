@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 import pybullet
@@ -21,9 +21,10 @@ class _Part(NamedTuple):
 class Pictures:
     """The visual shapes of one client's bodies, read once for each body."""
 
-    def __init__(self, client: int):
-        """Start with an empty world."""
+    def __init__(self, client: int, origin: Callable[[str], str]):
+        """Start with an empty world. `origin` returns the mesh file that one of PyBullet's was made from."""
         self._client = client
+        self._origin = origin
         self._floor = -1
         self._textures: Dict[int, str] = {}
         self._parts: Dict[int, List[_Part]] = {}
@@ -116,7 +117,7 @@ class Pictures:
             shape=shape,
             size=size,
             rgba=tuple(rgba),
-            file=file.decode() if shape == "mesh" else "",
+            file=self._origin(file.decode()) if shape == "mesh" else "",
             texture=self._textures.get(key[0], ""),
             floor=key[0] == self._floor,
         )

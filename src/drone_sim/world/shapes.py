@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Dict, NamedTuple, Sequence, Tuple
+from xml.etree import ElementTree as Xml
 
 import pybullet
 
+from drone_sim import urdf_files
 from drone_sim.frames import from_rpy, to_quaternion
 from drone_sim.state import Pose
+from drone_sim.world.own_files import OwnFiles
 
 _FLOOR_TILE = 2.0  # m covered by one floor texture
 _FLOOR_THICKNESS = 0.1  # m, below z = 0
@@ -37,29 +39,40 @@ class Shape(NamedTuple):
         return Pose((x, y, z), to_quaternion(from_rpy((0, 0, 0), self.rpy)))
 
 
-def create(client: int, shape: Shape) -> int:
-    """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
+def create(client: int, shape: Shape, files: OwnFiles) -> int:
+    """Add an object without its texture; return its body id.
+
+    Raises ValueError, in one line, for a file that cannot be read.
+    """
     position, orientation = shape.pose
     try:
         if shape.kind == "urdf":
-            return pybullet.loadURDF(
-                shape.file, position, orientation, useFixedBase=shape.mass == 0, physicsClientId=client
-            )
-        collision, visual = _geometry(shape)
+            path = files.urdf(_checked_urdf(shape.file))
+            return pybullet.loadURDF(path, position, orientation, useFixedBase=shape.mass == 0, physicsClientId=client)
+        collision, visual = _geometry(shape, files)
         solid = pybullet.createCollisionShape(physicsClientId=client, **collision)
         seen = pybullet.createVisualShape(rgbaColor=shape.color, physicsClientId=client, **visual)
-        body = pybullet.createMultiBody(shape.mass, solid, seen, position, orientation, physicsClientId=client)
-        if shape.texture:
-            image = pybullet.loadTexture(shape.texture, physicsClientId=client)
-            pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
-    except pybullet.error:
-        files = " ".join(filter(None, (shape.file, shape.texture)))
-        hint = "; of STL files, it reads binary ones" if shape.file.lower().endswith(".stl") else ""
-        raise ValueError(f"{shape.kind} {files}: PyBullet cannot read it{hint}") from None
-    return body
+        return pybullet.createMultiBody(shape.mass, solid, seen, position, orientation, physicsClientId=client)
+    except pybullet.error as error:
+        raise ValueError(f"{shape.kind} {shape.file}: PyBullet cannot make it ({error})") from None
 
 
-def _geometry(shape: Shape) -> Tuple[Dict[str, Any], Dict[str, Any]]:
+def _checked_urdf(path: str) -> Xml.Element:
+    try:
+        return urdf_files.read(path)
+    except OSError as error:
+        raise ValueError(f"urdf {path}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise ValueError(f"urdf {path}: {error}") from None
+
+
+def dress(client: int, body: int, path: str) -> None:
+    """Cover a body with the image at `path`."""
+    image = pybullet.loadTexture(path, physicsClientId=client)
+    pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
+
+
+def _geometry(shape: Shape, files: OwnFiles) -> Tuple[Dict[str, Any], Dict[str, Any]]:
     """Return PyBullet's arguments for the collision and for the visual shape, which differ in their words."""
     if shape.kind == "box":
         both: Dict[str, Any] = {"shapeType": pybullet.GEOM_BOX, "halfExtents": [length / 2 for length in shape.size]}
@@ -70,13 +83,14 @@ def _geometry(shape: Shape) -> Tuple[Dict[str, Any], Dict[str, Any]]:
     if shape.kind == "cylinder":
         both = {"shapeType": pybullet.GEOM_CYLINDER, "radius": shape.size[0]}
         return {**both, "height": shape.size[1]}, {**both, "length": shape.size[1]}
-    both = {"shapeType": pybullet.GEOM_MESH, "fileName": shape.file, "meshScale": list(shape.size)}
+    both = {"shapeType": pybullet.GEOM_MESH, "meshScale": list(shape.size)}
+    seen = {**both, "fileName": files.mesh(shape.file)}
     if shape.mass == 0:  # what stands still may be hollow; what moves is its convex hull
-        return {**both, "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH}, both
-    return both, both
+        return {**seen, "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH}, seen
+    return {**both, "fileName": files.mesh(shape.file, hull=True)}, seen
 
 
-def create_floor(client: int, folder: Path, size: float, texture: str) -> int:
+def create_floor(client: int, files: OwnFiles, size: float) -> int:
     """Add a square floor with its top at z = 0, `size` metres a side; return its body id."""
     solid = pybullet.createCollisionShape(
         pybullet.GEOM_BOX,
@@ -85,22 +99,16 @@ def create_floor(client: int, folder: Path, size: float, texture: str) -> int:
         physicsClientId=client,
     )
     seen = pybullet.createVisualShape(
-        pybullet.GEOM_MESH, fileName=_write_floor_mesh(folder, size), physicsClientId=client
+        pybullet.GEOM_MESH, fileName=files.write(_floor_mesh(size), ".obj"), physicsClientId=client
     )
-    body = pybullet.createMultiBody(0, solid, seen, physicsClientId=client)
-    image = pybullet.loadTexture(texture, physicsClientId=client)
-    pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
-    return body
+    return int(pybullet.createMultiBody(0, solid, seen, physicsClientId=client))
 
 
-def _write_floor_mesh(folder: Path, size: float) -> str:
-    """Write a square whose texture repeats every _FLOOR_TILE metres, centred; return its path."""
+def _floor_mesh(size: float) -> bytes:
+    """Return a square whose texture repeats every _FLOOR_TILE metres, centred, as an OBJ file."""
     half, reach = size / 2, size / 2 / _FLOOR_TILE
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     lines = [f"v {x * half} {y * half} 0" for x, y in corners]
     lines += [f"vt {x * reach} {y * reach}" for x, y in corners]
     lines += ["vn 0 0 1", "f 1/1/1 2/2/1 3/3/1", "f 1/1/1 3/3/1 4/4/1", ""]
-    # PyBullet and the renderer keep meshes by file name: another size is another file.
-    path = folder / f"floor_{size}.obj"
-    path.write_text("\n".join(lines), encoding="utf-8")
-    return str(path)
+    return "\n".join(lines).encode()

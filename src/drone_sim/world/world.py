@@ -5,9 +5,9 @@ One thread owns it. Every call names its client, so several worlds can live in o
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
+import itertools
 from typing import Dict, List, Mapping, Optional, Sequence, Set, Tuple
+from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pybullet
@@ -18,8 +18,10 @@ from drone_sim.state import Pose, State, compose, inverse
 from drone_sim.urdf import RigidBody
 from drone_sim.visual import Visual
 from drone_sim.world import shapes
+from drone_sim.world.own_files import OwnFiles
 from drone_sim.world.pictures import Pictures
 
+_changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
 
 
@@ -31,20 +33,20 @@ class World:
 
         Raises RuntimeError where `gui` finds no display.
         """
+        self._files = OwnFiles()
         self._client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         if self._client < 0:
             raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
         self._sub_step, self._gravity = sub_step, gravity
         self._snapshots: Set[int] = set()
-        self.changes = 0  # another number whenever something may look different
-        self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_")
+        self._gui = gui
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
         self.clear()
 
     def clear(self) -> None:
         """Remove everything."""
-        self.changes += 1
+        self.changes = next(_changes)
         for number in self._snapshots:  # PyBullet would keep them
             pybullet.removeState(number, physicsClientId=self._client)
         self._snapshots.clear()
@@ -53,27 +55,32 @@ class World:
         pybullet.setTimeStep(self._sub_step, self._client)
         self._inertial_frames: Dict[int, Tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: Dict[int, Tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
-        self._pictures = Pictures(self._client)
+        self._beginning: Dict[int, Tuple[Vector, Quaternion, List[float]]] = {}
+        self._files.clear()
+        self._pictures = Pictures(self._client, self._files.origin)
+        self._undressed: Dict[int, str] = {}  # bodies whose texture PyBullet has not been given
 
     def close(self) -> None:
         """Free the world; may be called twice."""
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
-            self._folder.cleanup()
+            self._files.close()
 
     # ---- building
 
     def add_floor(self, size: float, texture: str) -> int:
         """Add a square floor with its top at z = 0, `size` metres a side; return its body id."""
-        body = shapes.create_floor(self._client, Path(self._folder.name), size, texture)
+        body = shapes.create_floor(self._client, self._files, size)
+        self._cover(body, texture)
         self._set_material(body)
         self._pictures.set_floor(body, texture)
         return body
 
     def add_shape(self, shape: shapes.Shape) -> int:
         """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
-        body = shapes.create(self._client, shape)
+        body = shapes.create(self._client, shape, self._files)
+        self._cover(body, shape.texture)
         self._set_material(body)
         self.set_pose(body, shape.pose)  # again, for PyBullet reads a URDF's pose in single precision
         if shape.texture:
@@ -82,22 +89,32 @@ class World:
 
     def add_rigid_body(self, body: RigidBody, pose: Pose) -> int:
         """Add a merged URDF with its root link at `pose`, at rest; return its body id."""
-        path = Path(self._folder.name) / "body.urdf"
-        path.write_text(body.xml, encoding="utf-8")
+        path = self._files.urdf(Xml.fromstring(body.xml))
         # The merged inertia is right; what PyBullet would derive from the collision shapes' bounds is not.
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-        number = pybullet.loadURDF(
-            str(path), pose.position, pose.orientation, flags=flags, physicsClientId=self._client
-        )
+        number = pybullet.loadURDF(path, pose.position, pose.orientation, flags=flags, physicsClientId=self._client)
         self._set_material(number)
         self.set_pose(number, pose)  # again, for PyBullet reads a URDF's pose in single precision
         return number
 
+    def _cover(self, body: int, texture: str) -> None:
+        if texture:
+            self._undressed[body] = texture
+        if self._gui:
+            self._dress()
+
+    def _dress(self) -> None:
+        """Give PyBullet the textures, which only its window and its own renderer show."""
+        while self._undressed:
+            body, texture = self._undressed.popitem()
+            shapes.dress(self._client, body, self._files.texture(texture))
+
     def remove(self, body: int) -> None:
         """Take a body out of the world."""
-        self.changes += 1
+        self.changes = next(_changes)
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
+        self._undressed.pop(body, None)
         self._centres.pop(body, None)
         self._pictures.remove(body)
 
@@ -106,7 +123,7 @@ class World:
         for link in range(-1, pybullet.getNumJoints(body, self._client)):
             pybullet.changeVisualShape(body, link, rgbaColor=rgba, physicsClientId=self._client)
         self._pictures.forget(body)
-        self.changes += 1
+        self.changes = next(_changes)
 
     def _set_material(self, number: int) -> None:
         # V-REP's Bullet material: friction 1, no restitution, no damping (PyBullet's default damps).
@@ -122,7 +139,7 @@ class World:
         )
         info = pybullet.getDynamicsInfo(number, -1, self._client)
         inertial = Pose(info[3], info[4])
-        self.changes += 1
+        self.changes = next(_changes)
         self._inertial_frames[number] = (inertial, inverse(inertial))
 
     # ---- dynamics
@@ -142,11 +159,16 @@ class World:
         position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
         return State(position, orientation, (vx - sx, vy - sy, vz - sz), angular)
 
+    def is_finite(self) -> bool:
+        """Whether every body is somewhere, and as fast as numbers go."""
+        states = [self.state(body) for body in self._inertial_frames]
+        return bool(np.isfinite([number for state in states for part in state for number in part]).all())
+
     def set_pose(self, body: int, pose: Pose) -> None:
         """Move a body's root link to `pose` and stop it."""
         inertial = self._inertial_frames[body][0]
         centre, turn = compose(pose, inertial)
-        self.changes += 1
+        self.changes = next(_changes)
         self._centres.pop(body, None)
         self._pictures.moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
@@ -172,7 +194,26 @@ class World:
             step(client)
             known = {}
         self._centres.clear()
-        self.changes += 1
+        self.changes = next(_changes)
+
+    def keep_beginning(self) -> None:
+        """Remember where everything stands, at rest, for `begin_anew`: a snapshot would copy every mesh."""
+        for body in self._inertial_frames:
+            joints = range(pybullet.getNumJoints(body, self._client))
+            angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in joints]
+            self._beginning[body] = (*pybullet.getBasePositionAndOrientation(body, self._client), angles)
+        self.begin_anew()  # so that the first time is like every other, to the last bit
+
+    def begin_anew(self) -> None:
+        """Put everything where it stood, at rest."""
+        self.changes = next(_changes)
+        self._centres.clear()
+        self._pictures.all_moved()
+        for body, (centre, turn, angles) in self._beginning.items():
+            pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
+            pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
+            for joint, angle in enumerate(angles):
+                pybullet.resetJointState(body, joint, angle, 0, self._client)
 
     def snapshot(self) -> int:
         """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget`."""
@@ -183,7 +224,7 @@ class World:
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
         self._centres.clear()
-        self.changes += 1
+        self.changes = next(_changes)
         self._pictures.all_moved()
         pybullet.restoreState(number, physicsClientId=self._client)
 
@@ -206,12 +247,14 @@ class World:
 
     def place_visuals(self, body: int, places: Mapping[int, Matrix]) -> None:
         """Move some of a body's visuals, by index, to other places in its root link's frame."""
-        self.changes += self._pictures.place(body, places)
+        if self._pictures.place(body, places):
+            self.changes = next(_changes)
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
     ) -> Tuple[np.ndarray, np.ndarray]:
         """Return RGB and depth of PyBullet's software renderer: see Pictures.tiny."""
+        self._dress()
         return self._pictures.tiny(camera, (width, height), vertical_fov, (near, far))
 
     def look_from_behind(self, position: Sequence[float], yaw: float) -> None:

@@ -1,0 +1,50 @@
+"""What was read from files, kept while they stay as they are."""
+
+from __future__ import annotations
+
+import os
+from collections import OrderedDict
+from typing import Any, Callable, Dict, Generic, Iterable, NamedTuple, Optional, Tuple, TypeVar
+
+T = TypeVar("T")
+_Identity = Optional[Tuple[int, int, int]]
+
+
+class Reading(NamedTuple):
+    """What a file held, how much memory it takes (bytes), and what other files it depends on."""
+
+    value: Any
+    size: int
+    files: Iterable[str] = ()
+
+
+class FileCache(Generic[T]):
+    """Reads files by path; the ones used last stay, up to `limit` bytes."""
+
+    def __init__(self, read: Callable[[str], Reading], limit: int):
+        """Take what reads a file."""
+        self._read = read
+        self._limit = limit
+        self._kept: OrderedDict[str, Tuple[Reading, Dict[str, _Identity]]] = OrderedDict()
+
+    def get(self, path: str) -> T:
+        """Return what is in a file now. Raises what `read` raises."""
+        kept = self._kept.get(path)
+        if kept is None or any(_identity(file) != identity for file, identity in kept[1].items()):
+            before = _identity(path)
+            reading = self._read(path)
+            kept = (reading, {path: before, **{file: _identity(file) for file in reading.files}})
+            self._kept[path] = kept
+        self._kept.move_to_end(path)
+        while len(self._kept) > 1 and sum(one.size for one, _ in self._kept.values()) > self._limit:
+            self._kept.popitem(last=False)
+        value: T = kept[0].value
+        return value
+
+
+def _identity(path: str) -> _Identity:
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size, status.st_ino

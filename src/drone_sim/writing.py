@@ -1,0 +1,95 @@
+"""Files are written whole or not at all: what was there before stays until the new one is safe on the disk."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import shutil
+from pathlib import Path
+from typing import IO, Any, Iterator, Union
+
+
+@contextlib.contextmanager
+def replacing(path: Union[str, Path], binary: bool = False) -> Iterator[IO[Any]]:
+    """Give a file to write, which takes the place of `path` at the end; on an OSError the old one stays.
+
+    It is a temporary file in the same folder until then. Another exception (a flight that fails) keeps what was
+    written up to there. A `path` that is no regular file, such as /dev/stdout or a FIFO, is written directly. Text
+    is UTF-8 with \\n. Raises OSError, in one line that names the file.
+    """
+    options: Any = {"mode": "xb"} if binary else {"mode": "x", "encoding": "utf-8", "newline": "\n"}
+    with _named(path):
+        check(path)
+        if _is_special(path):
+            with open(path, **{**options, "mode": options["mode"].replace("x", "w")}) as file:
+                yield file
+            return
+        target = os.path.realpath(path)  # a link stays a link
+        folder, name = os.path.split(target)
+        temporary = os.path.join(folder, f".{name:.100}.{secrets.token_hex(4)}")
+        try:
+            with open(temporary, **options) as file:
+                try:
+                    yield file
+                except OSError:
+                    raise
+                except BaseException:
+                    _finish(file, temporary, target)
+                    raise
+                _finish(file, temporary, target)
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.unlink(temporary)
+            raise
+
+
+def write(path: Union[str, Path], content: str) -> None:
+    """Write a text file whole or not at all. Raises OSError, in one line that names the file."""
+    with replacing(path) as file:
+        file.write(content)
+
+
+def check(path: Union[str, Path]) -> None:
+    """Raise OSError, in one line, where `path` cannot become a file."""
+    with _named(path):
+        if os.path.isdir(path):
+            raise IsADirectoryError(0, "is a folder")
+        folder = os.path.dirname(os.path.realpath(path))
+        if not _is_special(path) and not os.path.isdir(folder):
+            raise FileNotFoundError(0, f"no such folder: {folder}")
+        if os.path.exists(path) and not os.access(path, os.W_OK):
+            raise PermissionError(0, "must not be written to")
+
+
+def _is_special(path: Union[str, Path]) -> bool:
+    # /dev/stdout may lead to a regular file, to which somebody else writes, too.
+    named = os.path.abspath(path).startswith(("/dev/", "/proc/"))
+    return named or (os.path.exists(path) and not os.path.isfile(path))
+
+
+def _finish(file: IO[Any], temporary: str, target: str) -> None:
+    file.flush()
+    if os.path.exists(target):
+        shutil.copymode(target, temporary)
+    os.fsync(file.fileno())
+    os.replace(temporary, target)
+    folder = os.open(os.path.dirname(target), os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+@contextlib.contextmanager
+def _named(path: Union[str, Path]) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if str(path) in str(error):
+            raise
+        raise OSError(f"{path}: {error.strerror or error}") from None
+    except ValueError as error:
+        if "null byte" not in str(error):
+            raise
+        raise OSError(f"{path!r:.60}: {error}") from None

@@ -1,0 +1,168 @@
+"""YAML as this package reads it: of what YAML 1.1 allows, only what cannot surprise.
+
+Refused are keys that come twice or are no text, and aliases, depths and sizes beyond the limits below; numbers are
+those of YAML 1.2: `1e3` is one, `1:30` is none (YAML 1.1 takes it for 90), `010` is ten.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, ClassVar, Dict, NamedTuple, Union
+
+import yaml
+
+from drone_sim.resources import MEBIBYTE, read_bytes, shown
+
+MAX_SIZE = MEBIBYTE  # bytes of a file
+MAX_DEPTH = 32  # lists and mappings within each other
+MAX_VALUES = 300_000  # keys and values, each alias counted with all that it stands for
+_MAX_DIGITS = 400  # of a number
+_OTHER = ("int", "float", "timestamp")  # what YAML 1.1 reads in ways of its own
+_INT = re.compile(r"[-+]?(?:[0-9]+|0x[0-9a-fA-F]+)$")
+_FLOAT = re.compile(
+    r"(?:[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"
+)
+
+
+class YamlError(ValueError):
+    """A YAML text is refused; one line that says where and why."""
+
+
+def read(path: Union[str, Path]) -> Any:
+    """Return what a YAML file holds; raises YamlError, which names the file."""
+    try:
+        content = read_bytes(path, MAX_SIZE)
+    except OSError as error:
+        raise YamlError(f"{shown(str(path))[1:-1]}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise YamlError(f"{shown(str(path))[1:-1]}: {error}") from None
+    try:
+        return parse(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise YamlError(f"{path}: line {line}: must be text in UTF-8") from None
+    except YamlError as error:
+        raise YamlError(f"{path}: {error}") from None
+
+
+def parse(text: str) -> Any:
+    """Return what a YAML text holds; raises YamlError."""
+    if len(text) > MAX_SIZE:
+        raise YamlError(f"larger than {MAX_SIZE / MEBIBYTE:g} MiB")
+    try:
+        _check_depth(text)
+        loader = _Loader(text)
+        try:
+            node = loader.get_single_node()
+            if node is None:
+                return None
+            _measure(node, {}, 1)
+            return loader.construct_document(node)
+        finally:
+            loader.dispose()
+    except yaml.MarkedYAMLError as error:
+        said = " ".join(filter(None, (error.context, error.problem)))
+        mark = error.problem_mark or error.context_mark
+        raise YamlError(f"{' '.join(said.split())}{_at(mark)}") from None
+    except yaml.YAMLError as error:
+        raise YamlError(f"{' '.join(str(error).split()):.200}") from None
+
+
+def _at(mark: Any) -> str:
+    return f" (line {mark.line + 1}, column {mark.column + 1})" if mark else ""
+
+
+# The C parser is ten times as fast; where PyYAML comes without it, its own one reads the same.
+_Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Loader(_Base):
+    """PyYAML's safe loader with YAML 1.2's numbers."""
+
+    yaml_implicit_resolvers: ClassVar = {
+        first: [(tag, pattern) for tag, pattern in resolvers if tag.rpartition(":")[2] not in _OTHER]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+
+
+def _refused(node: Any, problem: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+
+
+def _too_deep(node: Any) -> yaml.MarkedYAMLError:
+    return _refused(node, f"lists and mappings are more than {MAX_DEPTH} deep")
+
+
+def _number(loader: _Loader, node: Any) -> float:
+    text = str(loader.construct_scalar(node))
+    if len(text) > _MAX_DIGITS:
+        raise _refused(node, f"a number of {len(text)} characters")
+    if _INT.match(text):
+        return int(text, 16 if "x" in text else 10)
+    if not _FLOAT.match(text):
+        raise _refused(node, f"{shown(text)} is no number")
+    return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+
+
+def _refuse_tag(_loader: _Loader, node: Any) -> Any:
+    raise _refused(node, f"the tag {shown(node.tag)} is not allowed")
+
+
+for _tag, _pattern in (("int", _INT), ("float", _FLOAT)):
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _pattern, list("-+0123456789."))
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _number)
+for _tag in ("binary", "timestamp", "omap", "pairs", "set"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _refuse_tag)
+_Loader.add_constructor(None, _refuse_tag)
+
+
+def _check_depth(text: str) -> None:
+    """Refuse what is nested too deeply before anything recurses into it."""
+    depth = 0
+    for event in yaml.parse(text, Loader=_Base):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+            if depth > MAX_DEPTH:
+                raise _too_deep(event)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+
+
+def _check_keys(node: yaml.MappingNode) -> None:
+    seen = set()
+    for key, _ in node.value:
+        if key.tag == "tag:yaml.org,2002:merge":
+            continue
+        if key.tag != "tag:yaml.org,2002:str":
+            raise _refused(key, f"key {shown(key.value) if isinstance(key, yaml.ScalarNode) else '?'} must be a text")
+        if key.value in seen:
+            raise _refused(key, f"key {shown(key.value)} comes twice")
+        seen.add(key.value)
+
+
+class _Size(NamedTuple):
+    values: int
+    depth: int
+
+
+def _measure(node: Any, known: Dict[int, _Size], depth: int) -> _Size:
+    """Return how much a node stands for once its aliases are followed; raises where that is too much."""
+    size = known.get(id(node))
+    if size is None:
+        values, deepest = 1, 0
+        children = [] if isinstance(node, yaml.ScalarNode) else node.value
+        if isinstance(node, yaml.MappingNode):
+            _check_keys(node)
+        if depth > MAX_DEPTH + 1:
+            raise _too_deep(node)
+        for child in children:
+            for one in child if isinstance(child, tuple) else (child,):
+                part = _measure(one, known, depth + 1)
+                values, deepest = values + part.values, max(deepest, part.depth)
+        size = known[id(node)] = _Size(values, deepest + 1)
+    if size.values > MAX_VALUES:
+        raise _refused(node, f"more than {MAX_VALUES} values, aliases counted with what they stand for")
+    if depth + size.depth > MAX_DEPTH + 2:
+        raise _too_deep(node)
+    return size
