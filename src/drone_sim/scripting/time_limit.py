@@ -1,20 +1,27 @@
 """Stops a runaway script.
 
-A Python script runs in the simulation's own thread, so another thread has to raise an exception in it;
-a Lua script asks `exceeded` from a hook that counts instructions.
+A Lua script asks `exceeded` from a hook that counts instructions. A Python script runs in the simulation's own
+thread, where something has to raise an exception in it: in the main thread a signal's handler, which C code that
+waits (sleep, locks, sockets, `re`) lets through; in any other thread an exception that Python raises between two
+of its instructions.
 """
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
+import signal
+import sys
 import threading
 import time
 import weakref
+from types import FrameType
 from typing import Any, Callable, Iterator, Optional
 
 _POLL = 0.05  # s between two looks of the watchdog
 _AGAIN = 0.25  # s after which a script that swallowed the exception gets another
+_SIGNAL = signal.SIGURG  # who has no handler for it ignores it, and nobody sends it
 
 _raise_in_thread = ctypes.pythonapi.PyThreadState_SetAsyncExc
 _raise_in_thread.argtypes = (ctypes.c_ulong, ctypes.py_object)
@@ -31,7 +38,11 @@ class TimeLimit:
     def __init__(self, seconds: float):
         """Take the limit in seconds of real time; 0 means none."""
         self.seconds = seconds
+        self.struck = False  # whether the last script that `run` called was stopped
         self._deadline = 0.0
+        self._expired = False
+        self._carry: Optional[Callable[[Callable[[], Any]], Any]] = None
+        self._traced_by: Any = None  # a debugger's trace function, which comes back afterwards
         self._thread = 0
         # The script's thread writes `armed` and then reads `fired`, the watchdog the other way round: so one
         # of the two sees the other, without a lock in every call.
@@ -45,11 +56,21 @@ class TimeLimit:
 
     def start(self) -> None:
         """Begin to count."""
+        self._expired = False
         self._deadline = time.monotonic() + self.seconds
 
     def exceeded(self) -> bool:
         """Tell whether the time since `start` is used up."""
-        return self.seconds > 0 and time.monotonic() > self._deadline
+        return self._expired or (self.seconds > 0 and time.monotonic() > self._deadline)
+
+    def left(self) -> float:
+        """Return how many seconds are left, negative where none are; infinite without a limit."""
+        return self._deadline - time.monotonic() if self.seconds > 0 or self._expired else math.inf
+
+    def expire(self) -> None:
+        """Let the time be used up now."""
+        self._expired = True
+        self._deadline = time.monotonic()
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
@@ -62,58 +83,98 @@ class TimeLimit:
             self._deadline += time.monotonic() - began
             self._armed = armed
 
+    def carry_with(self, carry: Callable[[Callable[[], Any]], Any]) -> None:
+        """Take what calls a function in the simulation's thread, for a script that runs in another one."""
+        self._carry = carry
+
+    def outside(self, function: Callable[[], Any]) -> Any:
+        """Call a function of the simulator for the script: in the simulation's thread, and not counted."""
+        if self._carry is not None:
+            return self._carry(function)
+        with self.paused():
+            return function()
+
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a Python function; raises Stopped where it does not return in time."""
         if not self._thread:
             _watch(self)
         self._thread = threading.get_ident()
         self._deadline = time.monotonic() + self.seconds
+        self.struck, self._traced_by = False, None
         try:
             try:
                 self._armed = True
                 return function(*arguments)
             finally:
                 self._armed = False
-                if self._fired:
-                    self._take_back()
+                if self.struck or self._fired:
+                    self._end_strike()
         except Stopped:
             # It may have struck between the end of the function and the beginning of `finally`.
             self._armed = False
-            self._take_back()
+            self._end_strike()
             raise
 
-    def _take_back(self) -> None:
+    def _end_strike(self) -> None:
         """Drop an exception that is still on its way."""
-        while True:
+        if sys.gettrace() is _trace:
+            sys.settrace(self._traced_by)
+        while self._fired:
             try:
                 with self._firing:
                     self._fired = False
                     _raise_in_thread(self._thread, _NOTHING)
-                return
             except Stopped:
                 continue
 
     def fire_if_late(self) -> None:
-        """Raise Stopped in the script's thread; the watchdog calls it."""
+        """Stop the script where it is late; the watchdog calls it."""
+        global _late
         if not (self._armed and self.exceeded()):
+            return
+        if self._thread == threading.main_thread().ident and signal.getsignal(_SIGNAL) is _strike:
+            _late = self
+            signal.pthread_kill(self._thread, _SIGNAL)
             return
         with self._firing:
             self._fired = True
             if self._armed and self.exceeded():
+                self.struck = True
                 self._deadline = time.monotonic() + _AGAIN
                 _raise_in_thread(self._thread, Stopped)
             else:
                 self._fired = False
 
+    def strike(self, frame: Optional[FrameType]) -> None:
+        """Raise Stopped in the script that is late, and once more in the next line that it runs if it swallows that."""
+        if not (self._armed and self.exceeded()):
+            return
+        if not self.struck:
+            self.struck, self._traced_by = True, sys.gettrace()
+        self._deadline = time.monotonic() + _AGAIN
+        sys.settrace(_trace)
+        while frame is not None and frame.f_code is not TimeLimit.run.__code__:
+            frame.f_trace = _trace
+            frame = frame.f_back
+        raise Stopped
+
+    def insist(self) -> None:
+        """Raise Stopped once more in a script that goes on."""
+        if self._armed:
+            raise Stopped
+
 
 _watched: weakref.WeakSet[TimeLimit] = weakref.WeakSet()
 _watching = threading.Lock()
 _watchdog: Optional[threading.Thread] = None
+_late: Optional[TimeLimit] = None  # whom the signal is for
 
 
 def _watch(limit: TimeLimit) -> None:
     """Let the watchdog, which starts with the first one, look after a limit for as long as it exists."""
     global _watchdog
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(_SIGNAL, _strike)
     with _watching:
         _watched.add(limit)
         if _watchdog is None:
@@ -128,3 +189,14 @@ def _keep_watch() -> None:
             limits = list(_watched)
         for limit in limits:
             limit.fire_if_late()
+
+
+def _strike(_number: int, frame: Optional[FrameType]) -> None:
+    if _late is not None:
+        _late.strike(frame)
+
+
+def _trace(_frame: FrameType, _event: str, _argument: Any) -> Any:
+    if _late is not None:
+        _late.insist()
+    return _trace
