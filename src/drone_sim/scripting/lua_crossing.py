@@ -100,33 +100,33 @@ end
 
 local SCALAR = {number = 1, boolean = 1, ['nil'] = 1, string = 2, table = 3}
 
-local function is_short(list)
-  local length = rawlen(list)
-  if length == 0 or length > SHORT then return nil end
-  for index = 1, length do
-    if type(rawget(list, index)) ~= 'number' then return nil end
-  end
-  return length
+-- Read an answer; where the lists are not of numbers alone, hand the values over once more, as a stream.
+local function results_of_lists(f, name, a, b, c, how, ...)
+  if how == 4 then return hand_over(f, name, a, b, c) end
+  return results(how, ...)
 end
 
 -- Call a function with one to three values, one or two of which are tables.
-local function with_lists(f, name, a, b, c)
-  local kind_a, kind_b, kind_c = SCALAR[type(a)], SCALAR[type(b)], SCALAR[type(c)]
-  if kind_a == 1 and kind_b == 1 and kind_c == 3 then
-    local length = is_short(c)
-    if length then return results(f(3, a, b, unpack(c, 1, length))) end
-  elseif kind_a == 1 and kind_b == 3 and kind_c == 1 then
-    local length = is_short(b)
-    if length then return results(f(2, a, c, unpack(b, 1, length))) end
-  elseif kind_a == 3 and kind_b == 1 and kind_c == 1 then
-    local length = is_short(a)
-    if length then return results(f(1, b, c, unpack(a, 1, length))) end
+local function with_lists(f, name, kind_a, kind_b, kind_c, a, b, c)
+  if kind_b == 1 and kind_c == 1 then
+    local n = #a
+    if 0 < n and n <= SHORT then return results_of_lists(f, name, a, b, c, f(1, b, c, unpack(a, 1, n))) end
+  elseif kind_a == 1 and kind_c == 1 then
+    local n = #b
+    if 0 < n and n <= SHORT then return results_of_lists(f, name, a, b, c, f(2, a, c, unpack(b, 1, n))) end
+  elseif kind_a == 1 and kind_b == 1 then
+    local n = #c
+    if 0 < n and n <= SHORT then return results_of_lists(f, name, a, b, c, f(3, a, b, unpack(c, 1, n))) end
   elseif kind_a == 3 and kind_b == 3 and c == nil then
-    local length = is_short(a)
-    if length and is_short(b) == 3 then return results(f(4, b[1], b[2], b[3], unpack(a, 1, length))) end
+    local n = #a
+    if 0 < n and n <= SHORT and #b == 3 then
+      return results_of_lists(f, name, a, b, c, f(4, b[1], b[2], b[3], unpack(a, 1, n)))
+    end
   elseif kind_a == 1 and kind_b == 3 and kind_c == 3 then
-    local length = is_short(c)
-    if length and is_short(b) == 3 then return results(f(5, a, b[1], b[2], b[3], unpack(c, 1, length))) end
+    local n = #c
+    if 0 < n and n <= SHORT and #b == 3 then
+      return results_of_lists(f, name, a, b, c, f(5, a, b[1], b[2], b[3], unpack(c, 1, n)))
+    end
   end
   return hand_over(f, name, a, b, c)
 end
@@ -134,13 +134,15 @@ end
 local function define(place, key, name, f)
   rawset(place, key, function(a, b, c, ...)
     if memory('count') > SOFT then check_memory() end
-    if select('#', ...) > 0 then return hand_over(f, name, a, b, c, ...) end
-    local kind_a, kind_b, kind_c = SCALAR[type(a)], SCALAR[type(b)], SCALAR[type(c)]
-    if not (kind_a and kind_b and kind_c) or (kind_a == 2 and #a > LONG) or (kind_b == 2 and #b > LONG)
-        or (kind_c == 2 and #c > LONG) then
-      return hand_over(f, name, a, b, c)
+    local kind_a, kind_b, kind_c = SCALAR[type(a)], 1, 1
+    if b ~= nil or c ~= nil then kind_b, kind_c = SCALAR[type(b)], SCALAR[type(c)] end
+    if not (kind_a and kind_b and kind_c) or select('#', ...) > 0 or (kind_a == 2 and #a > LONG)
+        or (kind_b == 2 and #b > LONG) or (kind_c == 2 and #c > LONG) then
+      return hand_over(f, name, a, b, c, ...)
     end
-    if kind_a == 3 or kind_b == 3 or kind_c == 3 then return with_lists(f, name, a, b, c) end
+    if kind_a == 3 or kind_b == 3 or kind_c == 3 then
+      return with_lists(f, name, kind_a, kind_b, kind_c, a, b, c)
+    end
     if c ~= nil then return results(f(0, a, b, c)) end
     if b ~= nil then return results(f(0, a, b)) end
     if a ~= nil then return results(f(0, a)) end

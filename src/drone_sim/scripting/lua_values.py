@@ -13,13 +13,16 @@ from drone_sim.scripting.script_values import DEEPEST, MOST_BYTES, MOST_VALUES, 
 
 _ON_STACK = 200  # values that a Lua call takes at once
 _NUMBERS = frozenset((float, int, bool))
-_ALL_NUMBERS = _NUMBERS.issuperset
+ALL_NUMBERS = _NUMBERS.issuperset
 _LARGEST = 2**63  # whole numbers beyond are floats in Lua
 
 # How the values of an answer to Lua are read there (lua_crossing.py).
-FAILED, PLAIN, LIST, TWO_LISTS = range(4)
+FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM = range(5)
 # How a call's arguments come: with lists, or as a stream.
 _SCALARS, _FIRST, _SECOND, _THIRD, _FIRST_AND_SECOND, _SECOND_AND_THIRD, _STREAM = range(7)
+
+
+_NOTHING = (PLAIN,)
 
 
 class _Mark:
@@ -62,14 +65,19 @@ class Values:
     def _put(self, *values: Any) -> None:
         self._stream.extend(values)
 
-    def arguments(self, how: int, given: Tuple[Any, ...]) -> Sequence[Any]:
-        """Return a Lua call's arguments; nil at the end is as good as left out."""
+    def arguments(self, how: int, given: Tuple[Any, ...]) -> Optional[Sequence[Any]]:
+        """Return a Lua call's arguments; nil at the end is as good as left out.
+
+        None where the lists hold other things than numbers, and the call is to be made anew, with a stream.
+        """
         if how == _SCALARS:
             found: List[Any] = [value if type(value) in _NUMBERS else _text(value) for value in given]
         elif how == _STREAM:
             found, self._stream = _from_stream(self._stream), []
         else:
             found = _with_lists(how, given)
+            if not found:
+                return None
         while found and found[-1] is None:
             found.pop()
         return found
@@ -79,10 +87,10 @@ class Values:
     def results(self, value: Any) -> Tuple[Any, ...]:
         """Return what a Python function gave as an answer to Lua; raises ValueError for too much of it."""
         kind = type(value)
-        if kind is list and len(value) <= _ON_STACK and _ALL_NUMBERS(map(type, value)):
+        if kind is list and len(value) <= _ON_STACK and ALL_NUMBERS(map(type, value)):
             return (LIST, *value)
         if value is None:
-            return (PLAIN,)
+            return _NOTHING
         if kind is float or kind is bool:
             return (PLAIN, value)
         if kind is not tuple:
@@ -125,20 +133,19 @@ class Values:
 
 
 def _with_lists(how: int, given: Tuple[Any, ...]) -> List[Any]:
-    if how == _THIRD:
-        first, second, *values = given
-        return [first, second, values]
-    if how == _SECOND:
-        first, third, *values = given
-        return [first, values, third]
-    if how == _FIRST:
-        second, third, *values = given
-        return [values, second, third]
+    """Return the arguments; [] where the lists hold other things than numbers."""
+    if how < _FIRST_AND_SECOND:
+        one, other, *values = given
+        if not ALL_NUMBERS(map(type, values)):
+            return []
+        if how == _THIRD:
+            return [one, other, values]
+        return [one, values, other] if how == _SECOND else [values, one, other]
     if how == _FIRST_AND_SECOND:
         x, y, z, *values = given
-        return [values, [x, y, z]]
+        return [values, [x, y, z]] if ALL_NUMBERS(map(type, given)) else []
     first, x, y, z, *values = given
-    return [first, [x, y, z], values]
+    return [first, [x, y, z], values] if ALL_NUMBERS(map(type, given[1:])) else []
 
 
 def _from_stream(tokens: List[Any]) -> List[Any]:
@@ -166,7 +173,7 @@ def _from_stream(tokens: List[Any]) -> List[Any]:
 def _are_two_vectors(value: Tuple[Any, ...]) -> bool:
     if len(value) != 2 or type(value[0]) is not list or type(value[1]) is not list:
         return False
-    return len(value[0]) == 3 == len(value[1]) and _ALL_NUMBERS(map(type, (*value[0], *value[1])))
+    return len(value[0]) == 3 == len(value[1]) and ALL_NUMBERS(map(type, (*value[0], *value[1])))
 
 
 def _text(value: Any) -> Any:
