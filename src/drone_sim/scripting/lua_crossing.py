@@ -143,9 +143,11 @@ local function define(place, key, name, f)
     if kind_a == 3 or kind_b == 3 or kind_c == 3 then
       return with_lists(f, name, kind_a, kind_b, kind_c, a, b, c)
     end
-    if c ~= nil then return results(f(0, a, b, c)) end
-    if b ~= nil then return results(f(0, a, b)) end
-    if a ~= nil then return results(f(0, a)) end
+    local how = 0
+    if kind_a == 2 or kind_b == 2 or kind_c == 2 then how = 7 end
+    if c ~= nil then return results(f(how, a, b, c)) end
+    if b ~= nil then return results(f(how, a, b)) end
+    if a ~= nil then return results(f(how, a)) end
     return results(f(0))
   end)
 end

@@ -24,7 +24,7 @@ from drone_sim.scripting.errors import LONGEST_MESSAGE, ScriptError
 from drone_sim.scripting.lua_sandbox import PRELUDE
 from drone_sim.scripting.lua_source import LuaSource
 from drone_sim.scripting.lua_thread import MOST_LEFT, LeftBehind, LuaThread, left_behind
-from drone_sim.scripting.lua_values import ALL_NUMBERS, AS_STREAM, FAILED, Values
+from drone_sim.scripting.lua_values import AS_STREAM, FAILED, Values
 from drone_sim.scripting.messages import Callback
 from drone_sim.scripting.time_limit import TimeLimit
 
@@ -39,7 +39,7 @@ _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NAME_LENGTH = 50  # Lua cuts longer chunk names
 _NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
 _TIME, _OVER_MEMORY, _MISSING = 1, 2, 3  # why Lua stopped a script, or called nothing (lua_sandbox.py)
-_AS_STREAM = (AS_STREAM,)
+_AS_STREAM, _STOPPED = (AS_STREAM,), (FAILED, b"stopped")
 _TOO_MUCH = f"not enough memory: a Lua script may use {_MEMORY // _MIB} MiB, this one uses more than {_MEMORY // _MIB} MiB"
 
 
@@ -207,26 +207,24 @@ def _newest() -> str:
 
 def _lua_function(name: str, function: Function, values: Values, thread: LuaThread) -> Function:
     """Return a function that answers Lua's calls; one of a script that was left behind does nothing."""
-    arguments_of, results_of, all_numbers = values.arguments, values.results, ALL_NUMBERS
+    readers, answer = values.readers(), values.answer_of(function)
 
     def call(how: int, *given: Any) -> Tuple[Any, ...]:
+        if thread.closed:
+            return _STOPPED
         arguments: Any = given
-        thread.inside = True
         try:
-            if thread.closed:
-                return FAILED, b"stopped"
-            if how or not all_numbers(map(type, given)):
-                arguments = arguments_of(how, given)
+            if how:
+                arguments = readers[how](given)
                 if arguments is None:
                     return _AS_STREAM
-            return results_of(function(*arguments))
+            return answer(function(*arguments))
         except Exception as error:
             return FAILED, explain(name, function, arguments, error).encode("utf-8", "replace")
         except BaseException:  # a signal's handler, in the simulation's thread
-            return FAILED, b"interrupted"
-        finally:
-            thread.inside = False
+            return _STOPPED
 
+    thread.api_code = call.__code__
     return call
 
 
@@ -236,10 +234,8 @@ def _hook(thread: LuaThread, limit: TimeLimit) -> Callable[[], bool]:
 
 def _log(thread: LuaThread) -> Callable[[bytes], None]:
     def log(line: bytes) -> None:
-        thread.inside = True
         if not thread.closed:
             script_log.say(line)
-        thread.inside = False
 
     return log
 

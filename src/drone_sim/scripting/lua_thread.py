@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sys
 import threading
 import time
+from types import CodeType
 from typing import Any, Callable, List, Optional, Tuple
 
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
 
-_GRACE = 0.25  # s beyond the time limit, for what the hook ends
-_LOOK = 0.01  # s between two looks at whether a function of the API has come to its end
+_GRACE = 0.25  # s of the thread's own CPU time beyond the time limit, for what the hook ends
+_PATIENCE = 10.0  # s beyond the time limit, however little time a busy machine gives the thread
+_LOOK = 0.01  # s between two looks at what is late
 _OUTSTAY = 5.0  # s that such a function may go on
 _NICE = 19  # the priority of what is left behind: it gets the time that nobody else wants
 MOST_LEFT = 8  # threads of a process that may hang at once
@@ -43,7 +46,7 @@ class LuaThread:
     def __init__(self, limit: TimeLimit):
         """Start the thread; it ends with `close`."""
         self.closed = False  # once it is, no function of the API does anything
-        self.inside = False  # whether Lua is in a function of the API
+        self.api_code: Optional[CodeType] = None  # of the function that answers Lua's calls
         self._limit = limit
         limit.carry_with(self._carry)
         self._go, self._done = threading.Lock(), threading.Lock()
@@ -79,9 +82,23 @@ class LuaThread:
             self._go.release()
 
     def _wait(self) -> None:
-        while not self._is_back(self._patience()):
-            if not self._patience():
+        """Wait for the function to end; raises LeftBehind where it hangs."""
+        while not self._is_back(min(max(_LOOK, self._limit.left()), threading.TIMEOUT_MAX)):
+            if self._limit.exceeded():
+                self._wait_beyond(self._cpu_time() + _GRACE)
+                return
+
+    def _wait_beyond(self, last: float) -> None:
+        while not self._is_back(_LOOK):
+            if self._cpu_time() > last or self._limit.left() < -_PATIENCE:
                 self._leave()
+
+    def _cpu_time(self) -> float:
+        """Return the CPU time (s) that the thread has used; 0 where that is not known."""
+        try:
+            return time.clock_gettime(time.pthread_getcpuclockid(self._thread.ident or 0))
+        except (AttributeError, OSError):
+            return 0.0
 
     def _is_back(self, timeout: float) -> bool:
         """Wait for the function to end; does one errand, if there is one, instead."""
@@ -91,9 +108,6 @@ class LuaThread:
             return True
         self._do_errand()
         return False
-
-    def _patience(self) -> float:
-        return min(max(0.0, self._limit.left() + _GRACE), threading.TIMEOUT_MAX)
 
     def _do_errand(self) -> None:
         errand, self._errand = self._errand, None
@@ -123,7 +137,7 @@ class LuaThread:
         """Close the API, and leave the thread behind as soon as it is in none of its functions."""
         self.closed = True
         end = time.monotonic() + _OUTSTAY
-        while self.inside and time.monotonic() < end:
+        while self._is_in_api() and time.monotonic() < end:
             if self._is_back(_LOOK):
                 self._go.release()
                 break
@@ -132,6 +146,13 @@ class LuaThread:
             with contextlib.suppress(OSError, TypeError):
                 os.setpriority(os.PRIO_PROCESS, self._thread.native_id, _NICE)  # type: ignore[arg-type]
         raise LeftBehind
+
+    def _is_in_api(self) -> bool:
+        """Tell whether Lua is in a function of the API: looked up, since a note of it would cost every call."""
+        frame = sys._current_frames().get(self._thread.ident or 0)
+        while frame is not None and frame.f_code is not self.api_code:
+            frame = frame.f_back
+        return frame is not None
 
     # ---- in the thread
 

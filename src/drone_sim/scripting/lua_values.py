@@ -7,22 +7,27 @@ becomes several values; a message object becomes a table of its fields.
 from __future__ import annotations
 
 from numbers import Real
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from drone_sim.scripting.script_values import DEEPEST, MOST_BYTES, MOST_VALUES, refuse_if_too_large
 
-_ON_STACK = 200  # values that a Lua call takes at once
 _NUMBERS = frozenset((float, int, bool))
-ALL_NUMBERS = _NUMBERS.issuperset
+_ALL_NUMBERS = _NUMBERS.issuperset
 _LARGEST = 2**63  # whole numbers beyond are floats in Lua
 
 # How the values of an answer to Lua are read there (lua_crossing.py).
 FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM = range(5)
-# How a call's arguments come: with lists, or as a stream.
-_SCALARS, _FIRST, _SECOND, _THIRD, _FIRST_AND_SECOND, _SECOND_AND_THIRD, _STREAM = range(7)
 
 
-_NOTHING = (PLAIN,)
+
+# What functions of the API return, most often, and the answer that it is.
+_ANSWERS: Dict[Any, Callable[[Any], Tuple[Any, ...]]] = {
+    "None": lambda _: (PLAIN,),
+    "float": lambda value: (PLAIN, value),
+    "List[float]": lambda values: (LIST, *values),
+    "List[int]": lambda values: (LIST, *values),
+    "Tuple[List[float], List[float]]": lambda values: (TWO_LISTS, *values[0], *values[1]),
+}
 
 
 class _Mark:
@@ -65,38 +70,31 @@ class Values:
     def _put(self, *values: Any) -> None:
         self._stream.extend(values)
 
-    def arguments(self, how: int, given: Tuple[Any, ...]) -> Optional[Sequence[Any]]:
-        """Return a Lua call's arguments; nil at the end is as good as left out.
-
-        None where the lists hold other things than numbers, and the call is to be made anew, with a stream.
-        """
-        if how == _SCALARS:
-            found: List[Any] = [value if type(value) in _NUMBERS else _text(value) for value in given]
-        elif how == _STREAM:
-            found, self._stream = _from_stream(self._stream), []
-        else:
-            found = _with_lists(how, given)
-            if not found:
-                return None
-        while found and found[-1] is None:
+    def _from_stream(self, _given: Tuple[Any, ...]) -> List[Any]:
+        found, self._stream = _from_stream(self._stream), []
+        while found and found[-1] is None:  # nil at the end is as good as left out
             found.pop()
         return found
 
+    def readers(self) -> Sequence[Callable[[Tuple[Any, ...]], Optional[Sequence[Any]]]]:
+        """Return what makes a function's arguments of what a call handed over, by the form of the call.
+
+        They return None where lists hold other things than numbers: the call is to be made anew, with a stream.
+        """
+        return (tuple, _first, _second, _third, _first_and_second, _second_and_third, self._from_stream, _scalars)
+
     # ---- to Lua
 
-    def results(self, value: Any) -> Tuple[Any, ...]:
-        """Return what a Python function gave as an answer to Lua; raises ValueError for too much of it."""
-        kind = type(value)
-        if kind is list and len(value) <= _ON_STACK and ALL_NUMBERS(map(type, value)):
-            return (LIST, *value)
-        if value is None:
-            return _NOTHING
-        if kind is float or kind is bool:
-            return (PLAIN, value)
-        if kind is not tuple:
-            return (PLAIN, self.to_lua(value))
-        if _are_two_vectors(value):
-            return (TWO_LISTS, *value[0], *value[1])
+    def answer_of(self, function: Callable[..., Any]) -> Callable[[Any], Tuple[Any, ...]]:
+        """Return what turns a function's results into an answer to Lua, by what it is annotated to return.
+
+        The answer raises ValueError for too much.
+        """
+        return _ANSWERS.get(function.__annotations__.get("return", ""), self._results)
+
+    def _results(self, value: Any) -> Tuple[Any, ...]:
+        if type(value) is not tuple:
+            return (PLAIN,) if value is None else (PLAIN, self.to_lua(value))
         return (PLAIN, *self.to_lua(list(value), unpacked=True))
 
     def to_lua(self, value: Any, unpacked: bool = False) -> Any:
@@ -132,20 +130,36 @@ class Values:
         return self._to_lua(key)
 
 
-def _with_lists(how: int, given: Tuple[Any, ...]) -> List[Any]:
-    """Return the arguments; [] where the lists hold other things than numbers."""
-    if how < _FIRST_AND_SECOND:
-        one, other, *values = given
-        if not ALL_NUMBERS(map(type, values)):
-            return []
-        if how == _THIRD:
-            return [one, other, values]
-        return [one, values, other] if how == _SECOND else [values, one, other]
-    if how == _FIRST_AND_SECOND:
-        x, y, z, *values = given
-        return [values, [x, y, z]] if ALL_NUMBERS(map(type, given)) else []
+def _scalars(given: Tuple[Any, ...]) -> List[Any]:
+    return [_text(value) if type(value) is bytes else value for value in given]
+
+
+def _first(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    second, third, *values = given
+    if not _ALL_NUMBERS(map(type, values)):
+        return None
+    return [values] if second is third is None else [values, second, third]
+
+
+def _second(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    first, third, *values = given
+    if not _ALL_NUMBERS(map(type, values)):
+        return None
+    return [first, values] if third is None else [first, values, third]
+
+
+def _third(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    first, second, *values = given
+    return [first, second, values] if _ALL_NUMBERS(map(type, values)) else None
+
+
+def _first_and_second(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    return [[*given[3:]], [*given[:3]]] if _ALL_NUMBERS(map(type, given)) else None
+
+
+def _second_and_third(given: Tuple[Any, ...]) -> Optional[List[Any]]:
     first, x, y, z, *values = given
-    return [first, [x, y, z], values] if ALL_NUMBERS(map(type, given[1:])) else []
+    return [first, [x, y, z], values] if _ALL_NUMBERS(map(type, given[1:])) else None
 
 
 def _from_stream(tokens: List[Any]) -> List[Any]:
@@ -168,12 +182,6 @@ def _from_stream(tokens: List[Any]) -> List[Any]:
         else:
             here.append(_text(token))
     return here
-
-
-def _are_two_vectors(value: Tuple[Any, ...]) -> bool:
-    if len(value) != 2 or type(value[0]) is not list or type(value[1]) is not list:
-        return False
-    return len(value[0]) == 3 == len(value[1]) and ALL_NUMBERS(map(type, (*value[0], *value[1])))
 
 
 def _text(value: Any) -> Any:
