@@ -128,7 +128,8 @@ class PythonScript:
         line = self._line(error)
         if isinstance(error, UnknownName):
             return line, str(error)
-        return line, mistake(error, self._modules.values()) or f"{type(error).__name__}: {shown(error)}"
+        name, text = type(error).__name__, shown(error)
+        return line, mistake(error, self._modules.values()) or (f"{name}: {text}" if text else name)
 
     def _line(self, error: BaseException) -> int:
         lines = [line for frame, line in traceback.walk_tb(error.__traceback__) if frame.f_code.co_filename == self._path]

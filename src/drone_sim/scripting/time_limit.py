@@ -1,13 +1,14 @@
 """Stops a runaway script.
 
 A Lua script asks `exceeded` from a hook that counts instructions. A Python script runs in the simulation's own
-thread, where something has to raise an exception in it: in the main thread a signal's handler, which C code that
-waits (sleep, locks, sockets, `re`) lets through; in any other thread an exception that Python raises between two
-of its instructions.
+thread, where something has to raise an exception in it: in the main thread the handler of a kernel timer, which C
+code that waits or takes long and looks at signals (sleep, locks, sockets, `re`) lets through; in any other thread
+a watchdog, whose exception Python raises between two of its instructions.
 """
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import math
@@ -21,7 +22,8 @@ from typing import Any, Callable, Iterator, Optional
 
 _POLL = 0.05  # s between two looks of the watchdog
 _AGAIN = 0.25  # s after which a script that swallowed the exception gets another
-_SIGNAL = signal.SIGURG  # who has no handler for it ignores it, and nobody sends it
+_LATER = 0.001  # s, so that the time is used up when the timer goes off
+_LONGEST = 1e6  # s
 
 _raise_in_thread = ctypes.pythonapi.PyThreadState_SetAsyncExc
 _raise_in_thread.argtypes = (ctypes.c_ulong, ctypes.py_object)
@@ -96,11 +98,15 @@ class TimeLimit:
 
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a Python function; raises Stopped where it does not return in time."""
-        if not self._thread:
-            _watch(self)
-        self._thread = threading.get_ident()
         self._deadline = time.monotonic() + self.seconds
         self.struck, self._traced_by = False, None
+        self._thread = threading.get_ident()
+        if self._thread != _MAIN:
+            _watch(self)
+        elif self.seconds:
+            _timer.limit = self
+            if self._deadline < _timer.next:
+                _timer.set(self.seconds)
         try:
             try:
                 self._armed = True
@@ -129,12 +135,7 @@ class TimeLimit:
 
     def fire_if_late(self) -> None:
         """Stop the script where it is late; the watchdog calls it."""
-        global _late
         if not (self._armed and self.exceeded()):
-            return
-        if self._thread == threading.main_thread().ident and signal.getsignal(_SIGNAL) is _strike:
-            _late = self
-            signal.pthread_kill(self._thread, _SIGNAL)
             return
         with self._firing:
             self._fired = True
@@ -145,13 +146,19 @@ class TimeLimit:
             else:
                 self._fired = False
 
-    def strike(self, frame: Optional[FrameType]) -> None:
-        """Raise Stopped in the script that is late, and once more in the next line that it runs if it swallows that."""
-        if not (self._armed and self.exceeded()):
+    def strike_if_late(self, frame: Optional[FrameType]) -> None:
+        """Raise Stopped in a script that is late, and once more in its next line should it swallow that.
+
+        Sets the timer again unless no script runs; the timer's handler calls it.
+        """
+        if not self._armed:
             return
+        if not self.exceeded():
+            _timer.set(self.left() + _LATER)
+            return
+        _timer.set(_AGAIN)
         if not self.struck:
             self.struck, self._traced_by = True, sys.gettrace()
-        self._deadline = time.monotonic() + _AGAIN
         sys.settrace(_trace)
         while frame is not None and frame.f_code is not TimeLimit.run.__code__:
             frame.f_trace = _trace
@@ -164,17 +171,49 @@ class TimeLimit:
             raise Stopped
 
 
+class _Timer:
+    """The process's timer, SIGALRM. It is not set in every call, but goes off and is set anew while scripts run."""
+
+    def __init__(self) -> None:
+        self.limit: Optional[TimeLimit] = None  # of the script that runs in the main thread, or did
+        self.next = math.inf  # when it goes off
+        self._is_ready = False
+
+    def set(self, seconds: float) -> None:
+        signal.signal(signal.SIGALRM, _go_off)
+        if not self._is_ready:
+            atexit.register(signal.setitimer, signal.ITIMER_REAL, 0)  # nobody catches it while Python ends
+            self._is_ready = True
+        self.next = time.monotonic() + seconds
+        signal.setitimer(signal.ITIMER_REAL, min(seconds, _LONGEST))
+
+
+_MAIN = threading.main_thread().ident
+_timer = _Timer()
 _watched: weakref.WeakSet[TimeLimit] = weakref.WeakSet()
 _watching = threading.Lock()
 _watchdog: Optional[threading.Thread] = None
-_late: Optional[TimeLimit] = None  # whom the signal is for
+
+
+def _go_off(_number: int, frame: Optional[FrameType]) -> None:
+    _timer.next = math.inf
+    if _timer.limit is not None:
+        _timer.limit.strike_if_late(frame)
+
+
+def _trace(_frame: FrameType, event: str, _argument: Any) -> Any:
+    if event == "call":
+        return None  # new frames, such as __exit__, end by themselves or at the next strike
+    if event == "line" and _timer.limit is not None:
+        _timer.limit.insist()
+    return _trace
 
 
 def _watch(limit: TimeLimit) -> None:
     """Let the watchdog, which starts with the first one, look after a limit for as long as it exists."""
     global _watchdog
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(_SIGNAL, _strike)
+    if limit in _watched:
+        return
     with _watching:
         _watched.add(limit)
         if _watchdog is None:
@@ -189,14 +228,3 @@ def _keep_watch() -> None:
             limits = list(_watched)
         for limit in limits:
             limit.fire_if_late()
-
-
-def _strike(_number: int, frame: Optional[FrameType]) -> None:
-    if _late is not None:
-        _late.strike(frame)
-
-
-def _trace(_frame: FrameType, _event: str, _argument: Any) -> Any:
-    if _late is not None:
-        _late.insist()
-    return _trace
