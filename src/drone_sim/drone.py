@@ -75,6 +75,7 @@ class Drone:
         cameras = self._parameters.cameras
         self.objects = drone_objects.scene_objects(self, self.body.links, self._links, cameras)
         self.signals = Signals()
+        self.drawings_made = 0
         self.script_parameters = self._script_parameters()
         self._commanded = [self.script_parameters[respondable(number)] for number in (1, 2, 3, 4)]
 
@@ -162,13 +163,14 @@ class Drone:
         return frames.multiply(sensor, drone_objects.OPTICAL_FROM_SENSOR)
 
     def remember(self) -> Callable[[], None]:
-        """Return a function that brings back all that the drone's body is not: propellers, objects, script."""
-        own = (self.command, self._command_age, list(self._pushes), dict(self._joint_angles))
+        """Return a function that brings back all that the drone's body is not: propellers, objects, script, messages that wait."""
+        own = (self.command, self._command_age, self.drawings_made, list(self._pushes), dict(self._joint_angles))
         parameters = copy.deepcopy(self.script_parameters)
-        others = [one.remember() for one in (self._propellers, self.objects, self.signals, self.script)]
+        parts = (self._propellers, self.objects, self.signals, self.bus, self.drawings, self.script)
+        others = [one.remember() for one in parts if one is not None]
 
         def recall() -> None:
-            self.command, self._command_age, pushes, angles = own
+            self.command, self._command_age, self.drawings_made, pushes, angles = own
             self._pushes, self._joint_angles = list(pushes), dict(angles)
             self._added = Wrench()
             for name, values in copy.deepcopy(parameters).items():
@@ -192,7 +194,7 @@ class Drone:
         self.close()
         limit = TimeLimit(self._parameters.script_time_limit)
         sensors = {self._parameters.cameras[name].object: take for name, take in (pictures or {}).items()}
-        surroundings = Surroundings(clock, self._parameters.time_step, sensors, limit.paused)
+        surroundings = Surroundings(clock, self._parameters.time_step, sensors, limit.outside)
         modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
         self.script = load.load(path, modules, limit)
         self.script.call("init")

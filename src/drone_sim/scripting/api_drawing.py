@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, Dict, Optional, Sequence, Set
 
 from drone_sim.objects import WORLD
-from drone_sim.scripting.api_scripts import LOG
+from drone_sim.scripting.script_log import LOG
 from drone_sim.scripting.calls import Function, numbers
 from drone_sim.scripting.drawings import MOST
 from drone_sim.scripting.host import Host
@@ -42,8 +42,8 @@ class Drawing:
 
     def __init__(self, host: Host):
         """Take the drone, and whether its drawings are shown."""
+        self._host = host
         self._drawings = host.drawings
-        self._made = 0
         self._said: Set[str] = set()
 
     def functions(self) -> Dict[str, Function]:
@@ -68,8 +68,8 @@ class Drawing:
         `size` is in px for points and lines, else in m. Items stay where they are in the world: a parent does not
         carry them.
         """
-        self._made += 1
         rgb = numbers(color, 3) if color else _GREY
+        self._host.drawings_made += 1
         if self._drawings is None:
             self._say("addDrawingObject", "there is nothing to draw on; accepted and ignored")
         else:
@@ -78,9 +78,13 @@ class Drawing:
             if maxItemCount > MOST:
                 self._say("addDrawingObject", f"{maxItemCount} items are too many: {MOST} are kept")
             self._drawings.make(
-                self._made, int(objectType), float(size), float(duplicateTolerance), int(maxItemCount), rgb
+                self._host.drawings_made,
+                int(objectType),
+                *numbers((size, duplicateTolerance), 2),
+                int(maxItemCount),
+                rgb,
             )
-        return self._made
+        return self._host.drawings_made
 
     def addDrawingObjectItem(self, handle: Handle, item: Optional[Numbers] = None) -> None:
         """Draw one more item, its points one after the other (m, world); without an item, remove all of them."""
@@ -98,9 +102,9 @@ class Drawing:
     def _ignored(self, name: str, makes: bool) -> Function:
         def call(*_arguments: Any) -> Optional[int]:
             if makes:
-                self._made += 1
+                self._host.drawings_made += 1
             self._say(name, "there is nothing to draw on; accepted and ignored")
-            return self._made if makes else None
+            return self._host.drawings_made if makes else None
 
         call.__doc__ = "Do nothing."
         return call

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from typing import Any, Dict, Optional, Tuple
 
@@ -11,14 +10,16 @@ from drone_sim.scripting import object_paths
 from drone_sim.scripting.calls import WrongValue
 from drone_sim.scripting.constants import CONSTANTS
 from drone_sim.scripting.host import Host, Parameters, Surroundings
+from drone_sim.scripting.script_log import LOG, say
+from drone_sim.scripting.script_values import refuse_if_too_large
 
-LOG = logging.getLogger("drone_sim.script")
-LOG.setLevel(logging.INFO)  # a script's print is wanted, whatever the level of the rest
+__all__ = ["LOG", "Scripts"]
 
 Handle = int
 Name = str
 
 _VERSION = 40600  # the CoppeliaSim whose API this is nearest to
+_MOST = 1000  # parameters of one script
 _SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
 
 
@@ -90,13 +91,13 @@ class Scripts:
         """
         if script == _TREE:
             for parameters in self._parameters.values():
-                parameters[name] = _stored(value, parameters.get(name))
+                _set(parameters, name, value)
             return
         parameters = self._parameters.get(script) or self._parameters[self._index(script)]
-        if type(value) is float and math.isfinite(value):  # four times a step, so at once
+        if type(value) is float and name in parameters and math.isfinite(value):  # four times a step, so at once
             parameters[name] = value
         else:
-            parameters[name] = _stored(value, parameters.get(name))
+            _set(parameters, name, value)
 
     def _index(self, script: int) -> int:
         if script == _SELF:
@@ -111,11 +112,20 @@ class Scripts:
 
     def addStatusbarMessage(self, message: Any) -> None:
         """Write a line to the log."""
-        LOG.info("%s", message)
+        say(message)
 
     def addLog(self, _verbosity: int, message: Any) -> None:
         """Write a line to the log."""
-        LOG.info("%s", message)
+        say(message)
+
+
+def _set(parameters: Parameters, name: Any, value: Any) -> None:
+    """Keep a value; raises WrongValue, ValueError."""
+    value = _stored(value, parameters.get(name))
+    refuse_if_too_large([name, value])
+    if name not in parameters and len(parameters) >= _MOST:
+        raise ValueError(f"a script has at most {_MOST} parameters")
+    parameters[name] = value
 
 
 def _stored(value: Any, before: Any) -> Any:

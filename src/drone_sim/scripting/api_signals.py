@@ -6,10 +6,15 @@ import copy
 from typing import Any, Callable, Dict, Optional, Type
 
 from drone_sim.scripting.calls import WrongValue
+from drone_sim.scripting.script_values import MOST_BYTES
 
 Name = str
 Number = float
 Text = str
+
+_MOST = 10_000  # signals of a kind
+_LONGEST_NAME = 200  # characters
+_LARGEST = 2**31 - 1
 
 
 class Signals:
@@ -30,7 +35,7 @@ class Signals:
 
     def setFloatSignal(self, name: Name, value: Number) -> None:
         """Set a number."""
-        self._values[float][_name(name)] = float(value)
+        self._set(float, name, float(value))
 
     def getFloatSignal(self, name: Name) -> Optional[float]:
         """Return a number, or nothing where it is not set."""
@@ -42,7 +47,9 @@ class Signals:
 
     def setInt32Signal(self, name: Name, value: int) -> None:
         """Set a whole number."""
-        self._values[int][_name(name)] = int(value)
+        if not abs(value) <= _LARGEST:  # so written, it refuses NaN
+            raise WrongValue(f"a whole number within +-{_LARGEST} is expected")
+        self._set(int, name, int(value))
 
     def getInt32Signal(self, name: Name) -> Optional[int]:
         """Return a whole number, or nothing where it is not set."""
@@ -58,7 +65,11 @@ class Signals:
         """Set a string."""
         if not isinstance(value, (str, bytes)):
             raise WrongValue("a string is expected")
-        self._values[str][_name(name)] = value
+        before = self._values[str].get(name, "")
+        size = sum(map(len, self._values[str].values())) - len(before) + len(value)
+        if size > MOST_BYTES:
+            raise ValueError(f"string signals may hold {MOST_BYTES} bytes together, not {size}")
+        self._set(str, name, value)
 
     def getStringSignal(self, name: Name) -> Optional[str]:
         """Return a string, or nothing where it is not set."""
@@ -68,14 +79,18 @@ class Signals:
         """Forget a string, or all of them."""
         self._clear(str, name)
 
+    def _set(self, kind: Type[Any], name: str, value: Any) -> None:
+        if not isinstance(name, str):
+            raise WrongValue("the name of a signal is a string")
+        if len(name) > _LONGEST_NAME:
+            raise ValueError(f"the name of a signal has at most {_LONGEST_NAME} characters, not {len(name)}")
+        values = self._values[kind]
+        if name not in values and len(values) >= _MOST:
+            raise ValueError(f"{_MOST} signals of a kind are there already: clear some")
+        values[name] = value
+
     def _clear(self, kind: Type[Any], name: Optional[str]) -> None:
         if name is None:
             self._values[kind].clear()
         else:
             self._values[kind].pop(name, None)
-
-
-def _name(name: str) -> str:
-    if not isinstance(name, str):
-        raise WrongValue("the name of a signal is a string")
-    return name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 import sys
 import traceback
@@ -14,6 +15,8 @@ from drone_sim.scripting.errors import UnknownName
 Function = Callable[..., Any]
 _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError)
 _SHOWN = 60  # characters of a value
+_MOST = 13  # values
+_LONGEST = 1000  # characters of an error's message
 _NAME_IN_ERRORS = "__qualname__" if sys.version_info >= (3, 10) else "__name__"  # of a call with wrong arguments
 
 
@@ -73,14 +76,14 @@ def mistake(error: BaseException, apis: Iterable[Api]) -> Optional[str]:
 def explain(name: str, function: Function, arguments: Sequence[Any], error: Exception) -> str:
     """Return one line: what is wrong, what came, what is expected."""
     if isinstance(error, ValueError):
-        return f"{name}: {error}"
+        return f"{name}: {str(error)[:_LONGEST]}"
     signature = inspect.signature(function)
     try:
         signature.bind(*arguments)
         reason = str(error) if isinstance(error, WrongValue) else "wrong kind of value"
     except TypeError:
         reason = "wrong number of values"
-    came = ", ".join(show(value) for value in arguments)
+    came = ", ".join(show(value) for value in arguments[:_MOST])
     return f"{name}: {reason}: got ({came}), expected ({_expected(signature)})"
 
 
@@ -95,17 +98,29 @@ def _expected(signature: inspect.Signature) -> str:
     return ", ".join(shown)
 
 
-def show(value: Any) -> str:
-    """Return a value as a message shows it: short, on one line."""
+def show(value: Any, depth: int = 0) -> str:
+    """Return a value as a message shows it: short, on one line, whatever it is."""
+    try:
+        text = _shown(value, depth)
+    except Exception:
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+
+
+def _shown(value: Any, depth: int) -> str:
+    if value is None:
+        return "nothing"
     if isinstance(value, float):
         return f"{value:g}"
+    if isinstance(value, (str, bytes)):
+        return repr(value[:_SHOWN])
     if isinstance(value, (list, tuple)):
-        text = "[" + ", ".join(show(item) for item in value[:13]) + "]"
-    elif value is None:
-        return "nothing"
-    else:
-        text = repr(value)
-    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
+        inner = ", ".join(show(item, depth + 1) for item in value[:_MOST]) if depth < 2 else "..."
+        return f"[{inner}]"
+    if isinstance(value, Mapping):
+        some = itertools.islice(value.items(), _MOST) if depth < 2 else ()
+        return "{" + ", ".join(f"{show(key, 2)}: {show(item, depth + 1)}" for key, item in some) + "}"
+    return repr(value)
 
 
 class WrongValue(TypeError):

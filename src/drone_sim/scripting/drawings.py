@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
-from typing import Deque, Dict, Optional, Tuple
+from dataclasses import dataclass, replace
+from typing import Callable, Deque, Dict, Optional, Tuple
 
 from drone_sim.scripting.constants import CONSTANTS
 
 MOST = 2000  # items of one object: as many as can be sent to rviz ten times a second beside the flight
+
+_MOST_OBJECTS = 1000
 
 _KIND = 0x1F  # the bits of an object's type that say what its items are; the others say how they look
 # Numbers that make one item: its points, or its middle and its normal. A size or a color of its own may follow.
@@ -52,7 +54,9 @@ class Drawings:
         self.changes = 0
 
     def make(self, handle: int, kind: int, size: float, tolerance: float, most: int, color: Item) -> None:
-        """Add an object that holds up to `most` items; raises ValueError for a kind that there is not."""
+        """Add an object that holds up to `most` items; raises ValueError for a kind that there is not, or too many."""
+        if len(self.objects) >= _MOST_OBJECTS:
+            raise ValueError(f"{_MOST_OBJECTS} drawing objects are there already: remove some")
         if kind & _KIND not in _KINDS:
             raise ValueError(f"no drawing object has the type {kind}; known are sim.drawing_{', '.join(_NUMBERS)}")
         alpha = math.prod(part for flag, part in _SEEN_THROUGH.items() if kind & flag)
@@ -86,6 +90,17 @@ class Drawings:
         del self.objects[handle]
         self.changes += 1
 
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back what is drawn now."""
+        kept = _copied(self.objects)
+
+        def recall() -> None:
+            self.objects.clear()
+            self.objects.update(_copied(kept))
+            self.changes += 1
+
+        return recall
+
     def clear(self) -> None:
         """Remove every object."""
         self.objects.clear()
@@ -99,3 +114,7 @@ class Drawings:
     @staticmethod
     def _is_there(drawn: DrawingObject, item: Item) -> bool:
         return drawn.tolerance > 0 and any(math.dist(one[:3], item[:3]) < drawn.tolerance for one in drawn.items)
+
+
+def _copied(objects: Dict[int, DrawingObject]) -> Dict[int, DrawingObject]:
+    return {handle: replace(drawn, items=drawn.items.copy()) for handle, drawn in objects.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Callable, ContextManager, Dict, Mapping, Optional, Protocol
+from typing import Any, Callable, Dict, Mapping, Optional, Protocol
 
 import numpy as np
 
@@ -13,6 +13,10 @@ from drone_sim.scripting.api_signals import Signals
 from drone_sim.scripting.drawings import Drawings
 
 Parameters = Dict[str, Any]
+
+
+def _call(function: Callable[[], Any]) -> Any:
+    return function()
 
 
 class Host(Protocol):
@@ -38,6 +42,8 @@ class Host(Protocol):
     def drawings(self) -> Optional[Drawings]:
         """Where to draw, if anywhere."""
 
+    drawings_made: int  # the last handle that was given away
+
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m)."""
 
@@ -52,4 +58,4 @@ class Surroundings:
     clock: Callable[[], float]
     time_step: float
     pictures: Mapping[str, Callable[[], np.ndarray]] = field(default_factory=dict)
-    paused: Optional[Callable[[], ContextManager[None]]] = None
+    outside: Callable[[Callable[[], Any]], Any] = _call  # calls a function where OpenGL is, on nobody's time limit

@@ -15,6 +15,7 @@ from drone_sim.scripting.time_limit import TimeLimit
 
 _BUILT_IN = Path(__file__).resolve().parents[1] / "child_scripts"
 DEFAULT = "tutorial"
+_LARGEST = 1024 * 1024  # bytes
 
 
 class Script(Protocol):
@@ -73,12 +74,25 @@ def load(script: str, modules: Mapping[str, Api], limit: TimeLimit) -> Script:
     """Load a child script; raises ScriptError."""
     path = script_path(script)
     try:
+        source = _read(path)
         if path.endswith(".lua"):
             from drone_sim.scripting.lua_script import LuaScript  # whoever flies Python needs no lupa
 
-            return LuaScript(path, modules, limit)
-        return PythonScript(path, modules, limit)
+            return LuaScript(path, source, modules, limit)
+        return PythonScript(path, source, modules, limit)
     except OSError as error:
         raise ScriptError("load", path, 0, error.strerror or str(error)) from None
     except ImportError as error:
         raise ScriptError("load", path, 0, f"Lua scripts need lupa (pip install lupa): {error}") from None
+
+
+def _read(path: str) -> bytes:
+    """Return a script's text; raises ScriptError, OSError."""
+    file = Path(path)
+    if file.exists() and not file.is_file():
+        raise ScriptError("load", path, 0, "is not a file")
+    with file.open("rb") as opened:
+        source = opened.read(_LARGEST + 1)
+    if len(source) > _LARGEST:
+        raise ScriptError("load", path, 0, f"is too large: a script has at most {_LARGEST} bytes")
+    return source

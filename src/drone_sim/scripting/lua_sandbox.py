@@ -1,33 +1,42 @@
 """The Lua side of a Lua child script: what it finds, what it may not reach, and how it is stopped.
 
-The chunk runs once in a fresh Lua state (5.1 or newer), before the script is read. Nothing of Python
-is left in the script's reach: API functions are Lua closures over Python functions, and an error that
-is a Python object passes through every pcall. Finalizers run with hooks switched off, and so do the
-handlers of Lua's own xpcall: neither is to be had, for an endless loop in one could not be stopped.
+The chunk runs once in a fresh Lua state (5.1 or newer), before the script is read. The script has globals of its
+own; the real ones, which lupa looks at, stay as they are. Nothing of Python is left in the script's reach: API
+functions are Lua closures over Python functions, and an error that is a Python object passes through every pcall.
+Finalizers run with hooks switched off, and so do the handlers of Lua's own xpcall: neither is to be had.
 """
 
-PRELUDE = r"""
-local exceeded, log, source = ...
+from drone_sim.scripting.lua_crossing import CROSSING
+from drone_sim.scripting.lua_snapshots import SNAPSHOTS
 
-local pcall, error, type, tostring, select, next = pcall, error, type, tostring, select, next
-local rawget, rawset, setmetatable = rawget, rawset, setmetatable
+_LIMITS = r"""
+local bridge, source = ...
+
+local pcall, error, type, tostring, select, next, pairs = pcall, error, type, tostring, select, next, pairs
+local rawget, rawset, rawlen, setmetatable = rawget, rawset, rawlen, setmetatable
 local unpack = table.unpack or unpack
-local concat, byte = table.concat, string.byte
-local load, loadstring = load, loadstring
+local concat, byte, sub = table.concat, string.byte, string.sub
+local load, loadstring, setfenv = load, loadstring, setfenv
+local collectgarbage, memory = collectgarbage, collectgarbage
 local getinfo, sethook = debug.getinfo, debug.sethook
 local getupvalue, setupvalue = debug.getupvalue, debug.setupvalue
+local getmeta, setmeta = debug.getmetatable, debug.setmetatable
 local create, resume, close = coroutine.create, coroutine.resume, coroutine.close
-local global = _G
+local exceeded, log = bridge.exceeded, bridge.log
 local newer = _VERSION ~= 'Lua 5.1'
-local name_of_script = source:sub(2) -- source is '=name'
+debug = nil -- or lupa looks up its traceback in every call
+local name_of_script = sub(source, 2) -- source is '=name'
+rawlen = rawlen or function(t) return #t end -- which knows no __len in 5.1
 
 local function pack(...)
   return {n = select('#', ...), ...}
 end
 
----- errors, and the time limit
+---- errors, and the limits of time and memory
 
 local INSTRUCTIONS = 10000 -- between two looks at the clock: some 0.1 ms
+local SOFT = bridge.memory / 1024 -- KiB that the script may use
+local TIME, MEMORY, MISSING = 1, 2, 3 -- why it was stopped, or not called
 local stopped, stopped_at = false, 0
 
 local function line_in_script()
@@ -39,16 +48,25 @@ local function line_in_script()
   return 0
 end
 
+local function stop(why)
+  stopped, stopped_at = why, line_in_script()
+  error('stopped', 0)
+end
+
+local function check_memory()
+  if memory('count') <= SOFT then return end
+  collectgarbage()
+  if memory('count') > SOFT then stop(MEMORY) end
+end
+
 local function hook()
   if stopped then error('stopped', 0) end
-  if exceeded() then
-    stopped, stopped_at = true, line_in_script()
-    error('stopped', 0)
-  end
+  check_memory()
+  if exceeded() then stop(TIME) end
 end
 sethook(hook, '', INSTRUCTIONS)
 
--- Neither the end of the time limit nor a Python exception can be caught.
+-- Neither a limit nor a Python exception can be caught.
 local function caught(ok, ...)
   if not ok and (stopped or type((...)) == 'userdata') then error((...), 0) end
   return ok, ...
@@ -59,131 +77,98 @@ local function protected(f, ...)
 end
 
 local function message_of(value)
-  if type(value) == 'string' or type(value) == 'number' then return tostring(value) end
+  if type(value) == 'number' then return tostring(value) end
+  if type(value) == 'string' then return sub(value, 1, bridge.longest_message) end
   return 'an error that is a ' .. type(value)
 end
+"""
 
--- Run f; return true, or false with line and message (no line: the message may begin with it).
+_PHASES = r"""
+---- what Python calls: phases, callbacks, and the script itself
+
+local env, chunk = {}, nil
+local PHASES = {bridge.phases()}
+
+-- Tell which phases the script has: the sum of 1 for the first of them, 2 for the second, ...
+local function phases()
+  if chunk then return 15 end
+  local found, bit = 0, 1
+  for number = 1, 4 do
+    if type(rawget(env, PHASES[number])) == 'function' then found = found + bit end
+    bit = bit + bit
+  end
+  return found
+end
+
+-- Run f; return which phases there are, then true and what f returned, or the number of the limit and the line,
+-- or false and a message (which may begin with the line).
 local function run(f, ...)
   stopped = false
   local ok, value = pcall(f, ...)
-  if ok then return true end
+  if memory('count') > SOFT then pcall(check_memory) end
+  if stopped then return phases(), stopped, stopped_at end
+  if ok then return phases(), true, value end
   if type(value) == 'userdata' then error(value, 0) end
-  if stopped then return false, stopped_at end
-  return false, nil, message_of(value)
+  return phases(), false, message_of(value)
 end
 
----- what the script calls
-
-local function define(place, name, f)
-  rawset(place, name, function(...)
-    local results = pack(f(...))
-    if not results[1] then
-      error(name_of_script .. ':' .. line_in_script() .. ': ' .. results[2], 0)
-    end
-    return unpack(results, 2, results.n)
-  end)
-end
-
-local function list(...)
-  return {...}
-end
-
-local function items(t)
-  return unpack(t)
-end
-
-local callbacks = {}
-
--- Return what to call back, by name or, for functions themselves, by number.
-local function callback_number(f)
-  callbacks[#callbacks + 1] = f
-  return #callbacks
-end
-
----- snapshots
-
--- Return a function that gives every variable that the script can reach the value that it has now:
--- contents of tables, and locals that functions share. Coroutines are left as they are.
-local function remember()
-  local tables, locals, seen = {}, {}, {}
-  local visit
-
-  local function visit_table(t)
-    local copy = {}
-    for key, value in next, t do copy[key] = value end
-    tables[t] = copy
-    for key, value in next, copy do
-      visit(key)
-      visit(value)
-    end
+local function phase(number)
+  if chunk then
+    rawset(env, 'sim_call_type', number - 1)
+    return run(chunk)
   end
-
-  local function visit_function(f)
-    if getinfo(f, 'S').what == 'C' then return end
-    for index = 1, 255 do
-      local name, value = getupvalue(f, index)
-      if name == nil then return end
-      locals[#locals + 1] = {f, index, value}
-      visit(value)
-    end
-  end
-
-  function visit(value)
-    local kind = type(value)
-    if seen[value] or (kind ~= 'table' and kind ~= 'function') then return end
-    seen[value] = true
-    if kind == 'table' then visit_table(value) else visit_function(value) end
-  end
-
-  for _, f in next, callbacks do visit(f) end
-  visit(global)
-  return function()
-    for t, copy in next, tables do
-      for key in next, t do
-        if copy[key] == nil then rawset(t, key, nil) end
-      end
-      for key, value in next, copy do rawset(t, key, value) end
-    end
-    for _, kept in next, locals do setupvalue(kept[1], kept[2], kept[3]) end
-  end
+  return run(rawget(env, PHASES[number]))
 end
 
-local function find(name)
+local function called_back(name, message)
   local f = callbacks[name]
-  if f == nil then f = rawget(global, name) end
-  if type(f) == 'function' then return f end
+  if f == nil then f = rawget(env, name) end
+  if type(f) ~= 'function' then return phases(), MISSING end
+  return run(f, message)
 end
 
 local function compile(text, name)
-  if newer then return load(text, name, 't') end
   if byte(text) == 27 then return nil, 'precompiled code' end
-  return loadstring(text, name)
+  if newer then return load(text, name, 't', env) end
+  local f, message = loadstring(text, name)
+  if f then setfenv(f, env) end
+  return f, message
 end
 
+-- Compile the script; run it, unless it is to run in every phase.
+local function open(text, per_phase)
+  return run(function()
+    local f, message = compile(text, source)
+    if not f then error(message, 0) end
+    if per_phase then chunk = f else f() end
+  end)
+end
+"""
+
+_GLOBALS = r"""
 ---- the script's globals
 
-local modules = {math = math, string = string, table = table, coroutine = coroutine, os = {
-  time = os.time, clock = os.clock, date = os.date, difftime = os.difftime,
-}}
-if utf8 then modules.utf8 = utf8 end
-
-for _, name in pairs{'io', 'debug', 'package', 'python', 'dofile', 'loadfile', 'module', 'newproxy', 'getfenv',
-    'setfenv', 'warn', 'gcinfo'} do
-  global[name] = nil
+for _, name in pairs{'_VERSION', 'assert', 'collectgarbage', 'error', 'getmetatable', 'ipairs', 'math', 'next', 'pairs',
+    'rawequal', 'rawget', 'rawlen', 'rawset', 'select', 'string', 'table', 'tonumber', 'tostring', 'type', 'utf8',
+    'coroutine', 'bit32'} do
+  env[name] = _G[name]
 end
-os = modules.os
+env._G = env
+env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.difftime}
+local modules = {math = math, string = string, table = table, coroutine = coroutine, os = env.os, utf8 = utf8}
 string.dump = nil
 
-function print(...)
+function env.print(...)
   local words = {}
   for i = 1, select('#', ...) do words[i] = tostring((select(i, ...))) end
-  log(concat(words, '\t'))
+  local line = sub(concat(words, '\t'), 1, bridge.longest_line)
+  check_memory()
+  log(line)
 end
 
-_G.pcall = protected
+env.pcall = protected
 
-function xpcall(f, handler, ...)
+function env.xpcall(f, handler, ...)
   local results = pack(protected(f, ...))
   if results[1] then return unpack(results, 1, results.n) end
   return false, handler(results[2])
@@ -208,12 +193,13 @@ local function unwrapped(ok, ...)
   error((...), 0)
 end
 
+local new_thread = coroutine.create
 function coroutine.wrap(f)
-  local thread = coroutine.create(f)
+  local thread = new_thread(f)
   return function(...) return unwrapped(resume(thread, ...)) end
 end
 
-_G.setmetatable = function(t, meta)
+function env.setmetatable(t, meta)
   if type(meta) == 'table' and rawget(meta, '__gc') ~= nil then
     error('a child script has no finalizers (__gc)', 2)
   end
@@ -230,15 +216,21 @@ local function read_all(reader)
   return concat(pieces)
 end
 
-function _G.load(text, name, mode, ...)
+function env.load(text, name, mode, ...)
   text = read_all(text)
   if byte(text) == 27 or mode == 'b' then return nil, 'only text can be loaded' end
-  if not newer then return loadstring(text, name or '=(load)') end
-  return load(text, name or '=(load)', 't', ...)
+  if newer then
+    local its = env
+    if select('#', ...) > 0 then its = ... end
+    return load(text, name or '=(load)', 't', its)
+  end
+  local f, message = loadstring(text, name or '=(load)')
+  if f then setfenv(f, env) end
+  return f, message
 end
-_G.loadstring = _G.load
+env.loadstring = env.load
 
-function require(name)
+function env.require(name)
   local module = modules[name]
   if module == nil then error("no module '" .. tostring(name) .. "'", 2) end
   return module
@@ -246,7 +238,18 @@ end
 
 ---- what Lua 5.1 and newer call differently
 
-_G.unpack, table.unpack = unpack, unpack
+if not newer then -- whose matcher takes a piece of the C stack for each item of a pattern
+  for _, name in pairs{'find', 'match', 'gmatch', 'gsub'} do
+    local f = string[name]
+    string[name] = function(text, pattern, third, plain, ...)
+      if type(pattern) == 'string' and #pattern > 10000 and not (name == 'find' and plain) then
+        error('pattern too long: more than 10000 bytes', 2)
+      end
+      return f(text, pattern, third, plain, ...)
+    end
+  end
+end
+env.unpack, table.unpack = unpack, unpack
 math.mod = math.mod or math.fmod
 math.fmod = math.fmod or math.mod
 math.pow = math.pow or function(x, y) return x ^ y end
@@ -255,7 +258,9 @@ string.gfind = string.gfind or string.gmatch
 math.randomseed(1) -- the same flight every time
 
 return {
-  run = run, define = define, list = list, items = items, find = find, compile = compile,
-  callback_number = callback_number, remember = remember, modules = modules, globals = global, type = type,
+  phase = phase, called_back = called_back, open = open, remember = remember, recall = recall, define = define,
+  list = list, modules = modules, globals = env,
 }
 """
+
+PRELUDE = _LIMITS + CROSSING + _PHASES + SNAPSHOTS + _GLOBALS

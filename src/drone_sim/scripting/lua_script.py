@@ -14,50 +14,61 @@ import logging
 import re
 import weakref
 from pathlib import Path
-from typing import Any, Callable, Dict, Mapping, Optional, Set
+from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple
 
 from drone_sim.objects import near_names
-from drone_sim.scripting.api_scripts import LOG
+from drone_sim.scripting import script_log
 from drone_sim.scripting.calls import Api, Function, contents, explain
-from drone_sim.scripting.constants import CALL_TYPES, PHASES
-from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.constants import PHASES
+from drone_sim.scripting.errors import LONGEST_MESSAGE, ScriptError
 from drone_sim.scripting.lua_sandbox import PRELUDE
-from drone_sim.scripting.lua_values import Values
+from drone_sim.scripting.lua_source import LuaSource
+from drone_sim.scripting.lua_thread import MOST_LEFT, LeftBehind, LuaThread, left_behind
+from drone_sim.scripting.lua_values import AS_STREAM, FAILED, Values
 from drone_sim.scripting.messages import Callback
 from drone_sim.scripting.time_limit import TimeLimit
 
 _LOG = logging.getLogger(__name__)
-_MEMORY = 256 * 1024 * 1024  # bytes that a script may use
+_MIB = 1024 * 1024
+_MEMORY = 256 * _MIB  # bytes that a script may use
+_CAP = _MEMORY + 256 * _MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
 _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", "lua51")
-_FLAT = {"sim": "sim", "simROS": "simExtRosInterface_"}  # 3.x: simGetObjectPosition, simExtRosInterface_publish
+_FLAT = {"simROS": "simExtRosInterface_"}
 
-_COMMENT = re.compile(rb"--\[(=*)\[.*?\]\1\]|--[^\n]*", re.DOTALL)
-_PER_PHASE = re.compile(rb"\bsim_call_type\b")
-_FLAT_CALL = re.compile(rb"(?<![.:\w])sim[A-Z]\w*\s*\(")
 _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NAME_LENGTH = 50  # Lua cuts longer chunk names
+_NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
+_TIME, _OVER_MEMORY, _MISSING = 1, 2, 3  # why Lua stopped a script, or called nothing (lua_sandbox.py)
+_AS_STREAM, _STOPPED = (AS_STREAM,), (FAILED, b"stopped")
+_TOO_MUCH = f"not enough memory: a Lua script may use {_MEMORY // _MIB} MiB, this one uses more than {_MEMORY // _MIB} MiB"
 
 
 class LuaScript:
     """A file that defines sysCall_init, ... as it needs them, or looks at sim_call_type."""
 
-    def __init__(self, path: str, modules: Mapping[str, Api], limit: TimeLimit):
-        """Compile the file; run its top level unless it is to run in every phase. Raises ScriptError."""
+    def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
+        """Compile the file's text; run its top level unless it is to run in every phase. Raises ScriptError."""
         self._path = path
         self._limit = limit
-        source = Path(path).read_bytes()
-        if source.startswith(b"#"):
-            source = b"--" + source
-        bare = _COMMENT.sub(b" ", source)
-        self._per_phase = _PER_PHASE.search(bare) is not None
+        self._end = ""  # why nothing can be called any more
+        self._phases = 0
         self._name = Path(path).name[:_NAME_LENGTH]
-        self._open("lua51" if self._per_phase or _FLAT_CALL.search(bare) else _newest())
-        self._define(modules)
-        self._chunk = self._compile(source)
-        if not self._per_phase:
-            self._run("load", self._chunk)
+        if left_behind() >= MOST_LEFT:
+            raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
+        text = LuaSource(source)
+        self._thread = LuaThread(limit)
+        try:
+            dialect = "lua51" if text.per_phase or text.flat else _newest()
+            sandbox = self._thread.run(self._build, dialect, modules)
+            self._phase, self._called_back = sandbox[b"phase"], sandbox[b"called_back"]
+            self._remember, self._recall = sandbox[b"remember"], sandbox[b"recall"]
+            self._run("load", sandbox[b"open"], text.text, text.per_phase)
+        except BaseException:
+            self._thread.close()
+            raise
 
-    def _open(self, dialect: str) -> None:
+    def _build(self, dialect: str, modules: Mapping[str, Api]) -> Any:
+        """Return the sandbox (lua_sandbox.py) of a new Lua state, with the API in it."""
         lupa = importlib.import_module(f"lupa.{dialect}")
         runtime = lupa.LuaRuntime(
             encoding=None,
@@ -65,69 +76,94 @@ class LuaScript:
             register_builtins=False,
             attribute_filter=_nothing_of_python,
             unpack_returned_tuples=True,
-            max_memory=_MEMORY,
+            max_memory=_CAP,
         )
-        self._values = Values(runtime, lupa.lua_type)
+        self._values = values = Values(runtime)
         # What Lua holds of Python must not lead back to this object, or neither is ever freed.
-        self._finalizer = weakref.finalize(self, self._values.close)
-        chunk_name = f"={self._name}".encode()
-        sandbox = runtime.execute(PRELUDE.encode(), self._limit.exceeded, _log, chunk_name)
-        self._values.use(sandbox)
-        self._sandbox = sandbox
-        self._call, self._find = sandbox[b"run"], sandbox[b"find"]
-        self._globals = sandbox[b"globals"]
+        self._finalizer = weakref.finalize(self, _free, self._thread, values)
+        bridge = {
+            **values.bridge(),
+            "exceeded": _hook(self._thread, self._limit),
+            "log": _log(self._thread),
+            "memory": _MEMORY,
+            "longest_message": 4 * LONGEST_MESSAGE,
+            "longest_line": 4 * script_log.LONGEST,
+            "phases": _phase_functions,
+        }
+        table = runtime.table_from({key.encode(): value for key, value in bridge.items()})
+        sandbox = runtime.execute(PRELUDE.encode(), table, f"={self._name}".encode())
+        self._define(sandbox, modules)
         _LOG.debug("%s runs in %s", self._path, dialect)
+        return sandbox
 
     # ---- the script
 
     def call(self, phase: str) -> None:
         """Run a phase; raises ScriptError."""
-        if self._per_phase:
-            self._globals[b"sim_call_type"] = CALL_TYPES[phase]
-            self._run(phase, self._chunk)
-            return
-        function = self._find(_FUNCTIONS[phase])
-        if function is not None:
-            self._run(phase, function)
+        number = _NUMBERS[phase]
+        if self._phases & 1 << number - 1:
+            if self._end and phase == "cleanup":  # said when it happened
+                return
+            self._run(phase, self._phase, number)
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call the script's function of that name with a message; raises ScriptError."""
-        function = self._find(callback.encode() if isinstance(callback, str) else callback)
-        if function is None:
-            raise ScriptError(str(callback), self._path, 0, f"the script has no function '{callback}' to call back")
-        self._run(callback if isinstance(callback, str) else "callback", function, self._values.to_lua(message))
+        name = callback if isinstance(callback, str) else "callback"
+        self._run(name, self._call_back, callback.encode() if isinstance(callback, str) else callback, message)
+
+    def _call_back(self, callback: Any, message: Any) -> Any:
+        return self._called_back(callback, self._values.to_lua(message))
 
     def remember(self) -> Callable[[], None]:
-        """Return a function that gives the script's variables the values that they have now."""
-        return self._sandbox[b"remember"]()
+        """Return a function that gives the script's variables the values that they have now. Raises ScriptError."""
+        snapshot = self._run("snapshot", self._remember)
+        return lambda: self._run("restore", self._recall, snapshot)
 
     def close(self) -> None:
         """Free the Lua state; the script cannot be called after that."""
         self._finalizer()
-        self._sandbox = self._call = self._find = self._globals = self._chunk = None
+        self._end = self._end or "the script is closed"
+        self._phases = 0
+        self._phase = self._called_back = self._remember = self._recall = None
 
-    def _compile(self, source: bytes) -> Any:
-        compiled = self._sandbox[b"compile"](source, f"={self._name}".encode())
-        if isinstance(compiled, tuple):
-            raise self._error("load", None, compiled[1])
-        return compiled
-
-    def _run(self, phase: str, function: Any, *arguments: Any) -> None:
-        self._limit.start()
+    def _run(self, phase: str, function: Any, *arguments: Any) -> Any:
+        """Call a function in Lua's thread; return what it returns."""
+        if self._end:
+            raise self._error(phase, self._end)
+        script_log.new_call()
         try:
-            outcome = self._call(function, *arguments)
-        except Exception as error:  # lupa's own, such as a stack overflow in C
-            raise ScriptError(phase, self._path, 0, f"{type(error).__name__}: {error}") from None
-        if outcome is not True:
-            raise self._error(phase, *outcome[1:])
+            self._phases, how, *rest = self._thread.run(function, *arguments)
+        except LeftBehind:
+            self._end = str(self._limit)
+            raise self._error(phase, self._end) from None
+        except Exception as error:  # lupa's own, or a message that cannot be handed over
+            raise self._error(phase, str(error) or type(error).__name__) from None
+        finally:
+            script_log.new_call()
+        if how is True:
+            return rest[0] if rest else None
+        raise self._failure(phase, how, rest)
 
-    def _error(self, phase: str, line: Optional[int], message: Optional[bytes] = None) -> ScriptError:
-        if message is None:
-            return ScriptError(phase, self._path, int(line or 0), str(self._limit))
+    def _failure(self, phase: str, how: Any, rest: Any) -> ScriptError:
+        if how is False:
+            return self._error_with_line(phase, rest[0])
+        if how == _TIME:
+            return self._error(phase, str(self._limit), rest[0])
+        if how == _OVER_MEMORY:
+            self._end = _TOO_MUCH
+            return self._error(phase, self._end, rest[0])
+        return self._error(phase, f"the script has no function '{phase}' to call back")
+
+    def _error(self, phase: str, message: str, line: int = 0) -> ScriptError:
+        return ScriptError(phase, self._path, int(line), message)
+
+    def _error_with_line(self, phase: str, message: bytes) -> ScriptError:
         text = message.decode("utf-8", "replace")
+        if text == "not enough memory":
+            return self._error(phase, _TOO_MUCH)
         match = re.match(rf"{re.escape(self._name)}:(\d+): (.*)$", text, re.DOTALL)
         found, text = (int(match.group(1)), match.group(2)) if match else (0, text)
-        return ScriptError(phase, self._path, found, text + self._hint(text))
+        return self._error(phase, text + self._hint(text), found)
 
     def _hint(self, text: str) -> str:
         """Return what a name that is nil may have been meant to be."""
@@ -140,26 +176,26 @@ class LuaScript:
 
     # ---- the API
 
-    def _define(self, modules: Mapping[str, Api]) -> None:
+    def _define(self, sandbox: Any, modules: Mapping[str, Api]) -> None:
         self._known: Set[str] = set()
+        script_globals = sandbox[b"globals"]
+
+        def add(place: Any, name: str, shown: str, function: Function) -> None:
+            self._known.add(name)
+            called = _lua_function(shown, function, self._values, self._thread)
+            sandbox[b"define"](place, name.encode(), shown.encode(), called)
+
         for api in modules.values():
             name, functions, constants = contents(api)
-            table = self._sandbox[b"list"]()
+            table = sandbox[b"list"]()
             for known, function in functions.items():
-                self._add(table, known, f"{name}.{known}", function)
-                flat = _FLAT.get(name, name + "_")
-                self._add(self._globals, flat + (_capital(known) if flat == "sim" else known), "", function)
+                add(table, known, f"{name}.{known}", function)
+                flat = _flat(name, known)
+                add(script_globals, flat, flat, function)
             for known, constant in constants.items():
-                table[known.encode()] = self._globals[f"{name}_{known}".encode()] = constant
+                table[known.encode()] = script_globals[f"{name}_{known}".encode()] = constant
                 self._known.update((known, f"{name}_{known}"))
-            self._globals[name.encode()] = self._sandbox[b"modules"][name.encode()] = table
-
-    def _add(self, place: Any, name: str, shown: str, function: Function) -> None:
-        self._known.add(name)
-        self._sandbox[b"define"](place, name.encode(), _lua_function(shown or name, function, self._values))
-
-
-_FUNCTIONS: Dict[str, bytes] = {phase: f"sysCall_{phase}".encode() for phase in PHASES}
+            script_globals[name.encode()] = sandbox[b"modules"][name.encode()] = table
 
 
 def _newest() -> str:
@@ -169,26 +205,55 @@ def _newest() -> str:
     raise ImportError("lupa has no Lua")
 
 
-def _lua_function(name: str, function: Function, values: Values) -> Function:
-    """Return a function that gives Lua (true, results...) or (false, message)."""
+def _lua_function(name: str, function: Function, values: Values, thread: LuaThread) -> Function:
+    """Return a function that answers Lua's calls; one of a script that was left behind does nothing."""
+    readers, answer = values.readers(), values.answer_of(function)
 
-    def call(*given: Any) -> Any:
+    def call(how: int, *given: Any) -> Tuple[Any, ...]:
+        if thread.closed:
+            return _STOPPED
         arguments: Any = given
         try:
-            arguments = values.arguments(given)
-            return (True, *values.results(function(*arguments)))
+            if how:
+                arguments = readers[how](given)
+                if arguments is None:
+                    return _AS_STREAM
+            return answer(function(*arguments))
         except Exception as error:
-            return False, explain(name, function, arguments, error).encode("utf-8")
+            return FAILED, explain(name, function, arguments, error).encode("utf-8", "replace")
+        except BaseException:  # a signal's handler, in the simulation's thread
+            return _STOPPED
 
+    thread.api_code = call.__code__
     return call
 
 
-def _log(line: bytes) -> None:
-    LOG.info("%s", line.decode("utf-8", "replace"))
+def _hook(thread: LuaThread, limit: TimeLimit) -> Callable[[], bool]:
+    return lambda: thread.closed or limit.exceeded()
 
 
-def _capital(name: str) -> str:
-    return name[:1].upper() + name[1:]
+def _log(thread: LuaThread) -> Callable[[bytes], None]:
+    def log(line: bytes) -> None:
+        if not thread.closed:
+            script_log.say(line)
+
+    return log
+
+
+def _phase_functions() -> Tuple[bytes, ...]:
+    return tuple(f"sysCall_{phase}".encode() for phase in PHASES)
+
+
+def _free(thread: LuaThread, values: Values) -> None:
+    thread.close()
+    values.close()
+
+
+def _flat(module: str, name: str) -> str:
+    """Return the 3.x name of a function: simGetObjectPosition, simExtRosInterface_publish."""
+    if module == "sim":
+        return f"sim{name[:1].upper()}{name[1:]}"
+    return _FLAT.get(module, module + "_") + name
 
 
 def _nothing_of_python(_object: Any, name: Any, _is_setting: bool) -> Any:

@@ -9,116 +9,198 @@ from __future__ import annotations
 from numbers import Real
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
-_DEEPEST = 16  # levels of nested tables
-_ON_STACK = 200  # values that a Lua call takes at once
+from drone_sim.scripting.script_values import DEEPEST, MOST_BYTES, MOST_VALUES, refuse_if_too_large
+
+_NUMBERS = frozenset((float, int, bool))
+_ALL_NUMBERS = _NUMBERS.issuperset
+_LARGEST = 2**63  # whole numbers beyond are floats in Lua
+
+# How the values of an answer to Lua are read there (lua_crossing.py).
+FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM = range(5)
+
+
+
+# What functions of the API return, most often, and the answer that it is.
+_ANSWERS: Dict[Any, Callable[[Any], Tuple[Any, ...]]] = {
+    "None": lambda _: (PLAIN,),
+    "float": lambda value: (PLAIN, value),
+    "List[float]": lambda values: (LIST, *values),
+    "List[int]": lambda values: (LIST, *values),
+    "Tuple[List[float], List[float]]": lambda values: (TWO_LISTS, *values[0], *values[1]),
+}
+
+
+class _Mark:
+    """A mark in a stream of values: where a table begins or ends."""
+
+
+_OPEN_LIST, _OPEN_FIELDS, _CLOSE = _Mark(), _Mark(), _Mark()
 
 
 class Values:
     """Converts for one Lua state. `close` lets go of it: Python cannot see a cycle that leads through Lua."""
 
-    def __init__(self, runtime: Any, lua_type: Callable[[Any], Optional[str]]):
-        """Take lupa's runtime, and its lua_type."""
+    def __init__(self, runtime: Any):
+        """Take lupa's runtime."""
         self._runtime = runtime
-        self._lua_type = lua_type
-        self._table = type(runtime.table())
-        self._list: Any = None
-        self._items: Any = None
-        self._callback_number: Any = None
-
-    def use(self, sandbox: Any) -> None:
-        """Take the sandbox's helpers."""
-        self._list, self._items = sandbox[b"list"], sandbox[b"items"]
-        self._callback_number = sandbox[b"callback_number"]
+        self._stream: List[Any] = []
 
     def close(self) -> None:
         """Let go of the Lua state."""
-        self._runtime = self._list = self._items = self._callback_number = None
+        self._runtime = None
+
+    def bridge(self) -> Dict[str, Any]:
+        """Return what the Lua side needs for handing values over."""
+        return {
+            "fresh": self._fresh,
+            "put": self._put,
+            "open_list": _OPEN_LIST,
+            "open_fields": _OPEN_FIELDS,
+            "close": _CLOSE,
+            "deepest": DEEPEST,
+            "most_values": MOST_VALUES,
+            "most_bytes": MOST_BYTES,
+        }
 
     # ---- to Python
 
-    def arguments(self, values: Tuple[Any, ...]) -> List[Any]:
-        """Return a Lua call's arguments; nil at the end is as good as left out."""
-        found = [value if type(value) in _NUMBERS else self.to_python(value) for value in values]
-        while found and found[-1] is None:
+    def _fresh(self) -> None:
+        self._stream = []
+
+    def _put(self, *values: Any) -> None:
+        self._stream.extend(values)
+
+    def _from_stream(self, _given: Tuple[Any, ...]) -> List[Any]:
+        found, self._stream = _from_stream(self._stream), []
+        while found and found[-1] is None:  # nil at the end is as good as left out
             found.pop()
         return found
 
-    def to_python(self, value: Any, depth: int = 0) -> Any:
-        """Return a Lua value; raises TypeError for what Python has no counterpart of."""
-        if type(value) is self._table:
-            return self._from_table(value, depth)
-        if isinstance(value, bytes):
-            return _text(value)
-        kind = self._lua_type(value)
-        if kind is None:
-            return value
-        if kind == "function":
-            return self._callback_number(value)
-        raise TypeError(f"a {kind} cannot be handed over")
+    def readers(self) -> Sequence[Callable[[Tuple[Any, ...]], Optional[Sequence[Any]]]]:
+        """Return what makes a function's arguments of what a call handed over, by the form of the call.
 
-    def _from_table(self, table: Any, depth: int) -> Any:
-        if depth >= _DEEPEST:
-            raise ValueError("a table is nested too deeply")
-        count = len(table)
-        if not count:
-            named = {self.to_python(key): self.to_python(value, depth + 1) for key, value in table.items()}
-            return named or []
-        if count == 1:
-            values: Sequence[Any] = (table[1],)
-        elif count <= _ON_STACK:
-            values = self._items(table)
-        else:
-            values = [table[index] for index in range(1, count + 1)]
-        if all(map(_NUMBERS.__contains__, map(type, values))):
-            return list(values)
-        return [self.to_python(value, depth + 1) for value in values]
+        They return None where lists hold other things than numbers: the call is to be made anew, with a stream.
+        """
+        return (tuple, _first, _second, _third, _first_and_second, _second_and_third, self._from_stream, _scalars)
 
     # ---- to Lua
 
-    def results(self, value: Any) -> Tuple[Any, ...]:
-        """Return what a Python function gave as the values of a Lua call."""
-        if type(value) is tuple:
-            return tuple(map(self.to_lua, value))
-        return () if value is None else (self.to_lua(value),)
+    def answer_of(self, function: Callable[..., Any]) -> Callable[[Any], Tuple[Any, ...]]:
+        """Return what turns a function's results into an answer to Lua, by what it is annotated to return.
 
-    def to_lua(self, value: Any) -> Any:
-        """Return a value as Lua takes it: scalars as they are, everything else as a table."""
-        if value is None or type(value) in _NUMBERS or isinstance(value, bytes):
+        The answer raises ValueError for too much.
+        """
+        return _ANSWERS.get(function.__annotations__.get("return", ""), self._results)
+
+    def _results(self, value: Any) -> Tuple[Any, ...]:
+        if type(value) is not tuple:
+            return (PLAIN,) if value is None else (PLAIN, self.to_lua(value))
+        return (PLAIN, *self.to_lua(list(value), unpacked=True))
+
+    def to_lua(self, value: Any, unpacked: bool = False) -> Any:
+        """Return a value as Lua takes it: scalars as they are, everything else as a table.
+
+        `unpacked` is for a list: its items, each so. Raises ValueError for a value that is too large.
+        """
+        refuse_if_too_large(value, fields)
+        return [self._to_lua(item) for item in value] if unpacked else self._to_lua(value)
+
+    def _to_lua(self, value: Any) -> Any:
+        kind = type(value)
+        if kind is int:
+            return value if -_LARGEST <= value < _LARGEST else _as_float(value)
+        if value is None or kind in _NUMBERS or isinstance(value, bytes):
             return value
-        if type(value) is list:
-            return self._to_table(value)
         if isinstance(value, str):
-            return value.encode("utf-8")
-        return self._object_to_lua(value)
-
-    def _object_to_lua(self, value: Any) -> Any:
+            return value.encode("utf-8", "replace")
         if isinstance(value, Real):
             return float(value)
         if hasattr(value, "to_sec"):  # ROS's times
             return value.to_sec()
-        if isinstance(value, bytearray):
+        if isinstance(value, (bytearray, memoryview)):
             return bytes(value)
-        fields = _fields(value)
-        if fields is None:
-            return self._to_table(list(value))
-        return self._runtime.table_from({self.to_lua(key): self.to_lua(item) for key, item in fields.items()})
+        named = fields(value)
+        if named is None:
+            return self._runtime.table_from([self._to_lua(item) for item in value])
+        return self._runtime.table_from({self._key(key): self._to_lua(item) for key, item in named.items()})
 
-    def _to_table(self, value: List[Any]) -> Any:
-        values = value if all(map(_NUMBERS.__contains__, map(type, value))) else [self.to_lua(item) for item in value]
-        return self._list(*values) if len(values) <= _ON_STACK else self._runtime.table_from(values)
-
-
-_NUMBERS = frozenset((float, int, bool))
+    def _key(self, key: Any) -> Any:
+        if key is None or key != key:
+            raise ValueError(f"{key} cannot be a key")
+        return self._to_lua(key)
 
 
-def _text(value: bytes) -> Any:
+def _scalars(given: Tuple[Any, ...]) -> List[Any]:
+    return [_text(value) if type(value) is bytes else value for value in given]
+
+
+def _first(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    second, third, *values = given
+    if not _ALL_NUMBERS(map(type, values)):
+        return None
+    return [values] if second is third is None else [values, second, third]
+
+
+def _second(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    first, third, *values = given
+    if not _ALL_NUMBERS(map(type, values)):
+        return None
+    return [first, values] if third is None else [first, values, third]
+
+
+def _third(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    first, second, *values = given
+    return [first, second, values] if _ALL_NUMBERS(map(type, values)) else None
+
+
+def _first_and_second(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    return [[*given[3:]], [*given[:3]]] if _ALL_NUMBERS(map(type, given)) else None
+
+
+def _second_and_third(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+    first, x, y, z, *values = given
+    return [first, [x, y, z], values] if _ALL_NUMBERS(map(type, given[1:])) else None
+
+
+def _from_stream(tokens: List[Any]) -> List[Any]:
+    outer: List[List[Any]] = []
+    here: List[Any] = []
+    marks: List[Any] = []
+    for token in tokens:
+        if type(token) in _NUMBERS:
+            here.append(token)
+        elif token is _CLOSE:
+            made: Any = here
+            if marks.pop() is _OPEN_FIELDS:
+                made = dict(zip(here[::2], here[1::2])) or []
+            here = outer.pop()
+            here.append(made)
+        elif type(token) is _Mark:
+            outer.append(here)
+            marks.append(token)
+            here = []
+        else:
+            here.append(_text(token))
+    return here
+
+
+def _text(value: Any) -> Any:
+    if type(value) is not bytes:
+        return value
     try:
         return value.decode("utf-8")
     except UnicodeDecodeError:
         return value
 
 
-def _fields(value: Any) -> Optional[Mapping[str, Any]]:
+def _as_float(value: int) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError("a whole number is too large") from None
+
+
+def fields(value: Any) -> Optional[Mapping[Any, Any]]:
     """Return the named fields of a mapping or message object; None for a sequence."""
     if isinstance(value, Mapping):
         return value

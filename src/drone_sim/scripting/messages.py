@@ -7,6 +7,7 @@ where there is one: that is the seam to ROS.
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections import deque
 from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Protocol, Tuple, Union
@@ -14,6 +15,7 @@ from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Proto
 import numpy as np
 
 from drone_sim.scripting.calls import Function, WrongValue
+from drone_sim.scripting.script_values import refuse_if_too_large
 
 # The names by which messages say what is expected.
 Name = str
@@ -21,6 +23,8 @@ Handle = int
 Callback = Union[str, Callable[[Any], None]]
 
 _KEPT = 32  # published messages
+_MOST = 200  # subscriptions and publishers
+_LONGEST_QUEUE = 1000  # messages
 
 
 class Sender(Protocol):
@@ -80,12 +84,14 @@ class _Subscription(NamedTuple):
     topic: str
     callback: Callback
     messages: Deque[Any]
+    begin: Callable[[], Callable[[], None]]  # returns what ends it
     end: Callable[[], None]
 
 
 class _Publisher(NamedTuple):
     topic: str
     kind: str
+    begin: Callable[[], Optional[Sender]]
     sender: Optional[Sender]
 
 
@@ -129,13 +135,18 @@ class MessageBus:
         Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1.
         """
         resolved = self._resolve(topic)
-        messages: Deque[Any] = deque(maxlen=max(1, int(queue)))
-        end: Callable[[], None] = _nothing
-        if self.backend is not None and resolved not in self._own_topics:
-            end = self.backend.subscribe(resolved, kind, messages.append)
+        messages: Deque[Any] = deque(maxlen=min(max(1, int(queue)), _LONGEST_QUEUE))
+
+        def begin() -> Callable[[], None]:
+            if self.backend is None or resolved in self._own_topics:
+                return _nothing
+            return self.backend.subscribe(resolved, kind, messages.append)
+
+        self._refuse_if_too_many()
+        subscription = _Subscription(resolved, callback, messages, begin, begin())
         with self._lock:
             handle = self._new_handle()
-            self._subscriptions[handle] = _Subscription(resolved, callback, messages, end)
+            self._subscriptions[handle] = subscription
         return handle
 
     def shutdownSubscriber(self, handle: Handle) -> None:
@@ -148,15 +159,19 @@ class MessageBus:
 
     def advertise(self, topic: Name, kind: Name, queue: int = 1, latch: bool = False, *_ignored: Any) -> int:
         """Advertise a topic; return a handle to publish on."""
-        resolved = self._resolve(topic)
-        sender = self.backend.advertise(resolved, kind, max(1, int(queue)), bool(latch)) if self.backend else None
-        return self._add_publisher(_Publisher(resolved, kind, sender))
+        resolved, kept = self._resolve(topic), min(max(1, int(queue)), _LONGEST_QUEUE)
+
+        def begin() -> Optional[Sender]:
+            return self.backend.advertise(resolved, kind, kept, bool(latch)) if self.backend else None
+
+        return self._add_publisher(resolved, kind, begin)
 
     def publish(self, handle: Handle, message: Any) -> None:
         """Publish a message: a table of its fields."""
         publisher = self._publisher(handle)
         if message is None or isinstance(message, (str, bytes, int, float)):
             raise WrongValue("a table of the message's fields is expected")
+        refuse_if_too_large(message)
         self._send(publisher, message)
 
     def shutdownPublisher(self, handle: Handle) -> None:
@@ -168,14 +183,22 @@ class MessageBus:
 
     def imageTransportAdvertise(self, topic: Name, queue: int = 1) -> int:
         """Advertise an image topic; return a handle to publish on."""
-        resolved = self._resolve(topic)
-        sender = self.backend.advertise_image(resolved, max(1, int(queue))) if self.backend else None
-        return self._add_publisher(_Publisher(resolved, "sensor_msgs/Image", sender))
+        resolved, kept = self._resolve(topic), min(max(1, int(queue)), _LONGEST_QUEUE)
+
+        def begin() -> Optional[Sender]:
+            return self.backend.advertise_image(resolved, kept) if self.backend else None
+
+        return self._add_publisher(resolved, "sensor_msgs/Image", begin)
 
     def imageTransportPublish(self, handle: Handle, data: Any, width: int, height: int, frame_id: Name) -> None:
         """Publish a vision sensor's image as getVisionSensorCharImage returns it, the bottom row first."""
+        if isinstance(data, int):
+            raise WrongValue("an image is expected")
+        refuse_if_too_large(data)
         pixels = data.encode("utf-8") if isinstance(data, str) else bytes(data)
         row, rows = 3 * int(width), int(height)
+        if row < 0 or rows < 0:
+            raise ValueError(f"an image of {width} x {height} does not exist")
         if len(pixels) != row * rows:
             raise ValueError(f"an image of {width} x {height} has {row * rows} bytes, not {len(pixels)}")
         top_first = b"".join(np.frombuffer(pixels, np.uint8).reshape(rows, row)[::-1])
@@ -198,9 +221,9 @@ class MessageBus:
     def deliver(self, call: Callable[[Callback, Any], None]) -> None:
         """Hand every waiting message to `call(callback, message)`, oldest first."""
         waiting: List[Tuple[Callback, Any]] = []
-        for _, callback, messages, _ in self._subscriptions.values():  # which no other thread changes
-            while messages:
-                waiting.append((callback, messages.popleft()))
+        for subscription in self._subscriptions.values():  # which no other thread changes
+            while subscription.messages:
+                waiting.append((subscription.callback, subscription.messages.popleft()))
         for callback, message in waiting:
             call(callback, message)
 
@@ -215,11 +238,40 @@ class MessageBus:
             if publisher.sender is not None:
                 publisher.sender.shutdown()
 
-    def _add_publisher(self, publisher: _Publisher) -> int:
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back what is subscribed and advertised now, and the messages that wait."""
+        subscriptions, publishers, last = dict(self._subscriptions), dict(self._publishers), self._next_handle
+        waiting = {handle: _copied(one.messages) for handle, one in subscriptions.items()}
+
+        def recall() -> None:
+            for handle in set(self._subscriptions) - set(subscriptions):
+                self.shutdownSubscriber(handle)
+            for handle in set(self._publishers) - set(publishers):
+                self.shutdownPublisher(handle)
+            for handle in set(subscriptions) - set(self._subscriptions):
+                subscriptions[handle] = subscriptions[handle]._replace(end=subscriptions[handle].begin())
+            for handle in set(publishers) - set(self._publishers):
+                publishers[handle] = publishers[handle]._replace(sender=publishers[handle].begin())
+            with self._lock:
+                self._subscriptions, self._publishers = {**subscriptions}, {**publishers}
+                self._next_handle = last
+                for handle, messages in waiting.items():
+                    subscriptions[handle].messages.clear()
+                    subscriptions[handle].messages.extend(_copied(messages))
+
+        return recall
+
+    def _add_publisher(self, topic: str, kind: str, begin: Callable[[], Optional[Sender]]) -> int:
+        self._refuse_if_too_many()
+        publisher = _Publisher(topic, kind, begin, begin())
         with self._lock:
             handle = self._new_handle()
             self._publishers[handle] = publisher
         return handle
+
+    def _refuse_if_too_many(self) -> None:
+        if len(self._subscriptions) + len(self._publishers) >= _MOST:
+            raise ValueError(f"a script has at most {_MOST} subscriptions and publishers")
 
     def _publisher(self, handle: int) -> _Publisher:
         if handle not in self._publishers:
@@ -241,3 +293,12 @@ class MessageBus:
 
 def _nothing() -> None:
     pass
+
+
+def _copied(messages: Deque[Any]) -> Deque[Any]:
+    """Return copies of messages, which a callback may change; other threads may append meanwhile."""
+    kept = messages.copy()
+    try:
+        return copy.deepcopy(kept)
+    except Exception:  # whatever a message's class raises when it is copied
+        return kept

@@ -7,19 +7,22 @@ import copy
 import traceback
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Callable, Dict, Mapping
+from typing import Any, Callable, Dict, Mapping, Tuple
 
 from drone_sim.objects import near_names
-from drone_sim.scripting.api_scripts import LOG
+from drone_sim.scripting import script_log
 from drone_sim.scripting.calls import Api, mistake
 from drone_sim.scripting.constants import PHASES
 from drone_sim.scripting.errors import ScriptError, UnknownName
 from drone_sim.scripting.messages import Callback
+from drone_sim.scripting.process import process_kept
+from drone_sim.scripting.script_log import say, shown
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
 
 __all__ = ["PythonScript", "ScriptError"]
 
 _STOPPED = "__stopped__"  # Stopped, among a script's globals
+_RARE = ("init", "cleanup")
 _FUNCTIONS = {phase: f"sysCall_{phase}" for phase in PHASES}
 
 
@@ -30,7 +33,7 @@ class PythonScript:
     CoppeliaSim's Python scripts do. What it prints goes to the log.
     """
 
-    def __init__(self, path: str, modules: Mapping[str, Api], limit: TimeLimit):
+    def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
         """Run the file's top level; raises ScriptError."""
         self._path = path
         self._limit = limit
@@ -44,17 +47,22 @@ class PythonScript:
             _STOPPED: Stopped,
             **modules,
         }
-        try:
-            tree = ast.parse(Path(path).read_bytes(), path)
-            code = compile(_let_stopped_pass(tree), path, "exec")
-        except (SyntaxError, ValueError, RecursionError) as error:
-            raise self._error("load", error) from None
-        self._run("load", exec, code, self._globals)
+        with process_kept():
+            self._run("load", self._load, source)
+
+    def _load(self, source: bytes) -> None:
+        code = compile(_let_stopped_pass(ast.parse(source, self._path)), self._path, "exec")
+        exec(code, self._globals)
 
     def call(self, phase: str) -> None:
         """Call `sysCall_<phase>` if the script has it; raises ScriptError."""
         function = self._globals.get(_FUNCTIONS[phase])
-        if function is not None:
+        if function is None:
+            return
+        if phase in _RARE:
+            with process_kept():
+                self._run(phase, function)
+        else:
             self._run(phase, function)
 
     def callback(self, callback: Callback, message: Any) -> None:
@@ -87,11 +95,15 @@ class PythonScript:
         self._globals.clear()
 
     def _run(self, phase: str, function: Any, *arguments: Any) -> None:
+        failed = None
+        script_log.new_call()
         try:
             self._limit.run(function, *arguments)
-        except (Exception, Stopped, SystemExit) as error:
-            # Not chained: nobody wants the simulator's own frames, nor keeps the script's alive.
-            raise self._error(phase, error) from None
+        except BaseException as error:  # KeyboardInterrupt, too: whose it is cannot be told
+            failed = self._error(phase, error)
+        script_log.new_call()
+        if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive
+            raise failed
 
     def _require(self, name: str) -> Api:
         if name not in self._modules:
@@ -99,17 +111,29 @@ class PythonScript:
         return self._modules[name]
 
     def _error(self, phase: str, error: BaseException) -> ScriptError:
-        if isinstance(error, SyntaxError) and error.filename == self._path:
-            return ScriptError(phase, self._path, error.lineno or 0, f"SyntaxError: {error.msg}")
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == self._path]
-        return ScriptError(phase, self._path, (lines or [0])[-1] or 0, self._message(error))
+        if self._limit.struck:
+            return ScriptError(phase, self._path, self._line(error), str(self._limit))
+        kind = "an exception"
+        try:
+            kind = type(error).__name__
+            line, message = self._limit.run(self._told, error)
+        except BaseException:
+            line, message = 0, f"{kind}, which cannot be shown"
+        return ScriptError(phase, self._path, line, message)
 
-    def _message(self, error: BaseException) -> str:
-        if isinstance(error, Stopped):
-            return str(self._limit)
+    def _told(self, error: BaseException) -> Tuple[int, str]:
+        """Return line and message of an exception; whatever the script made of it may raise, or not return."""
+        if isinstance(error, SyntaxError) and error.filename == self._path:
+            return error.lineno or 0, f"SyntaxError: {error.msg}"
+        line = self._line(error)
         if isinstance(error, UnknownName):
-            return str(error)
-        return mistake(error, self._modules.values()) or f"{type(error).__name__}: {error}"
+            return line, str(error)
+        name, text = type(error).__name__, shown(error)
+        return line, mistake(error, self._modules.values()) or (f"{name}: {text}" if text else name)
+
+    def _line(self, error: BaseException) -> int:
+        lines = [line for frame, line in traceback.walk_tb(error.__traceback__) if frame.f_code.co_filename == self._path]
+        return lines[-1] if lines else 0
 
 
 def _copied(variables: Mapping[str, Any]) -> Dict[str, Any]:
@@ -134,7 +158,7 @@ def _print(*values: Any, sep: str = " ", file: Any = None, **options: Any) -> No
     if file is not None:
         print(*values, sep=sep, file=file, **options)
     else:
-        LOG.info("%s", (sep if sep is not None else " ").join(map(str, values)))
+        say((sep if sep is not None else " ").join(map(shown, values)))
 
 
 def _let_stopped_pass(tree: ast.Module) -> ast.Module:

@@ -1,20 +1,29 @@
 """Stops a runaway script.
 
-A Python script runs in the simulation's own thread, so another thread has to raise an exception in it;
-a Lua script asks `exceeded` from a hook that counts instructions.
+A Lua script asks `exceeded` from a hook that counts instructions. A Python script runs in the simulation's own
+thread, where something has to raise an exception in it: in the main thread the handler of a kernel timer, which C
+code that waits or takes long and looks at signals (sleep, locks, sockets, `re`) lets through; in any other thread
+a watchdog, whose exception Python raises between two of its instructions.
 """
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
+import math
+import signal
+import sys
 import threading
 import time
 import weakref
+from types import FrameType
 from typing import Any, Callable, Iterator, Optional
 
 _POLL = 0.05  # s between two looks of the watchdog
 _AGAIN = 0.25  # s after which a script that swallowed the exception gets another
+_LATER = 0.001  # s, so that the time is used up when the timer goes off
+_LONGEST = 1e6  # s
 
 _raise_in_thread = ctypes.pythonapi.PyThreadState_SetAsyncExc
 _raise_in_thread.argtypes = (ctypes.c_ulong, ctypes.py_object)
@@ -31,7 +40,11 @@ class TimeLimit:
     def __init__(self, seconds: float):
         """Take the limit in seconds of real time; 0 means none."""
         self.seconds = seconds
+        self.struck = False  # whether the last script that `run` called was stopped
         self._deadline = 0.0
+        self._expired = False
+        self._carry: Optional[Callable[[Callable[[], Any]], Any]] = None
+        self._traced_by: Any = None  # a debugger's trace function, which comes back afterwards
         self._thread = 0
         # The script's thread writes `armed` and then reads `fired`, the watchdog the other way round: so one
         # of the two sees the other, without a lock in every call.
@@ -45,11 +58,21 @@ class TimeLimit:
 
     def start(self) -> None:
         """Begin to count."""
+        self._expired = False
         self._deadline = time.monotonic() + self.seconds
 
     def exceeded(self) -> bool:
         """Tell whether the time since `start` is used up."""
-        return self.seconds > 0 and time.monotonic() > self._deadline
+        return self._expired or (self.seconds > 0 and time.monotonic() > self._deadline)
+
+    def left(self) -> float:
+        """Return how many seconds are left, negative where none are; infinite without a limit."""
+        return self._deadline - time.monotonic() if self.seconds > 0 or self._expired else math.inf
+
+    def expire(self) -> None:
+        """Let the time be used up now."""
+        self._expired = True
+        self._deadline = time.monotonic()
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
@@ -62,58 +85,135 @@ class TimeLimit:
             self._deadline += time.monotonic() - began
             self._armed = armed
 
+    def carry_with(self, carry: Callable[[Callable[[], Any]], Any]) -> None:
+        """Take what calls a function in the simulation's thread, for a script that runs in another one."""
+        self._carry = carry
+
+    def outside(self, function: Callable[[], Any]) -> Any:
+        """Call a function of the simulator for the script: in the simulation's thread, and not counted."""
+        if self._carry is not None:
+            return self._carry(function)
+        with self.paused():
+            return function()
+
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a Python function; raises Stopped where it does not return in time."""
-        if not self._thread:
-            _watch(self)
-        self._thread = threading.get_ident()
         self._deadline = time.monotonic() + self.seconds
+        self.struck, self._traced_by = False, None
+        self._thread = threading.get_ident()
+        if self._thread != _MAIN:
+            _watch(self)
+        elif self.seconds:
+            _timer.limit = self
+            if self._deadline < _timer.next:
+                _timer.set(self.seconds)
         try:
             try:
                 self._armed = True
                 return function(*arguments)
             finally:
                 self._armed = False
-                if self._fired:
-                    self._take_back()
+                if self.struck or self._fired:
+                    self._end_strike()
         except Stopped:
             # It may have struck between the end of the function and the beginning of `finally`.
             self._armed = False
-            self._take_back()
+            self._end_strike()
             raise
 
-    def _take_back(self) -> None:
+    def _end_strike(self) -> None:
         """Drop an exception that is still on its way."""
-        while True:
+        if sys.gettrace() is _trace:
+            sys.settrace(self._traced_by)
+        while self._fired:
             try:
                 with self._firing:
                     self._fired = False
                     _raise_in_thread(self._thread, _NOTHING)
-                return
             except Stopped:
                 continue
 
     def fire_if_late(self) -> None:
-        """Raise Stopped in the script's thread; the watchdog calls it."""
+        """Stop the script where it is late; the watchdog calls it."""
         if not (self._armed and self.exceeded()):
             return
         with self._firing:
             self._fired = True
             if self._armed and self.exceeded():
+                self.struck = True
                 self._deadline = time.monotonic() + _AGAIN
                 _raise_in_thread(self._thread, Stopped)
             else:
                 self._fired = False
 
+    def strike_if_late(self, frame: Optional[FrameType]) -> None:
+        """Raise Stopped in a script that is late, and once more in its next line should it swallow that.
 
+        Sets the timer again unless no script runs; the timer's handler calls it.
+        """
+        if not self._armed:
+            return
+        if not self.exceeded():
+            _timer.set(self.left() + _LATER)
+            return
+        _timer.set(_AGAIN)
+        if not self.struck:
+            self.struck, self._traced_by = True, sys.gettrace()
+        sys.settrace(_trace)
+        while frame is not None and frame.f_code is not TimeLimit.run.__code__:
+            frame.f_trace = _trace
+            frame = frame.f_back
+        raise Stopped
+
+    def insist(self) -> None:
+        """Raise Stopped once more in a script that goes on."""
+        if self._armed:
+            raise Stopped
+
+
+class _Timer:
+    """The process's timer, SIGALRM. It is not set in every call, but goes off and is set anew while scripts run."""
+
+    def __init__(self) -> None:
+        self.limit: Optional[TimeLimit] = None  # of the script that runs in the main thread, or did
+        self.next = math.inf  # when it goes off
+        self._is_ready = False
+
+    def set(self, seconds: float) -> None:
+        signal.signal(signal.SIGALRM, _go_off)
+        if not self._is_ready:
+            atexit.register(signal.setitimer, signal.ITIMER_REAL, 0)  # nobody catches it while Python ends
+            self._is_ready = True
+        self.next = time.monotonic() + seconds
+        signal.setitimer(signal.ITIMER_REAL, min(seconds, _LONGEST))
+
+
+_MAIN = threading.main_thread().ident
+_timer = _Timer()
 _watched: weakref.WeakSet[TimeLimit] = weakref.WeakSet()
 _watching = threading.Lock()
 _watchdog: Optional[threading.Thread] = None
 
 
+def _go_off(_number: int, frame: Optional[FrameType]) -> None:
+    _timer.next = math.inf
+    if _timer.limit is not None:
+        _timer.limit.strike_if_late(frame)
+
+
+def _trace(_frame: FrameType, event: str, _argument: Any) -> Any:
+    if event == "call":
+        return None  # new frames, such as __exit__, end by themselves or at the next strike
+    if event == "line" and _timer.limit is not None:
+        _timer.limit.insist()
+    return _trace
+
+
 def _watch(limit: TimeLimit) -> None:
     """Let the watchdog, which starts with the first one, look after a limit for as long as it exists."""
     global _watchdog
+    if limit in _watched:
+        return
     with _watching:
         _watched.add(limit)
         if _watchdog is None:

@@ -1,0 +1,70 @@
+"""The Lua side of snapshots of a Lua child script."""
+
+SNAPSHOTS = r"""
+---- snapshots
+
+-- Return a function that gives every variable that the script can reach the value that it has now: contents of
+-- tables, their metatables, and locals that functions share. Coroutines are left as they are.
+local function take_snapshot()
+  local tables, metatables, locals = {}, {}, {}
+  local seen, waiting, count = {}, {}, 0
+
+  local function visit(value)
+    local kind = type(value)
+    if (kind ~= 'table' and kind ~= 'function') or seen[value] then return end
+    seen[value] = true
+    count = count + 1
+    waiting[count] = value
+  end
+
+  local function keep_table(t)
+    local copy, meta = {}, getmeta(t)
+    for key, value in next, t do
+      copy[key] = value
+      visit(key)
+      visit(value)
+    end
+    visit(meta)
+    tables[t], metatables[t] = copy, meta or false
+  end
+
+  local function keep_locals(f)
+    if getinfo(f, 'S').what == 'C' then return end
+    for index = 1, 255 do
+      local name, value = getupvalue(f, index)
+      if name == nil then return end
+      locals[#locals + 1] = {f, index, value}
+      visit(value)
+    end
+  end
+
+  visit(env)
+  visit(getmeta(''))
+  for _, f in next, callbacks do visit(f) end
+  if chunk then visit(chunk) end
+  while count > 0 do
+    local value = waiting[count]
+    waiting[count] = nil
+    count = count - 1
+    if type(value) == 'table' then keep_table(value) else keep_locals(value) end
+  end
+  return function()
+    for t, copy in next, tables do
+      for key in next, t do
+        if copy[key] == nil then rawset(t, key, nil) end
+      end
+      for key, value in next, copy do rawset(t, key, value) end
+      setmeta(t, metatables[t] or nil)
+    end
+    for _, kept in next, locals do setupvalue(kept[1], kept[2], kept[3]) end
+  end
+end
+
+local function remember()
+  return run(take_snapshot)
+end
+
+local function recall(snapshot)
+  return run(snapshot)
+end
+"""

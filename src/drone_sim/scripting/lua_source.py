@@ -1,0 +1,37 @@
+"""What can be told of a Lua script before it runs."""
+
+from __future__ import annotations
+
+import re
+from typing import List
+
+_COMMENT = re.compile(rb"--(?:\[(=*)\[)?")
+_PER_PHASE = re.compile(rb"\bsim_call_type\b")
+_FLAT_CALL = re.compile(rb"(?<![.:\w])sim[A-Z]\w{0,200}[ \t\r\n]{0,200}\(")
+
+
+class LuaSource:
+    """A script's text; `per_phase` if it looks at sim_call_type, `flat` if it calls V-REP 3.x's functions."""
+
+    def __init__(self, text: bytes):
+        """Take the file's contents, which may begin with a #! line."""
+        self.text = b"--" + text if text.startswith(b"#") else text
+        bare = _without_comments(self.text)
+        self.per_phase = _PER_PHASE.search(bare) is not None
+        self.flat = _FLAT_CALL.search(bare) is not None
+
+
+def _without_comments(text: bytes) -> bytes:
+    kept: List[bytes] = []
+    here = 0
+    while True:
+        comment = _COMMENT.search(text, here)
+        if comment is None:
+            return b" ".join([*kept, text[here:]])
+        kept.append(text[here : comment.start()])
+        level = comment.group(1)
+        end = b"\n" if level is None else b"]" + level + b"]"
+        found = text.find(end, comment.end())
+        if found < 0:
+            return b" ".join(kept)
+        here = found if level is None else found + len(end)

@@ -1,0 +1,39 @@
+"""What of the process a Python child script must not spoil, though it is trusted code: by mistake, that is."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+import threading
+from typing import Iterator
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_STREAMS = ("stdin", "stdout", "stderr")
+_DEEPEST = 10_000  # levels of recursion that fit into a stack of 8 MiB; beyond, the process would crash
+
+_set_recursion_limit = sys.setrecursionlimit
+
+
+@contextlib.contextmanager
+def process_kept() -> Iterator[None]:
+    """Give signal handlers and standard streams back to the process afterwards."""
+    sys.setrecursionlimit = _guarded
+    streams = [getattr(sys, name) for name in _STREAMS]
+    handlers = [(number, signal.getsignal(number)) for number in _SIGNALS]
+    try:
+        yield
+    finally:
+        for name, stream in zip(_STREAMS, streams):
+            setattr(sys, name, stream)
+        if threading.current_thread() is threading.main_thread():
+            for number, handler in handlers:
+                if handler is not None and signal.getsignal(number) is not handler:
+                    signal.signal(number, handler)
+
+
+def _guarded(limit: int) -> None:
+    """Set the recursion limit; raises ValueError beyond what the stack holds."""
+    if limit > _DEEPEST:
+        raise ValueError(f"a child script's recursion limit is {_DEEPEST} at most, not {limit}")
+    _set_recursion_limit(limit)

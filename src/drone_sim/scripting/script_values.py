@@ -1,0 +1,56 @@
+"""How much a script may hand over at once, and how it is counted."""
+
+from __future__ import annotations
+
+from typing import Any, Callable, List, Mapping, Optional, Tuple
+
+DEEPEST = 16  # levels of nested tables, lists and mappings
+MOST_VALUES = 1_000_000  # in one call or message
+MOST_BYTES = 64 * 1024 * 1024  # of all its strings
+
+_PLAIN = frozenset((float, int, bool, type(None)))
+_STRINGS = (str, bytes, bytearray, memoryview)
+Fields = Callable[[Any], Optional[Mapping[Any, Any]]]
+
+
+def fields_of_mapping(value: Any) -> Optional[Mapping[Any, Any]]:
+    """Return a mapping as it is, None for anything else."""
+    return value if isinstance(value, Mapping) else None
+
+
+def refuse_if_too_large(value: Any, fields: Fields = fields_of_mapping) -> None:
+    """Raise ValueError for a value of the script's that is nested too deeply, in itself, or that is too large.
+
+    `fields` returns the named fields of what has some. Lists, tuples and mappings are looked into, and what has fields.
+    """
+    if type(value) in _PLAIN:
+        return
+    count = size = 0
+    waiting: List[Tuple[Any, int]] = [(value, 0)]
+    while waiting:
+        value, depth = waiting.pop()
+        if isinstance(value, _STRINGS):
+            size += len(value)
+            if size > MOST_BYTES:
+                raise ValueError(f"more than {MOST_BYTES} bytes are too many")
+            continue
+        inner = _inner(value, fields)
+        if inner is None:
+            continue
+        if depth >= DEEPEST:
+            raise ValueError(f"a table is nested too deeply, at most {DEEPEST} levels")
+        count += len(inner)
+        if count > MOST_VALUES:
+            raise ValueError(f"more than {MOST_VALUES} values are too many")
+        waiting.extend((one, depth + 1) for one in inner if type(one) not in _PLAIN)
+
+
+def _inner(value: Any, fields: Fields) -> Optional[List[Any]]:
+    named = fields(value)
+    if named is not None:
+        return [*named.keys(), *named.values()]
+    if not hasattr(value, "__len__") or not hasattr(value, "__iter__"):
+        return None
+    if len(value) > MOST_VALUES:
+        raise ValueError(f"more than {MOST_VALUES} values are too many")
+    return list(value)
