@@ -51,7 +51,10 @@ class Scene:
         self._parameters = parameters.scene
         scene_files.check(parameters.scene)
         self._world = world
-        world.add_floor(parameters.scene.floor.size, parameters.scene.floor.texture)
+        floor = parameters.scene.floor
+        world.add_floor(floor.size, floor.texture)
+        if not floor.edge:
+            world.add_ground(floor.size)
         try:
             self._numbers = [world.add_shape(_shape(one)) for one in parameters.scene.objects]
         except ValueError as error:

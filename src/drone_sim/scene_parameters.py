@@ -20,6 +20,7 @@ from drone_sim.parameter_types import (
     OptionalFile,
     ParameterError,
     Point,
+    Switch,
     Within,
     named_in,
     read_yaml,
@@ -31,10 +32,11 @@ _Scale = Annotated[Finite, Within(1e-6, 1e6)]
 
 
 class FloorParameters(Checked):
-    """A square floor at z = 0, centred on the origin."""
+    """A square floor at z = 0, centred on the origin; around it is ground, or nothing where `edge` is true."""
 
     size: Annotated[Finite, Within(0.01, 1e4)]
     texture: File
+    edge: Switch
 
 
 class _ObjectParameters(Checked):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Hashable, Tuple
 
+GROUND = (0.47, 0.50, 0.44)  # colour of the bare ground around the floor
 SHAPES = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
 
 
@@ -20,6 +21,7 @@ class Visual:
     file: path of the mesh.
     texture: path of an image that replaces the mesh's own texture.
     floor: receives the shadows; a horizontal surface whose top is the top of its geometry.
+    ground: what is around the floor, as far as one sees; receives the shadows, too.
     """
 
     key: Hashable
@@ -29,3 +31,4 @@ class Visual:
     file: str = ""
     texture: str = ""
     floor: bool = False
+    ground: bool = False

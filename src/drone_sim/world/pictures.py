@@ -25,7 +25,7 @@ class Pictures:
         """Start with an empty world. `origin` returns the mesh file that one of PyBullet's was made from."""
         self._client = client
         self._origin = origin
-        self._floor = -1
+        self._floor = self._ground = -1
         self._textures: Dict[int, str] = {}
         self._parts: Dict[int, List[_Part]] = {}
         self._standing: Dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
@@ -34,6 +34,10 @@ class Pictures:
         """Say which body receives the shadows, and its texture."""
         self._floor = body
         self.set_texture(body, texture)
+
+    def set_ground(self, body: int) -> None:
+        """Say which body is the ground around the floor."""
+        self._ground = body
 
     def set_texture(self, body: int, texture: str) -> None:
         """Say which image covers a body: PyBullet does not tell."""
@@ -120,6 +124,7 @@ class Pictures:
             file=self._origin(file.decode()) if shape == "mesh" else "",
             texture=self._textures.get(key[0], ""),
             floor=key[0] == self._floor,
+            ground=key[0] == self._ground,
         )
         return _Part(visual, link, from_quaternion(position, orientation))
 

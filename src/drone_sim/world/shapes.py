@@ -10,10 +10,13 @@ import pybullet
 from drone_sim import urdf_files
 from drone_sim.frames import from_rpy, to_quaternion
 from drone_sim.state import Pose
+from drone_sim.visual import GROUND
 from drone_sim.world.own_files import OwnFiles
 
 _FLOOR_TILE = 2.0  # m covered by one floor texture
 _FLOOR_THICKNESS = 0.1  # m, below z = 0
+_GROUND_REACH = 2000.0  # m from the origin, along either axis
+_BELOW = 1e-3  # m that the ground is drawn below the floor, for PyBullet's own renderer to tell them apart
 
 
 class Shape(NamedTuple):
@@ -100,6 +103,28 @@ def create_floor(client: int, files: OwnFiles, size: float) -> int:
     )
     seen = pybullet.createVisualShape(
         pybullet.GEOM_MESH, fileName=files.write(_floor_mesh(size), ".obj"), physicsClientId=client
+    )
+    return int(pybullet.createMultiBody(0, solid, seen, physicsClientId=client))
+
+
+def create_ground(client: int, files: OwnFiles, hole: float) -> int:
+    """Add bare ground around a floor of `hole` metres a side, its top at z = 0, too; return its body id."""
+    reach, half, depth = _GROUND_REACH, hole / 2, _FLOOR_THICKNESS / 2
+    wide = (reach - half) / 2
+    sides = [(reach, wide, 0, half + wide), (reach, wide, 0, -half - wide)]
+    sides += [(wide, half, half + wide, 0), (wide, half, -half - wide, 0)]
+    solid = pybullet.createCollisionShapeArray(
+        shapeTypes=[pybullet.GEOM_BOX] * len(sides),
+        halfExtents=[[x, y, depth] for x, y, _, _ in sides],
+        collisionFramePositions=[[x, y, -depth] for _, _, x, y in sides],
+        physicsClientId=client,
+    )
+    seen = pybullet.createVisualShape(
+        pybullet.GEOM_MESH,
+        fileName=files.write(_floor_mesh(2 * reach), ".obj"),
+        rgbaColor=(*GROUND, 1),
+        visualFramePosition=[0, 0, -_BELOW],
+        physicsClientId=client,
     )
     return int(pybullet.createMultiBody(0, solid, seen, physicsClientId=client))
 

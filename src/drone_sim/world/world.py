@@ -77,6 +77,13 @@ class World:
         self._pictures.set_floor(body, texture)
         return body
 
+    def add_ground(self, hole: float) -> int:
+        """Add bare ground around a floor of `hole` metres a side; return its body id."""
+        body = shapes.create_ground(self._client, self._files, hole)
+        self._set_material(body)
+        self._pictures.set_ground(body)
+        return body
+
     def add_shape(self, shape: shapes.Shape) -> int:
         """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
         body = shapes.create(self._client, shape, self._files)
