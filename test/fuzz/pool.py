@@ -1,0 +1,100 @@
+"""Tries cases in a worker process, and makes a new one where it dies, hangs, or grows."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from multiprocessing import Pipe
+from pathlib import Path
+from typing import Any, Optional
+
+from case import Answer, Case
+
+HANGS = 3.0  # s that a case may take
+GROWTH = 800 << 20  # bytes that a case may leave behind; and what a worker may grow by before it is replaced
+_PATIENCE = 12.0  # s after which nobody waits for it any more
+_FIRST = 60.0  # s for the first case: imports, compiling shaders
+_SOURCE = Path(__file__).resolve().parents[2] / "src"
+
+
+class Trier:
+    """One worker at a time; not thread-safe."""
+
+    def __init__(self) -> None:
+        """Begin without a worker: the first case starts it."""
+        self._process: Optional[subprocess.Popen[bytes]] = None
+        self._connection: Any = None
+        self._log = tempfile.TemporaryFile()
+        self._resident = self._last = self._threads = 0
+
+    def run(self, case: Case) -> Answer:
+        """Try a case; a slow one is tried again in a worker of its own, lest another process be to blame."""
+        answer = self._attempt(case)
+        if not answer.fault and answer.seconds > HANGS:
+            self.close()
+            answer = self._attempt(case)
+            if not answer.fault and answer.seconds > HANGS:
+                answer = answer._replace(fault=f"slow: {answer.seconds:.1f} s")
+        return answer
+
+    def _attempt(self, case: Case) -> Answer:
+        if self._process is None:
+            self._open()
+        try:
+            self._connection.send(case)
+            if not self._connection.poll(_PATIENCE):
+                return self._lost(f"hang: no end after {_PATIENCE:.0f} s")
+            answer: Answer = self._connection.recv()
+        except (EOFError, OSError):
+            return self._lost("")
+        if not answer.fault and answer.resident > self._last + GROWTH:
+            answer = answer._replace(fault=f"memory: grew by {(answer.resident - self._last) >> 20} MB")
+        self._last = answer.resident
+        if answer.threads > self._threads + 2 or answer.resident > self._resident + GROWTH:
+            self.close()  # a script that never ends is left behind in its thread
+        return answer
+
+    def _open(self) -> None:
+        ours, theirs = Pipe()
+        self._log.truncate(0)
+        paths = os.pathsep.join([str(_SOURCE), os.environ.get("PYTHONPATH", "")])
+        self._process = subprocess.Popen(
+            [sys.executable, str(Path(__file__).with_name("worker.py")), str(theirs.fileno())],
+            pass_fds=[theirs.fileno()],
+            stdin=subprocess.DEVNULL,
+            stdout=self._log,
+            stderr=self._log,
+            env={**os.environ, "PYTHONPATH": paths, "LP_NUM_THREADS": "0", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        )
+        theirs.close()
+        self._connection = ours
+        ours.send(Case("parameters", {}, {}))  # imports, shaders
+        if not ours.poll(_FIRST):
+            raise RuntimeError("the worker does not start")
+        first: Answer = ours.recv()
+        if first.fault:
+            raise RuntimeError(f"the default parameters fail: {first.fault}")
+        self._resident = self._last = first.resident
+        self._threads = first.threads
+
+    def _lost(self, fault: str) -> Answer:
+        """Say how the worker ended."""
+        assert self._process is not None
+        if not fault:
+            self._process.wait()
+            self._log.seek(0)
+            lines = self._log.read().decode("utf-8", "replace").splitlines()
+            said = [line for line in lines if "rror" in line or "what()" in line or "File" in line or "terminate" in line]
+            fault = f"crash: status {self._process.returncode}\n" + "\n".join(said[:12])
+        self.close()
+        return Answer(fault)
+
+    def close(self) -> None:
+        """End the worker, however busy it is."""
+        if self._process is not None:
+            self._connection.close()
+            self._process.kill()
+            self._process.wait()
+            self._process = None
