@@ -54,6 +54,10 @@ class _Wrong(AssertionError):
     """Tells hypothesis that a case failed."""
 
 
+class _Enough(BaseException):
+    """Ends hypothesis's search for a smaller case: it passes what is no Exception."""
+
+
 class _Kind:
     """Tries a kind's cases; remembers what each fault looked like."""
 
@@ -88,10 +92,12 @@ class _Kind:
         )
         try:
             hypothesis.seed(seed)(profile(given(self.cases)(self._one)))()
-        except (_Wrong, hypothesis.errors.FlakyFailure):
+        except (_Wrong, _Enough, hypothesis.errors.FlakyFailure):
             pass
 
     def _one(self, case: Case) -> None:
+        if self._new and time.monotonic() > self._until:
+            raise _Enough
         if self._fault(case) == self._new != "":
             raise _Wrong(self._new)
 
@@ -100,8 +106,6 @@ class _Kind:
         key = pickle.dumps(case)
         if key in self._known:
             return self._known[key]
-        if self._new and time.monotonic() > self._until:
-            return ""  # small enough
         answer = self.trier.run(case)
         self.slowest = max(self.slowest, answer.seconds)
         name = self._known[key] = fingerprint(answer.fault)
@@ -124,7 +128,9 @@ def fingerprint(fault: str) -> str:
     """Return what two faults of one cause have in common: the first line without its numbers and quotes."""
     first = fault.partition("\n")[0]
     if first.startswith("crash"):
-        first = fault.replace("\n", " ")[:200]
+        place = re.search(r"(\w+\.py)\", line \d+ in (\w+)", fault)
+        first += f" in {place.group(1)}:{place.group(2)}" if place else fault[len(first) : 200].replace("\n", " ")
+        return first
     return re.sub(r"(0x)?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"|/tmp/\S*", "_", first)[:90]
 
 

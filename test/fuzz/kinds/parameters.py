@@ -22,13 +22,19 @@ def _leaves(values, path=()):
 _KEYS = sorted(_leaves(_DEFAULTS), key=lambda leaf: leaf[0])
 
 
+_WORDS = ["3.x", "4.x", "color", "depth", "none", "target", "drone", "Track_base", "front_optical", "no_such_frame", "odom"]
+
+
 def _alike(value):
-    """Something of the kind that stands there."""
-    if isinstance(value, (bool, str, dict)) or value is None:
-        return st.one_of(st.booleans(), texts)
+    """Something of the kind that stands there, often near to it."""
+    if isinstance(value, bool):
+        return st.booleans()
+    if isinstance(value, (str, dict)):
+        return st.one_of(st.sampled_from(_WORDS), words, texts)
     if isinstance(value, list):
         return vectors(len(value))
-    return numbers
+    factors = st.sampled_from([0.5, 2, 3, 0.1, 10, 0.01, 100, 1e3, 1e-3])
+    return st.one_of(factors.map(lambda factor: type(value)(value * factor)), factors.map(lambda f: value * f), numbers)
 
 
 @st.composite
@@ -43,7 +49,7 @@ def _overrides(draw):
             place = place.setdefault(key, {}) if isinstance(place, dict) else {}
         if isinstance(place, dict):
             place[path[-1]] = draw(mostly(_alike(value)))
-    if draw(st.integers(0, 9)) == 0:  # another camera, as a user would add one
+    if draw(st.integers(0)) == 0:  # another camera, as a user would add one
         camera = {**_CAMERA, "topic": draw(st.sampled_from(["odom", "front", "track/camera_info", "new/image", "cmd_vel"]))}
         camera["object"] = draw(st.sampled_from(["TrackCam", "NewCam", "Drone", "Quadricopter_base"]))
         overrides.setdefault("cameras", {})
@@ -57,7 +63,7 @@ _ASSIGNMENTS = st.lists(
         lambda leaf, value, equals: ".".join(leaf[0]) + equals + str(value),
         st.sampled_from(_KEYS),
         st.one_of(numbers, texts, junk),
-        st.sampled_from(["=", "==", "", "=="]),
+        st.sampled_from(["="] * 9 + ["", "=="]),
     ),
     max_size=3,
 )

@@ -12,20 +12,20 @@ _COUNT = st.one_of(st.integers(0, 4), st.sampled_from([30]))
 
 @st.composite
 def _object(draw):
-    shape = draw(mostly(st.sampled_from(sorted(_SIZES)), junk, 9))
+    shape = draw(mostly(st.sampled_from(sorted(_SIZES)), junk))
     one = {"shape": shape, "position": draw(vectors())}
     wanted = _SIZES.get(shape, 3) if isinstance(shape, str) else 3
     if wanted:
         good = st.lists(st.floats(0.01, 3), min_size=wanted, max_size=wanted)
         one["size"] = draw(mostly(good, st.one_of(vectors(wanted), junk)))
     if shape in ("mesh", "urdf"):
-        one["file"] = draw(st.sampled_from(["one.obj", "one.urdf", "none.obj"]))
+        one["file"] = draw(st.sampled_from(["one.obj", "one.urdf", "one.obj", "one.urdf", "none.obj"]))
     optional = {
         "name": st.one_of(words, texts),
         "rpy": vectors(),
         "mass": mostly(st.floats(0, 10), st.one_of(numbers, junk)),
-        "color": st.one_of(st.lists(st.floats(0, 1), min_size=4, max_size=4), vectors(4)),
-        "texture": st.sampled_from(["", "one.png", "none.png", "one.obj", "/dev/null"]),
+        "color": mostly(st.lists(st.floats(0, 1), min_size=4, max_size=4), vectors(4)),
+        "texture": st.sampled_from(["", "", "", "none.png", "one.obj", "/dev/null"]),
     }
     for key, values in optional.items():
         if draw(st.integers(0, 4)) == 0:
@@ -40,12 +40,12 @@ def _scene(draw):
     scene = {}
     if draw(st.booleans()):
         floor = {"size": draw(mostly(st.floats(0.1, 100), st.one_of(numbers, junk)))}
-        scene["floor"] = draw(mostly(st.just(floor), junk, 9))
+        scene["floor"] = draw(mostly(st.just(floor), junk))
     if draw(st.booleans()):
-        drone = {"position": draw(vectors()), "yaw": draw(mostly(small, st.one_of(numbers, junk)))}
-        scene["drone"] = draw(mostly(st.just(drone), junk, 9))
+        drone = {"position": draw(mostly(st.tuples(small, small, st.floats(0, 9)).map(list), vectors())), "yaw": draw(mostly(small, st.one_of(numbers, junk)))}
+        scene["drone"] = draw(mostly(st.just(drone), junk))
     objects = [draw(_object()) for _ in range(draw(st.integers(0, 3)))] * draw(_COUNT)
-    scene["objects"] = draw(mostly(st.just(objects), junk, 9))
+    scene["objects"] = draw(mostly(st.just(objects), junk))
     if draw(st.integers(0, 19)) == 0:
         scene[draw(texts)] = draw(junk)
     return scene
@@ -95,7 +95,9 @@ def _bomb(draw):
 
 
 _GOOD = b"objects:\n- {name: Box, shape: box, size: [1, 1, 1], position: [3, 0, 4], mass: 1}\ndrone: {position: [1, 2, 3], yaw: 0.5}\n"
-_TEXTS = st.one_of(_scene().map(_dump), _scene().map(_dump), _bomb(), mutated(_GOOD), junk.map(_dump), st.binary(max_size=40))
+_WHOLE = _scene().map(_dump)
+_ODD = st.one_of(_bomb(), mutated(_GOOD), junk.map(_dump), st.binary(max_size=40))
+_TEXTS = st.one_of(_WHOLE, _WHOLE, _WHOLE, _ODD)
 _CUBE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 _LINK = (
     b'<robot name="one"><link name="a"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'

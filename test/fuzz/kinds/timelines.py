@@ -12,7 +12,7 @@ _GOOD = b"- {at: 0.1, twist: {linear: [1, 0, 0]}}\n- {at: 0.2, push: {force: [1,
 
 @st.composite
 def _entry(draw):
-    kind = draw(mostly(st.sampled_from(sorted(_ACTIONS)), texts, 9))
+    kind = draw(mostly(st.sampled_from(sorted(_ACTIONS)), texts))
     action = {}
     for key in _ACTIONS.get(kind, ("linear",)):
         if draw(st.booleans()):
@@ -21,7 +21,7 @@ def _entry(draw):
         action["duration"] = draw(mostly(st.floats(0.01, 1), st.one_of(numbers, junk)))
     if draw(st.integers(0, 19)) == 0:
         action[draw(words)] = draw(junk)
-    entry = {"at": draw(mostly(st.floats(0, 0.5), st.one_of(numbers, junk))), kind: draw(mostly(st.just(action), junk, 9))}
+    entry = {"at": draw(mostly(st.floats(0, 0.5), st.one_of(numbers, junk))), kind: draw(mostly(st.just(action), junk))}
     if draw(st.integers(0, 19)) == 0:
         entry[draw(texts)] = draw(junk)
     return entry
@@ -35,7 +35,7 @@ def _dump(value):
 
 
 _TEXTS = st.one_of(
-    st.lists(mostly(_entry(), junk, 9), max_size=5).map(_dump),
+    st.lists(mostly(_entry(), junk), max_size=5).map(_dump),
     mutated(_GOOD),
     st.sampled_from([b"- " * 2000, b"&x [*x]", b"[" * 5000, b"- {at: 1:30, pose: {}}", b"\xff", b"- {at: 0, at: 1, pose: {}}"]),
 )
