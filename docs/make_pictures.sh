@@ -8,7 +8,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(cameras plots rviz)
+sections=(diagrams cameras plots rviz)
+
+# The diagrams of docs/tutorial.md.
+diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
 
 # What the drone's own cameras see.
 cameras() { "$python" docs/take_pictures.py "$pictures"; }

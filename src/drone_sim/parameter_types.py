@@ -43,6 +43,9 @@ Color = Tuple[Fraction, Fraction, Fraction, Fraction]
 File = Annotated[str, AfterValidator(_existing_file)]
 OptionalFile = Annotated[str, AfterValidator(lambda name: _existing_file(name) if name else "")]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+AngleOrNone = Annotated[
+    Optional[Annotated[float, Field(gt=0, lt=3.14, allow_inf_nan=False)]], BeforeValidator(_none_from_word)
+]
 Limits = Annotated[Optional[Tuple[Finite, Finite]], BeforeValidator(_none_from_word), AfterValidator(_increasing)]
 
 

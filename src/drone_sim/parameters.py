@@ -15,6 +15,7 @@ from typing_extensions import Annotated
 from drone_sim import scene_parameters
 from drone_sim.frames import Matrix, from_rpy, multiply
 from drone_sim.parameter_types import (
+    AngleOrNone,
     Checked,
     File,
     Finite,
@@ -64,6 +65,7 @@ class PropellerParameters(Checked):
     particle_density: Positive
     particle_size: Positive
     torque_per_velocity: NonNegative
+    velocity_limits: Limits
 
 
 class ControlParameters(Checked):
@@ -80,6 +82,8 @@ class ControlParameters(Checked):
     Pangle: NonNegative
     Dangle: NonNegative
     Kvcorr: NonNegative
+    recovery_tilt: AngleOrNone
+    Precovery: NonNegative
 
 
 class MountParameters(Checked):

@@ -101,12 +101,15 @@ class Propellers:
         self.air = [0.0] * len(axes)  # m of it that went through each
         self._law = ParticleLaw(parameters, time_step)
         self._time_step = time_step
+        self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
         self._by_axis: Dict[Vector, List[Tuple[int, Vector, float]]] = {}
         for number, (axis, point, rotation) in enumerate(zip(axes, points, rotations)):
             self._by_axis.setdefault(axis, []).append((number, point, rotation * parameters.torque_per_velocity))
 
     def blow(self, velocities: Sequence[float], body: Matrix, wrench: Wrench) -> None:
-        """Emit a step's particles at these velocities (m/s) from a body there; add to its wrench."""
+        """Emit a step's particles from a body there, at these velocities (m/s) as far as they can; add to its wrench."""
+        if min(velocities) < self._slowest or max(velocities) > self._fastest:
+            velocities = [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
         newtons, air, time_step = self._law.emit(), self.air, self._time_step
         for axis, members in self._by_axis.items():
             force = torque = x = y = z = 0.0

@@ -1,70 +1,26 @@
 """docs/tutorial.md: each stage flies as its text says, its commands print what it shows, its lines are the scripts'."""
 
-import contextlib
+import ast
 import math
 import re
 import shlex
 import textwrap
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
 
-from drone_sim import parameters
-from drone_sim.offline import timeline
+from drone_sim.drone import PROPELLERS
 from drone_sim.offline.fly import main as fly_main
-from drone_sim.offline.fly import settings
-from drone_sim.simulation import Simulation
 from drone_sim.state import Pose, Twist, Vector3
 
-ROOT = Path(__file__).resolve().parents[2]
-DOCS = ROOT / "docs"
-TEXT = (DOCS / "tutorial.md").read_text(encoding="utf-8")
-STAGES = {path.stem: path for path in sorted((DOCS / "tutorial").glob("[0-9]_*.py"))}
 FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
 RIPPLE = 0.01  # m/s, of vz: particles come whole
 
 
 def blocks(language):
     return re.findall(rf"^ *```{language}\n(.*?)^ *```$", TEXT, re.MULTILINE | re.DOTALL)
-
-
-@contextlib.contextmanager
-def flying(stage, *assignments):
-    values = parameters.load(settings(assignments))
-    simulation = Simulation(values, script=str(STAGES[stage]) if stage in STAGES else stage)
-    try:
-        yield simulation
-    finally:
-        simulation.close()
-
-
-def fly(simulation, seconds, commands=None):
-    """Return x y z, velocities, yaw and propellers after each step, as arrays by name."""
-    states, yaws, propellers = [], [], []
-    for step in range(round(seconds / simulation.parameters.time_step)):
-        if commands is not None:
-            commands.apply(step, simulation.drone)
-        simulation.step()
-        states.append([number for part in simulation.drone.state for number in part])
-        yaws.append(math.atan2(simulation.drone.matrix[4], simulation.drone.matrix[0]))
-        propellers.append(simulation.drone.particle_velocities)
-    columns = np.array(states).T
-    names = ["x", "y", "z", "qx", "qy", "qz", "qw", "vx", "vy", "vz", "wx", "wy", "wz"]
-    flight = SimpleNamespace(**dict(zip(names, columns)))
-    flight.states, flight.yaw, flight.propellers = np.array(states), np.array(yaws), np.array(propellers)
-    return flight
-
-
-def fly_timeline(stage, name, *assignments, seconds=None):
-    with flying(stage, *assignments) as simulation:
-        commands = timeline.read(str(DOCS / "tutorial" / name), simulation.parameters)
-        return fly(simulation, seconds or commands.end + 5, commands)
-
-
-def at(values, seconds):
-    return values[round(seconds / 0.05) - 1]
 
 
 # ---- the stages
@@ -200,6 +156,17 @@ def test_the_camera_stage_publishes_every_step_s_picture():
 # ---- the text
 
 
+def test_the_propellers_are_drawn_as_they_are():
+    source = (DOCS / "draw_diagrams.py").read_text()
+    drawn = ast.literal_eval(re.search(r"^PROPELLERS = (\(.*?^\))", source, re.MULTILINE | re.DOTALL).group(1))
+    script = STAGES["1_thrust"].read_text()
+    for (_, name, _, _, clockwise, signs), (known, rotation) in zip(drawn, PROPELLERS):
+        assert name == known.replace("_", " ")
+        assert clockwise == (rotation > 0)  # the blades turn against the torque that they leave
+        mixing = " ".join(f"{sign} self.{what}_corr" for sign, what in zip(signs, ("pitch", "roll", "yaw")))
+        assert f"prop_{known} = self.thrust * (1 {mixing})" in script
+
+
 @pytest.mark.parametrize("stage", STAGES)
 def test_the_text_names_every_stage(stage):
     assert f"(tutorial/{stage}.py)" in TEXT
@@ -224,7 +191,7 @@ def test_links_and_pictures_are_there():
 
 
 def test_every_picture_is_made_by_a_command():
-    made = (DOCS / "make_pictures.sh").read_text() + (DOCS / "take_pictures.py").read_text()
+    made = "".join((DOCS / name).read_text() for name in ("make_pictures.sh", "take_pictures.py", "draw_diagrams.py"))
     plots = re.search(r"^plots\(\).*?^\}", made, re.MULTILINE | re.DOTALL).group()
     for name in re.findall(r"\(pictures/tutorial_([^)]+)\.png\)", TEXT):
         assert f"tutorial_{name}.png" in made or name in plots.split() or f" {name};" in plots, name
@@ -246,7 +213,7 @@ def test_the_commands_print_what_the_text_shows(tmp_path, monkeypatch, capsys):
 
 def commands_in(block):
     """Return the commands of a console block, with the lines shown below each."""
-    parts = re.split(r"^\$ ", textwrap.dedent(block), flags=re.MULTILINE)
+    parts = re.split(r"^[12]\$ ", textwrap.dedent(block), flags=re.MULTILINE)
     return [part.partition("\n")[::2] for part in parts[1:]]
 
 
@@ -258,7 +225,7 @@ def run(command):
         assert fly_main([*words[3:drawn], *words[drawn + 2 :]]) == 0
     elif words[:2] == ["python3", "-c"]:
         exec(words[2], {})
-    elif words[0] == "python3":
+    elif words[0] in ("python3", ".venv/bin/python"):
         source = Path(words[1]).read_text()
         names = {"__name__": "imported"}
         exec(compile(source, words[1], "exec"), names)

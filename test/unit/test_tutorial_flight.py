@@ -56,9 +56,20 @@ def test_a_command_reaches_its_velocity_in_5_s_and_ends_at_rest_in_6_s(simulatio
     assert velocity(simulation) == pytest.approx([0.0] * 6, abs=0.02)
 
 
-@pytest.mark.parametrize("limits, lowest, highest", [([3.0, 8.0], 176, 180), ("none", 133, 143)])
-def test_displaced_starts_return_to_rest(limits, lowest, highest):
-    values = parameters.load({"control": {"thrust_limits": limits}, "drone": {"position": [0, 0, 5]}})
+BARE = {"thrust_limits": "none", "recovery_tilt": "none"}
+
+
+@pytest.mark.parametrize(
+    "control, propellers, lowest, highest",
+    [
+        ({}, {}, 180, 180),
+        ({"recovery_tilt": "none"}, {"velocity_limits": "none"}, 176, 180),
+        (BARE, {"velocity_limits": "none"}, 133, 143),
+    ],
+)
+def test_displaced_starts_return_to_rest(control, propellers, lowest, highest):
+    own = {"control": control, "propellers": propellers}
+    values = parameters.load({**own, "drone": {"position": [0, 0, 5]}})
     returned = sum(returns(values, *start) for start in STARTS)
     assert lowest <= returned <= highest
 

@@ -1,8 +1,11 @@
 """The tutorial's child script: velocity commands in, four propeller velocities out.
 
-Same names, gains and order of arithmetic as the Lua script that the tutorial builds, with one addition:
-the collective thrust is kept within `thrust_limits`.
+Same names, gains and order of arithmetic as the Lua script that the tutorial builds, with two additions:
+the collective thrust is kept within `thrust_limits`, and a drone that leans by more than `recovery_tilt`,
+as against a wall, first rights itself.
 """
+
+import math
 
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
 
@@ -18,7 +21,10 @@ GAINS = (
     "Pangle",
     "Dangle",
     "Kvcorr",
+    "recovery_tilt",
+    "Precovery",
 )
+RECOVERY_YAW = 0.3  # yaw_corr beyond this would leave nothing of the propellers to level the drone
 
 
 def sysCall_init():
@@ -30,6 +36,7 @@ def sysCall_init():
 
     for name in GAINS:
         setattr(self, name, sim.getScriptSimulationParameter(sim.handle_self, name))
+    self.least_level = math.cos(self.recovery_tilt) if self.recovery_tilt else -2  # a cosine is never less than -1
     self.dt = sim.getSimulationTimeStep()
     self.thrust = self.thrust_gravity
     self.pitch_corr = self.yaw_corr = self.roll_corr = 0
@@ -86,6 +93,9 @@ def sysCall_sensing():
     roll_target = target_angle(self.vy, d_local_pos[1])
     self.roll_corr = self.Pangle * (roll_target - roll) - self.Dangle * droll
 
+    if math.cos(local_ori[0]) * math.cos(local_ori[1]) < self.least_level:  # the cosine of the tilt
+        recover(d_global_ori)
+
 
 def control_elevation(z, vz):
     """Hold the elevation zref, or follow a vertical speed and remember where it led."""
@@ -97,6 +107,22 @@ def control_elevation(z, vz):
     if self.thrust_limits:
         lowest, highest = self.thrust_limits
         self.thrust = min(max(self.thrust, lowest), highest)
+
+
+def recover(w):
+    """Level out, wherever the commands would lead; `w` is the angular velocity (rad/s, world).
+
+    Far from level the Euler angles turn into one another, so the tilt is taken from where the body sees the
+    world's z axis. Velocity commands count again when the drone leans less.
+    """
+    m = sim.getObjectMatrix(self.d, -1)
+    up_x, up_y, up_z = m[8], m[9], m[10]
+    level = math.hypot(up_x, up_y)
+    tilt = math.atan2(level, up_z) / level if level > 1e-6 else 0
+    roll_rate, pitch_rate = (m[i] * w[0] + m[i + 4] * w[1] + m[i + 8] * w[2] for i in (0, 1))
+    self.pitch_corr = self.Precovery * tilt * up_x - self.Dangle * pitch_rate
+    self.roll_corr = self.Precovery * tilt * up_y + self.Dangle * roll_rate
+    self.yaw_corr = min(max(self.yaw_corr, -RECOVERY_YAW), RECOVERY_YAW)
 
 
 def target_angle(command, speed):

@@ -1,0 +1,85 @@
+"""Against a wall, along it, on a box: it stays a drone, and comes free when the command is taken back."""
+
+import math
+
+import pytest
+
+from drone_sim import frames, parameters
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist, Vector3
+
+WALL = {"shape": "box", "size": [0.2, 60, 4], "position": [2.1, 0, 2]}
+BOX = {"shape": "box", "size": [1, 1, 0.4], "position": [0, 0, 0.2]}
+EDGE = {**BOX, "position": [0.45, 0, 0.2]}
+MINUTE = 60.0  # s
+
+
+class Flight:
+    """A drone among objects, and the worst that it went through."""
+
+    def __init__(self, *objects, yaw=0.0, **overrides):
+        scene = {"floor": {"size": 60}, "objects": list(objects)}
+        self.simulation = Simulation(parameters.load({"scene": scene, "drone": {"yaw": yaw}, **overrides}))
+        self.fastest_turn = self.most_tilt = 0.0
+
+    def fly(self, command, seconds):
+        """Fly a command (vx, vy, vz, wz) whose vx and vy are along the world's axes as the drone is turned now."""
+        (vx, vy, vz, wz), yaw = command, frames.to_euler(self.simulation.drone.track)[2]
+        ahead, left = vx * math.cos(yaw) + vy * math.sin(yaw), vy * math.cos(yaw) - vx * math.sin(yaw)
+        self.simulation.drone.receive(Twist(Vector3(ahead, left, vz), Vector3(0, 0, wz)))
+        for _ in range(round(seconds / 0.05)):
+            self.simulation.step()
+            drone = self.simulation.drone
+            self.fastest_turn = max(self.fastest_turn, math.hypot(*drone.state.angular_velocity))
+            self.most_tilt = max(self.most_tilt, math.acos(min(1.0, drone.matrix[10])))
+        return self.simulation.drone.state
+
+    def assert_comes_free(self):
+        x = self.simulation.drone.state.position[0]
+        for _ in range(5):  # a wall that one leans on turns the drone, and a pilot aims again
+            away = self.fly((-1, 0, 0, 0), 1)
+        assert away.position[0] < x - 1.5
+        rest = self.fly((0, 0, 0, 0), 9)
+        assert math.hypot(*rest.linear_velocity, *rest.angular_velocity) < 0.02
+        assert self.most_tilt < 0.8
+        assert self.fastest_turn < 5.0
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5, -1.2, math.pi])
+@pytest.mark.parametrize("speed", [0.5, 1.0])
+def test_a_minute_against_a_wall(speed, yaw):
+    flight = Flight(WALL, yaw=yaw)
+    pushed = flight.fly((speed, 0, 0, 0), MINUTE)
+    assert pushed.position[0] == pytest.approx(1.85, abs=0.05)
+    assert pushed.position[2] == pytest.approx(0.8, abs=0.15)
+    flight.assert_comes_free()
+
+
+@pytest.mark.parametrize(
+    "command", [(0.3, 1, 0, 0), (0.5, 1, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, 0.3, 0), (1, 0, 0, 1)]
+)
+def test_scraping_along_a_wall(command):
+    flight = Flight(WALL)
+    scraped = flight.fly(command, 10)
+    assert scraped.position[0] < 1.9
+    flight.assert_comes_free()
+
+
+@pytest.mark.parametrize("things, top", [((), 0.0), ((BOX,), 0.4), ((EDGE,), 0.4)])
+def test_landing_and_leaving(things, top):
+    flight = Flight(*things)
+    landed = flight.fly((0, 0, -0.5, 0), MINUTE)
+    assert landed.position[2] == pytest.approx(top + 0.01, abs=0.01)
+    flown = flight.fly((0, 0, 0.5, 0), 5)
+    assert flown.position[2] > top + 1.0
+    assert flight.most_tilt < 0.05
+
+
+def test_propellers_have_limits():
+    """Without them the bare law throws the drone off the wall at hundreds of m/s of particle velocity."""
+    bare = {"thrust_limits": "none", "recovery_tilt": "none"}
+    thrown = Flight(WALL, control=bare, propellers={"velocity_limits": "none"})
+    thrown.fly((1, 0, 0, 0), 10)
+    held = Flight(WALL, control=bare, propellers={"velocity_limits": [0, 12]})
+    held.fly((1, 0, 0, 0), 10)
+    assert held.fastest_turn < 5.0 < thrown.fastest_turn

@@ -1,0 +1,120 @@
+"""docs/tutorial/solutions: each flies as its exercise asks, and differs from its stage by a few lines."""
+
+import difflib
+import math
+import re
+
+import numpy as np
+import pytest
+from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying, push
+
+from drone_sim.offline import timeline
+
+SOLUTIONS = {path.stem: path for path in sorted((DOCS / "tutorial" / "solutions").glob("*.py"))}
+STAGE_OF = {name: next(stage for stage in STAGES if stage[0] == name[0]) for name in SOLUTIONS}
+
+
+def fly_solution(name, commands=None, *assignments, seconds=None):
+    with flying(str(SOLUTIONS[name]), *assignments) as simulation:
+        if commands is None:
+            return fly(simulation, seconds)
+        planned = timeline.read(str(DOCS / "tutorial" / commands), simulation.parameters)
+        return fly(simulation, seconds or planned.end + 5, planned)
+
+
+def test_every_exercise_links_its_solution():
+    linked = re.findall(r"\(tutorial/solutions/(\w+)\.py\)", TEXT)
+    assert sorted(linked) == sorted(SOLUTIONS)
+    exercises = re.findall(r"^> \*\*Exercise\.\*\*.*?(?:\n(?!>)|\Z)", TEXT, re.MULTILINE | re.DOTALL)
+    assert len(exercises) >= 9
+    assert all("tutorial/solutions/" in exercise for exercise in exercises)
+
+
+@pytest.mark.parametrize("name", SOLUTIONS)
+def test_a_solution_is_its_stage_with_a_few_lines_changed(name):
+    stage, solution = (path.read_text().splitlines() for path in (STAGES[STAGE_OF[name]], SOLUTIONS[name]))
+    changes = [line for line in difflib.ndiff(stage, solution) if line[0] in "+-"]
+    assert 3 <= len(changes) <= 30
+
+
+def test_solution_a_frame_that_nobody_moves_stays():
+    with flying(str(SOLUTIONS["1_frame"])) as simulation:
+        fly(simulation, 0.05)
+        before = simulation.drone.track
+        push(simulation.drone, (1, 0, 0))
+        assert fly(simulation, 5).x[-1] > 1.5
+        assert simulation.drone.track == before
+
+
+def test_solution_a_thrust_hangs_for_a_minute():
+    assert fly_solution("1_thrust", seconds=60).z[-1] == pytest.approx(0.8, abs=0.01)
+
+
+def test_solution_half_the_damping_overshoots():
+    halved = fly_solution("2_elevation", "2_elevation.yaml").z[round(6.1 / 0.05) :]
+    assert 0.15 < halved.max() - halved[-1] < 0.17
+    whole = fly_timeline("2_elevation", "2_elevation.yaml").z[round(6.1 / 0.05) :]
+    assert whole.max() - whole[-1] < 0.01
+
+
+@pytest.mark.parametrize("start", [0, 1.7])  # 1.7: the spin goes past pi
+def test_solution_the_heading_is_held_the_short_way_round(start):
+    flight = fly_solution("3_yaw", "3_yaw.yaml", f"drone.yaw={start}", seconds=16)
+    yaw = np.unwrap(flight.yaw)
+    assert at(yaw, 5.9) - start == pytest.approx(1.384, abs=0.02)
+    assert at(yaw, 6.4) - start > 1.384 + 0.07
+    assert yaw[-1] - start == pytest.approx(1.384, abs=0.002)
+    assert (flight.yaw.min() < 0) == (start > 0)
+
+
+def test_solution_a_gentler_outer_loop_overshoots_less_and_needs_longer():
+    gentle, given = fly_solution("4_pitch", "4_pitch.yaml"), fly_timeline("4_pitch", "4_pitch.yaml")
+    assert gentle.vx.max() < 1.3 < 1.5 < given.vx.max()
+    assert np.argmax(gentle.vx > 0.9) > np.argmax(given.vx > 0.9) + 8
+
+
+@pytest.mark.parametrize(
+    "name, rests", [("5_square", (10.9, 20.9, 30.9, 40.9)), ("5_square_turning", (10.4, 29, 47.5, 66))]
+)
+def test_solution_a_square_has_its_corners(name, rests):
+    flight = fly_solution(name, seconds=75)
+    corners = [(at(flight.x, rest), at(flight.y, rest)) for rest in rests]
+    assert np.allclose(corners, [(4, 0), (4, 4), (0, 4), (0, 0)], atol=0.06)
+    turned = np.unwrap(flight.yaw)[-1]
+    assert turned == pytest.approx(2 * math.pi if "turning" in name else 0, abs=0.01)
+
+
+def test_solution_the_guard_catches_the_fall():
+    flight = fly_solution("5_guard", "fall.yaml", "drone.position=[0, 0, 5]", seconds=26)
+    assert flight.z[-1] == pytest.approx(5, abs=0.01)
+    assert np.hypot(flight.vx[-1], flight.vy[-1]) < 0.05
+
+
+def test_solution_a_turn_without_slip():
+    with_slip, without = fly_timeline("6_ros", "6_ros.yaml"), fly_solution("6_ros", "6_ros.yaml")
+    assert sideways(with_slip, 19.9) == pytest.approx(-1 * 0.5 / 9.81 / 0.5, abs=0.01)  # -v w / g / Kvcorr
+    assert sideways(without, 19.9) == pytest.approx(0, abs=0.01)
+
+
+def sideways(flight, seconds):
+    yaw = at(flight.yaw, seconds)
+    return -math.sin(yaw) * at(flight.vx, seconds) + math.cos(yaw) * at(flight.vy, seconds)
+
+
+def test_solution_every_fourth_picture_has_no_red():
+    with flying(str(SOLUTIONS["7_camera"]), "cameras.front.width=64", "cameras.front.height=48") as simulation:
+        fly(simulation, 0.6)
+        published = list(simulation.drone.bus.published)
+        seen = simulation.cameras["front"].take()
+    assert len(published) == 3
+    picture = np.frombuffer(published[-1].message.data, np.uint8).reshape(seen.shape)
+    assert not picture[..., 0].any()
+    assert np.array_equal(picture[..., 1:], seen[..., 1:])
+
+
+def test_solution_a_gram_more_lies_on_the_floor_after_nine_seconds():
+    with flying(str(SOLUTIONS["1_thrust"])) as simulation:
+        push(simulation.drone, (0, 0, -9.81e-3), seconds=12)
+        flight = fly(simulation, 12)
+    assert at(flight.z, 8.5) > 0.05
+    assert at(flight.z, 9.5) < 0.03
