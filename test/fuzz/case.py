@@ -18,6 +18,6 @@ class Answer(NamedTuple):
 
     fault: str
     refusal: str = ""
-    seconds: float = 0.0
+    seconds: float = 0.0  # of the processor
     resident: int = 0  # bytes, afterwards
-    threads: int = 0
+    busy: bool = False  # with what the case began, though it is over

@@ -12,9 +12,9 @@ from typing import Any, Optional
 
 from case import Answer, Case
 
-HANGS = 3.0  # s that a case may take
+HANGS = 3.0  # s of the processor that a case may take
 GROWTH = 800 << 20  # bytes that a case may leave behind; and what a worker may grow by before it is replaced
-_PATIENCE = 12.0  # s after which nobody waits for it any more
+_PATIENCE = 12.0  # s by the clock after which nobody waits for it any more
 _FIRST = 60.0  # s for the first case: imports, compiling shaders
 _SOURCE = Path(__file__).resolve().parents[2] / "src"
 
@@ -26,17 +26,14 @@ class Trier:
         """Begin without a worker: the first case starts it."""
         self._process: Optional[subprocess.Popen[bytes]] = None
         self._connection: Any = None
-        self._log = tempfile.TemporaryFile()
-        self._resident = self._last = self._threads = 0
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as this
+        self._resident = self._last = 0
 
     def run(self, case: Case) -> Answer:
-        """Try a case; a slow one is tried again in a worker of its own, lest another process be to blame."""
+        """Try a case."""
         answer = self._attempt(case)
         if not answer.fault and answer.seconds > HANGS:
-            self.close()
-            answer = self._attempt(case)
-            if not answer.fault and answer.seconds > HANGS:
-                answer = answer._replace(fault=f"slow: {answer.seconds:.1f} s")
+            return answer._replace(fault=f"slow: {answer.seconds:.1f} s")
         return answer
 
     def _attempt(self, case: Case) -> Answer:
@@ -52,7 +49,7 @@ class Trier:
         if not answer.fault and answer.resident > self._last + GROWTH:
             answer = answer._replace(fault=f"memory: grew by {(answer.resident - self._last) >> 20} MB")
         self._last = answer.resident
-        if answer.threads > self._threads + 2 or answer.resident > self._resident + GROWTH:
+        if answer.busy or answer.resident > self._resident + GROWTH:
             self.close()  # a script that never ends is left behind in its thread
         return answer
 
@@ -66,7 +63,13 @@ class Trier:
             stdin=subprocess.DEVNULL,
             stdout=self._log,
             stderr=self._log,
-            env={**os.environ, "PYTHONPATH": paths, "LP_NUM_THREADS": "0", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+            env={
+                **os.environ,
+                "PYTHONPATH": paths,
+                "LP_NUM_THREADS": "0",
+                "OMP_NUM_THREADS": "1",
+                "OPENBLAS_NUM_THREADS": "1",
+            },
         )
         theirs.close()
         self._connection = ours
@@ -77,7 +80,6 @@ class Trier:
         if first.fault:
             raise RuntimeError(f"the default parameters fail: {first.fault}")
         self._resident = self._last = first.resident
-        self._threads = first.threads
 
     def _lost(self, fault: str) -> Answer:
         """Say how the worker ended."""

@@ -9,6 +9,7 @@ Exit status 1 where there was any.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib
 import pickle
 import re
@@ -61,10 +62,10 @@ class _Enough(BaseException):
 class _Kind:
     """Tries a kind's cases; remembers what each fault looked like."""
 
-    def __init__(self, name: str):
+    def __init__(self, name: str, trier: Trier):
         self.name = name
         self.cases = importlib.import_module(f"kinds.{name}").CASES
-        self.trier = Trier()
+        self.trier = trier
         self.taken = self.refused = 0
         self.slowest = 0.0
         self.found: Dict[str, Found] = {}
@@ -76,7 +77,6 @@ class _Kind:
         """Try `count` cases; the seed and the kind's name say which."""
         for first in range(0, count, _CHUNK):
             self._chunk(min(_CHUNK, count - first), seed * 1_000_003 + zlib.crc32(self.name.encode()) + first)
-        self.trier.close()
         return Result(self.name, self.taken, self.refused, self.found, self.slowest)
 
     def _chunk(self, count: int, seed: int) -> None:
@@ -90,10 +90,8 @@ class _Kind:
             suppress_health_check=list(HealthCheck),
             report_multiple_bugs=False,
         )
-        try:
+        with contextlib.suppress(_Wrong, _Enough, hypothesis.errors.FlakyFailure):
             hypothesis.seed(seed)(profile(given(self.cases)(self._one)))()
-        except (_Wrong, _Enough, hypothesis.errors.FlakyFailure):
-            pass
 
     def _one(self, case: Case) -> None:
         if self._new and time.monotonic() > self._until:
@@ -134,10 +132,19 @@ def fingerprint(fault: str) -> str:
     return re.sub(r"(0x)?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"|/tmp/\S*", "_", first)[:90]
 
 
-def run_kind(name: str, count: int, seed: int) -> Result:
+def run_kind(name: str, count: int, seed: int, trier: Trier) -> Result:
     """Try `count` cases of a kind."""
-    warnings.simplefilter("ignore", hypothesis.errors.HypothesisWarning)  # some cases are large
-    return _Kind(name).run(count, seed)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", hypothesis.errors.HypothesisWarning)  # some cases are large
+        return _Kind(name, trier).run(count, seed)
+
+
+def _run_alone(name: str, count: int, seed: int) -> Result:
+    trier = Trier()
+    try:
+        return run_kind(name, count, seed, trier)
+    finally:
+        trier.close()
 
 
 def keep(result: Result, out: Path, seed: int) -> List[str]:
@@ -150,7 +157,9 @@ def keep(result: Result, out: Path, seed: int) -> List[str]:
         for file, content in found.case.files.items():
             (folder / file).write_bytes(content)
         (folder / "case.pickle").write_bytes(pickle.dumps(found.case))
-        (folder / "fault.txt").write_text(f"seed {seed}\n{found.case!r:.5000}\n\n{found.fault}\n", encoding="utf-8", errors="replace")
+        (folder / "fault.txt").write_text(
+            f"seed {seed}\n{found.case!r:.5000}\n\n{found.fault}\n", encoding="utf-8", errors="replace"
+        )
         lines.append(f"{folder}: {found.count} times: {found.fault.splitlines()[0][:160]}")
     return lines
 
@@ -172,7 +181,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("cases", nargs="?", type=int, default=1000, help="how many, over all kinds (default: 1000)")
     parser.add_argument("--seed", type=int, default=0, help="the same seed tries the same cases (default: 0)")
-    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS, metavar="KIND", help=f"of {', '.join(KINDS)}")
+    parser.add_argument(
+        "--kinds", nargs="+", choices=KINDS, default=KINDS, metavar="KIND", help=f"of {', '.join(KINDS)}"
+    )
     parser.add_argument("--out", type=Path, default=OUT, help="where the faults are kept (default: build/fuzz)")
     parser.add_argument("--again", nargs="+", metavar="FOLDER", help="try again what was kept there, and nothing else")
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time (default: 2)")
@@ -187,7 +198,7 @@ def main() -> int:
     began, lines = time.monotonic(), []
     count = -(-options.cases // len(options.kinds))
     with ProcessPoolExecutor(options.jobs) as executor:
-        futures: List[Any] = [executor.submit(run_kind, kind, count, options.seed) for kind in options.kinds]
+        futures: List[Any] = [executor.submit(_run_alone, kind, count, options.seed) for kind in options.kinds]
         for future in futures:
             one: Result = future.result()
             faults = sum(found.count for found in one.found.values())

@@ -110,10 +110,17 @@ def _scene(case: Case, folder: Path) -> None:
 
 def _mesh(case: Case, folder: Path) -> None:
     (name,) = set(case.files) - {"one.mtl", "one.png"}
-    one: Dict[str, Any] = {"shape": "mesh", "file": str(folder / name), "position": [2, 0, 1], "mass": case.data["mass"]}
+    one: Dict[str, Any] = {
+        "shape": "mesh",
+        "file": str(folder / name),
+        "position": [2, 0, 1],
+        "mass": case.data["mass"],
+    }
     if case.data["in_urdf"]:
         inertia = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-        look = "".join(f'<{tag}><geometry><mesh filename="{name}"/></geometry></{tag}>' for tag in ("collision", "visual"))
+        look = "".join(
+            f'<{tag}><geometry><mesh filename="{name}"/></geometry></{tag}>' for tag in ("collision", "visual")
+        )
         (folder / "one.urdf").write_text(f'<robot name="one"><link name="a">{inertia}{look}</link></robot>')
         one = {"shape": "urdf", "file": str(folder / "one.urdf"), "position": [2, 0, 1], "mass": case.data["mass"]}
     _simulate(_with_small_pictures({"scene": {"objects": [one]}}), folder)
@@ -134,7 +141,9 @@ def _urdf(case: Case, folder: Path) -> None:
 def _script(case: Case, folder: Path) -> str:
     """Fly a script, start it again, and leave: each call may say that the script failed."""
     (name,) = case.files
-    simulation = Simulation(parameters.load({"script_time_limit": _SCRIPT_LIMIT, "cameras": {"front": dict(_SMALL)}}), started=False)
+    simulation = Simulation(
+        parameters.load({"script_time_limit": _SCRIPT_LIMIT, "cameras": {"front": dict(_SMALL)}}), started=False
+    )
     simulation.script = str(folder / name)
     said: List[str] = []
 

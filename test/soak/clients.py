@@ -96,7 +96,11 @@ def within(seconds: float, action: Callable[[], Any]) -> Tuple[bool, Any]:
 
 def call_services(dice: random.Random, folder: Path, diary: Diary) -> None:
     """Press every button, in any order, as somebody in a hurry."""
-    names = ["start"] * 6 + ["stop", "step", "snapshot", "restore", "load_scene", "load_scene", "save_scene"] + ["pause"] * 3
+    names = (
+        ["start"] * 6
+        + ["stop", "step", "snapshot", "restore", "load_scene", "load_scene", "save_scene"]
+        + ["pause"] * 3
+    )
     while True:
         name = dice.choice(names)
         if dice.random() < 0.2:

@@ -14,7 +14,6 @@ import contextlib
 import json
 import os
 import random
-import re
 import shutil
 import signal
 import socket
@@ -23,30 +22,16 @@ import sys
 import tempfile
 import threading
 import time
-from collections import Counter
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional
+from typing import Any, Iterator, List, Optional
 from xmlrpc.client import ServerProxy
 
 import clients
-import numpy as np
+from measure import Sample, answers, faults, report
 
 EVERY = 10.0  # s between two lines
 STARTS = 60.0  # s that the launch may take
 ENDS = 10.0  # s that the node may take to end; roslaunch itself gives it 15
-MOST_MEMORY = 1.0  # MB a minute after warming up, and
-LEAST_MEMORY = 15.0  # MB in all, below which nothing is said of a slope
-MOST_MORE = 8  # threads, descriptors
-_TIDY = re.compile(r"\d[\d.e+-]*|'[^']*'|/\S+")
-
-
-class Sample(NamedTuple):
-    """The node's process at a moment (s): resident memory in MB, threads, open descriptors."""
-
-    at: float
-    memory: float
-    threads: int
-    descriptors: int
 
 
 class Launch:
@@ -126,14 +111,26 @@ class Crowd:
         self._sleeper = self._processes[-1]
         if shutil.which("rosbag"):
             topics = ["/drone/odom", "/tf", "/drone/front/compressed"]
-            bag = ["rosbag", "record", "-q", "--split", "--size=20", "--max-splits=2", "-O", str(folder / "bag"), *topics]
-            self._processes.append(subprocess.Popen(bag, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+            bag = [
+                "rosbag",
+                "record",
+                "-q",
+                "--split",
+                "--size=20",
+                "--max-splits=2",
+                "-O",
+                str(folder / "bag"),
+                *topics,
+            ]
+            # A session of its own: rosbag starts another program, which is to end with it.
+            quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            self._processes.append(subprocess.Popen(bag, start_new_session=True, **quiet))
         self._stopped = False
 
     def _start(self, role: str, seed: int) -> subprocess.Popen:
         program = [sys.executable, str(Path(clients.__file__)), role, str(seed), str(self._folder)]
         with (self._folder / f"{role}-{seed}.log").open("w") as log:
-            return subprocess.Popen(program, stdout=log, stderr=subprocess.STDOUT)
+            return subprocess.Popen(program, stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
 
     def stir(self) -> None:
         """Put the sleeper to sleep, or wake it."""
@@ -148,7 +145,8 @@ class Crowd:
     def close(self) -> None:
         """End them."""
         for one in self._processes:
-            one.kill()
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(one.pid, signal.SIGKILL)
         for one in self._processes:
             one.wait()
 
@@ -160,78 +158,6 @@ class Crowd:
                 with contextlib.suppress(ValueError):  # cut off, where the client was ended
                     noted.append(json.loads(line))
         return noted
-
-
-# ---- what is made of it
-
-
-def slope(samples: List[Sample]) -> float:
-    """Return by how many MB a minute the memory grew: the median of the slopes between any two (Theil and Sen)."""
-    at, memory = np.array([[s.at, s.memory] for s in samples]).T
-    first, second = np.triu_indices(len(at), 1)
-    far = at[second] - at[first] > 0.2 * (at[-1] - at[0])
-    slopes = (memory[second] - memory[first])[far] / (at[second] - at[first])[far]
-    return float(np.median(slopes) * 60.0) if len(slopes) else 0.0
-
-
-def settled(samples: List[Sample]) -> List[Sample]:
-    """Return the samples after the warm-up: a third of the run, at most two minutes."""
-    warm = samples[0].at + min(120.0, (samples[-1].at - samples[0].at) / 3)
-    return [sample for sample in samples if sample.at >= warm]
-
-
-def growth(samples: List[Sample]) -> List[str]:
-    """Name what grew after the warm-up."""
-    rest = settled(samples)
-    if len(rest) < 12:
-        return []
-    found = []
-    third = len(rest) // 3
-    early, late = rest[:third], rest[-third:]
-    risen = min(s.memory for s in late) - min(s.memory for s in early)
-    if slope(rest) > MOST_MEMORY and risen > LEAST_MEMORY:
-        found.append(f"memory grows by {slope(rest):.1f} MB a minute")
-    for name in ("threads", "descriptors"):
-        more = min(getattr(s, name) for s in late) - min(getattr(s, name) for s in early)
-        if more > MOST_MORE:
-            found.append(f"{name} grow: {more} more")
-    return found
-
-
-def late_steps(lines: List[str]) -> int:
-    """Return how many late steps the node has counted."""
-    counts = [int(n) for line in lines for n in re.findall(r"\((\d+) so far\)|(\d+) late steps", line)[0:1] for n in n if n]
-    return max(counts, default=0)
-
-
-def answers(diary: List[Any]) -> Dict[str, Counter]:
-    """Count what the services said, with numbers and names left out."""
-    said: Dict[str, Counter] = {}
-    for what, _, well, text in diary:
-        if what != "odom":
-            key = "well" if well else _TIDY.sub("_", text)[:110]
-            said.setdefault(what, Counter())[key] += 1
-    return said
-
-
-def faults(launch: Launch, diary: List[Any], samples: List[Sample]) -> List[str]:
-    """Name what went wrong."""
-    found = [f"{what}: {text} after {seconds:.1f} s" for what, seconds, _, text in diary if text[:4] in ("HUNG", "NOT ", "NO A")]
-    found += [f"the node printed: {line[:200]}" for line in launch.lines if "Traceback" in line]
-    return [*found[:10], *growth(samples)]
-
-
-def report(samples: List[Sample], launch: Launch, diary: List[Any], began: float) -> str:
-    """Return the line of now."""
-    now = samples[-1]
-    odometry = [int(text) for what, _, well, text in diary if what == "odom" and well][-10:]
-    calls = [entry for entry in diary if entry[0] != "odom"]
-    return (
-        f"{now.at - began:6.0f} s  {now.memory:6.1f} MB {slope(settled(samples)):+6.2f} MB/min  {now.threads:3d} threads "
-        f"{now.descriptors:4d} descriptors  {late_steps(launch.lines):4d} late  {len(calls):5d} calls "
-        f"{sum(not entry[2] for entry in calls):4d} refused, slowest {max([c[1] for c in calls], default=0):.1f} s  "
-        f"{np.mean(odometry) if odometry else 0:5.1f} odom/s"
-    )
 
 
 @contextlib.contextmanager
@@ -262,7 +188,7 @@ def soak(launch: Launch, crowd: Crowd, minutes: float) -> List[Sample]:
         samples.append(sample)
         if time.monotonic() > due:
             due += EVERY
-            print(report(samples, launch, crowd.diary(), began), flush=True)
+            print(report(samples, launch.lines, crowd.diary(), began), flush=True)
     return samples
 
 
@@ -281,45 +207,60 @@ def afterwards(folder: Path) -> List[str]:
     environment = {**os.environ, "PYTHONPATH": f"{Path(__file__).parent}:{os.environ.get('PYTHONPATH', '')}"}
     try:
         done = subprocess.run(
-            [sys.executable, "-c", program, str(folder)], env=environment, timeout=40, capture_output=True, text=True, check=False
+            [sys.executable, "-c", program, str(folder)],
+            env=environment,
+            timeout=40,
+            capture_output=True,
+            text=True,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         return ["it does not answer afterwards"]
     return [] if done.returncode == 0 else [f"it does not fly afterwards: {done.stderr[-300:]}"]
 
 
+def finish(launch: Launch, crowd: Crowd, folder: Path, samples: List[Sample]) -> List[str]:
+    """See that the node still flies, end it, say what the services answered; return what went wrong."""
+    survived = launch.alive()
+    found = afterwards(folder) if survived else ["the node died; it said last:", *launch.lines[-3:]]
+    took = launch.end()
+    if took > ENDS:
+        found.append(f"the node took {took:.1f} s to end")
+    diary = crowd.diary()
+    for what, counts in sorted(answers(diary).items()):
+        print(f"{what}: " + "; ".join(f"{count} {text}" for text, count in counts.most_common(8)))
+    flew = [line.partition("drone_sim: ")[2] for line in launch.lines if "times real time" in line]
+    print(f"ended within {took:.1f} s; {flew[-1] if flew else 'it did not say how far it flew'}")
+    return found + (faults(launch.lines, diary, samples) if survived else [])
+
+
 def main() -> int:
     """Run."""
-    parser = argparse.ArgumentParser(prog="./dev.sh soak", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="./dev.sh soak", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("minutes", nargs="?", type=float, default=5.0, help="how long (default: 5)")
     parser.add_argument("--seed", type=int, default=0, help="of what the clients do (default: 0)")
-    parser.add_argument("--keep", action="store_true", help="keep the folder with scripts, scenes and the clients' diaries")
+    parser.add_argument(
+        "--keep", action="store_true", help="keep the folder with scripts, scenes and the clients' diaries"
+    )
     options, arguments = parser.parse_known_args()
     with home(options.keep) as folder:
         launch = Launch(folder, [f"script:={folder / 'flown.py'}", *arguments])
         crowd = Crowd(folder, options.seed)
         try:
             samples = soak(launch, crowd, options.minutes)
-            dead = crowd.dead()
+            found = [f"a client of the soak ended: {one}" for one in crowd.dead()]
         finally:
             crowd.close()
-        found = [f"a client of the soak ended: {one}" for one in dead]
-        survived = launch.alive()
-        found += afterwards(folder) if survived else ["the node died; it said last:", *launch.lines[-3:]]
-        took = launch.end()
-        found += [f"the node took {took:.1f} s to end"] if took > ENDS else []
-        diary = crowd.diary()
-        found += faults(launch, diary, samples) if survived else []
-        for what, counts in sorted(answers(diary).items()):
-            print(f"{what}: " + "; ".join(f"{count} {text}" for text, count in counts.most_common(8)))
-        flew = [line for line in launch.lines if "times real time" in line]
-        print(f"ended within {took:.1f} s; {flew[-1].partition('drone_sim: ')[2] if flew else 'it did not say how far it flew'}")
-        if found:
-            (Path("build") / "soak.log").write_text("\n".join(launch.lines), encoding="utf-8")
-            print(f"seed {options.seed}; what the node printed is in build/soak.log", *found, sep="\n")
-        else:
-            print(f"seed {options.seed}: nothing broke")
-    return 1 if found else 0
+        found += finish(launch, crowd, folder, samples)
+    if found:
+        log = Path(__file__).parents[2] / "build" / "soak.log"
+        log.write_text("\n".join(launch.lines), encoding="utf-8")
+        print(f"seed {options.seed}; what the node printed is in {log}", *found, sep="\n")
+        return 1
+    print(f"seed {options.seed}: nothing broke")
+    return 0
 
 
 if __name__ == "__main__":

@@ -3,11 +3,12 @@
 from hypothesis import strategies as st
 
 from kinds.scripts import FUNCTIONS, OBJECTS, ROS_FUNCTIONS, scripts
+from kinds.values import one_of_words
 
 _VALUES = st.recursive(
     st.one_of(
-        st.sampled_from(["nil", "true", "-1", "0", "1", "2.5", "1/0", "-1/0", "0/0", "2^53", "1e308", "5e-324", "math.huge"]),
-        st.sampled_from(["''", "'x'", r"'\0'", r"'\255\254'", "('x'):rep(1e5)", "print", "function() end", "sim", "_G", "_ENV"]),
+        one_of_words("nil true -1 0 1 2.5 1/0 -1/0 0/0 2^53 1e308 5e-324 math.huge '' 'x' print sim _G _ENV"),
+        st.sampled_from([r"'\0'", r"'\255\254'", "('x'):rep(1e5)", "function() end"]),
         st.sampled_from(["coroutine.create(print)", "setmetatable({}, {})", "io", "string", "deep", "ring", "angry"]),
         st.sampled_from([f"sim.getObjectHandle('{name}')" for name in OBJECTS]),
         st.sampled_from(["'std_msgs/Float64'", "'/x'", "'odd'", "'on_message'", "'geometry_msgs/Twist'"]),
@@ -19,20 +20,24 @@ _VALUES = st.recursive(
     ),
     max_leaves=6,
 )
-_FUNCTION = st.one_of(st.sampled_from([f"sim.{f}" for f in FUNCTIONS]), st.sampled_from([f"simROS.{f}" for f in ROS_FUNCTIONS]))
+_FUNCTION = st.sampled_from([*(f"sim.{f}" for f in FUNCTIONS), *(f"simROS.{f}" for f in ROS_FUNCTIONS)])
 _CALLS = st.builds("x = {}({})".format, _FUNCTION, st.lists(_VALUES, max_size=5).map(", ".join))
-_PATTERN = st.sampled_from([".-.-.-.-.-y", "(.-)(.-)(.-)%1y", ".*.*.*.*y", "[^x]*[^x]*y", "%b()", "%f[y]", "((((", "%", "[", "x*x*x*y"])
-_SIZE = st.sampled_from(["10", "1e3", "1e5", "250000", "1e7", "2^31", "2^53", "-1", "0"])
+_PATTERN = one_of_words(".-.-.-.-.-y (.-)(.-)(.-)%1y .*.*.*.*y [^x]*[^x]*y %b() %f[y] (((( % [ x*x*x*y")
+_SIZE = one_of_words("10 1e3 1e5 250000 1e7 2^31 2^53 -1 0")
 _LIBRARY = st.one_of(
     st.builds("x = ('x'):rep({}):find('{}')".format, _SIZE, _PATTERN),
-    st.builds("x = ('x'):rep({}):gsub('{}', {})".format, _SIZE, _PATTERN, st.sampled_from(["'%1'", "'%9'", "print", "{}", "x"])),
+    st.builds("x = ('x'):rep({}):gsub('{}', {})".format, _SIZE, _PATTERN, one_of_words("'%1' '%9' print {} x")),
     st.builds("for a in ('x'):rep({}):gmatch('{}') do x = a end".format, _SIZE, _PATTERN),
-    st.builds("table.{}({}, {}, {}, {})".format, st.sampled_from(["move", "concat", "unpack", "insert", "remove"]), _VALUES, _SIZE, _SIZE, _VALUES),
-    st.builds("table.sort({}, {})".format, _VALUES, st.sampled_from(["nil", "function() return true end", "error", "print"])),
-    st.builds("x = string.format({}, {})".format, st.sampled_from(["'%d'", "'%s'", "'%99.99f'", "'%q'", "'%'", "'%5000d'"]), _VALUES),
-    st.builds("x = {}({})".format, st.sampled_from(["load", "require", "dofile", "tonumber", "tostring", "select", "type", "next"]), _VALUES),
-    st.builds("x = {}({}, {})".format, st.sampled_from(["setmetatable", "rawset", "rawget", "pcall", "xpcall", "rawlen", "ipairs"]), _VALUES, _VALUES),
-    st.builds("x = {}".format, st.sampled_from(["os.exit()", "io.open('/etc/passwd')", "debug.sethook()", "collectgarbage('stop')", "package.loadlib('x', 'y')", "python.eval('1')", "os.getenv('HOME')", "string.dump(print)", "utf8.char(2^31)"])),
+    st.builds("table.move({}, {}, {}, {})".format, _VALUES, _SIZE, _SIZE, _VALUES),
+    st.builds("x = table.{}({}, {}, {})".format, one_of_words("concat unpack insert remove"), _VALUES, _SIZE, _SIZE),
+    st.builds("table.sort({}, {})".format, _VALUES, one_of_words("nil error print select")),
+    st.builds("x = string.format('{}', {})".format, one_of_words("%d %s %99.99f %q % %5000d %c %x"), _VALUES),
+    st.builds("x = {}({})".format, one_of_words("load require tonumber tostring select type next"), _VALUES),
+    st.builds("x = {}({}, {})".format, one_of_words("setmetatable rawset rawget pcall xpcall"), _VALUES, _VALUES),
+    st.builds("x = {}".format, one_of_words("os.exit() io.open('/etc/passwd') debug.sethook() collectgarbage('stop')")),
+    st.builds(
+        "x = {}".format, one_of_words("package.loadlib('x','y') python.eval('1') os.getenv('HOME') string.dump(print)")
+    ),
 )
 _LOOPS = st.sampled_from(
     [
@@ -114,7 +119,7 @@ _META = st.sampled_from(
         "sysCall_actuation = 5",
         "sysCall_sensing = setmetatable({}, {__call = function() error('x') end})",
         "sysCall_cleanup = function() sysCall_cleanup() end",
-        "function on_message(m) x = m.linear.x m.linear = m error(m) end simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'on_message')",
+        "function odd(m) m.linear = m error(m) end simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'odd')",
         "simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', function(m) while true do end end)",
         "string.rep = error tostring = error",
         "x = function() end string = x",
@@ -130,11 +135,11 @@ _WRAPPED = st.one_of(
     st.builds("xpcall(function() {} end, function(e) {} end)".format, _ANY, _ANY),
     st.text(max_size=30),
 )
-_HEAD = (
-    "deep = {} do local t = deep for i = 1, 300 do t[1] = {} t = t[1] end end\n"
-    "ring = {} ring[1] = ring ring.x = ring\n"
-    "angry = setmetatable({}, {__index = error, __len = error, __tostring = error, __call = error, __pairs = error})\n"
-)
+_HEAD = """
+deep = {} do local t = deep for i = 1, 300 do t[1] = {} t = t[1] end end
+ring = {} ring[1] = ring ring.x = ring
+angry = setmetatable({}, {__index = error, __len = error, __tostring = error, __call = error, __pairs = error})
+"""
 
 
 def _put(placed):

@@ -12,15 +12,25 @@ _CUBE = (
     "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nvt 0 0\nvt 1 1\nvn 0 0 1\n"
     "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
 )
-_STL_TEXT = "solid one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid one\n"
+_STL_TEXT = """solid one
+facet normal 0 0 1
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid one
+"""
 _DAE = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset><library_geometries><geometry id="g"><mesh><source id="p">
-<float_array id="pa" count="9">0 0 0 1 0 0 0 1 0</float_array><technique_common><accessor source="#pa" count="3" stride="3">
-<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices><triangles count="1">
+<float_array id="pa" count="9">0 0 0 1 0 0 0 1 0</float_array>
+<technique_common><accessor source="#pa" count="3" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common>
+</source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices><triangles count="1">
 <input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry></library_geometries>
-<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
 
 
 @st.composite
@@ -30,7 +40,9 @@ def _obj(draw):
     index = st.one_of(st.integers(-5, 9), st.sampled_from([0, 2**31, -(2**31), 10**30, 4_000_000])).map(str)
     corner = st.builds("/".join, st.lists(index, min_size=1, max_size=4))
     line = st.one_of(
-        st.builds("{} {}".format, st.sampled_from(["mtllib", "usemtl", "o", "g", "s", "map_Kd", "call", "l", "#"]), odd),
+        st.builds(
+            "{} {}".format, st.sampled_from(["mtllib", "usemtl", "o", "g", "s", "map_Kd", "call", "l", "#"]), odd
+        ),
         st.builds("v {}".format, st.lists(_NUMBERS, max_size=7).map(" ".join)),
         st.builds("{} {}".format, st.sampled_from(["vt", "vn", "vp"]), st.lists(_NUMBERS, max_size=4).map(" ".join)),
         st.builds("f {}".format, st.lists(corner, max_size=6).map(" ".join)),
@@ -66,7 +78,9 @@ def _many(draw):
 def _dae(draw):
     text = _DAE
     for _ in range(draw(st.integers(0, 3))):
-        old = draw(st.sampled_from(["0 1 2", "1.4.1", 'count="9"', 'meter="1"', "Z_UP", "#g", "#p", "#v", 'stride="3"', "<p>"]))
+        old = draw(
+            st.sampled_from(["0 1 2", "1.4.1", 'count="9"', 'meter="1"', "Z_UP", "#g", "#p", "#v", 'stride="3"', "<p>"])
+        )
         text = text.replace(old, draw(st.one_of(_NUMBERS, st.sampled_from(ODD_TEXTS[:-1]), st.just("#n"))), 1)
     if draw(st.integers(0, 9)) == 0:
         entities = "".join(f'<!ENTITY e{n} "&e{n - 1};&e{n - 1};">' for n in range(1, 40))
@@ -92,7 +106,9 @@ _FILES = st.one_of(
     st.tuples(st.just("mesh.obj"), st.one_of(_obj(), _obj(), mutated(_CUBE.encode()), _many())),
     st.tuples(st.just("mesh.stl"), st.one_of(_stl(), mutated(_STL_TEXT.encode()))),
     st.tuples(st.just("mesh.dae"), st.one_of(_dae(), mutated(_DAE.encode()))),
-    st.tuples(st.sampled_from(["mesh.obj", "mesh.stl", "mesh.dae", "mesh.OBJ", "mesh.glb", "mesh"]), st.binary(max_size=200)),
+    st.tuples(
+        st.sampled_from(["mesh.obj", "mesh.stl", "mesh.dae", "mesh.OBJ", "mesh.glb", "mesh"]), st.binary(max_size=200)
+    ),
 )
 CASES = st.builds(
     lambda file, mtl, picture, in_urdf, mass: Case(

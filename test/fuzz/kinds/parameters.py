@@ -22,7 +22,19 @@ def _leaves(values, path=()):
 _KEYS = sorted(_leaves(_DEFAULTS), key=lambda leaf: leaf[0])
 
 
-_WORDS = ["3.x", "4.x", "color", "depth", "none", "target", "drone", "Track_base", "front_optical", "no_such_frame", "odom"]
+_WORDS = [
+    "3.x",
+    "4.x",
+    "color",
+    "depth",
+    "none",
+    "target",
+    "drone",
+    "Track_base",
+    "front_optical",
+    "no_such_frame",
+    "odom",
+]
 
 
 def _alike(value):
@@ -50,7 +62,10 @@ def _overrides(draw):
         if isinstance(place, dict):
             place[path[-1]] = draw(mostly(_alike(value)))
     if draw(st.integers(0)) == 0:  # another camera, as a user would add one
-        camera = {**_CAMERA, "topic": draw(st.sampled_from(["odom", "front", "track/camera_info", "new/image", "cmd_vel"]))}
+        camera = {
+            **_CAMERA,
+            "topic": draw(st.sampled_from(["odom", "front", "track/camera_info", "new/image", "cmd_vel"])),
+        }
         camera["object"] = draw(st.sampled_from(["TrackCam", "NewCam", "Drone", "Quadricopter_base"]))
         overrides.setdefault("cameras", {})
         if isinstance(overrides["cameras"], dict):

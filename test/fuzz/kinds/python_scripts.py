@@ -5,12 +5,13 @@ import textwrap
 from hypothesis import strategies as st
 
 from kinds.scripts import FUNCTIONS, OBJECTS, ROS_FUNCTIONS, scripts
+from kinds.values import one_of_words
 
 _VALUES = st.recursive(
     st.one_of(
-        st.sampled_from(["None", "True", "-1", "0", "1", "2.5", "float('inf')", "float('nan')", "2**53", "1e308", "5e-324", "10**400"]),
-        st.sampled_from(["''", "'x'", r"'\0'", r"'\ud800'", r"b'\xff'", "'x' * 10**5", "print", "lambda: 0", "sim", "self", "object()"]),
-        st.sampled_from(["deep", "ring", "Angry()", "iter(int, 1)", "range(10**9)", "{}", "set()", "globals()", "type"]),
+        one_of_words("None True -1 0 1 2.5 float('inf') float('nan') 2**53 1e308 5e-324 10**400 '' 'x'"),
+        st.sampled_from([r"'\0'", r"'\ud800'", r"b'\xff'", "'x' * 10**5", "lambda: 0", "iter(int, 1)"]),
+        one_of_words("deep ring Angry() range(10**9) {} set() globals() type print sim self object()"),
         st.sampled_from([f"sim.getObjectHandle('{name}')" for name in OBJECTS]),
         st.sampled_from(["'std_msgs/Float64'", "'/x'", "'odd'", "'on_message'", "'geometry_msgs/Twist'"]),
         st.integers(-100, 2**40).map(str),
@@ -21,7 +22,7 @@ _VALUES = st.recursive(
     ),
     max_leaves=6,
 )
-_FUNCTION = st.one_of(st.sampled_from([f"sim.{f}" for f in FUNCTIONS]), st.sampled_from([f"simROS.{f}" for f in ROS_FUNCTIONS]))
+_FUNCTION = st.sampled_from([*(f"sim.{f}" for f in FUNCTIONS), *(f"simROS.{f}" for f in ROS_FUNCTIONS)])
 _CALLS = st.builds("x = {}({})".format, _FUNCTION, st.lists(_VALUES, max_size=5).map(", ".join))
 _LOOPS = st.sampled_from(
     [
@@ -98,7 +99,7 @@ _META = st.sampled_from(
         "async def sysCall_actuation(): pass",
         "def sysCall_actuation(a, b): pass",
         "def sysCall_sensing():\n    yield 1",
-        "def on_message(m):\n    m.linear = m\n    raise Angry\nsimROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'on_message')",
+        "def odd(m):\n    m.linear = m\n    raise Angry\nsimROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'odd')",
         "simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', lambda m: [0 for _ in iter(int, 1)])",
         "import sys\nsys.setrecursionlimit(10**6)",
         "import warnings\nwarnings.warn('x')",
@@ -107,7 +108,6 @@ _META = st.sampled_from(
         "self.generator = (x for x in [1])",
         "self.me = self\nself.angry = Angry()",
         "__builtins__ = {}",
-        
         "x = eval('(' * 500 + ')' * 500)",
     ]
 )

@@ -42,7 +42,10 @@ def _scene(draw):
         floor = {"size": draw(mostly(st.floats(0.1, 100), st.one_of(numbers, junk)))}
         scene["floor"] = draw(mostly(st.just(floor), junk))
     if draw(st.booleans()):
-        drone = {"position": draw(mostly(st.tuples(small, small, st.floats(0, 9)).map(list), vectors())), "yaw": draw(mostly(small, st.one_of(numbers, junk)))}
+        drone = {
+            "position": draw(mostly(st.tuples(small, small, st.floats(0, 9)).map(list), vectors())),
+            "yaw": draw(mostly(small, st.one_of(numbers, junk))),
+        }
         scene["drone"] = draw(mostly(st.just(drone), junk))
     objects = [draw(_object()) for _ in range(draw(st.integers(0, 3)))] * draw(_COUNT)
     scene["objects"] = draw(mostly(st.just(objects), junk))
@@ -94,15 +97,17 @@ def _bomb(draw):
     )
 
 
-_GOOD = b"objects:\n- {name: Box, shape: box, size: [1, 1, 1], position: [3, 0, 4], mass: 1}\ndrone: {position: [1, 2, 3], yaw: 0.5}\n"
+_GOOD = b"""objects:
+- {name: Box, shape: box, size: [1, 1, 1], position: [3, 0, 4], mass: 1}
+drone: {position: [1, 2, 3], yaw: 0.5}
+"""
 _WHOLE = _scene().map(_dump)
 _ODD = st.one_of(_bomb(), mutated(_GOOD), junk.map(_dump), st.binary(max_size=40))
 _TEXTS = st.one_of(_WHOLE, _WHOLE, _WHOLE, _ODD)
 _CUBE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-_LINK = (
-    b'<robot name="one"><link name="a"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
-    b'</inertial><collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>'
-)
+_LINK = b"""<robot name="one"><link name="a">
+<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+<collision><geometry><box size="1 1 1"/></geometry></collision></link></robot>"""
 CASES = st.builds(
     lambda text: Case("scene", {"scene.yaml": text, "one.obj": _CUBE, "one.urdf": _LINK}),
     _TEXTS,

@@ -37,11 +37,15 @@ def _dump(value):
 _TEXTS = st.one_of(
     st.lists(mostly(_entry(), junk), max_size=5).map(_dump),
     mutated(_GOOD),
-    st.sampled_from([b"- " * 2000, b"&x [*x]", b"[" * 5000, b"- {at: 1:30, pose: {}}", b"\xff", b"- {at: 0, at: 1, pose: {}}"]),
+    st.sampled_from(
+        [b"- " * 2000, b"&x [*x]", b"[" * 5000, b"- {at: 1:30, pose: {}}", b"\xff", b"- {at: 0, at: 1, pose: {}}"]
+    ),
 )
 _DURATION = st.one_of(st.just("0.5"), st.just("0.5"), numbers.filter(lambda x: not 10 < x < 1e300).map(str), texts)
 _ARGUMENTS = st.lists(
-    st.sampled_from(["--csv=out.csv", "--csv=/dev/full", "--csv=.", "--csv=none/out.csv", "--set=control.Kzref=4", "--no"]),
+    st.sampled_from(
+        ["--csv=out.csv", "--csv=/dev/full", "--csv=.", "--csv=none/out.csv", "--set=control.Kzref=4", "--no"]
+    ),
     max_size=2,
 )
 CASES = st.builds(

@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from kinds.values import ODD_NUMBERS, ODD_TEXTS, finite, mutated, small
 
 _DRONE = (Path(__file__).parents[3] / "urdf" / "drone.urdf").read_bytes()
-_NUMBER = st.one_of(small, small, finite, st.sampled_from(ODD_NUMBERS[:-1]), st.sampled_from(["", "one", "1,2", "0x1"])).map(str)
+_NUMBER = st.one_of(
+    small, small, finite, st.sampled_from(ODD_NUMBERS[:-1]), st.sampled_from(["", "one", "1,2", "0x1"])
+).map(str)
 _GOOD = st.floats(0.01, 2).map(str)
 _THREE = st.one_of(st.lists(_GOOD, min_size=3, max_size=3), st.lists(_NUMBER, max_size=5)).map(" ".join)
 _ODD_NAMES = tuple(text for text in ODD_TEXTS if text.isprintable() and not set(text) & set('<&"') and len(text) < 400)
@@ -26,7 +28,10 @@ def _geometry(draw):
         _element("sphere", radius=draw(_NUMBER)),
         _element("cylinder", radius=draw(_NUMBER), length=draw(_NUMBER)),
         _element("capsule", radius=draw(_GOOD), length=draw(_GOOD)),
-        _element("mesh", filename=draw(st.sampled_from(["one.obj", "none.stl", "", "..", "package://no/x.obj", "robot.urdf"]))),
+        _element(
+            "mesh",
+            filename=draw(st.sampled_from(["one.obj", "none.stl", "", "..", "package://no/x.obj", "robot.urdf"])),
+        ),
         _element("mesh", filename="one.obj", scale=draw(_THREE)),
         _element("plane", normal="0 0 1"),
         "",
@@ -38,7 +43,9 @@ def _geometry(draw):
 @st.composite
 def _link(draw, name):
     number = st.one_of(_GOOD, _GOOD, _GOOD, _NUMBER)
-    origin = draw(st.one_of(st.just(""), st.builds(lambda xyz, rpy: _element("origin", xyz=xyz, rpy=rpy), _THREE, _THREE)))
+    origin = draw(
+        st.one_of(st.just(""), st.builds(lambda xyz, rpy: _element("origin", xyz=xyz, rpy=rpy), _THREE, _THREE))
+    )
     inertia = {key: draw(number) for key in ("ixx", "iyy", "izz")} | dict.fromkeys(("ixy", "ixz", "iyz"), draw(_NUMBER))
     inertial = f"<inertial>{origin}{_element('mass', value=draw(number))}{_element('inertia', **inertia)}</inertial>"
     parts = [inertial if draw(st.integers(0, 4)) else ""]
@@ -56,11 +63,17 @@ def _robot(draw):
     joints = []
     for number, name in enumerate(names[1:], start=1):
         parent = names[draw(st.integers(0, number - 1 if tree else len(names) - 1))]
-        kind = draw(st.sampled_from(["fixed"] * 6 + ["continuous", "revolute", "prismatic", "floating", "planar", "", "bad"]))
-        limit = draw(st.sampled_from(["", '<limit lower="-1" upper="1" effort="1" velocity="1"/>', '<limit lower="nan"/>']))
+        kind = draw(
+            st.sampled_from(["fixed"] * 6 + ["continuous", "revolute", "prismatic", "floating", "planar", "", "bad"])
+        )
+        limit = draw(
+            st.sampled_from(["", '<limit lower="-1" upper="1" effort="1" velocity="1"/>', '<limit lower="nan"/>'])
+        )
         ends = f'<parent link="{parent}"/><child link="{name}"/>'
         axis = _element("axis", xyz=draw(_THREE))
-        joints.append(f'<joint name="j{number}" type="{kind}">{ends}{_element("origin", xyz=draw(_THREE))}{axis}{limit}</joint>')
+        joints.append(
+            f'<joint name="j{number}" type="{kind}">{ends}{_element("origin", xyz=draw(_THREE))}{axis}{limit}</joint>'
+        )
     if not tree and joints:
         del joints[draw(st.integers(0, len(joints) - 1))]
     links = [draw(_link(name)) for name in names]

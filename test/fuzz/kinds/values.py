@@ -12,8 +12,28 @@ ODD_NUMBERS = (
 LONG = "x" * 300
 ODD_TEXTS = (
     *("", " ", "none", "null", "~", "true", "1:30", "0x10", "1_000", "é", "日本", "\U0001f681", "a\nb", "a\tb", "\x00"),
-    *("\x1b[31m", "%s %d", "{0}", "..", ".", "/", "//", "~", "~nobody_here/x", "/dev/null", "/dev/zero", "/proc/self/mem"),
-    *("package://", "package:///", "package://drone_sim", "package://drone_sim/urdf", "package://no_such/x", "file:///etc"),
+    *(
+        "\x1b[31m",
+        "%s %d",
+        "{0}",
+        "..",
+        ".",
+        "/",
+        "//",
+        "~",
+        "~nobody_here/x",
+        "/dev/null",
+        "/dev/zero",
+        "/proc/self/mem",
+    ),
+    *(
+        "package://",
+        "package:///",
+        "package://drone_sim",
+        "package://drone_sim/urdf",
+        "package://no_such/x",
+        "file:///etc",
+    ),
     *("Drone", "Quadricopter_base", "front", "world", "odom", "../" * 30, LONG, LONG + "/" + LONG, "x" * 100_000),
 )
 
@@ -31,6 +51,11 @@ junk = st.recursive(
     ),
     max_leaves=8,
 )
+
+
+def one_of_words(text: str) -> st.SearchStrategy:
+    """Return one of the words of a text."""
+    return st.sampled_from(text.split())
 
 
 def mostly(good: st.SearchStrategy, bad: st.SearchStrategy = junk) -> st.SearchStrategy:
