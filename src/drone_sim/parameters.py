@@ -82,7 +82,7 @@ class ControlParameters(Checked):
     Pangle: NonNegative
     Dangle: NonNegative
     Kvcorr: NonNegative
-    recovery_tilt: AngleOrNone
+    recovery_margin: AngleOrNone
     Precovery: NonNegative
 
 

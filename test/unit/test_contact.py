@@ -36,12 +36,12 @@ class Flight:
 
     def assert_comes_free(self):
         x = self.simulation.drone.state.position[0]
-        for _ in range(5):  # a wall that one leans on turns the drone, and a pilot aims again
+        for _ in range(6):  # a wall that one leans on turns the drone, and a pilot aims again
             away = self.fly((-1, 0, 0, 0), 1)
         assert away.position[0] < x - 1.5
         rest = self.fly((0, 0, 0, 0), 9)
         assert math.hypot(*rest.linear_velocity, *rest.angular_velocity) < 0.02
-        assert self.most_tilt < 0.8
+        assert self.most_tilt < 0.95
         assert self.fastest_turn < 5.0
 
 
@@ -56,7 +56,8 @@ def test_a_minute_against_a_wall(speed, yaw):
 
 
 @pytest.mark.parametrize(
-    "command", [(0.3, 1, 0, 0), (0.5, 1, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, 0.3, 0), (1, 0, 0, 1)]
+    "command",
+    [(0.3, 1, 0, 0), (0.5, 1, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, 0.3, 0), (1, 0, 0, 1), (0.6, -0.6, 0, 0)],
 )
 def test_scraping_along_a_wall(command):
     flight = Flight(WALL)
@@ -77,7 +78,7 @@ def test_landing_and_leaving(things, top):
 
 def test_propellers_have_limits():
     """Without them the bare law throws the drone off the wall at hundreds of m/s of particle velocity."""
-    bare = {"thrust_limits": "none", "recovery_tilt": "none"}
+    bare = {"thrust_limits": "none", "recovery_margin": "none"}
     thrown = Flight(WALL, control=bare, propellers={"velocity_limits": "none"})
     thrown.fly((1, 0, 0, 0), 10)
     held = Flight(WALL, control=bare, propellers={"velocity_limits": [0, 12]})

@@ -56,14 +56,14 @@ def test_a_command_reaches_its_velocity_in_5_s_and_ends_at_rest_in_6_s(simulatio
     assert velocity(simulation) == pytest.approx([0.0] * 6, abs=0.02)
 
 
-BARE = {"thrust_limits": "none", "recovery_tilt": "none"}
+BARE = {"thrust_limits": "none", "recovery_margin": "none"}
 
 
 @pytest.mark.parametrize(
     "control, propellers, lowest, highest",
     [
         ({}, {}, 180, 180),
-        ({"recovery_tilt": "none"}, {"velocity_limits": "none"}, 176, 180),
+        ({"recovery_margin": "none"}, {"velocity_limits": "none"}, 176, 180),
         (BARE, {"velocity_limits": "none"}, 133, 143),
     ],
 )

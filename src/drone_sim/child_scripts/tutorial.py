@@ -1,8 +1,8 @@
 """The tutorial's child script: velocity commands in, four propeller velocities out.
 
 Same names, gains and order of arithmetic as the Lua script that the tutorial builds, with two additions:
-the collective thrust is kept within `thrust_limits`, and a drone that leans by more than `recovery_tilt`,
-as against a wall, first rights itself.
+the collective thrust is kept within `thrust_limits`, and a drone that leans by `recovery_margin`
+more than it is ever told to, as against a wall, first rights itself.
 """
 
 import math
@@ -21,7 +21,7 @@ GAINS = (
     "Pangle",
     "Dangle",
     "Kvcorr",
-    "recovery_tilt",
+    "recovery_margin",
     "Precovery",
 )
 RECOVERY_YAW = 0.3  # yaw_corr beyond this would leave nothing of the propellers to level the drone
@@ -36,7 +36,7 @@ def sysCall_init():
 
     for name in GAINS:
         setattr(self, name, sim.getScriptSimulationParameter(sim.handle_self, name))
-    self.least_level = math.cos(self.recovery_tilt) if self.recovery_tilt else -2  # a cosine is never less than -1
+    self.most_lean = self.angle_max + self.recovery_margin if self.recovery_margin else math.inf
     self.dt = sim.getSimulationTimeStep()
     self.thrust = self.thrust_gravity
     self.pitch_corr = self.yaw_corr = self.roll_corr = 0
@@ -93,7 +93,7 @@ def sysCall_sensing():
     roll_target = target_angle(self.vy, d_local_pos[1])
     self.roll_corr = self.Pangle * (roll_target - roll) - self.Dangle * droll
 
-    if math.cos(local_ori[0]) * math.cos(local_ori[1]) < self.least_level:  # the cosine of the tilt
+    if max(abs(pitch), abs(roll)) > self.most_lean:
         recover(d_global_ori)
 
 
