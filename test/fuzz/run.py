@@ -75,9 +75,15 @@ class _Kind:
 
     def run(self, count: int, seed: int) -> Result:
         """Try `count` cases; the seed and the kind's name say which."""
-        for first in range(0, count, _CHUNK):
-            self._chunk(min(_CHUNK, count - first), seed * 1_000_003 + zlib.crc32(self.name.encode()) + first)
+        seed = seed * 1_000_003 + zlib.crc32(self.name.encode())
+        chunk = 0
+        while self._tried() < count and chunk < count:  # where hypothesis has no more to try, it ends early
+            self._chunk(min(_CHUNK, count - self._tried()), seed + chunk)
+            chunk += 1
         return Result(self.name, self.taken, self.refused, self.found, self.slowest)
+
+    def _tried(self) -> int:
+        return self.taken + self.refused + sum(found.count for found in self.found.values())
 
     def _chunk(self, count: int, seed: int) -> None:
         self._new = ""

@@ -202,7 +202,7 @@ def _messages(case: Case, folder: Path) -> str:
 
     log = _Log()
     logging.getLogger("rosout").addHandler(log)
-    simulation = Simulation(parameters.load())
+    simulation = Simulation(parameters.load(_with_small_pictures({})))
     try:
         commands.send(simulation, case.data)
         _fly_a_little(simulation)

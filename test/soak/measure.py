@@ -87,12 +87,12 @@ def faults(lines: List[str], diary: List[Any], samples: List[Sample]) -> List[st
 
 def report(samples: List[Sample], lines: List[str], diary: List[Any], began: float) -> str:
     """Return the line of now."""
-    now = samples[-1]
+    now, calls = samples[-1], [entry for entry in diary if entry[0] != "odom"]
     odometry = [int(text) for what, _, well, text in diary if what == "odom" and well][-10:]
-    calls = [entry for entry in diary if entry[0] != "odom"]
+    refused = sum(not well for _, _, well, _ in calls)
+    slowest = max((seconds for _, seconds, _, _ in calls), default=0.0)
     return (
-        f"{now.at - began:6.0f} s  {now.memory:6.1f} MB {slope(settled(samples)):+6.2f} MB/min  "
-        f"{now.threads:3d} threads {now.descriptors:4d} descriptors  {late_steps(lines):4d} late  {len(calls):5d} calls "
-        f"{sum(not entry[2] for entry in calls):4d} refused, slowest {max([c[1] for c in calls], default=0):.1f} s  "
-        f"{np.mean(odometry) if odometry else 0:5.1f} odom/s"
+        f"{now.at - began:6.0f} s  {now.memory:6.1f} MB {slope(settled(samples)):+6.2f} MB/min  {now.threads:3d} threads "
+        + f"{now.descriptors:4d} descriptors  {late_steps(lines):4d} late  {len(calls):5d} calls {refused:4d} refused, "
+        + f"slowest {slowest:.1f} s  {np.mean(odometry) if odometry else 0:5.1f} odom/s"
     )

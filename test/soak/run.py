@@ -31,7 +31,8 @@ from measure import Sample, answers, faults, report
 
 EVERY = 10.0  # s between two lines
 STARTS = 60.0  # s that the launch may take
-ENDS = 10.0  # s that the node may take to end; roslaunch itself gives it 15
+SCRIPT_LIMIT = 0.5  # s; several clients may each have to wait for another's script that hangs
+ENDS = 5.0  # s that the node may take to end: 3, and what roslaunch takes to tell it
 
 
 class Launch:
@@ -83,6 +84,15 @@ class Launch:
             )
         except OSError:
             return None
+
+    def __enter__(self) -> Launch:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End it, if that has not been done."""
+        if self.process.poll() is None:
+            self.end()
 
     def end(self) -> float:
         """Send SIGINT as Ctrl-C does; return how long the node took to end (s)."""
@@ -142,7 +152,11 @@ class Crowd:
         """Name the clients that ended by themselves, which is the harness's own fault."""
         return [f"{one.args}" for one in self._processes if one.poll() is not None]
 
-    def close(self) -> None:
+    def __enter__(self) -> Crowd:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
         """End them."""
         for one in self._processes:
             with contextlib.suppress(ProcessLookupError):
@@ -167,11 +181,14 @@ def home(keep: bool) -> Iterator[Path]:
     for name, text in {**clients.SCRIPTS, **clients.SCENES}.items():
         (folder / name).write_text(text, encoding="utf-8")
     (folder / "flown.py").symlink_to(clients.GOOD_SCRIPTS[0])
-    yield folder
-    if keep:
-        print(f"kept: {folder}")
-    else:
-        shutil.rmtree(folder, ignore_errors=True)
+    (folder / "config.yaml").write_text(f"script_time_limit: {SCRIPT_LIMIT}\n", encoding="utf-8")
+    try:
+        yield folder
+    finally:
+        if keep:
+            print(f"kept: {folder}")
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def soak(launch: Launch, crowd: Crowd, minutes: float) -> List[Sample]:
@@ -245,15 +262,14 @@ def main() -> int:
         "--keep", action="store_true", help="keep the folder with scripts, scenes and the clients' diaries"
     )
     options, arguments = parser.parse_known_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and tidy up
     with home(options.keep) as folder:
-        launch = Launch(folder, [f"script:={folder / 'flown.py'}", *arguments])
-        crowd = Crowd(folder, options.seed)
-        try:
-            samples = soak(launch, crowd, options.minutes)
-            found = [f"a client of the soak ended: {one}" for one in crowd.dead()]
-        finally:
-            crowd.close()
-        found += finish(launch, crowd, folder, samples)
+        ours = [f"script:={folder / 'flown.py'}", f"config:={folder / 'config.yaml'}"]
+        with Launch(folder, [*ours, *arguments]) as launch:
+            with Crowd(folder, options.seed) as crowd:
+                samples = soak(launch, crowd, options.minutes)
+                found = [f"a client of the soak ended: {one}" for one in crowd.dead()]
+            found += finish(launch, crowd, folder, samples)
     if found:
         log = Path(__file__).parents[2] / "build" / "soak.log"
         log.write_text("\n".join(launch.lines), encoding="utf-8")
