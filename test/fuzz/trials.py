@@ -15,6 +15,8 @@ from typing import Any, Callable, Dict, List
 from case import Case
 
 from drone_sim import checks, parameters
+from drone_sim.camera import vision
+from drone_sim.camera.renderer import Renderer
 from drone_sim.offline import fly
 from drone_sim.offline.timeline import TimelineError
 from drone_sim.parameter_types import ParameterError
@@ -27,6 +29,20 @@ REFUSALS = (ParameterError, ScriptError, UrdfError, TimelineError, checks.Refuse
 LONGEST = 600  # characters of a refusal, without the folder that the case lies in
 _SCRIPT_LIMIT = 0.2  # s
 _SMALL = {"width": 32, "height": 24}  # px: what a picture shows does not matter here
+
+
+_RENDERERS: Dict[int, Renderer] = {}
+
+
+def _renderer(samples: int = 0) -> Renderer:
+    """Return one that is kept: to compile its shaders takes longer than most cases."""
+    if samples not in _RENDERERS:
+        renderer = _RENDERERS[samples] = Renderer(samples=samples)
+        renderer.close = lambda: renderer.set_visuals(())  # type: ignore[method-assign]
+    return _RENDERERS[samples]
+
+
+vision.Renderer = _renderer  # type: ignore
 
 
 class Fault(Exception):

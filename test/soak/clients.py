@@ -96,11 +96,7 @@ def within(seconds: float, action: Callable[[], Any]) -> Tuple[bool, Any]:
 
 def call_services(dice: random.Random, folder: Path, diary: Diary) -> None:
     """Press every button, in any order, as somebody in a hurry."""
-    names = (
-        ["start"] * 6
-        + ["stop", "step", "snapshot", "restore", "load_scene", "load_scene", "save_scene"]
-        + ["pause"] * 3
-    )
+    names = ["start"] * 3 + ["pause"] * 3 + ["snapshot", "restore", "step"] * 2 + ["stop", "load_scene", "save_scene"]
     while True:
         name = dice.choice(names)
         if dice.random() < 0.2:
@@ -108,7 +104,7 @@ def call_services(dice: random.Random, folder: Path, diary: Diary) -> None:
         if name in ("load_scene", "save_scene"):
             rospy.set_param("/drone_sim/scene_file", _scene(dice, folder, saving=name == "save_scene"))
         _call(name, dice.random() < 0.3, diary)
-        time.sleep(dice.choice([0.0, 0.0, 0.05, 0.3, 1.0]))
+        time.sleep(dice.choice([0.0, 0.05, 0.5, 2.0]))
 
 
 def _call(name: str, on: bool, diary: Diary) -> None:
@@ -131,7 +127,7 @@ def _call(name: str, on: bool, diary: Diary) -> None:
 
 def _choose_script(dice: random.Random, folder: Path) -> None:
     """Put another script where the node finds the one that it flies: a link, so that it may be of either language."""
-    good = dice.random() < 0.7
+    good = dice.random() < 0.8
     target = dice.choice(GOOD_SCRIPTS) if good else folder / dice.choice(sorted(SCRIPTS))
     link = folder / f"link-{os.getpid()}"
     link.symlink_to(target)
