@@ -93,6 +93,7 @@ def report(samples: List[Sample], lines: List[str], diary: List[Any], began: flo
     slowest = max((seconds for _, seconds, _, _ in calls), default=0.0)
     return (
         f"{now.at - began:6.0f} s  {now.memory:6.1f} MB {slope(settled(samples)):+6.2f} MB/min  "
-        + f"{now.threads:3d} threads {now.descriptors:4d} descriptors  {late_steps(lines):4d} late  "
-        + f"{len(calls):5d} calls {refused:4d} refused, slowest {slowest:.1f} s  {np.mean(odometry) if odometry else 0:5.1f} odom/s"
+        f"{now.threads:3d} threads {now.descriptors:4d} descriptors  {late_steps(lines):4d} late  "
+        f"{len(calls):5d} calls {refused:4d} refused, slowest {slowest:.1f} s  "
+        f"{np.mean(odometry) if odometry else 0:5.1f} odom/s"
     )
