@@ -10,6 +10,7 @@ import numpy as np
 
 MOST_MEMORY = 1.0  # MB a minute after warming up, and
 LEAST_MEMORY = 15.0  # MB in all, below which nothing is said of a slope
+JUDGED = 90.0  # s, after warming up, before anything is said of growth
 MOST_MORE = 8  # threads, descriptors
 _TIDY = re.compile(r"\d[\d.e+-]*|'[^']*'|/\S+")
 
@@ -39,9 +40,9 @@ def settled(samples: List[Sample]) -> List[Sample]:
 
 
 def growth(samples: List[Sample]) -> List[str]:
-    """Name what grew after the warm-up."""
+    """Name what grew after the warm-up, if that was long enough ago."""
     rest = settled(samples)
-    if len(rest) < 12:
+    if rest[-1].at - rest[0].at < JUDGED:
         return []
     found = []
     third = len(rest) // 3
