@@ -1,7 +1,8 @@
-"""Keep simulated time beside real time: without drift, without bursts. The clock is an argument."""
+"""When the next step is due, and when it is time to show something. The clock is an argument."""
 
 from __future__ import annotations
 
+import math
 import time
 from typing import Callable
 
@@ -19,6 +20,7 @@ class Pacer:
     ):
         """Take the period in real seconds (0: as fast as it can), a monotonic clock, and a sleep."""
         self.overruns = 0
+        self.worst = 0.0  # s, of the overruns
         self._period = period
         self._clock = clock
         self._sleep = sleep
@@ -33,6 +35,7 @@ class Pacer:
         late = max(0.0, self._clock() - self._due) if self._period else 0.0
         if late:
             self.overruns += 1
+            self.worst = max(self.worst, late)
             self._due += late
         while self._due > self._clock() and not interrupted():
             self._sleep(min(_SLICE, max(0.0, self._due - self._clock())))
@@ -42,3 +45,39 @@ class Pacer:
     def restart(self) -> None:
         """Begin to count anew, as after a pause: the next step is due one period from now."""
         self._due = self._clock() + self._period
+
+
+class Throttle:
+    """Lets something pass, but not more often than once per period."""
+
+    def __init__(self, period: float, clock: Callable[[], float] = time.monotonic):
+        """Take the period in real seconds, and a monotonic clock."""
+        self._period = period
+        self._clock = clock
+        self._next = -math.inf
+
+    def passes(self) -> bool:
+        """Tell whether it may pass now; it counts as passed then."""
+        now = self._clock()
+        if now < self._next:
+            return False
+        self._next = now + self._period
+        return True
+
+
+class Beat:
+    """Says when to show again what stands still: soon after a change, but not too often, and seldom without one."""
+
+    def __init__(self, soon: float, seldom: float, clock: Callable[[], float] = time.monotonic):
+        """Take both periods in real seconds, and a monotonic clock."""
+        self._soon, self._seldom = soon, seldom
+        self._clock = clock
+        self.restart()
+
+    def left(self, changed: bool) -> float:
+        """Return the seconds until it is time: 0 when it is."""
+        return max(0.0, self._last + (self._soon if changed else self._seldom) - self._clock())
+
+    def restart(self) -> None:
+        """Count from now: it has been shown."""
+        self._last = self._clock()

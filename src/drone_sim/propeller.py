@@ -107,7 +107,7 @@ class Propellers:
             self._by_axis.setdefault(axis, []).append((number, point, rotation * parameters.torque_per_velocity))
 
     def blow(self, velocities: Sequence[float], body: Matrix, wrench: Wrench) -> None:
-        """Emit a step's particles at these velocities (m/s), within the limits, from a body there; add to its wrench."""
+        """Emit a step's particles at these velocities (m/s), within limits, from a body there; add to its wrench."""
         if min(velocities) < self._slowest or max(velocities) > self._fastest:
             velocities = [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
         newtons, air, time_step = self._law.emit(), self.air, self._time_step

@@ -11,7 +11,7 @@ For example:
 from __future__ import annotations
 
 from functools import partial
-from typing import Callable, Dict, NamedTuple, Optional, Tuple
+from typing import Callable, Dict, NamedTuple, Optional
 
 import numpy as np
 
@@ -96,7 +96,6 @@ class Simulation:
         """Be at time 0 of a new run, in the initial scene."""
         self.steps = 0
         self._runs += 1
-        self._looked: Dict[str, Tuple[int, np.ndarray]] = {}  # by camera, step and picture of the script's last look
         self.scene.name_objects(self.drone.objects)
         if self._drawings is not None:
             self._drawings.clear()
@@ -121,7 +120,7 @@ class Simulation:
         _try_out(parameters)
         self._build(parameters)
         self.running = True
-        pictures = {name: partial(self._picture, name) for name in self.cameras}
+        pictures = {name: partial(self._look, camera) for name, camera in self.cameras.items()}
         self.drone.load_script(self.script, lambda: self.time, pictures)
 
     def stop(self) -> None:
@@ -164,7 +163,8 @@ class Simulation:
         self.world.advance(self.drone.wrenches(), self._sub_steps)
         self.drone.refresh()
         self.steps += 1
-        self._take_pictures()
+        for camera in self.cameras.values():
+            camera.image = self._look(camera) if self.steps % camera.every == 0 and camera.watched() else None
         self.drone.script.call("sensing")
 
     def snapshot(self) -> Snapshot:
@@ -180,7 +180,6 @@ class Simulation:
             raise ValueError("the snapshot is of an earlier run: start and stop forget it")
         self.world.restore(snapshot.world)
         self.steps = snapshot.steps
-        self._looked.clear()
         snapshot.recall()
 
     def forget(self, snapshot: Snapshot) -> None:
@@ -190,25 +189,14 @@ class Simulation:
 
     # ---- pictures
 
-    def _take_pictures(self) -> None:
-        shown = False
+    def look(self) -> None:
+        """Let cameras that are watched show what is there now, between two steps."""
         for camera in self.cameras.values():
-            camera.image = None
-            if self.steps % camera.every == 0 and camera.watched():
-                if not shown:
-                    self.drone.show_blades()
-                    shown = True
-                camera.image = camera.take()
+            camera.image = self._look(camera) if camera.watched() else None
 
-    def _picture(self, name: str) -> np.ndarray:
-        """Return what a camera sees, for the script: the step's picture if there is one, else a new one."""
-        camera = self.cameras[name]
-        if camera.image is not None:
-            return camera.image
-        if self._looked.get(name, (-1,))[0] != self.steps:
-            self.drone.show_blades()
-            self._looked[name] = (self.steps, camera.take())
-        return self._looked[name][1]
+    def _look(self, camera: Camera) -> np.ndarray:
+        self.drone.show_blades()
+        return camera.look()
 
 
 def _try_out(parameters: Parameters) -> None:

@@ -19,6 +19,10 @@ _LOG = logging.getLogger(__name__)
 class Scene(Protocol):
     """What a picture is taken of."""
 
+    @property
+    def changes(self) -> int:
+        """Return another number than before whenever a picture of it may look different."""
+
     def visuals(self) -> List[Visual]:
         """Return everything that can be drawn."""
 
@@ -72,6 +76,11 @@ class Vision:
             self._fallback = True
             _LOG.warning("%s; pictures come from PyBullet's TinyRenderer, at a few frames per second", error)
 
+    @property
+    def changes(self) -> int:
+        """Return another number than before whenever a picture may look different."""
+        return self._scene.changes
+
     def close(self) -> None:
         """Free the renderer; may be called twice."""
         if self._renderer is not None:
@@ -88,10 +97,18 @@ class Camera:
         self.intrinsics = intrinsics
         self.every = 1  # steps between two pictures
         self.watched: Callable[[], bool] = lambda: False
-        self.image: Optional[np.ndarray] = None  # of the last step, if somebody looked
+        self.image: Optional[np.ndarray] = None  # what those who look are shown; None while nobody does
         self.pose = pose
         self._vision = vision
+        self._last: Optional[Tuple[int, Matrix, np.ndarray]] = None  # the scene's changes, the pose, the picture
 
     def take(self) -> np.ndarray:
         """Return a picture of the scene as it stands; shape and type as Vision.picture says."""
         return self._vision.picture(self.kind, self.intrinsics, np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4)))
+
+    def look(self) -> np.ndarray:
+        """Return what it sees now: the last picture where nothing has changed since, else a new one."""
+        changes, pose = self._vision.changes, self.pose()
+        if self._last is None or self._last[:2] != (changes, pose):
+            self._last = changes, pose, self.take()
+        return self._last[2]

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import logging
 import math
+import signal
 import sys
 import time
 from typing import Any, Callable, ContextManager, Dict, Iterator, NoReturn, Optional, Sequence, TextIO
@@ -15,6 +16,7 @@ from tqdm import tqdm
 
 from drone_sim import parameters as parameters_module
 from drone_sim.frames import to_euler
+from drone_sim.guardian import Guardian
 from drone_sim.offline import timeline as timeline_module
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import Timeline, first_step
@@ -26,15 +28,20 @@ from drone_sim.simulation import Simulation
 _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
 _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
-_FAILED, _INTERRUPTED = 1, 130  # exit statuses; 130 is what shells report after Ctrl-C
+_FAILED, _SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
 _EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
 
-def main(arguments: Optional[Sequence[str]] = None) -> int:
-    """Fly; return 0, or 1 after a line on stderr for a wrong input or script, or 130 after Ctrl-C."""
+def main(arguments: Optional[Sequence[str]] = None, guardian: Optional[Guardian] = None) -> int:
+    """Fly; return 0, or 1 after a line on stderr for a wrong input or script, or 130 after Ctrl-C.
+
+    With a guardian the flight ends between two steps when a signal comes; without one, signals are the caller's.
+    """
     options = _parser().parse_args(arguments)
+    if guardian is not None:
+        guardian.ready()
     with _shown_on_stdout(SCRIPT_LOG):
-        return _status_of(lambda: _run(options))
+        return _status_of(lambda: _run(options, guardian))
 
 
 def settings(assignments: Sequence[str]) -> Dict[str, Any]:
@@ -61,7 +68,7 @@ def settings(assignments: Sequence[str]) -> Dict[str, Any]:
     return nested
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace, guardian: Optional[Guardian]) -> int:
     parameters = parameters_module.load(settings(options.set))
     timeline = Timeline((), parameters.time_step)
     if options.commands:
@@ -71,10 +78,12 @@ def _run(options: argparse.Namespace) -> int:
         recording = Recording(file)
         simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
         began = time.perf_counter()
-        flown = _status_of(lambda: _fly(simulation, timeline, steps, recording))
+        flown = _status_of(lambda: _fly(simulation, timeline, steps, recording, guardian))
         took = time.perf_counter() - began
         # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
         closed = _status_of(simulation.close)
+    if guardian is not None:
+        guardian.stand_down()  # no script runs any more, and a plot takes its time
     print(_summary(recording, took), flush=True)
     draw = options.plot and recording.rows
     drawn = _status_of(lambda: _plot(options.plot, recording, timeline)) if draw else 0
@@ -102,15 +111,20 @@ def _duration(options: argparse.Namespace, timeline: Timeline) -> float:
     return timeline.end + _AFTER if timeline.entries else _WITHOUT_COMMANDS
 
 
-def _fly(simulation: Simulation, timeline: Timeline, steps: int, recording: Recording) -> None:
+def _fly(
+    simulation: Simulation, timeline: Timeline, steps: int, recording: Recording, guardian: Optional[Guardian]
+) -> int:
     recording.add(simulation)
     # disable=None: no bar where stderr is not a terminal.
     with tqdm(total=steps, unit=" steps", delay=_BAR_AFTER, disable=None, leave=False) as bar:
         for step in range(steps):
+            if guardian is not None and guardian.asked:
+                return _SIGNALLED + guardian.asked
             timeline.apply(step, simulation.drone)
             simulation.step()
             recording.add(simulation)
             bar.update()
+    return 0
 
 
 def _plot(path: str, recording: Recording, timeline: Timeline) -> None:
@@ -136,7 +150,7 @@ def _status_of(action: Callable[[], Optional[int]]) -> int:
     try:
         return action() or 0
     except KeyboardInterrupt:
-        return _INTERRUPTED
+        return _SIGNALLED + signal.SIGINT
     except _EXPECTED as error:
         print(f"fly: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
         return _FAILED
@@ -185,4 +199,4 @@ def _seconds(text: str) -> float:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(guardian=Guardian("fly")))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Callable
+
 import numpy as np
 import rospy
 from cv_bridge import CvBridge
@@ -35,13 +37,13 @@ class CameraOutput:
         compressed = self._compressed
         return self._image.get_num_connections() > 0 or bool(compressed and compressed.get_num_connections())
 
-    def publish(self, stamp: rospy.Time) -> None:
-        """Publish this step's picture, and the model that belongs to it."""
+    def publish(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish what the camera sees, and the model that belongs to it, under what `stamp` returns."""
         if self._info_publisher.get_num_connections():
-            self._info.header.stamp = stamp
+            self._info.header.stamp = stamp()
             self._info_publisher.publish(self._info)
         if self._camera.image is not None:
-            self._publish_image(stamp, self._camera.image)
+            self._publish_image(stamp(), self._camera.image)
 
     def _publish_image(self, stamp: rospy.Time, image: np.ndarray) -> None:
         frame = self._parameters.frame

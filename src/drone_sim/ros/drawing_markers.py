@@ -10,10 +10,11 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from drone_sim.pacing import Throttle
 from drone_sim.ros.messages import WORLD
 from drone_sim.scripting.drawings import DrawingObject, Drawings, Item
 
-_EVERY = 2  # steps between two looks at what was drawn
+_PERIOD = 0.09  # s of real time, between two looks at what was drawn
 _PIXEL = 0.005  # m; rviz measures points and lines in the world
 _KINDS = {
     "points": Marker.POINTS,
@@ -32,16 +33,15 @@ class DrawingMarkers:
     def __init__(self, drone: str, drawings: Drawings):
         """Advertise in the drone's namespace."""
         self._drawings = drawings
-        self._steps = 0
+        self._throttle = Throttle(_PERIOD)
         self._shown = 0
         self._publisher = rospy.Publisher(f"{drone}/drawing", MarkerArray, queue_size=1, latch=True)
 
     def update(self) -> None:
         """Publish what has changed, if anybody listens."""
-        self._steps += 1
-        if self._shown == self._drawings.changes or self._steps % _EVERY:
+        if self._shown == self._drawings.changes or not self._publisher.get_num_connections():
             return
-        if self._publisher.get_num_connections():
+        if self._throttle.passes():
             self._shown = self._drawings.changes
             drawn = [_marker(handle, one) for handle, one in self._drawings.objects.items() if one.items]
             self._publisher.publish(MarkerArray([Marker(action=Marker.DELETEALL), *drawn]))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import signal
 import threading
 
 import rospy
 import rospy.core
+
+from drone_sim.guardian import Guardian
 
 _PATIENCE = 2.0  # s, of one thread for the other
 
@@ -16,14 +17,15 @@ class Ending:
 
     rospy's own signal handler calls the master from within whatever the signal interrupts, and hangs for ever
     where that is a call to the master, too. And `rosnode kill` closes the topics from another thread, while a
-    step may be publishing on them: here it waits until there are no more steps.
+    step may be publishing on them: here it waits until there are no more steps. Where they do not come to an
+    end, the guardian ends the process.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, guardian: Guardian) -> None:
         """Take over the signals; init_node must have been called, with disable_signals."""
+        self._guardian = guardian
         self._asked, self._done, self._closed = threading.Event(), threading.Event(), threading.Event()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, lambda *_: self._asked.set())
+        guardian.ready(self._asked.set)
         rospy.on_shutdown(self._wait_for_the_node)
         rospy.core.add_shutdown_hook(lambda _reason: self._closed.set())  # the last: topics are closed by then
 
@@ -34,9 +36,11 @@ class Ending:
     def complete(self) -> None:
         """Say that the node has taken its last step and cleaned up; return when rospy has closed its topics."""
         self._done.set()
+        self._guardian.count()
         rospy.signal_shutdown("the node ends")  # where another thread does that already, it returns at once
         self._closed.wait(_PATIENCE)
 
     def _wait_for_the_node(self) -> None:
+        self._guardian.count()
         self._asked.set()
         self._done.wait(_PATIENCE)

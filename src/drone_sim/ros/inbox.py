@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from typing import Callable, List
 
 _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
@@ -12,8 +12,9 @@ _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
 class Inbox:
     """Jobs from any thread, carried out between two steps, in the order in which they came."""
 
-    def __init__(self) -> None:
-        """Start empty."""
+    def __init__(self, patience: float = _PATIENCE) -> None:
+        """Start empty; whoever asks waits for `patience` (s)."""
+        self._patience = patience
         self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._came = threading.Event()
 
@@ -23,12 +24,18 @@ class Inbox:
         self._came.set()
 
     def ask(self, job: Callable[[], str]) -> str:
-        """Leave a job, wait until it is done, and return its answer; raises what it raised, or TimeoutError."""
+        """Leave a job, wait until it is done, and return its answer; raises what it raised.
+
+        Raises TimeoutError where the answer does not come in time; a job that has not begun by then never will.
+        """
         answer: List[str] = []
         failure: List[Exception] = []
         done = threading.Event()
+        begun = threading.Lock()  # taken by what comes first: the job, or the end of patience
 
         def carry_out() -> None:
+            if not begun.acquire(blocking=False):
+                return
             try:
                 answer.append(job())
             except Exception as error:
@@ -36,8 +43,9 @@ class Inbox:
             done.set()
 
         self.put(carry_out)
-        if not done.wait(_PATIENCE):
-            raise TimeoutError(f"no answer within {_PATIENCE:.0f} s")
+        if not done.wait(self._patience):
+            late = "it will not be carried out" if begun.acquire(blocking=False) else "it is still being carried out"
+            raise TimeoutError(f"no answer within {self._patience:g} s: {late}")
         if failure:
             raise failure[0]
         return answer[0]
@@ -46,16 +54,10 @@ class Inbox:
         """Sleep until a job comes, or for so long."""
         self._came.wait(seconds)
 
-    def empty(self) -> bool:
-        """Carry out all that has come; return whether there was anything. The simulation's thread calls it."""
+    def empty(self) -> None:
+        """Carry out all that has come by now. The simulation's thread calls it."""
         if not self._came.is_set():
-            return False
+            return
         self._came.clear()
-        found = False
-        while True:
-            try:
-                job = self._jobs.get_nowait()
-            except Empty:
-                return found
-            job()
-            found = True
+        for _ in range(self._jobs.qsize()):  # what comes meanwhile waits: a flood must not hold up the step
+            self._jobs.get_nowait()()

@@ -16,7 +16,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-from drone_sim.ros.master_watch import master_is_there
+from drone_sim.ros.starting import init_node, reported
 
 _STEP = 0.1  # m/s, per key press
 _TURN_STEP = 0.2  # rad/s, per key press
@@ -140,13 +140,12 @@ def main() -> int:
     if not sys.stdin.isatty() or not sys.stdout.isatty():
         print("key_teleop: needs a terminal to read keys from", file=sys.stderr)
         return 1
-    if not master_is_there():
-        return 1
     # rospy's own handlers would close the topics before the last stop is sent.
-    rospy.init_node("key_teleop", anonymous=True, disable_signals=True)
+    if not init_node("key_teleop", anonymous=True, disable_signals=True):
+        return 1
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     os.environ.setdefault("ESCDELAY", "25")  # ms; curses waits a second for what may follow an ESC
-    curses.wrapper(_fly)
+    status = reported("key_teleop", lambda: curses.wrapper(_fly))
     rospy.signal_shutdown("left")
-    return 0
+    return status

@@ -13,12 +13,14 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 from drone_sim import checks, frames
 from drone_sim.drone_objects import TARGET
 from drone_sim.frames import Matrix
+from drone_sim.pacing import Throttle
+from drone_sim.ros.held import Held
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput, move_target
 from drone_sim.ros.messages import WORLD
 from drone_sim.simulation import Simulation
 
-_EVERY = 4  # steps between two updates: five a second are enough for handles
+_PERIOD = 0.19  # s of real time, between two updates: five a second are enough for handles
 _DRONE = "Drone"
 _UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # a control acts along, about, or across its x axis: turned to z
 
@@ -31,8 +33,8 @@ class Handles:
         self._simulation = simulation
         self._inputs = inputs
         self._inbox = inbox
-        self._held: Set[str] = set()
-        self._steps = 0
+        self._held = Held()
+        self._throttle = Throttle(_PERIOD)
         self._server = _Server(f"{simulation.drone.name}/markers")
         self._looks = {TARGET: _ball(), _DRONE: _ring()}
         self._shown: Set[str] = set()
@@ -41,12 +43,11 @@ class Handles:
 
     def update(self) -> None:
         """Let the handles follow what they stand for, unless they are being dragged."""
-        self._steps += 1
-        if self._steps % _EVERY or not self._server.update_pub.get_num_connections():
+        if not self._server.update_pub.get_num_connections() or not self._throttle.passes():
             return
         objects = self._simulation.drone.objects
         self._show({_DRONE} | ({TARGET} if objects[objects.handle(TARGET)].parent is None else set()))
-        for name in self._shown - self._held:
+        for name in self._shown - self._held.names():
             matrix = objects.matrix(objects.handle(name))
             yaw = frames.to_euler(matrix)[2]
             level = frames.from_euler(frames.position(matrix), (0, 0, yaw))
@@ -62,12 +63,14 @@ class Handles:
         self._shown = wanted
 
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        name = feedback.marker_name
+        name, client = feedback.marker_name, feedback.client_id
         if feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN:
-            self._held.add(name)
+            self._held.take(name, client)
         elif feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
-            self._held.discard(name)
-        elif feedback.event_type == InteractiveMarkerFeedback.POSE_UPDATE:
+            self._held.let_go(name, client)
+        else:
+            self._held.keep(name, client)
+        if feedback.event_type == InteractiveMarkerFeedback.POSE_UPDATE:
             self._move(name, feedback)
 
     def _move(self, name: str, feedback: InteractiveMarkerFeedback) -> None:

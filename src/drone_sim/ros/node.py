@@ -2,25 +2,24 @@
 
 Parameters (private): every key of config/drone.yaml.
 Topics, in the drone's namespace: see inputs.py, outputs.py, cameras.py and markers.py; services: services.py.
-/clock is published with use_sim_time.
+/clock is published with use_sim_time: see step_time.py.
 Frames: world -> base_link, Track_base, and the cameras that have a `mount`; the rest comes from the URDF.
 """
 
 from __future__ import annotations
 
 import contextlib
+import gc
 import logging
 import sys
 import time
 from typing import Callable
 
-import rosgraph
 import rospy
-from rosgraph_msgs.msg import Clock
 
-from drone_sim import parameters as parameters_module
 from drone_sim.frames import position, to_euler
-from drone_sim.pacing import Pacer
+from drone_sim.guardian import Guardian
+from drone_sim.pacing import Beat, Pacer
 from drone_sim.parameters import Parameters
 from drone_sim.ros.cameras import CameraOutput
 from drone_sim.ros.drawing_markers import DrawingMarkers
@@ -28,18 +27,20 @@ from drone_sim.ros.ending import Ending
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput
 from drone_sim.ros.markers import Handles
-from drone_sim.ros.master_watch import MasterWatch, master_is_there
+from drone_sim.ros.master_watch import MasterWatch
 from drone_sim.ros.outputs import DroneOutput
-from drone_sim.ros.paths import from_shell
 from drone_sim.ros.player import Player
 from drone_sim.ros.scene_markers import SceneMarkers
 from drone_sim.ros.script_topics import RosBackend
 from drone_sim.ros.services import Services
+from drone_sim.ros.starting import init_node, read_parameters, reported, use_sim_time
+from drone_sim.ros.step_time import StepTime
 from drone_sim.scripting.drawings import Drawings
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Simulation
 
-_STANDING = 0.2  # s between two messages while the simulation stands still
+_NAME = "drone_sim"
+_SOON, _SELDOM = 0.05, 0.2  # s between two messages while the simulation stands: after a change, and without one
 
 
 class Node:
@@ -49,8 +50,6 @@ class Node:
         """Build the scene and advertise. Raises what Simulation raises."""
         self._parameters = parameters
         logging.getLogger("drone_sim").handlers = [_ToRosout()]
-        self._simulated_time = bool(rospy.get_param("/use_sim_time", False))
-        self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if self._simulated_time else None
         drone = parameters.drone.name
         images = {rospy.resolve_name(f"{drone}/{camera.topic}") for camera in parameters.cameras.values()}
         drawings = Drawings()
@@ -58,11 +57,12 @@ class Node:
             parameters,
             script=parameters.script,
             gui=parameters.gui,
-            backend=RosBackend(images),
+            backend=RosBackend(images, lambda: self._time.stamp()),
             drawings=drawings,
             started=False,
         )
-        self.player = Player(self.simulation, self._simulated_time)
+        self._time = StepTime(self.simulation, use_sim_time())
+        self.player = Player(self.simulation, self._step_and_show, self._time.simulated)
         self._inbox = Inbox()
         self._services = Services(self.player, self._inbox)
         factor = parameters.real_time_factor
@@ -74,8 +74,10 @@ class Node:
             CameraOutput(drone, camera, parameters.cameras[name]) for name, camera in self.simulation.cameras.items()
         ]
         self._output = DroneOutput(self.simulation)
+        self._beat = Beat(_SOON, _SELDOM)
+        self._shown = -1  # the world's changes, when it was shown
         for camera in self.simulation.cameras.values():
-            camera.take()  # the first picture takes long: compiling shaders must not make a step late
+            camera.look()  # the first picture takes long: compiling shaders must not make a step late
 
     def run(self, ending: Callable[[], bool] = lambda: False) -> None:
         """Start, and step until it is time to end, or ROS shuts the node down."""
@@ -83,8 +85,12 @@ class Node:
         def over() -> bool:
             return ending() or rospy.is_shutdown()
 
+        if over():
+            return
         with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
             self.player.start()
+        gc.collect()
+        gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
         commands = rospy.resolve_name(f"{self._parameters.drone.name}/cmd_vel")
         rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; commands on {commands}")
         steps, seconds = 0, 0.0
@@ -100,7 +106,8 @@ class Node:
                 self._pacer.restart()
         flown = steps * self._parameters.time_step
         factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
-        rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {self._pacer.overruns} late steps")
+        late = f"{self._pacer.overruns} late steps, by {self._pacer.worst * 1e3:.0f} ms at most"
+        rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {late}")
 
     def _wait(self, over: Callable[[], bool]) -> None:
         if self.player.begun:  # reading scene and script took its time, which no step is late for
@@ -112,33 +119,60 @@ class Node:
 
     def step(self) -> bool:
         """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
-        stamp = rospy.Time.now()
         self._inbox.empty()
-        if not self.player.playing or not self.player.step():
-            return False
-        if self._clock is not None:
-            stamp = rospy.Time.from_sec(self.simulation.time)
-            self._clock.publish(stamp)
-        self._publish(stamp)
-        return True
+        return self.player.playing and self.player.step()
+
+    def _step_and_show(self) -> None:
+        self._time.begin()
+        self.simulation.step()
+        self._show()
+        self._time.end(at_once=self.player.paused)  # who asks for single steps is told of each
 
     def _stand(self) -> None:
         """Paused or stopped: wait for something to do, and show what it changed."""
-        self._inbox.wait(_STANDING)
+        self._inbox.wait(self._left())
+        self._time.begin()
         self._inbox.empty()
-        if not self._simulated_time:  # in simulated time a second message of one stamp would be an error
-            self._publish(rospy.Time.now())
+        if self.player.playing or self._left():
+            return
+        if self._time.simulated:
+            self._show_at_the_same_time()
+        else:
+            self.simulation.look()
+            self._show()
 
-    def _publish(self, stamp: rospy.Time) -> None:
+    def _left(self) -> float:
+        return self._beat.left(self.simulation.world.changes != self._shown)
+
+    # ---- what is there
+
+    def _show(self) -> None:
+        self._show_state()
+        self._output.publish_transforms(self._time.stamp)
+        self._show_to_eyes()
+
+    def _show_at_the_same_time(self) -> None:
+        """Show what has changed under a stamp that was used before: no transforms, which tf2 takes only once."""
+        self._time.end(at_once=True)
+        if self.simulation.world.changes != self._shown:
+            self.simulation.look()
+            self._show_state()
+        self._show_to_eyes()
+
+    def _show_state(self) -> None:
         for camera in self._cameras:
-            camera.publish(stamp)
-        self._output.publish(stamp)
+            camera.publish(self._time.stamp)
+        self._output.publish_state(self._time.stamp)
+        self._shown = self.simulation.world.changes
+
+    def _show_to_eyes(self) -> None:
         self._handles.update()
         for markers in self._markers:
             markers.update()
         if self._parameters.gui:
             track = self.simulation.drone.track
             self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
+        self._beat.restart()
 
     def close(self) -> None:
         """Run the script's cleanup and free the world. Raises ScriptError."""
@@ -152,37 +186,25 @@ class _ToRosout(logging.Handler):
         logging.getLogger("rosout").log(record.levelno, record.getMessage())
 
 
-def _parameters() -> Parameters:
-    given = rospy.get_param("~", {})
-    for key in ("script", "scene_file"):
-        if isinstance(given.get(key), str):
-            given[key] = from_shell(given[key])
-    return parameters_module.load(given)
-
-
-def main() -> int:
+def main(guardian: Guardian) -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
-    if not master_is_there():
+    # The time of messages is the simulation's; hearing its own /clock would cost the node half of its speed.
+    if not init_node(_NAME, disable_signals=True, disable_rostime=True):
         return 1
-    rospy.init_node("drone_sim", disable_signals=True)
-    ending = Ending()
-    node = None
-    try:
-        node = Node(_parameters())
+    ending = Ending(guardian)
+    nodes = []
+
+    def run() -> None:
+        nodes.append(Node(read_parameters()))
         MasterWatch().start()
-        node.run(ending.asked)
-    except (ValueError, ScriptError, RuntimeError) as error:  # each says in one line what is wrong
-        rospy.logfatal(f"drone_sim: {error}")
-        return 1
-    except (OSError, rosgraph.MasterException):
-        rospy.logfatal(f"drone_sim: the ROS master at {rosgraph.get_master_uri()} has gone")
-        return 1
-    finally:
-        if node is not None:
-            node.close()
-        ending.complete()
-    return 0
+        nodes[0].run(ending.asked)
+
+    status = reported(_NAME, run)
+    for node in nodes:
+        status = reported(_NAME, node.close) or status
+    ending.complete()
+    return status
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(Guardian(_NAME)))

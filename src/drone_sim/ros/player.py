@@ -13,9 +13,13 @@ from drone_sim.simulation import Simulation
 class Player:
     """Plays a simulation; the thread that owns the simulation calls all of this."""
 
-    def __init__(self, simulation: Simulation, simulated_time: bool):
-        """Begin stopped. `simulated_time`: the node publishes /clock, so that others wait when it stands still."""
+    def __init__(self, simulation: Simulation, step: Callable[[], None], simulated_time: bool):
+        """Begin stopped. `step` runs one step and shows it.
+
+        `simulated_time`: the node publishes /clock, so that others wait when it stands still.
+        """
         self.simulation = simulation
+        self._step = step
         self.paused = False
         self.begun = False  # since this was last set to False
         self._simulated_time = simulated_time
@@ -29,6 +33,7 @@ class Player:
         """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
         self.paused = False
         self.attempt(lambda: self.simulation.start(scene_file))
+        self.simulation.look()  # meshes and textures are read now, which the first step would be late for
         self.begun = True
         scene = self.simulation.parameters.scene_file
         rospy.loginfo(f"started{f' in {scene}' if scene else ''}")
@@ -57,13 +62,13 @@ class Player:
         """Run one step while paused. Raises ValueError when it is not, ScriptError."""
         if not self.simulation.running or not self.paused:
             raise ValueError("is not paused: one step at a time needs `pause` first")
-        self.attempt(self.simulation.step)
+        self.attempt(self._step)
         return f"t = {self.simulation.time:.2f} s"
 
     def step(self) -> bool:
         """Run one step; when the script fails, say so once, stop, and return False."""
         try:
-            self.attempt(self.simulation.step)
+            self.attempt(self._step)
         except ScriptError:
             return False
         return True

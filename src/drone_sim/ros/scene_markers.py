@@ -12,11 +12,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim import frames
 from drone_sim.camera.mesh import WHITE
+from drone_sim.pacing import Throttle
 from drone_sim.ros.messages import WORLD
 from drone_sim.simulation import Simulation
 from drone_sim.visual import Visual
 
-_EVERY = 4  # steps between two looks at what has moved
+_PERIOD = 0.19  # s of real time, between two looks at what has moved
 _FLAT = 1e-3  # m, thickness of a plane
 _WIDE = 200.0  # m, its side
 _FROM_ITS_FILE = (0.0, 0.0, 0.0, 0.0)  # the color by which rviz keeps a mesh's own
@@ -28,15 +29,14 @@ class SceneMarkers:
     def __init__(self, simulation: Simulation):
         """Advertise in the drone's namespace."""
         self._simulation = simulation
-        self._steps = 0
+        self._throttle = Throttle(_PERIOD)
         self._shown: Optional[Tuple[List[Visual], np.ndarray]] = None
         name = f"{simulation.drone.name}/scene"
         self._publisher = rospy.Publisher(name, MarkerArray, queue_size=1, latch=True)
 
     def update(self) -> None:
         """Publish what has moved, come or gone, if anybody listens."""
-        self._steps += 1
-        if self._steps % _EVERY or not self._publisher.get_num_connections():
+        if not self._publisher.get_num_connections() or not self._throttle.passes():
             return
         visuals, poses = self._simulation.scene.visuals()
         if self._shown and visuals == self._shown[0] and np.array_equal(poses, self._shown[1]):

@@ -16,9 +16,10 @@ from drone_sim.scripting.messages import Image
 class RosBackend:
     """Subscribes and advertises any installed message type."""
 
-    def __init__(self, camera_topics: Collection[str]):
-        """Take the resolved image topics that the node's own cameras publish already."""
+    def __init__(self, camera_topics: Collection[str], stamp: Callable[[], rospy.Time]):
+        """Take the resolved image topics that the node's own cameras publish already, and what to stamp with."""
         self._camera_topics = camera_topics
+        self._stamp = stamp
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
         """Call `take` with every message, in rospy's thread; return what ends that."""
@@ -27,22 +28,25 @@ class RosBackend:
     def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> _Sender:
         """Advertise a topic."""
         made = _message_class(kind)
-        return _Sender(rospy.Publisher(topic, made, queue_size=queue, latch=latch), made)
+        return _Sender(rospy.Publisher(topic, made, queue_size=queue, latch=latch), made, self._stamp)
 
     def advertise_image(self, topic: str, queue: int) -> Any:
         """Advertise an image topic; one that a camera publishes already stays the camera's."""
         if topic in self._camera_topics:
             rospy.loginfo(f"{topic}: the node's camera publishes it already; the script's images are not sent twice")
             return _Silence()
-        return _ImageSender(rospy.Publisher(topic, ImageMessage, queue_size=queue))
+        return _ImageSender(rospy.Publisher(topic, ImageMessage, queue_size=queue), self._stamp)
 
 
 class _Sender:
-    def __init__(self, publisher: rospy.Publisher, made: Type[genpy.Message]):
+    def __init__(self, publisher: rospy.Publisher, made: Type[genpy.Message], stamp: Callable[[], rospy.Time]):
         self._publisher = publisher
         self._made = made
+        self._stamp = stamp
 
     def publish(self, message: Any) -> None:
+        if self._publisher.get_num_connections():
+            self._stamp()  # /clock before the message
         self._publisher.publish(_fill(self._made(), message, self._made._type))
 
     def shutdown(self) -> None:
@@ -50,12 +54,13 @@ class _Sender:
 
 
 class _ImageSender:
-    def __init__(self, publisher: rospy.Publisher):
+    def __init__(self, publisher: rospy.Publisher, stamp: Callable[[], rospy.Time]):
         self._publisher = publisher
+        self._stamp = stamp
 
     def publish(self, image: Image) -> None:
         message = ImageMessage(width=image.width, height=image.height, encoding="rgb8", step=3 * image.width)
-        message.header.stamp, message.header.frame_id = rospy.Time.now(), image.frame_id
+        message.header.stamp, message.header.frame_id = self._stamp(), image.frame_id
         message.data = image.data
         self._publisher.publish(message)
 

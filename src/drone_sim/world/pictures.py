@@ -58,12 +58,15 @@ class Pictures:
         if body == self._floor:
             self._floor = -1
 
-    def place(self, body: int, places: Mapping[int, Matrix]) -> None:
-        """Move some of a body's visuals, by index, to other places in their link's frame."""
+    def place(self, body: int, places: Mapping[int, Matrix]) -> bool:
+        """Move some of a body's visuals, by index, to places in their link's frame; return whether any moves."""
         parts = self._of(body)
-        self.moved(body)
-        for index, place in places.items():
+        others = {index: place for index, place in places.items() if parts[index].local != place}
+        if others:
+            self.moved(body)
+        for index, place in others.items():
             parts[index] = parts[index]._replace(local=place)
+        return bool(others)
 
     def visuals(self, bodies: Iterable[int]) -> List[Visual]:
         """Return all that can be drawn of these bodies."""

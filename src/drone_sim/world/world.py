@@ -36,6 +36,7 @@ class World:
             raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
         self._sub_step, self._gravity = sub_step, gravity
         self._snapshots: Set[int] = set()
+        self.changes = 0  # another number whenever something may look different
         self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_")
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
@@ -43,6 +44,7 @@ class World:
 
     def clear(self) -> None:
         """Remove everything."""
+        self.changes += 1
         for number in self._snapshots:  # PyBullet would keep them
             pybullet.removeState(number, physicsClientId=self._client)
         self._snapshots.clear()
@@ -93,6 +95,7 @@ class World:
 
     def remove(self, body: int) -> None:
         """Take a body out of the world."""
+        self.changes += 1
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
         self._centres.pop(body, None)
@@ -103,6 +106,7 @@ class World:
         for link in range(-1, pybullet.getNumJoints(body, self._client)):
             pybullet.changeVisualShape(body, link, rgbaColor=rgba, physicsClientId=self._client)
         self._pictures.forget(body)
+        self.changes += 1
 
     def _set_material(self, number: int) -> None:
         # V-REP's Bullet material: friction 1, no restitution, no damping (PyBullet's default damps).
@@ -118,6 +122,7 @@ class World:
         )
         info = pybullet.getDynamicsInfo(number, -1, self._client)
         inertial = Pose(info[3], info[4])
+        self.changes += 1
         self._inertial_frames[number] = (inertial, inverse(inertial))
 
     # ---- dynamics
@@ -141,6 +146,7 @@ class World:
         """Move a body's root link to `pose` and stop it."""
         inertial = self._inertial_frames[body][0]
         centre, turn = compose(pose, inertial)
+        self.changes += 1
         self._centres.pop(body, None)
         self._pictures.moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
@@ -166,6 +172,7 @@ class World:
             step(client)
             known = {}
         self._centres.clear()
+        self.changes += 1
 
     def snapshot(self) -> int:
         """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget`."""
@@ -176,6 +183,7 @@ class World:
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
         self._centres.clear()
+        self.changes += 1
         self._pictures.all_moved()
         pybullet.restoreState(number, physicsClientId=self._client)
 
@@ -198,7 +206,7 @@ class World:
 
     def place_visuals(self, body: int, places: Mapping[int, Matrix]) -> None:
         """Move some of a body's visuals, by index, to other places in its root link's frame."""
-        self._pictures.place(body, places)
+        self.changes += self._pictures.place(body, places)
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float

@@ -1,0 +1,45 @@
+"""Which handles somebody holds with the mouse."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Callable, Dict, Set, Tuple
+
+PATIENCE = 1.0  # s; while a handle is held, rviz says so every 0.25 s
+
+
+class Held:
+    """The handles that clients hold; one of which nothing has been heard for PATIENCE has let go, or has died.
+
+    Any thread may call all of it.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        """Begin with none; take a monotonic clock."""
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._heard: Dict[Tuple[str, str], float] = {}  # by handle and client, s
+
+    def take(self, name: str, client: str) -> None:
+        """Say that a client has taken a handle."""
+        with self._lock:
+            self._heard[name, client] = self._clock()
+
+    def keep(self, name: str, client: str) -> None:
+        """Say that a client that holds a handle does so still."""
+        with self._lock:
+            if (name, client) in self._heard:
+                self._heard[name, client] = self._clock()
+
+    def let_go(self, name: str, client: str) -> None:
+        """Say that a client holds it no longer."""
+        with self._lock:
+            self._heard.pop((name, client), None)
+
+    def names(self) -> Set[str]:
+        """Return the handles that are held."""
+        with self._lock:
+            since = self._clock() - PATIENCE
+            self._heard = {one: heard for one, heard in self._heard.items() if heard > since}
+            return {name for name, _ in self._heard}
