@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any, Optional
@@ -14,7 +15,8 @@ from case import Answer, Case
 
 HANGS = 3.0  # s of the processor that a case may take
 GROWTH = 800 << 20  # bytes that a case may leave behind; and what a worker may grow by before it is replaced
-_PATIENCE = 12.0  # s by the clock after which nobody waits for it any more
+_BUSY = 6.0  # s of the processor, and
+_IDLE = 30.0  # s by the clock, after which nobody waits for it any more
 _FIRST = 60.0  # s for the first case: imports, compiling shaders
 _SOURCE = Path(__file__).resolve().parents[2] / "src"
 
@@ -41,8 +43,8 @@ class Trier:
             self._open()
         try:
             self._connection.send(case)
-            if not self._connection.poll(_PATIENCE):
-                return self._lost(f"hang: no end after {_PATIENCE:.0f} s")
+            if not self._answers():
+                return self._lost("hang: it does not end")
             answer: Answer = self._connection.recv()
         except (EOFError, OSError):
             return self._lost("")
@@ -52,6 +54,19 @@ class Trier:
         if answer.busy or answer.resident > self._resident + GROWTH:
             self.close()  # a script that never ends is left behind in its thread
         return answer
+
+    def _answers(self) -> bool:
+        began, end = self._spent(), time.monotonic() + _IDLE
+        while not self._connection.poll(0.5):
+            if self._spent() > began + _BUSY or time.monotonic() > end:
+                return False
+        return True
+
+    def _spent(self) -> float:
+        """Return how many seconds of the processor the worker has had."""
+        assert self._process is not None
+        fields = Path(f"/proc/{self._process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def _open(self) -> None:
         ours, theirs = Pipe()
