@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | lint | bench [NAME...]
+# Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | lint | bench [NAME...] |
+#   fuzz [CASES] | soak [MINUTES]
 #
 # Installs what is missing (Debian 12: its own ROS 1; Ubuntu 20.04: /opt/ros/noetic), keeps the pip packages
 # in .venv, and builds into build/ and devel/. What is there already is left alone, so a second run takes seconds.
@@ -125,5 +126,7 @@ case "$command" in
   test) setup; run_tests ;;
   lint) setup; lint ;;
   bench) setup; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
-  *) sed -n '2,5s/^# \{0,1\}//p' "$0" ;;
+  fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
+  soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
+  *) sed -n '2,6s/^# \{0,1\}//p' "$0" ;;
 esac

@@ -24,6 +24,9 @@ Scene = Tuple[List[Visual], np.ndarray]
 
 CAMERA = Intrinsics(640, 480, np.radians(60.0), 0.02, 100.0)
 AHEAD = np.array([[0.0, 0.0, 1.0, 0.2], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.8], [0.0, 0.0, 0.0, 1.0]])
+DOWNWARD = np.array(  # 1 m above the floor, 30 degrees down: floor to the last pixel, and the quadrotor's shadow
+    [[0.0, -0.5, np.sqrt(0.75), -4.5], [-1.0, 0.0, 0.0, 0.0], [0.0, -np.sqrt(0.75), -0.5, 1.0], [0.0, 0.0, 0.0, 1.0]]
+)
 WHITE, DARK = (1.0, 1.0, 1.0, 1.0), (0.2, 0.2, 0.22, 1.0)
 COLOURS = ((0.85, 0.25, 0.2, 1.0), (0.2, 0.5, 0.8, 1.0), (0.95, 0.75, 0.2, 1.0), (0.35, 0.65, 0.35, 1.0))
 ARM = 0.13  # metres from the middle to a propeller
@@ -127,7 +130,11 @@ def bullet_draw(client: int, **options: int) -> Callable[[], Any]:
 def compare(folder: Path, seconds: float = 2.0) -> List[Row]:
     """Ours beside TinyRenderer and PyBullet's EGL plugin."""
     scene = build(folder)
-    rows = [ours("drone_sim", scene, seconds), ours("drone_sim, 4 samples", scene, seconds, samples=4)]
+    rows = [
+        ours("drone_sim", scene, seconds),
+        ours("drone_sim, 4 samples", scene, seconds, samples=4),
+        ours("drone_sim, nothing but floor", build(folder, things=0), seconds, view=DOWNWARD),
+    ]
     bare = {"shadow": 0, "flags": pybullet.ER_NO_SEGMENTATION_MASK}
     for name, plugin in (("TinyRenderer", False), ("EGL plugin", True)):
         client = pybullet.connect(pybullet.DIRECT)
@@ -150,14 +157,22 @@ def _load_plugin(client: int) -> bool:
     return bool(path) and pybullet.loadPlugin(path, "_eglRendererPlugin", physicsClientId=client) >= 0
 
 
-def ours(name: str, scene: Scene, seconds: float, camera: Intrinsics = CAMERA, samples: int = 0, **facts: Any) -> Row:
+def ours(
+    name: str,
+    scene: Scene,
+    seconds: float,
+    camera: Intrinsics = CAMERA,
+    view: np.ndarray = AHEAD,
+    samples: int = 0,
+    **facts: Any,
+) -> Row:
     """Our renderer, poses sent anew for every frame, into one buffer."""
     renderer = Renderer(samples=samples)
     try:
         visuals, poses = scene
         renderer.set_visuals(visuals)
         out = np.empty((camera.height, camera.width, 3), np.uint8)
-        draw = lambda: renderer.render(camera, AHEAD, poses, out)  # noqa: E731 - it is only timed
+        draw = lambda: renderer.render(camera, view, poses, out)  # noqa: E731 - it is only timed
         return measure(name, draw, seconds, renderer=renderer.description, **facts)
     finally:
         renderer.close()

@@ -196,13 +196,15 @@ def _draw(gl: moderngl.Context, batches: Sequence[Batch], role: str) -> None:
 
 
 def _programs(gl: moderngl.Context) -> Programs:
-    def textured(source: str) -> str:
-        return source.replace("#version 330 core", "#version 330 core\n#define TEXTURED")
+    def surface(*names: str) -> Tuple[str, ...]:
+        start = "\n".join(["#version 330 core", *(f"#define {name}" for name in names)])
+        plain = (shaders.SURFACE_VERTEX, shaders.SURFACE_FRAGMENT)
+        return tuple(source.replace("#version 330 core", start) for source in plain)
 
-    plain = (shaders.SURFACE_VERTEX, shaders.SURFACE_FRAGMENT)
     sources = {
-        "plain": plain,
-        "textured": (textured(plain[0]), textured(plain[1])),
+        "plain": surface(),
+        "textured": surface("TEXTURED"),
+        "floor": surface("TEXTURED", "FLAT"),
         "shadow": (shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT),
         "sky": (shaders.SKY_VERTEX, shaders.SKY_FRAGMENT),
         "data": (shaders.DATA_VERTEX, shaders.DATA_FRAGMENT),
@@ -212,7 +214,7 @@ def _programs(gl: moderngl.Context) -> Programs:
         for name, (vertex, fragment) in sources.items()
     }
     to_sun = np.array(TO_SUN) / np.linalg.norm(TO_SUN)
-    for name in ("plain", "textured", "shadow"):
+    for name in ("plain", "textured", "floor", "shadow"):
         programs[name]["to_sun"] = tuple(to_sun)
     return programs
 

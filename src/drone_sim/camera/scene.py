@@ -62,7 +62,7 @@ class Scene:
     """The visuals as batches; must be used with its context current."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, software: bool) -> None:
-        """Empty. programs: by name: plain, textured, shadow, data; software: whether the CPU draws."""
+        """Empty. programs: by name: plain, textured, floor, shadow, data; software: whether the CPU draws."""
         self._context = context
         self._programs = programs
         self._software = software
@@ -201,7 +201,7 @@ class Scene:
         fixed = self._context.buffer(np.array(records, dtype=np.float32))
         self._buffers = [moving, fixed]
         for batch in self.batches:
-            surface = "plain" if batch.part.texture is None else "textured"
+            surface = "plain" if batch.part.texture is None else "floor" if batch.floor else "textured"
             for role, name in (("surface", surface), ("shadow", "shadow"), ("data", "data")):
                 batch.arrays[role] = self._array(batch, self._programs[name])
 

@@ -15,12 +15,16 @@ vec3 world_point() {
 """
 
 # Light is computed per vertex: floors and boxes have one normal per face, and round things enough vertices.
+# FLAT spares what is level the interpolation of a colour that is the same everywhere.
 SURFACE_VERTEX = (
     _INPUTS
     + """
 uniform vec3 to_sun;
 in vec3 normal;
 in vec4 paint;
+#ifdef FLAT
+flat
+#endif
 out vec4 colour;
 #ifdef TEXTURED
 in vec2 uv;
@@ -41,6 +45,9 @@ void main() {
 
 SURFACE_FRAGMENT = """
 #version 330 core
+#ifdef FLAT
+flat
+#endif
 in vec4 colour;
 #ifdef TEXTURED
 in vec2 texel;

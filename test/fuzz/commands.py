@@ -1,0 +1,72 @@
+"""Messages to the callbacks of the node, without a master: rospy's subscribers only remember whom they would call."""
+
+from __future__ import annotations
+
+from typing import Any, Callable, Dict, List, Tuple
+
+import rospy
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, WrenchStamped
+from visualization_msgs.msg import InteractiveMarkerFeedback
+
+from drone_sim.ros.inbox import Inbox
+from drone_sim.ros.inputs import DroneInput
+from drone_sim.ros.markers import Handles
+from drone_sim.simulation import Simulation
+
+_CALLBACKS: Dict[str, Callable[[Any], None]] = {}
+_KINDS = {
+    "cmd_vel": Twist,
+    "set_pose": PoseStamped,
+    "target_pose": PoseStamped,
+    "initialpose": PoseWithCovarianceStamped,
+    "push": WrenchStamped,
+    "markers/feedback": InteractiveMarkerFeedback,
+}
+
+
+class _Deaf:
+    """Stands for a Subscriber, a Publisher and a Timer."""
+
+    def __init__(self, name: Any, _kind: Any = None, callback: Any = None, **_: Any) -> None:
+        if callable(callback):
+            _CALLBACKS[str(name)] = callback
+
+    def __getattr__(self, _: str) -> Callable[..., int]:
+        return lambda *_arguments, **_named: 0
+
+
+rospy.Subscriber = rospy.Publisher = rospy.Timer = _Deaf
+rospy.rostime.set_rostime_initialized(True)
+
+
+def send(simulation: Simulation, messages: List[Tuple[str, Dict[str, Any]]]) -> None:
+    """Call what the node has subscribed, and do what that left to be done."""
+    inbox = Inbox()
+    Handles(simulation, DroneInput(simulation, inbox), inbox)
+    for topic, fields in messages:
+        message = _KINDS[topic]()
+        _fill(message, fields)
+        _CALLBACKS[f"{simulation.drone.name}/{topic}"](message)
+    inbox.empty()
+
+
+def _fill(message: Any, fields: Dict[str, Any]) -> None:
+    if "frame" in fields:
+        message.header.frame_id = fields["frame"]
+    if "event" in fields:
+        message.client_id, message.marker_name = fields["client"], fields["marker"]
+        message.event_type = fields["event"]
+    pose = message.pose if "position" in fields else None
+    if isinstance(message, PoseWithCovarianceStamped):
+        pose = message.pose.pose
+    parts = {
+        "position": lambda: pose.position,
+        "orientation": lambda: pose.orientation,
+        "linear": lambda: message.linear,
+        "angular": lambda: message.angular,
+        "force": lambda: message.wrench.force,
+        "torque": lambda: message.wrench.torque,
+    }
+    for name in parts.keys() & fields.keys():
+        for axis, value in zip("xyzw", fields[name]):
+            setattr(parts[name](), axis, value)

@@ -1,0 +1,23 @@
+"""What Lua and Python scripts have in common: a few fragments, put into the phases of a script."""
+
+import re
+from pathlib import Path
+
+from case import Case
+from hypothesis import strategies as st
+
+_SOURCES = sorted((Path(__file__).parents[3] / "src" / "drone_sim" / "scripting").glob("api_*.py"))
+# Read from the text, so that whoever only makes cases needs nothing of drone_sim.
+FUNCTIONS = sorted({name for path in _SOURCES for name in re.findall(r"^    def ([a-z]\w*)\(", path.read_text(), re.M)})
+ROS_FUNCTIONS = (
+    *("subscribe", "shutdownSubscriber", "advertise", "publish", "shutdownPublisher", "imageTransportAdvertise"),
+    *("imageTransportPublish", "imageTransportShutdownPublisher"),
+)
+OBJECTS = ("Drone", "Quadricopter_base", "DronePosition", "FrontVision", "Quadricopter_propeller_respondable1", "no")
+PHASES = ("", "init", "actuation", "sensing", "cleanup")
+
+
+def scripts(suffix, fragments, put):
+    """Return cases: one to three fragments, each in a phase ('' is the top level), written down by `put`."""
+    placed = st.lists(st.tuples(st.sampled_from(PHASES), fragments), min_size=1, max_size=3)
+    return placed.map(lambda some: Case("script", {f"script.{suffix}": put(some).encode("utf-8", "replace")}))

@@ -1,0 +1,249 @@
+"""How a case of each kind is tried: by the same calls as the node and `fly` make. Raises what they raise.
+
+What counts as a user's mistake is refused with one of REFUSALS, in one line; everything else is a fault.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import logging
+import math
+from pathlib import Path
+from typing import Any, Callable, Dict, List
+
+from case import Case
+
+from drone_sim import checks, parameters
+from drone_sim.camera import vision
+from drone_sim.camera.renderer import Renderer
+from drone_sim.offline import fly
+from drone_sim.offline.timeline import TimelineError
+from drone_sim.parameter_types import ParameterError
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist, Vector3
+from drone_sim.urdf import UrdfError
+
+REFUSALS = (ParameterError, ScriptError, UrdfError, TimelineError, checks.Refused)
+LONGEST = 600  # characters of a refusal, without the folder that the case lies in
+_SCRIPT_LIMIT = 0.2  # s
+_SMALL = {"width": 32, "height": 24}  # px: what a picture shows does not matter here
+
+
+_RENDERERS: Dict[int, Renderer] = {}
+
+
+def _renderer(samples: int = 0) -> Renderer:
+    """Return one that is kept: to compile its shaders takes longer than most cases."""
+    if samples not in _RENDERERS:
+        renderer = _RENDERERS[samples] = Renderer(samples=samples)
+        renderer.close = lambda: renderer.set_visuals(())  # type: ignore[method-assign]
+    return _RENDERERS[samples]
+
+
+vision.Renderer = _renderer  # type: ignore
+
+
+class Fault(Exception):
+    """Something that must not be; the message begins with what it is."""
+
+
+def run(case: Case, folder: Path) -> str:
+    """Write the case's files into the folder and try it; return what was refused, '' where all was taken.
+
+    Raises Fault, or what the code raised.
+    """
+    for name, content in case.files.items():
+        (folder / name).write_bytes(content)
+    try:
+        return _TRIALS[case.kind](case, folder) or ""
+    except REFUSALS as refusal:
+        return one_line(str(refusal), folder)
+
+
+def one_line(text: str, folder: Path) -> str:
+    """Return a refusal; raises Fault where it is not one line, or longer than anybody reads."""
+    text = text.replace(str(folder), "")
+    if "\n" in text or "\r" in text or not text.strip():
+        raise Fault(f"a refusal of more lines than one, or none: {text[:300]!r}")
+    if len(text) > LONGEST:
+        raise Fault(f"a refusal of {len(text)} characters: {text[:300]!r}...")
+    return text
+
+
+# ---- what stands in a scene
+
+
+def _fly_a_little(simulation: Simulation, steps: int = 3) -> None:
+    """Step, look, snapshot, restore, save; the drone must be somewhere after that."""
+    simulation.drone.receive(Twist(Vector3(0.5, 0.0, 0.1), Vector3(0.0, 0.0, 0.3)))
+    simulation.step()
+    snapshot = simulation.snapshot()
+    for _ in range(steps):
+        simulation.step()
+    simulation.restore(snapshot)
+    for camera in simulation.cameras.values():
+        camera.take()
+    simulation.step()
+    state = simulation.drone.state
+    if not all(map(math.isfinite, (*state.position, *state.orientation, *state.linear_velocity))):
+        raise Fault(f"the drone is at {state.position}")
+
+
+def _simulate(given: Dict[str, Any], folder: Path) -> None:
+    simulation = Simulation(parameters.load(given))
+    try:
+        _fly_a_little(simulation)
+        saved = folder / "saved.yaml"
+        simulation.scene.save(saved, simulation.drone.matrix)
+        if simulation.parameters.time_step < 1.0:  # in a long step things go anywhere
+            _load_again(simulation, saved)
+        simulation.stop()
+    finally:
+        simulation.close()
+
+
+def _load_again(simulation: Simulation, saved: Path) -> None:
+    try:
+        simulation.start(str(saved))
+    except REFUSALS as refusal:
+        raise Fault(f"what was saved is refused: {refusal}") from None
+
+
+def _parameters(case: Case, folder: Path) -> None:
+    _simulate(_with_small_pictures(case.data), folder)
+
+
+def _with_small_pictures(given: Dict[str, Any]) -> Dict[str, Any]:
+    small: Dict[str, Any] = {"cameras": {name: dict(_SMALL) for name in ("front", "depth", "track", "floor")}}
+    return dict(parameters._merge(small, given))
+
+
+def _scene(case: Case, folder: Path) -> None:
+    _simulate(_with_small_pictures({"scene_file": str(folder / "scene.yaml")}), folder)
+
+
+def _mesh(case: Case, folder: Path) -> None:
+    (name,) = set(case.files) - {"one.mtl", "one.png"}
+    one: Dict[str, Any] = {
+        "shape": "mesh",
+        "file": str(folder / name),
+        "position": [2, 0, 1],
+        "mass": case.data["mass"],
+    }
+    if case.data["in_urdf"]:
+        inertia = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+        look = "".join(
+            f'<{tag}><geometry><mesh filename="{name}"/></geometry></{tag}>' for tag in ("collision", "visual")
+        )
+        (folder / "one.urdf").write_text(f'<robot name="one"><link name="a">{inertia}{look}</link></robot>')
+        one = {"shape": "urdf", "file": str(folder / "one.urdf"), "position": [2, 0, 1], "mass": case.data["mass"]}
+    _simulate(_with_small_pictures({"scene": {"objects": [one]}}), folder)
+
+
+def _urdf(case: Case, folder: Path) -> None:
+    file = str(folder / "robot.urdf")
+    given: Dict[str, Any] = {"drone": {"urdf": file}}
+    if case.data != "drone":
+        mass = 1.0 if case.data == "heavy object" else 0.0
+        given = {"scene": {"objects": [{"shape": "urdf", "file": file, "position": [2, 0, 1], "mass": mass}]}}
+    _simulate(_with_small_pictures(given), folder)
+
+
+# ---- scripts
+
+
+def _script(case: Case, folder: Path) -> str:
+    """Fly a script, start it again, and leave: each call may say that the script failed."""
+    (name,) = case.files
+    simulation = Simulation(
+        parameters.load({"script_time_limit": _SCRIPT_LIMIT, "cameras": {"front": dict(_SMALL)}}), started=False
+    )
+    simulation.script = str(folder / name)
+    said: List[str] = []
+
+    def attempt(action: Callable[[], None]) -> None:
+        try:
+            action()
+        except ScriptError as error:
+            said.append(one_line(str(error), folder))
+
+    def whole() -> None:
+        simulation.start()
+        simulation.drone.receive(Twist(Vector3(0.5, 0.0, 0.1), Vector3(0.0, 0.0, 0.3)))
+        simulation.step()
+        snapshot = simulation.snapshot()
+        simulation.step()
+        simulation.restore(snapshot)
+        simulation.step()
+
+    attempt(whole)
+    attempt(simulation.stop)
+    if not said:
+        attempt(whole)
+    attempt(simulation.close)
+    return said[0] if said else ""
+
+
+# ---- fly
+
+
+def _fly(case: Case, folder: Path) -> str:
+    return _status(["--commands", str(folder / "flight.yaml"), *case.data], folder)
+
+
+def _status(arguments: List[str], folder: Path) -> str:
+    errors = io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()):
+        try:
+            status = fly.main(arguments)
+        except SystemExit as left:  # argparse's way
+            status = left.code if isinstance(left.code, int) else 1
+    said = errors.getvalue().rstrip("\n")
+    if (status == 0) != (said == ""):
+        raise Fault(f"fly: status {status}, and it said: {said[:300]!r}")
+    return one_line(said, folder) if said else ""
+
+
+def _assignments(case: Case, folder: Path) -> str:
+    return _status([*(word for text in case.data for word in ("--set", text)), "--duration=0.1"], folder)
+
+
+# ---- messages
+
+
+def _messages(case: Case, folder: Path) -> str:
+    import commands  # ROS is there for this alone
+
+    log = _Log()
+    logging.getLogger("rosout").addHandler(log)
+    simulation = Simulation(parameters.load(_with_small_pictures({})))
+    try:
+        commands.send(simulation, case.data)
+        _fly_a_little(simulation)
+    finally:
+        simulation.close()
+        logging.getLogger("rosout").removeHandler(log)
+    return "; ".join(one_line(line, folder) for line in log.lines)
+
+
+class _Log(logging.Handler):
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: List[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.lines.append(record.getMessage())
+
+
+_TRIALS: Dict[str, Callable[[Case, Path], Any]] = {
+    "parameters": _parameters,
+    "assignments": _assignments,
+    "scene": _scene,
+    "mesh": _mesh,
+    "urdf": _urdf,
+    "script": _script,
+    "fly": _fly,
+    "messages": _messages,
+}

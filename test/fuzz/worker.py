@@ -1,0 +1,92 @@
+"""The process that a case is tried in: takes cases from a pipe until its end, within a limit of memory.
+
+`python worker.py DESCRIPTOR`: of a connection of multiprocessing's.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import gc
+import os
+import resource
+import shutil
+import sys
+import tempfile
+import threading
+import time
+import traceback
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, List
+
+from case import Answer
+
+MEMORY = 4 << 30  # bytes of address space, some 1.5 of which are Python's and Mesa's before any case
+
+
+def _resident() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def _where(error: BaseException) -> str:
+    """Name the innermost line of drone_sim, which tells faults of one message apart."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if "drone_sim" in f.filename]
+    last = frames[-1] if frames else None
+    return f"{Path(last.filename).name}:{last.name}" if last else "?"
+
+
+def _try(case: Any, background: List[str]) -> Answer:
+    from trials import Fault, run
+
+    folder = Path(tempfile.mkdtemp(prefix="fuzz"))
+    began = time.process_time()  # of the processor: other processes may be busy, too
+    fault = refusal = ""
+    try:
+        refusal = run(case, folder)
+    except Fault as error:
+        fault = str(error)
+    except BaseException as error:  # whatever it is: nothing else may come through
+        trace = "".join(traceback.format_tb(error.__traceback__))
+        fault = f"{type(error).__name__} in {_where(error)}: {_said(error)}\n{trace}"
+    seconds = time.process_time() - began
+    shutil.rmtree(folder, ignore_errors=True)
+    gc.collect()
+    if background and not fault:
+        fault = "in the background: " + background[0]
+    background.clear()
+    return Answer(fault, refusal, seconds, _resident(), _busy())
+
+
+def _busy() -> bool:
+    """Tell whether a thread goes on with what the case began."""
+    began = time.process_time()
+    if len(os.listdir("/proc/self/task")) > 1:
+        time.sleep(0.02)
+    return time.process_time() - began > 0.01
+
+
+def _said(error: BaseException) -> str:
+    try:
+        return str(error)[:300]
+    except Exception:
+        return "(its __str__ raises)"
+
+
+def main() -> None:
+    """Serve."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    faulthandler.enable()
+    background: List[str] = []
+    threading.excepthook = lambda hook: background.append(f"{hook.exc_type.__name__}: {_said(hook.exc_value)}")
+    connection = Connection(int(sys.argv[1]))
+    while True:
+        try:
+            case = connection.recv()
+        except EOFError:
+            return
+        connection.send(_try(case, background))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,251 @@
+"""Who bothers the node during a soak: each role is a process, `clients.py ROLE SEED FOLDER`, until it is killed.
+
+What a role saw goes to FOLDER/ROLE-SEED.jsonl, a line each: what, how long (s), whether it went well, what was said.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import random
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Tuple
+
+import rospy
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, WrenchStamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerUpdate, MarkerArray
+
+HUNG = 10.0  # s that a service may take
+PACKAGE = Path(__file__).resolve().parents[2]
+
+SCRIPTS: Dict[str, str] = {
+    "broken.py": "def sysCall_init(:\n",
+    "broken.lua": "function sysCall_init(\n",
+    "raises.py": "def sysCall_actuation():\n    1 / 0\n",
+    "raises.lua": "function sysCall_sensing()\n  error({})\nend\n",
+    "hangs.py": "def sysCall_actuation():\n    while True:\n        pass\n",
+    "hangs.lua": "function sysCall_actuation()\n  while true do pcall(error) end\nend\n",
+    "hangs_in_c.lua": "function sysCall_init()\n  x = ('x'):rep(250000):find('.-.-.-.-.-y')\nend\n",
+    "eats.lua": "function sysCall_init()\n  x = {}\n  while true do x[#x + 1] = ('x'):rep(1e6) .. #x end\nend\n",
+    "cleanup.py": "def sysCall_cleanup():\n    raise ValueError('x')\n",
+    "draws.lua": (
+        "function sysCall_init()\n  d = sim.addDrawingObject(2, 2, 0, -1, 100, {1, 0, 0})\nend\n"
+        "function sysCall_sensing()\n  sim.addDrawingObjectItem(d, {math.random(), 0, 1})\nend\n"
+    ),
+    "talks.py": (
+        "def sysCall_init():\n    self.out = simROS.advertise('/soak/talk', 'std_msgs/Float64')\n"
+        "    simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'on_twist')\n"
+        "def on_twist(m):\n    simROS.publish(self.out, {'data': m.linear.x})\n"
+    ),
+}
+GOOD_SCRIPTS = (
+    *sorted((PACKAGE / "src" / "drone_sim" / "child_scripts").glob("t*.py")),
+    *sorted((PACKAGE / "test" / "unit" / "scripts").glob("*.lua")),
+)
+SCENES: Dict[str, str] = {
+    "bad_key.yaml": "object: []\n",
+    "bad_yaml.yaml": "objects: [{\n",
+    "bad_size.yaml": "objects: [{shape: box, size: [1, -1, 1], position: [0, 0, 1]}]\n",
+    "no_mesh.yaml": "objects: [{shape: mesh, file: none.obj, position: [0, 0, 1]}]\n",
+    "two_roots.yaml": "objects: [{shape: urdf, file: two_roots.urdf, position: [0, 0, 1]}]\n",
+    "mtllib.yaml": "objects: [{shape: mesh, file: mtllib.obj, position: [0, 0, 1]}]\n",
+    "two_roots.urdf": '<robot name="r"><link name="a"/><link name="b"/></robot>',
+    "mtllib.obj": "mtllib ..\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    "boxes.yaml": "objects:\n" + "- {shape: box, size: [0.2, 0.2, 0.2], position: [2, 0, 1], mass: 1}\n" * 60,
+}
+_ODD = (math.nan, math.inf, -math.inf, 1e300, -1e9, 5e-324, 1e4)
+
+
+class Diary:
+    """What a role saw."""
+
+    def __init__(self, path: Path):
+        """Write to a file."""
+        self._file = path.open("a", encoding="utf-8", buffering=1)
+
+    def add(self, what: str, seconds: float, well: bool, said: str) -> None:
+        """Note one thing."""
+        self._file.write(json.dumps([what, round(seconds, 3), well, said]) + "\n")
+
+
+def within(seconds: float, action: Callable[[], Any]) -> Tuple[bool, Any]:
+    """Return whether the action came to its end in that time, and its result or what it raised."""
+    result: List[Any] = []
+
+    def run() -> None:
+        try:
+            result.append(action())
+        except Exception as error:
+            result.append(error)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    return bool(result), result[0] if result else None
+
+
+# ---- services
+
+
+def call_services(dice: random.Random, folder: Path, diary: Diary) -> None:
+    """Press every button, in any order, as somebody in a hurry."""
+    names = ["start"] * 3 + ["pause"] * 3 + ["snapshot", "restore", "step"] * 2 + ["stop", "load_scene", "save_scene"]
+    while True:
+        name = dice.choice(names)
+        if dice.random() < 0.2:
+            _choose_script(dice, folder)
+        if name in ("load_scene", "save_scene"):
+            rospy.set_param("/drone_sim/scene_file", _scene(dice, folder, saving=name == "save_scene"))
+        _call(name, dice.random() < 0.3, diary)
+        time.sleep(dice.choice([0.0, 0.05, 0.5, 2.0]))
+
+
+def _call(name: str, on: bool, diary: Diary) -> None:
+    began = time.monotonic()
+
+    def call() -> Any:
+        if name == "pause":
+            return rospy.ServiceProxy("/drone_sim/pause", SetBool)(on)
+        return rospy.ServiceProxy(f"/drone_sim/{name}", Trigger)()
+
+    ended, answer = within(HUNG, call)
+    took = time.monotonic() - began
+    if not ended:
+        diary.add(name, took, False, "HUNG")
+    elif isinstance(answer, Exception):
+        diary.add(name, took, False, f"NO ANSWER {type(answer).__name__}: {answer}")
+    else:
+        diary.add(name, took, answer.success, answer.message)
+
+
+def _choose_script(dice: random.Random, folder: Path) -> None:
+    """Put another script where the node finds the one that it flies: a link, so that it may be of either language."""
+    good = dice.random() < 0.8
+    target = dice.choice(GOOD_SCRIPTS) if good else folder / dice.choice(sorted(SCRIPTS))
+    link = folder / f"link-{os.getpid()}"
+    link.symlink_to(target)
+    link.replace(folder / "flown.py")
+
+
+def _scene(dice: random.Random, folder: Path, saving: bool) -> str:
+    if saving:
+        return str(folder / "saved.yaml")
+    own = [folder / name for name in SCENES if name.endswith(".yaml")]
+    shipped = sorted((PACKAGE / "config" / "scenes").glob("*.yaml"))
+    return str(dice.choice([*own, *shipped * 4, folder / "saved.yaml", folder / "none.yaml", ""]) or "")
+
+
+# ---- topics
+
+
+def send_commands(dice: random.Random, _folder: Path, _diary: Diary) -> None:
+    """Publish commands, good ones and nonsense, far more often than there are steps."""
+    kinds: Dict[str, Any] = {"cmd_vel": Twist, "set_pose": PoseStamped, "target_pose": PoseStamped}
+    kinds.update({"initialpose": PoseWithCovarianceStamped, "push": WrenchStamped})
+    kinds["markers/feedback"] = InteractiveMarkerFeedback
+    publishers = {topic: rospy.Publisher(f"/drone/{topic}", kind, queue_size=10) for topic, kind in kinds.items()}
+    while True:
+        topic = dice.choice(["cmd_vel"] * 20 + sorted(kinds))
+        message = kinds[topic]()
+        _fill(message, dice)
+        publishers[topic].publish(message)
+        time.sleep(dice.choice([0.0, 0.005, 0.005, 0.02]))
+
+
+def _fill(message: Any, dice: random.Random) -> None:
+    """Give every number of a message a value, most of them sensible."""
+
+    def number() -> float:
+        return dice.choice(_ODD) if dice.random() < 0.01 else dice.uniform(-1, 1)
+
+    def fill(part: Any) -> None:
+        for axis in {"x", "y", "z", "w"} & set(part.__slots__):
+            setattr(part, axis, number())
+
+    if isinstance(message, Twist):
+        fill(message.linear)
+        fill(message.angular)
+        return
+    message.header.frame_id = dice.choice(["world"] * 9 + ["base_link"])
+    if isinstance(message, WrenchStamped):
+        fill(message.wrench.force)
+        return
+    if isinstance(message, InteractiveMarkerFeedback):
+        message.client_id, message.marker_name = "soak", dice.choice(["Drone", "DronePosition", "odd"])
+        message.event_type = dice.randint(0, 5)
+    pose = message.pose.pose if isinstance(message, PoseWithCovarianceStamped) else message.pose
+    fill(pose.position)
+    pose.position.z += 1.5
+    pose.orientation.w = 1.0
+
+
+TOPICS: Tuple[Tuple[str, Any], ...] = (
+    ("front", Image),
+    ("front/compressed", CompressedImage),
+    ("camera_info", CameraInfo),
+    ("depth/image", Image),
+    ("track/image", Image),
+    ("floor/image", Image),
+    ("odom", Odometry),
+    ("scene", MarkerArray),
+    ("drawing", MarkerArray),
+    ("markers/update", InteractiveMarkerUpdate),
+)
+
+
+def look(dice: random.Random, _folder: Path, _diary: Diary) -> None:
+    """Subscribe and unsubscribe."""
+    subscribers: Dict[str, rospy.Subscriber] = {}
+    while True:
+        topic, kind = dice.choice(TOPICS)
+        if topic in subscribers:
+            subscribers.pop(topic).unregister()
+        elif len(subscribers) < 3:
+            subscribers[topic] = rospy.Subscriber(f"/drone/{topic}", kind, lambda _message: None, queue_size=1)
+        time.sleep(dice.uniform(0.1, 2.0))
+
+
+def listen(_dice: random.Random, _folder: Path, diary: Diary) -> None:
+    """Count the odometry; say every second how much came, and that what came were numbers."""
+    count = [0]
+
+    def on_odometry(message: Odometry) -> None:
+        count[0] += 1
+        where = message.pose.pose.position
+        if not all(map(math.isfinite, (where.x, where.y, where.z))):
+            diary.add("odom", 0.0, False, f"NOT FINITE {where.x} {where.y} {where.z}")
+
+    rospy.Subscriber("/drone/odom", Odometry, on_odometry, queue_size=100)
+    while True:
+        time.sleep(1.0)
+        diary.add("odom", 1.0, True, str(count[0]))
+        count[0] = 0
+
+
+def sleep(_dice: random.Random, _folder: Path, _diary: Diary) -> None:
+    """Listen to everything; run.py stops this process with SIGSTOP now and then, and its sockets fill up."""
+    for topic, kind in TOPICS[:7]:
+        rospy.Subscriber(f"/drone/{topic}", kind, lambda _message: None)
+    while True:
+        time.sleep(1.0)
+
+
+ROLES = {"services": call_services, "commands": send_commands, "looker": look, "odometry": listen, "sleeper": sleep}
+
+
+def main() -> None:
+    """Play a role."""
+    role, seed, folder = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3])
+    rospy.init_node(f"soak_{role}_{seed}", disable_signals=True)
+    ROLES[role](random.Random(f"{role} {seed}"), folder, Diary(folder / f"{role}-{seed}.jsonl"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""What is made of samples of the node's process, of its output, and of the clients' diaries."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from typing import Any, Dict, List, NamedTuple
+
+import numpy as np
+
+MOST_MEMORY = 1.0  # MB a minute after warming up, and
+LEAST_MEMORY = 15.0  # MB in all, below which nothing is said of a slope
+JUDGED = 90.0  # s, after warming up, before anything is said of growth
+MOST_MORE = 8  # threads, descriptors
+_TIDY = re.compile(r"\d[\d.e+-]*|'[^']*'|/\S+")
+
+
+class Sample(NamedTuple):
+    """The node's process at a moment (s): resident memory in MB, threads, open descriptors."""
+
+    at: float
+    memory: float
+    threads: int
+    descriptors: int
+
+
+def slope(samples: List[Sample]) -> float:
+    """Return by how many MB a minute the memory grew: the median of the slopes between any two (Theil and Sen)."""
+    at, memory = np.array([[s.at, s.memory] for s in samples]).T
+    first, second = np.triu_indices(len(at), 1)
+    far = at[second] - at[first] > 0.2 * (at[-1] - at[0])
+    slopes = (memory[second] - memory[first])[far] / (at[second] - at[first])[far]
+    return float(np.median(slopes) * 60.0) if len(slopes) else 0.0
+
+
+def settled(samples: List[Sample]) -> List[Sample]:
+    """Return the samples after the warm-up: a third of the run, at most two minutes."""
+    warm = samples[0].at + min(120.0, (samples[-1].at - samples[0].at) / 3)
+    return [sample for sample in samples if sample.at >= warm]
+
+
+def growth(samples: List[Sample]) -> List[str]:
+    """Name what grew after the warm-up, if that was long enough ago."""
+    rest = settled(samples)
+    if rest[-1].at - rest[0].at < JUDGED:
+        return []
+    found = []
+    third = len(rest) // 3
+    early, late = rest[:third], rest[-third:]
+    risen = min(s.memory for s in late) - min(s.memory for s in early)
+    if slope(rest) > MOST_MEMORY and risen > LEAST_MEMORY:
+        found.append(f"memory grows by {slope(rest):.1f} MB a minute")
+    for name in ("threads", "descriptors"):
+        more = min(getattr(s, name) for s in late) - min(getattr(s, name) for s in early)
+        if more > MOST_MORE:
+            found.append(f"{name} grow: {more} more")
+    return found
+
+
+def late_steps(lines: List[str]) -> int:
+    """Return how many late steps the node has counted."""
+    counts = [
+        int(n) for line in lines for n in re.findall(r"\((\d+) so far\)|(\d+) late steps", line)[0:1] for n in n if n
+    ]
+    return max(counts, default=0)
+
+
+def answers(diary: List[Any]) -> Dict[str, Counter]:
+    """Count what the services said, with numbers and names left out."""
+    said: Dict[str, Counter] = {}
+    for what, _, well, text in diary:
+        if what != "odom":
+            key = "well" if well else _TIDY.sub("_", text)[:110]
+            said.setdefault(what, Counter())[key] += 1
+    return said
+
+
+def faults(lines: List[str], diary: List[Any], samples: List[Sample]) -> List[str]:
+    """Name what went wrong."""
+    found = [
+        f"{what}: {text} after {seconds:.1f} s"
+        for what, seconds, _, text in diary
+        if text[:4] in ("HUNG", "NOT ", "NO A")
+    ]
+    found += [f"the node printed: {line[:200]}" for line in lines if "Traceback" in line]
+    return [*found[:10], *growth(samples)]
+
+
+def report(samples: List[Sample], lines: List[str], diary: List[Any], began: float) -> str:
+    """Return the line of now."""
+    now, calls = samples[-1], [entry for entry in diary if entry[0] != "odom"]
+    odometry = [int(text) for what, _, well, text in diary if what == "odom" and well][-10:]
+    refused = sum(not well for _, _, well, _ in calls)
+    slowest = max((seconds for _, seconds, _, _ in calls), default=0.0)
+    return (
+        f"{now.at - began:6.0f} s  {now.memory:6.1f} MB {slope(settled(samples)):+6.2f} MB/min  "
+        f"{now.threads:3d} threads {now.descriptors:4d} descriptors  {late_steps(lines):4d} late  "
+        f"{len(calls):5d} calls {refused:4d} refused, slowest {slowest:.1f} s  "
+        f"{np.mean(odometry) if odometry else 0:5.1f} odom/s"
+    )
