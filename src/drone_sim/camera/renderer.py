@@ -1,9 +1,9 @@
 """Pictures, depth images and labels of a list of visuals, drawn by OpenGL without a display.
 
-The shadow costs no pass over a shadow map: the floor leaves its darkening in the picture's alpha, everything
+The shadow costs no pass over a shadow map: floor and ground leave their darkening in the picture's alpha, everything
 else leaves 1; the things are then drawn once more, flattened onto the floor along the light, each multiplying
-the colour by alpha and setting alpha to 1. So only what is floor darkens, and only once. There are shadows on
-floors alone, in the plane of the first one, and transparent things cast none.
+the colour by alpha and setting alpha to 1. So only what is floor or ground darkens, and only once. There
+are shadows on these alone, in the plane of the first floor, and transparent things cast none.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 from drone_sim.camera import context, shaders, sky
 from drone_sim.camera.context import RendererUnavailable
 from drone_sim.camera.intrinsics import Intrinsics
-from drone_sim.camera.scene import Batch, Programs, Scene
+from drone_sim.camera.scene import SHADE, Batch, Programs, Scene
 from drone_sim.visual import Visual
 
 __all__ = ["Renderer", "RendererUnavailable"]
@@ -89,7 +89,7 @@ class Renderer:
                 target = self._targets[size] = _Target(gl, size, self._samples)
             self._prepare(intrinsics, camera_pose, poses)
             target.framebuffer.use()
-            target.framebuffer.clear(*sky.HAZE, 1.0)
+            target.framebuffer.clear(*sky.HAZE, SHADE if self._scene.has_ground else 1.0)
             self._paint(gl, camera_pose, poses)
             if self._samples:
                 gl.copy_framebuffer(target.resolved, target.framebuffer)

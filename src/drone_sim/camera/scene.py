@@ -48,6 +48,7 @@ class Batch:
     members: List[int]  # indices into the visuals
     floor: bool = False
     transparent: bool = False
+    ground: bool = False
     first: int = 0  # record
     arrays: Dict[str, moderngl.VertexArray] = field(default_factory=dict)
 
@@ -74,6 +75,7 @@ class Scene:
         self.batches: List[Batch] = []
         self.solids: List[Batch] = []
         self.floors: List[Batch] = []
+        self.has_ground = False  # which the picture is cleared to; it has a depth, too
         self.glass: List[Batch] = []
 
     def update(self, visuals: Sequence[Visual]) -> None:
@@ -91,8 +93,9 @@ class Scene:
             self._parts[form] = tuple(self._upload(one) for one in meshes)
         self.visuals = visuals
         self.batches = self._sort(visuals, [form for form, _ in shared])
-        self.solids = [batch for batch in self.batches if not batch.floor and not batch.transparent]
+        self.solids = [batch for batch in self.batches if not (batch.floor or batch.transparent or batch.ground)]
         self.floors = [batch for batch in self.batches if batch.floor]
+        self.has_ground = any(batch.ground for batch in self.batches)
         self.glass = [batch for batch in self.batches if batch.transparent]
         self._members = np.array([i for batch in self.batches for i in batch.members], dtype=np.intp)
         self._scales = np.array([shared[i][1] for i in self._members]).reshape(-1, 1, 3)
@@ -176,7 +179,9 @@ class Scene:
         singles: List[Batch] = []
         for index, (visual, form) in enumerate(zip(visuals, forms)):
             for part in self._parts[form]:
-                if visual.floor:
+                if visual.ground:
+                    singles.append(Batch(part, [index], ground=True))
+                elif visual.floor:
                     singles.append(Batch(part, [index], floor=True))
                 elif part.transparent or visual.rgba[3] < 1.0:
                     singles.append(Batch(part, [index], transparent=True))

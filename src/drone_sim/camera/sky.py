@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from drone_sim.visual import GROUND
+
 SECTORS = 8
-HAZE = (0.60, 0.61, 0.60)  # the ground far away; the picture is cleared to it
+HAZE = GROUND  # far away; the picture is cleared to it
 # Elevation in degrees, and the colour there: the ground's haze brightens to the horizon, blue above it.
 BANDS = (
     (-6.0, HAZE),

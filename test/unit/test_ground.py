@@ -1,0 +1,84 @@
+"""Beyond the floor there is ground; where a scene wants an edge, the drone falls, and the log says so once."""
+
+import logging
+
+import numpy as np
+import pybullet
+import pytest
+
+from drone_sim import parameters
+from drone_sim.simulation import Simulation
+from drone_sim.state import Pose, Twist, Vector3
+from drone_sim.visual import GROUND
+
+DOWN, FORWARD = Twist(Vector3(0, 0, -1)), Twist(Vector3(1, 0, 0))
+
+
+def simulation_at(x, **floor):
+    simulation = Simulation(parameters.load({"scene": {"floor": floor}}))
+    simulation.drone.move(Pose((x, 0.0, 0.8)))
+    return simulation
+
+
+@pytest.mark.parametrize("x", [3.0, 5.0, 6.0, 300.0, -900.0])
+def test_the_drone_lands_on_floor_and_ground_alike(x):
+    simulation = simulation_at(x)
+    simulation.drone.receive(DOWN)
+    for _ in range(200):
+        simulation.step()
+    assert simulation.drone.state.position[2] == pytest.approx(0.01, abs=0.003)
+    simulation.close()
+
+
+def test_it_slides_over_the_rim_of_the_floor():
+    simulation = Simulation(
+        parameters.load(
+            {"scene": {"objects": [{"shape": "sphere", "size": [0.1], "mass": 1, "position": [4, 0, 0.1]}]}}
+        )
+    )
+    simulation.drone.move(Pose((0.0, 3.0, 0.8)))
+    ball = simulation.scene._bodies[0]
+    import pybullet
+
+    pybullet.resetBaseVelocity(ball._body, [2, 0, 0], [0, 20, 0], simulation.world._client)
+    for _ in range(60):
+        simulation.step()
+        assert ball.state.position[2] == pytest.approx(0.1, abs=0.002)
+    assert ball.state.position[0] > 6.0
+    simulation.close()
+
+
+def test_at_an_edge_it_falls_and_is_told_so_once(caplog):
+    simulation = simulation_at(4.9, edge=True)
+    with caplog.at_level(logging.WARNING):
+        simulation.drone.receive(FORWARD)
+        for _ in range(60):
+            simulation.step()
+        simulation.drone.receive(DOWN)
+        for _ in range(100):
+            simulation.step()
+    assert simulation.drone.state.position[2] < -1.0
+    assert [record.getMessage() for record in caplog.records if "edge" in record.getMessage()] == [
+        caplog.records[0].getMessage()
+    ]
+    simulation.close()
+
+
+def test_pictures_and_depth_show_the_ground():
+    simulation = simulation_at(8.0)  # looking away from the floor
+    picture, depth = (simulation.cameras[name].look() for name in ("front", "depth"))
+    bottom = picture[-1].astype(float) / 255
+    assert np.abs(bottom - GROUND).max() < 0.01
+    assert np.isnan(depth[0]).all()
+    # 0.8 m above the ground, half a picture below the axis at a field of view of 60 degrees across 640 x 480.
+    assert depth[-1, 320] == pytest.approx(0.8 / (239.5 / simulation.cameras["depth"].intrinsics.fy), rel=0.01)
+    simulation.close()
+
+
+def test_the_shadow_falls_on_the_ground():
+    simulation = simulation_at(9.0)
+    simulation.step()  # the tracking camera comes along
+    picture = simulation.cameras["track"].look().astype(float) / 255
+    dark = np.abs(picture - np.multiply(GROUND, 0.55)).max(axis=2) < 0.02
+    assert 200 < dark.sum() < 20000
+    simulation.close()
