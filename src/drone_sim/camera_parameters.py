@@ -66,16 +66,16 @@ def check_together(cameras: Mapping[str, CameraParameters]) -> None:
         for topic, what in _topics(camera):
             if topic in topics:
                 raise ParameterError(
-                    f"{here}/topic = '{camera.topic}': {what}, {topic}, is {topics[topic]} too; "
+                    f"{here}/topic = '{camera.topic}': its {what} would be {topic}, which is {topics[topic]}; "
                     "a topic such as rear/image has a namespace of its own"
                 )
-        topics.update((topic, f"{what} of cameras/{name}") for topic, what in _topics(camera))
+        topics.update((topic, f"the {what} of cameras/{name}") for topic, what in _topics(camera))
 
 
 def _topics(camera: CameraParameters) -> Iterator[Tuple[str, str]]:
     """Yield what a camera publishes, and what it is."""
-    yield camera.topic, "its image"
+    yield camera.topic, "image"
     folder, slash, _ = camera.topic.rpartition("/")
-    yield f"{folder}{slash}camera_info", "its camera_info"
+    yield f"{folder}{slash}camera_info", "camera_info"
     for transport in ("compressed", "compressed/parameter_descriptions", "compressed/parameter_updates"):
-        yield f"{camera.topic}/{transport}", f"its {transport}"
+        yield f"{camera.topic}/{transport}", transport

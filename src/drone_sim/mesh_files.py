@@ -171,7 +171,7 @@ def _check_text(content: bytes, kind: str) -> None:
             raise ValueError("must have no DOCTYPE")
     for word, most in _MOST.get(kind, {}).items():
         if len(re.findall(word, content)) > most:
-            raise ValueError(f"more than {most} times `{word.rpartition(b')?')[2].decode().strip()}`")
+            raise ValueError(f"more than {most} times `{word.rpartition(b')?')[2].decode().lstrip(chr(92) + 'n')}`")
 
 
 def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,12 +37,12 @@ class ParameterError(ValueError):
 
 def numeric(value: Any) -> Any:
     """Let nothing but a number be one. YAML 1.1, which rosparam reads, takes `1e3` for a text."""
-    if isinstance(value, str) and _EXPONENT.match(value) and len(value) < MAX_NAME:
+    if isinstance(value, str) and len(value) < MAX_NAME and _EXPONENT.match(value):
         return float(value)
     if isinstance(value, (bool, str)):
         raise ValueError("input should be a valid number")
     if isinstance(value, int) and abs(value) > 1e300:
-        return math.copysign(1e300, value)  # beyond every range, and still a float
+        return 1e300 if value > 0 else -1e300  # beyond every range, and still a float
     return value
 
 

@@ -76,7 +76,7 @@ class Simulation:
         self._runs = 0
         self._gui = gui
         load.script_path(script)  # one that is not there needs no world
-        self._build(parameters)
+        self._take(_Built(parameters, World(parameters.sub_step, parameters.gravity, gui)))
         try:
             self.vision = Vision(self.world, parameters.samples)
             self.cameras: Dict[str, Camera] = {name: self._camera(one) for name, one in parameters.cameras.items()}
@@ -91,20 +91,21 @@ class Simulation:
 
     def _build(self, parameters: Parameters) -> None:
         """Put the scene and a drone without a script into a new world, which then takes the last one's place."""
-        stands = hasattr(self, "world")
-        if stands and self._gui:  # there is one window: what cannot be built must not replace what it shows
-            _Built(parameters, World(parameters.sub_step, parameters.gravity)).world.close()
+        built = _Built(parameters, World(parameters.sub_step, parameters.gravity))
+        if self._gui:  # a process has one window: what can be built is built there once more
+            built.world.close()
             self.world.clear()
             built = _Built(parameters, self.world)
         else:
-            built = _Built(parameters, World(parameters.sub_step, parameters.gravity, self._gui))
-        if stands and not self._gui:
             self.world.close()
-        self.parameters = parameters
-        self._sub_steps = parameters.sub_steps
+        self._take(built)
+        self.vision.look_at(self.world)
+
+    def _take(self, built: _Built) -> None:
+        """Begin in what has been built."""
+        self.parameters = built.parameters
+        self._sub_steps = built.parameters.sub_steps
         self.world, self.scene, self.drone = built.world, built.scene, built.drone
-        if stands:
-            self.vision.look_at(self.world)
         self.drone.bus.backend = self._backend
         self.drone.drawings = self._drawings
         self.world.keep_beginning()
@@ -239,6 +240,7 @@ class _Built:
 
     def __init__(self, parameters: Parameters, world: World):
         """Fill an empty world. Raises ParameterError and UrdfError."""
+        self.parameters = parameters
         self.world = world
         try:
             self.scene = Scene(parameters, world)

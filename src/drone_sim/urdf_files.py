@@ -23,7 +23,7 @@ JOINTS = ("fixed", "continuous", "revolute", "prismatic")
 class _Numbers(NamedTuple):
     """So many numbers of one attribute, from `low` to `high` or 0."""
 
-    count: int
+    many: int
     low: float
     high: float
     or_zero: bool = False
@@ -36,8 +36,8 @@ class _Numbers(NamedTuple):
             numbers = [float(word) for word in words]
         except ValueError:
             numbers = []
-        if len(numbers) != self.count or not all(map(math.isfinite, numbers)):
-            raise ValueError(f"{shown(text)}: must be {self.count} finite numbers")
+        if len(numbers) != self.many or not all(map(math.isfinite, numbers)):
+            raise ValueError(f"{shown(text)}: must be {self.many} finite numbers")
         for number in numbers:
             if not (self.low <= number <= self.high or (self.or_zero and number == 0)):
                 zero = "0, or " if self.or_zero else ""
@@ -47,7 +47,7 @@ class _Numbers(NamedTuple):
 
 _Attributes = Mapping[str, _Numbers]
 _Colors = Mapping[Optional[str], Optional[Xml.Element]]
-_LENGTH = {"low": 1e-6, "high": 1e4}
+_LENGTH = _Numbers(1, 1e-6, 1e4)
 _MOMENT = _Numbers(1, 1e-12, 1e9, or_zero=True, default="0")
 _PRODUCT = _Numbers(1, -1e9, 1e9, default="0")
 _ORIGIN: _Attributes = {"xyz": _Numbers(3, -1e4, 1e4, default="0 0 0"), "rpy": _Numbers(3, -1e3, 1e3, default="0 0 0")}
@@ -56,10 +56,10 @@ _INERTIA: _Attributes = {
     **{name: _PRODUCT for name in ("ixy", "ixz", "iyz")},
 }
 _SHAPES: Dict[str, _Attributes] = {
-    "box": {"size": _Numbers(3, **_LENGTH)},
-    "cylinder": {"radius": _Numbers(1, **_LENGTH), "length": _Numbers(1, **_LENGTH)},
-    "capsule": {"radius": _Numbers(1, **_LENGTH), "length": _Numbers(1, **_LENGTH)},
-    "sphere": {"radius": _Numbers(1, **_LENGTH)},
+    "box": {"size": _LENGTH._replace(many=3)},
+    "cylinder": {"radius": _LENGTH, "length": _LENGTH},
+    "capsule": {"radius": _LENGTH, "length": _LENGTH},
+    "sphere": {"radius": _LENGTH},
     "plane": {"normal": _Numbers(3, -1, 1)},
     "mesh": {"scale": _Numbers(3, -1e6, 1e6, default="1 1 1")},
 }

@@ -16,7 +16,7 @@ from drone_sim.resources import MEBIBYTE, read_bytes, shown
 
 MAX_SIZE = MEBIBYTE  # bytes of a file
 MAX_DEPTH = 32  # lists and mappings within each other
-MAX_VALUES = 300_000  # keys and values, each alias counted with all that it stands for
+MAX_VALUES = 100_000  # keys and values, each alias counted with all that it stands for
 _MAX_DIGITS = 400  # of a number
 _OTHER = ("int", "float", "timestamp")  # what YAML 1.1 reads in ways of its own
 _INT = re.compile(r"[-+]?(?:[0-9]+|0x[0-9a-fA-F]+)$")
@@ -51,7 +51,7 @@ def parse(text: str) -> Any:
     if len(text) > MAX_SIZE:
         raise YamlError(f"larger than {MAX_SIZE / MEBIBYTE:g} MiB")
     try:
-        _check_depth(text)
+        _check_events(text)
         loader = _Loader(text)
         try:
             node = loader.get_single_node()
@@ -94,6 +94,10 @@ def _too_deep(node: Any) -> yaml.MarkedYAMLError:
     return _refused(node, f"lists and mappings are more than {MAX_DEPTH} deep")
 
 
+def _too_much(node: Any) -> yaml.MarkedYAMLError:
+    return _refused(node, f"more than {MAX_VALUES} values, aliases counted with what they stand for")
+
+
 def _number(loader: _Loader, node: Any) -> float:
     text = str(loader.construct_scalar(node))
     if len(text) > _MAX_DIGITS:
@@ -117,16 +121,18 @@ for _tag in ("binary", "timestamp", "omap", "pairs", "set"):
 _Loader.add_constructor(None, _refuse_tag)
 
 
-def _check_depth(text: str) -> None:
-    """Refuse what is nested too deeply before anything recurses into it."""
+def _check_events(text: str) -> None:
+    """Refuse what is nested too deeply or too much before anything is made of it."""
     depth = 0
-    for event in yaml.parse(text, Loader=_Base):
+    for number, event in enumerate(yaml.parse(text, Loader=_Base)):
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
             if depth > MAX_DEPTH:
                 raise _too_deep(event)
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
+        if number > 2 * MAX_VALUES:
+            raise _too_much(event)
 
 
 def _check_keys(node: yaml.MappingNode) -> None:
@@ -162,7 +168,7 @@ def _measure(node: Any, known: Dict[int, _Size], depth: int) -> _Size:
                 values, deepest = values + part.values, max(deepest, part.depth)
         size = known[id(node)] = _Size(values, deepest + 1)
     if size.values > MAX_VALUES:
-        raise _refused(node, f"more than {MAX_VALUES} values, aliases counted with what they stand for")
+        raise _too_much(node)
     if depth + size.depth > MAX_DEPTH + 2:
         raise _too_deep(node)
     return size

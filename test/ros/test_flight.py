@@ -6,6 +6,7 @@ import sys
 import unittest
 
 import numpy as np
+import rosgraph
 import rospy
 import rostest
 import tf2_ros
@@ -15,6 +16,9 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Float32MultiArray
+
+from drone_sim import parameters
+from drone_sim.camera_parameters import RESERVED_TOPICS
 
 CUBE = {"size": 0.4, "position": (2.5, 0.25, 1.1), "yaw": 0.6}  # as in cube.yaml
 
@@ -50,6 +54,21 @@ class Flight(unittest.TestCase):
     def setUp(self):
         self.commands.publish(twist())
         self.move(at(0, 0, 0.8))
+
+    def test_the_drones_own_topics_are_reserved(self):
+        """A camera's topic may be none of them."""
+        publishers, subscribers, _ = rosgraph.Master("/test_flight").getSystemState()
+        named = {topic[len("/drone/") :] for topic, _ in publishers + subscribers if topic.startswith("/drone/")}
+        cameras = parameters.load().cameras.values()
+        folders = {camera.topic.rpartition("/")[0] for camera in cameras}
+        infos = {f"{folder}/camera_info".lstrip("/") for folder in folders}
+        own = {
+            topic
+            for topic in named - infos
+            if not any(topic == camera.topic or topic.startswith(f"{camera.topic}/") for camera in cameras)
+        }
+        self.assertLessEqual({"odom", "cmd_vel"}, own)
+        self.assertLessEqual(own, set(RESERVED_TOPICS))
 
     def move(self, pose):
         message = PoseStamped(pose=pose)

@@ -3,6 +3,9 @@
 import pytest
 
 from drone_sim import parameters
+from drone_sim.simulation import Simulation
+
+BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
 
 
 @pytest.mark.parametrize(
@@ -20,13 +23,55 @@ from drone_sim import parameters
         ({"propellers": {"law": "5.x"}}, "parameter propellers/law = '5.x': input should be '3.x' or '4.x'"),
         ({"drone": {"position": [0, 0, -1]}}, "parameter drone/position/2 = -1: input should be greater than or equal"),
         ({"colour": "red"}, "parameter colour: unknown key"),
+        (5, "parameters = 5: must be a mapping"),
+        (
+            {"time_step": 5e-324, "sub_step": 5e-324},
+            "time_step = 5e-324: input should be greater than or equal to 0.0001",
+        ),
+        ({"time_step": 1e9}, "time_step = 1000000000.0: input should be less than or equal to 1"),
+        ({"time_step": True}, "time_step = True: input should be a valid number"),
+        ({"time_step": "0.05"}, "time_step = '0.05': input should be a valid number"),
+        ({"sub_step": 1e-5}, "sub_step = 1e-05: makes 5000 of a time_step of 0.05 s; at most 1000 are allowed"),
+        ({"sub_step": 1e-300}, "sub_step = 1e-300: input should be greater than or equal to 0.00001"),
+        ({"gravity": 10**5000}, "gravity = 1e+300: input should be less than or equal to 100"),
+        ({"gravity": "9" * 10**7}, "input should be a valid number"),
+        ({"gravity": "1:30"}, "gravity = '1:30': input should be a valid number"),
+        ({"a" * 10**6: 1}, "unknown key"),
+        ({"a\nb": 1}, "parameter 'a\\nb': unknown key"),
+        ({"control": {"Kzref": 1e300}}, "control/Kzref = 1e+300: input should be less than or equal to 10000"),
+        ({"real_time_factor": 1e-9}, "real_time_factor = 1e-09: must be 0, or from 0.001 to 1000"),
+        ({"gui": 1}, "gui = 1: input should be a valid boolean"),
+        ({"samples": False}, "samples = False"),
+        ({"drone": {"position": [1, 2]}}, "drone/position/2"),
+        ({"drone": {"position": [1, 2, 3, 4]}}, "drone/position = [1, 2, 3, 4]"),
+        ({"drone": {"name": "a" * 100}}, "string should have at most 64 characters"),
+        ({"drone": {"urdf": "x" * 300}}, "no such file"),
+        ({"drone": {"urdf": "a\0b"}}, "no such file"),
+        ({"drone": {"urdf": "~nobody_at_all/x"}}, "no such home"),
+        ({"cameras": {"front": {"horizontal_fov": 5e-324}}}, "horizontal_fov = 5e-324: input should be greater than"),
+        ({"cameras": {"front": {"width": 640.5}}}, "cameras/front/width = 640.5: input should be a valid integer"),
+        ({"cameras": {"front": {"topic": "odom"}}}, "'odom': its image would be odom, which is the drone's own"),
+        ({"cameras": {"front": {"topic": "markers/update"}}}, "markers/update, which is the drone's own"),
+        ({"cameras": {"front": {"topic": "a//b"}}}, "should match pattern"),
+        ({"cameras": {"track": {"topic": "camera_info"}}}, "which is the camera_info of cameras/front"),
+        ({"cameras": {"track": {"topic": "front/compressed"}}}, "which is the compressed of cameras/front"),
+        ({"cameras": {"track": {"topic": "track"}}}, "'track': its camera_info would be camera_info, which is the"),
+        ({"cameras": {"track": {"object": "FrontVision"}}}, "object = 'FrontVision': is that of cameras/front too"),
+        ({"cameras": {"track": {"width": 4096, "height": 4096}}}, "at most 16777216 are allowed"),
+        ({"cameras": {f"c{n}": {} for n in range(20)}}, "parameter cameras"),
+        ({"scene": {"objects": [BALL, BALL]}}, "scene/objects/1/name = 'Ball': comes twice"),
+        ({"scene": {"objects": [{**BALL, "mass": 1e-300}]}}, "mass = 1e-300: must be 0, or from 1e-06 to 1e+06"),
+        ({"scene": {"objects": [{**BALL, "mass": float("nan")}]}}, "mass = nan: input should be a finite number"),
+        ({"config": 5}, "config = 5: must be the name of a file"),
+        ({"config": "no.yaml"}, "config = 'no.yaml': no such file"),
+        ({"script": "a\nb.py"}, "must be printable"),
     ],
 )
 def test_a_mistake_gets_one_line(overrides, message):
     with pytest.raises(parameters.ParameterError) as refused:
         parameters.load(overrides)
     assert message in str(refused.value)
-    assert "\n" not in str(refused.value) and len(str(refused.value)) < 400
+    assert "\n" not in str(refused.value) and len(str(refused.value)) < 700
 
 
 def test_only_the_keys_that_change_are_needed():
@@ -43,3 +88,47 @@ def test_no_limits_can_be_written_as_a_word(word):
 def test_parameters_are_frozen():
     with pytest.raises(ValueError, match="frozen"):
         parameters.load().control.Kzref = 1.0
+
+
+def test_a_deep_value_is_cut_before_it_is_shown():
+    deep = value = {}
+    for _ in range(50_000):
+        value["a"] = value = {}
+    with pytest.raises(parameters.ParameterError, match=r"gravity = \{'a': ") as refused:
+        parameters.load({"gravity": deep})
+    assert len(str(refused.value)) < 200
+
+
+def test_what_yaml_1_1_takes_for_a_text_is_a_number():
+    assert parameters.load({"gravity": "1e1"}).gravity == 10.0
+
+
+@pytest.mark.parametrize("name", ["Floor", "Drone", "target", "Track_base"])
+def test_a_camera_is_not_called_like_an_object_that_there_is(name):
+    with pytest.raises(parameters.ParameterError, match=f"an object named '{name}' is there already"):
+        Simulation(parameters.load({"cameras": {"front": {"object": name}}}))
+
+
+def test_a_config_file_lies_between_the_defaults_and_what_is_given(tmp_path):
+    config = tmp_path / "config.yaml"
+    config.write_text("gravity: -1\ncontrol: {Kzref: 1, Dzref: 2}")
+    loaded = parameters.load({"config": str(config), "control": {"Kzref": 4}})
+    assert (loaded.gravity, loaded.control.Kzref, loaded.control.Dzref, loaded.time_step) == (-1.0, 4.0, 2.0, 0.05)
+    assert loaded.in_scene("").gravity == -1.0
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("gravity: 1:30", "config.yaml: parameter gravity = '1:30'"),
+        ("gravity: 1\ngravity: 2", "config.yaml: key 'gravity' comes twice (line 2, column 1)"),
+        ("gravty: 1", "config.yaml: parameter gravty: unknown key; known are gravity"),
+        ("config: other.yaml", "config.yaml: a config file names no other `config`"),
+        ("- 1", "config.yaml: must hold `key: value` lines"),
+    ],
+)
+def test_a_mistake_in_a_config_file_names_it(tmp_path, text, words):
+    (tmp_path / "config.yaml").write_text(text)
+    with pytest.raises(parameters.ParameterError) as refused:
+        parameters.load({"config": str(tmp_path / "config.yaml")})
+    assert words in str(refused.value) and "\n" not in str(refused.value)

@@ -9,7 +9,7 @@ import pytest
 
 from drone_sim import frames, parameters
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.simulation import Simulation
+from drone_sim.simulation import Diverged, Simulation
 from drone_sim.state import Pose, Twist, Vector3
 
 SCRIPTS = Path(__file__).parent / "scripts"
@@ -206,3 +206,49 @@ def test_cleanup_that_fails_runs_once_too(simulate, tmp_path, caplog, end):
         getattr(simulation, end)()
     simulation.close()
     assert [record.getMessage() for record in caplog.records].count("cleanup") == 1
+
+
+def test_a_scene_that_cannot_be_built_leaves_the_last_one_standing(simulate, tmp_path):
+    """What is wrong shows only when all is built: a name that the drone has."""
+    simulation = simulate(scene={"objects": CLUTTER})
+    world, drone, path = simulation.world, simulation.drone, fly(simulation, 10)
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 1]}]")
+    before = resources()[1:]
+    for _ in range(3):
+        with pytest.raises(parameters.ParameterError, match="named 'Drone' is there already"):
+            simulation.start(scene_file=str(scene))
+    assert simulation.world is world and simulation.drone is drone and resources()[1:] == before
+    simulation.start()
+    assert fly(simulation, 10) == path
+
+
+def test_numbers_that_mean_nothing_end_the_flight_with_one_line(simulate):
+    simulation = simulate()
+    path = fly(simulation, 3)
+    simulation.drone.push((0.0, 0.0, float("nan")), (0.0, 0.0, 0.0), 1.0)
+    with pytest.raises(Diverged, match=r"the simulation has diverged at t = 0\.\d\d s: position") as said:
+        fly(simulation, 20)
+    assert "\n" not in str(said.value)
+    simulation.start()
+    assert fly(simulation, 3) == path
+
+
+@pytest.mark.parametrize("script", ["missing.py", "missing.lua", "nosuch", "x" * 300 + ".py", "a\0.py"])
+def test_a_script_that_is_not_there_ends_it_before_anything_is_built(tmp_path, script):
+    for started in (True, False):
+        with pytest.raises(ScriptError) as said:
+            Simulation(parameters.load(), script=script, started=started)
+        assert "\n" not in str(said.value)
+
+
+def test_a_script_that_has_gone_is_refused_at_the_start_and_the_simulation_stands(simulate, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("def sysCall_init(): pass\n")
+    simulation = simulate(script)
+    simulation.stop()
+    script.unlink()
+    with pytest.raises(ScriptError, match="no such file"):
+        simulation.start()
+    simulation.stop()
+    assert not simulation.running

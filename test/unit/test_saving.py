@@ -1,0 +1,115 @@
+"""A scene that is saved: nothing is lost, and what was written can be loaded."""
+
+import os
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+import yaml
+
+from drone_sim import frames, parameters
+from drone_sim.parameters import ParameterError
+from drone_sim.resources import package_path
+from drone_sim.simulation import Simulation
+from drone_sim.state import Pose
+
+SCENE = """
+floor: {size: 20, texture: pictures/tile.png}
+drone: {position: [0, 0, 1], yaw: 0.5, urdf: package://drone_sim/urdf/drone.urdf}
+objects:
+  - {name: Å, shape: mesh, file: ball.stl, position: [3, 0, 1], texture: ABSOLUTE}
+  - {shape: box, size: [1, 1, 1], position: [5, 0, 1], texture: package://drone_sim/urdf/floor.png}
+"""
+
+
+@pytest.fixture(name="scene")
+def _scene(tmp_path):
+    (tmp_path / "pictures").mkdir()
+    cv2.imwrite(str(tmp_path / "pictures" / "tile.png"), np.zeros((2, 2, 3), np.uint8))
+    trimesh.creation.icosphere(subdivisions=1).export(str(tmp_path / "ball.stl"))
+    path = tmp_path / "scene.yaml"
+    path.write_text(SCENE.replace("ABSOLUTE", str(tmp_path / "pictures" / "tile.png")), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(name="simulation")
+def _simulation(scene):
+    simulation = Simulation(parameters.load({"scene_file": str(scene)}))
+    yield simulation
+    simulation.close()
+
+
+def files(path):
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    first, second = content["objects"]
+    return [content["floor"]["texture"], first["file"], first["texture"], second["texture"], content["drone"]["urdf"]]
+
+
+def test_files_keep_the_names_that_they_were_given(simulation, scene):
+    before = files(scene)
+    simulation.scene.save(scene, simulation.drone.matrix)
+    assert files(scene) == before
+    assert yaml.safe_load(scene.read_text(encoding="utf-8"))["objects"][0]["name"] == "Å"
+
+
+def test_saved_elsewhere_they_are_found_all_the_same(simulation, scene, tmp_path):
+    there = tmp_path / "there" / "scene.yaml"
+    simulation.scene.save(there, simulation.drone.matrix)
+    texture, ball, *others = files(there)
+    assert (texture, ball) == (str(tmp_path / "pictures" / "tile.png"), str(tmp_path / "ball.stl"))
+    assert others == files(scene)[2:]
+    assert parameters.load({"scene_file": str(there)}).scene == parameters.load({"scene_file": str(scene)}).scene
+
+
+def test_names_given_beside_a_file_are_found_from_another_folder(tmp_path, monkeypatch, scene):
+    monkeypatch.chdir(tmp_path)
+    ball = {"shape": "mesh", "file": "ball.stl", "position": [3, 0, 1]}
+    simulation = Simulation(parameters.load({"scene": {"objects": [ball]}}))
+    simulation.scene.save(tmp_path / "there" / "scene.yaml", simulation.drone.matrix)
+    simulation.close()
+    monkeypatch.chdir("/")
+    (again,) = parameters.load({"scene_file": str(tmp_path / "there" / "scene.yaml")}).scene.objects
+    assert again.file == str(tmp_path / "ball.stl")
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, -3.0])
+def test_yaw_is_the_heading_however_the_drone_leans(simulation, scene, yaw):
+    leaning = frames.from_rpy((0, 0, 2), (0.7, -0.6, yaw))
+    simulation.drone.move(Pose((0, 0, 2), frames.to_quaternion(leaning)))
+    simulation.scene.save(scene, simulation.drone.matrix)
+    assert parameters.load({"scene_file": str(scene)}).drone.yaw == pytest.approx(yaw)
+
+
+def test_what_could_not_be_loaded_is_not_saved(simulation, scene):
+    before = scene.read_text(encoding="utf-8")
+    below = frames.from_rpy((0, 0, -0.5), (0, 0, 0))
+    with pytest.raises(ParameterError, match=r"cannot be saved: .*drone/position/2 = -0\.5") as refused:
+        simulation.scene.save(scene, below)
+    assert "\n" not in str(refused.value)
+    assert scene.read_text(encoding="utf-8") == before
+
+
+def test_a_full_disk_leaves_the_last_scene(simulation, scene, monkeypatch):
+    before = scene.read_text(encoding="utf-8")
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match=r"scene\.yaml: No space left on device"):
+        simulation.scene.save(scene, simulation.drone.matrix)
+    assert scene.read_text(encoding="utf-8") == before
+    assert sorted(os.listdir(scene.parent)) == ["ball.stl", "pictures", "scene.yaml"]
+
+
+def test_every_shipped_scene_can_be_saved(tmp_path):
+    for name in ("empty", "gates", "room"):
+        simulation = Simulation(
+            parameters.load({"scene_file": str(package_path() / "config" / "scenes" / f"{name}.yaml")})
+        )
+        simulation.scene.save(tmp_path / f"{name}.yaml", simulation.drone.matrix)
+        simulation.close()
+        assert parameters.load({"scene_file": str(tmp_path / f"{name}.yaml")}).scene.floor.size == pytest.approx(
+            simulation.parameters.scene.floor.size
+        )

@@ -1,0 +1,87 @@
+"""YAML: what can surprise, or grow without end, is refused in one line."""
+
+import os
+
+import pytest
+
+from drone_sim import parameters, yaml_files
+from drone_sim.parameters import ParameterError
+
+
+def bomb(levels, start, link):
+    lines = [f"a0: &a0 {start}", *(f"a{n}: &a{n} {link.replace('*', f'*a{n - 1}')}" for n in range(1, levels))]
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        (bomb(9, "[1, 2, 3, 4, 5, 6, 7, 8, 9]", "[*, *, *, *, *, *, *, *, *]"), "more than 100000 values"),
+        (bomb(25, "{k: v}", "{<<: [*, *]}"), "more than"),
+        (bomb(5000, "{k: v}", "{k: *}"), "more than 32 deep (line 3"),
+        ("a: &a [*a]", "more than 32 deep (line 1"),
+        ("[" * 100_000, "more than 32 deep (line 1, column 33)"),
+        ("{a: " * 100_000, "more than 32 deep"),
+        ("\n".join(" " * n + "a:" for n in range(1000)), "more than 32 deep (line 33"),
+        ("x: [" + "1," * 300_000 + "]", "more than 100000 values"),
+        ("a: 1\nb: 2\na: 3", "key 'a' comes twice (line 3, column 1)"),
+        ("a: {b: 1, b: 2}", "key 'b' comes twice (line 1, column 11)"),
+        ("1: 2", "key '1' must be a text (line 1"),
+        ("true: 2", "key 'true' must be a text"),
+        ("~: 2", "key '~' must be a text"),
+        ("? [1, 2]\n: 3", "must be a text"),
+        ("a: 1\n---\na: 2", "expected a single document"),
+        ("a:\n\t1", "cannot start any token (line 2"),
+        ('a: "\0"', "#x0000"),
+        ("a: !!python/object/apply:os.system [ls]", "is not allowed (line 1, column 4)"),
+        ("a: !!binary aGFsbG8=", "tag:yaml.org,2002:binary' is not allowed"),
+        ("a: !other 1", "the tag '!other' is not allowed"),
+        ("a: " + "9" * 100_000, "a number of 100000 characters (line 1"),
+        ('a: !!int "1:30"', "'1:30' is no number"),
+        ("a: *nobody", "undefined alias (line 1"),
+        ("x" * 2_000_000, "larger than 1 MiB"),
+    ],
+)
+def test_what_can_surprise_is_refused_in_one_line(text, words):
+    with pytest.raises(yaml_files.YamlError) as refused:
+        yaml_files.parse(text)
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value) and len(str(refused.value)) < 300
+
+
+@pytest.mark.parametrize(
+    "text, value",
+    [
+        *(("1e3", 1000.0), ("-1.5E-2", -0.015), ("+.5", 0.5), ("5.", 5.0), ("010", 10), ("0x1F", 31), ("-7", -7)),
+        *(("1:30", "1:30"), ("1:30.5", "1:30.5"), ("1_000", "1_000"), ("2001-01-01", "2001-01-01"), (".5.5", ".5.5")),
+        *(("-.inf", float("-inf")), (".INF", float("inf")), ("true", True), ("~", None), ("''", ""), ("-", [None])),
+    ],
+)
+def test_scalars_are_those_of_yaml_1_2(text, value):
+    read = yaml_files.parse(text)
+    assert read == value and type(read) is type(value)
+
+
+def test_aliases_and_merges_work():
+    assert yaml_files.parse("a: &a {x: 1}\nb: {<<: *a, y: 2}\nc: [*a, *a]") == {
+        "a": {"x": 1},
+        "b": {"x": 1, "y": 2},
+        "c": [{"x": 1}, {"x": 1}],
+    }
+
+
+@pytest.mark.parametrize(
+    "name", ["/dev/zero", "/tmp", "fifo", "no.yaml", "x" * 300, "a\0b", "latin.yaml", "utf16.yaml"]
+)
+def test_only_regular_files_in_utf_8_are_read(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("fifo")
+    (tmp_path / "latin.yaml").write_bytes(b"gravity: 1\nscript: \xff")
+    (tmp_path / "utf16.yaml").write_bytes("gravity: 1".encode("utf-16"))
+    for key in ("config", "scene_file"):
+        with pytest.raises(ParameterError) as refused:
+            parameters.load({key: name})
+        assert name[:50].split("\0")[0] in str(refused.value)
+        assert "\n" not in str(refused.value) and len(str(refused.value)) < 900
+    if name == "latin.yaml":
+        assert "line 2: must be text in UTF-8" in str(refused.value)
