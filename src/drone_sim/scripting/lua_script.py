@@ -130,7 +130,6 @@ class LuaScript:
         """Call a function in Lua's thread; return what it returns."""
         if self._end:
             raise self._error(phase, self._end)
-        script_log.new_call()
         try:
             self._phases, how, *rest = self._thread.run(function, *arguments)
         except LeftBehind:
@@ -139,7 +138,7 @@ class LuaScript:
         except Exception as error:  # lupa's own, or a message that cannot be handed over
             raise self._error(phase, str(error) or type(error).__name__) from None
         finally:
-            script_log.new_call()
+            script_log.end_call()
         if how is True:
             return rest[0] if rest else None
         raise self._failure(phase, how, rest)

@@ -48,6 +48,7 @@ class LuaThread:
         self.closed = False  # once it is, no function of the API does anything
         self.api_code: Optional[CodeType] = None  # of the function that answers Lua's calls
         self._limit = limit
+        self._seconds = min(limit.seconds or threading.TIMEOUT_MAX, threading.TIMEOUT_MAX)
         limit.carry_with(self._carry)
         self._go, self._done = threading.Lock(), threading.Lock()
         self._go.acquire()
@@ -68,7 +69,9 @@ class LuaThread:
         self._limit.start()
         self._go.release()
         try:
-            self._wait()
+            came = self._done.acquire(timeout=self._seconds)
+            if not came or self._errand is not None:
+                self._wait(came)
         except BaseException:  # LeftBehind, or what a signal's handler raised
             self._end()
             raise
@@ -81,8 +84,10 @@ class LuaThread:
             self._job = None
             self._go.release()
 
-    def _wait(self) -> None:
-        """Wait for the function to end; raises LeftBehind where it hangs."""
+    def _wait(self, called: bool = False) -> None:
+        """Wait for the function to end, after an errand if it called for one; raises LeftBehind where it hangs."""
+        if called:
+            self._do_errand()
         while not self._is_back(min(max(_LOOK, self._limit.left()), threading.TIMEOUT_MAX)):
             if self._limit.exceeded():
                 self._wait_beyond(self._cpu_time() + _GRACE)

@@ -96,12 +96,11 @@ class PythonScript:
 
     def _run(self, phase: str, function: Any, *arguments: Any) -> None:
         failed = None
-        script_log.new_call()
         try:
             self._limit.run(function, *arguments)
         except BaseException as error:  # KeyboardInterrupt, too: whose it is cannot be told
             failed = self._error(phase, error)
-        script_log.new_call()
+        script_log.end_call()
         if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive
             raise failed
 

@@ -21,7 +21,7 @@ class _Lines:
         if self.count <= MOST:
             LOG.info("%s", text if len(text) <= LONGEST else text[:LONGEST] + "… (the rest of the line is left out)")
 
-    def begin(self) -> None:
+    def end(self) -> None:
         left_out, self.count = self.count - MOST, 0
         if left_out > 0:
             LOG.info("… %d lines left out: a call of the script may write %d", left_out, MOST)
@@ -35,10 +35,10 @@ def say(text: Any) -> None:
     _lines.say(text if type(text) is str else shown(text))
 
 
-def new_call() -> None:
-    """Begin to count anew; say how many lines were left out."""
+def end_call() -> None:
+    """Begin to count anew, after a call of the script; say how many lines were left out."""
     if _lines.count:
-        _lines.begin()
+        _lines.end()
 
 
 def shown(value: Any) -> str:
