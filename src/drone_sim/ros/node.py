@@ -166,6 +166,7 @@ class Node:
         self._shown = self.simulation.world.changes
 
     def _show_to_eyes(self) -> None:
+        self._output.publish_command(self._time.stamp)
         self._handles.update()
         for markers in self._markers:
             markers.update()
