@@ -93,6 +93,8 @@ class Screen:
         room = height > len(HELP) + len(lines)
         if self._unknown:
             lines[-1] = "no such key; the keys are above" if room else "no such key; a larger window shows the keys"
+        if not room:
+            lines = [line for line in (lines[-1], *lines[:-1]) if line]  # what there is to say comes first
         self._screen.erase()
         if room:
             self._write(0, list(HELP), width, curses.A_BOLD if self._unknown else curses.A_NORMAL)
@@ -142,8 +144,9 @@ def main() -> int:
         return 1
     teleop = Teleop()
     status = reported(_NAME, lambda: _fly(teleop))
+    rest_of_line = (curses.tigetstr("el") or b"").decode()  # what was typed before it began stands there
     try:
-        print(f"{_NAME}: {teleop.farewell}", flush=True)
+        print(f"\r{rest_of_line}{_NAME}: {teleop.farewell}", flush=True)
     except OSError:  # the terminal is gone
         status = 1
     rospy.signal_shutdown("left")
