@@ -1,4 +1,7 @@
-"""The node as a process on one core, with a master of its own: real-time factors and latencies."""
+"""The node as a process, with a master of its own: real-time factors and latencies.
+
+The bare node has one core and its listeners the other; what the launch file starts shares them all, as a user's does.
+"""
 
 import contextlib
 import os
@@ -11,7 +14,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Any, Dict, Iterator, List
+from typing import Any, Callable, ContextManager, Dict, Iterator, List
 
 import numpy as np
 
@@ -36,12 +39,21 @@ def master() -> Iterator[None]:
         process.wait()
 
 
-@contextlib.contextmanager
-def node(*arguments: str, program: str = "") -> Iterator[List[str]]:
+def node(*arguments: str, program: str = "") -> ContextManager[List[str]]:
     """Run the simulator, or a python program, on one core until the block ends; yield its lines of output."""
     what = [sys.executable, "-c", program] if program else ["rosrun", "drone_sim", "simulator"]
+    return _running("taskset", "-c", CORE, *what, *arguments)
+
+
+def launched(*arguments: str) -> ContextManager[List[str]]:
+    """Run all of the launch file until the block ends; yield its lines of output."""
+    return _running("roslaunch", "drone_sim", "drone.launch", *arguments)
+
+
+@contextlib.contextmanager
+def _running(*command: str) -> Iterator[List[str]]:
     process = subprocess.Popen(
-        ["taskset", "-c", CORE, *what, *arguments],
+        command,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -69,25 +81,51 @@ def node(*arguments: str, program: str = "") -> Iterator[List[str]]:
         reader.join()
 
 
-def real_time_factors(seconds: float = 6.0) -> List[Row]:
-    """As fast as it can, heard by nobody, and with the front camera published to a subscriber."""
+def real_time_factors(rounds: int = 3, seconds: float = 6.0) -> List[Row]:
+    """As fast as it can, by turns: the bare node, and the launch file in real and in simulated time.
+
+    Heard by nobody, and with the front camera and odometry heard by another process. Medians, lowest and highest.
+    """
+    free = "real_time_factor:=0"
+    running: Dict[str, Callable[[], ContextManager[List[str]]]] = {
+        "bare node": lambda: node(f"_{free}"),
+        "drone.launch": lambda: launched("rviz:=false", free),
+        "drone.launch, use_sim_time": lambda: launched("rviz:=false", free, "use_sim_time:=true"),
+    }
+    factors: Dict[str, List[float]] = {}
+    for _ in range(rounds):
+        for name, run in running.items():
+            for heard in (False, True):
+                row = f"{name}, {'front camera and odometry heard' if heard else 'nobody listens'}"
+                print(f"  {row}", file=sys.stderr, flush=True)
+                factors.setdefault(row, []).append(_factor(run, heard, seconds))
+    return [
+        {"name": name, "factor": median, "low": min(some), "high": max(some), "step_ms": 50 / median}
+        for name, some in factors.items()
+        for median in [float(np.median(some))]
+    ]
+
+
+def _factor(run: Callable[[], ContextManager[List[str]]], heard: bool, seconds: float) -> float:
+    from nav_msgs.msg import Odometry
     from sensor_msgs.msg import Image
 
-    rows = []
-    for name, topics in (("node, nobody listens", []), ("node, front camera published", ["/drone/front"])):
-        print(f"  {name}", file=sys.stderr, flush=True)
-        with node("_real_time_factor:=0") as lines:
-            listening = [_listen(topic, Image) for topic in topics]
-            time.sleep(seconds)
-            for subscriber in listening:
-                subscriber.unregister()
-            # The factor counts the whole run; ending at once keeps the unheard rest short.
-        flew = re.search(r"flew ([\d.]+) s at ([\d.]+) times real time", "".join(lines))
-        if flew is None:
-            raise RuntimeError("the node said nothing of its flight:\n" + "".join(lines))
-        factor = float(flew.group(2))
-        rows.append({"name": name, "factor": factor, "step_ms": 50 / factor})
-    return rows
+    with run() as lines:
+        # Another process than the node's, as a user's program is.
+        listening = [_listen("/drone/front", Image), _listen("/drone/odom", Odometry)] if heard else []
+        time.sleep(seconds)
+        for subscriber in listening:
+            subscriber.unregister()
+        # The factor counts the whole run; ending at once keeps the unheard rest short.
+    return float(_flew(lines).group(2))
+
+
+def _flew(lines: List[str]) -> "re.Match[str]":
+    """Return what the node says at its end: seconds flown, factor, late steps."""
+    flew = re.search(r"flew ([\d.]+) s at ([\d.]+) times real time, (\d+) late steps", "".join(lines))
+    if flew is None:
+        raise RuntimeError("the node said nothing of its flight:\n" + "".join(lines))
+    return flew
 
 
 def _listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
@@ -143,12 +181,11 @@ def latencies(seconds: float = 20.0) -> List[Row]:
                 time.sleep(random.uniform(0.03, 0.07))
             subscriber.unregister()
         delays = [float(line) for line in path.read_text().split()]
-    late = re.search(r"(\d+) late steps", "".join(lines))
     jitter = np.abs(np.diff(came) - 0.05)
     return [
         _spread("cmd_vel published -> seen by the loop", delays),
         _spread("image stamped -> in the subscriber's callback", ages),
-        {**_spread("jitter of the 20 Hz images", jitter), "late_steps": int(late.group(1)) if late else -1},
+        {**_spread("jitter of the 20 Hz images", jitter), "late_steps": int(_flew(lines).group(3))},
     ]
 
 
