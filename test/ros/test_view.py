@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`rosrun drone_sim view` without a display: a file with the pictures of several topics, and a line for each mistake."""
+"""`rosrun drone_sim view` without a display: a file with the pictures of topics, and a line for each mistake."""
 
 import os
 import subprocess

@@ -9,7 +9,7 @@ from typing import Callable, List
 UP, DOWN, LEFT, RIGHT, BACKSPACE, ESCAPE, UNKNOWN = "up", "down", "left", "right", "backspace", "escape", "unknown"
 PATIENCE = 0.5  # s, for what may follow an ESC; a slow line sends a sequence in pieces
 
-# ECMA-48: ESC [ parameters final, or ESC O final; the Linux console adds ESC [ [ final, and Alt puts an ESC before a key.
+# ECMA-48: ESC [ parameters final, or ESC O final. The Linux console adds ESC [ [ final, and Alt an ESC before a key.
 _WHOLE = re.compile(rb"\x1b+(?:\[\[.|\[[0-?]*[ -/]*[@-Z\\-~]|O[0-9;]*[@-~]|[^\x1b\[O])", re.DOTALL)
 _BEGINNING = re.compile(rb"\x1b+(?:\[\[?|\[[0-?]*[ -/]*|O[0-9;]*)?")
 _ARROW = re.compile(rb"\x1b+[\[O][0-9;]*([ABCD])")
@@ -19,7 +19,7 @@ _PLAIN = {b"\x7f": BACKSPACE, b"\x08": BACKSPACE}
 
 
 class KeyDecoder:
-    """Takes bytes as they come, in pieces of any size, and tells the keys: a printed character, or a name from above."""
+    """Takes bytes as they come, in pieces of any size, and tells the keys: a character, or one of the names above."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
         """Take a monotonic clock."""

@@ -57,7 +57,7 @@ def blank(text: str) -> np.ndarray:
 
 
 def tile(pictures: List[Tuple[str, np.ndarray]], largest: Optional[Size] = None) -> np.ndarray:
-    """Return named pictures (BGR) in one, side by side and below each other; no larger than `largest` (width, height)."""
+    """Return named pictures (BGR) side by side and below each other, no larger than `largest` (width, height)."""
     columns = math.ceil(math.sqrt(len(pictures)))
     width = max(picture.shape[1] for _, picture in pictures)
     height = max(picture.shape[0] for _, picture in pictures)

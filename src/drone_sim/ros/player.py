@@ -63,7 +63,7 @@ class Player:
         return "stopped"
 
     def restart(self) -> str:
-        """Stop and start. Raises what `start` does; a failure of the script's cleanup is said, and does not hinder it."""
+        """Stop and start. Raises what `start` does; an error in the script's cleanup is said, and does not hinder it."""
         if self.simulation.running:
             try:
                 self.stop()

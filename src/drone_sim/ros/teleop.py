@@ -123,12 +123,12 @@ class Teleop:
     def lines(self) -> List[str]:
         """Return the read-out: state, command in force, what the drone does, and what there is to say."""
         state = self._state()
-        command = self._in_force.heard
-        if command is None:
-            told = f"{self._in_force.sent}   (as sent)" if self.connected else "-"
-        else:
-            told = str(command)
-        return [f"state    {state}", f"command  {told}", *_motion(self._odometry), self.said]
+        return [f"state    {state}", f"command  {self._told_command()}", *_motion(self._odometry), self.said]
+
+    def _told_command(self) -> str:
+        if self._in_force.heard is not None:
+            return str(self._in_force.heard)
+        return f"{self._in_force.sent}   (as sent)" if self.connected else "-"
 
     def _state(self) -> str:
         known = self._states.get_num_connections() > 0
