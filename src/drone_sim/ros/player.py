@@ -63,7 +63,7 @@ class Player:
         return "stopped"
 
     def restart(self) -> str:
-        """Stop and start. Raises what `start` does; an error in the script's cleanup is said, and does not hinder it."""
+        """Stop and start. Raises what `start` does; errors in the script's cleanup are said and do not hinder it."""
         if self.simulation.running:
             try:
                 self.stop()
