@@ -84,6 +84,7 @@ class Topic:
         message, self._message = self._message, None
         if message is None:
             return False
+        self._since = time.monotonic()
         try:
             self.shown = pictures.decode(message)
         except ValueError as error:
@@ -91,9 +92,16 @@ class Topic:
         return True
 
     @property
+    def caption(self) -> str:
+        """The name, and for how long no picture has come, if that is long."""
+        silent = time.monotonic() - self._since
+        old = self.shown is not None and silent > _PATIENCE
+        return f"{self.name}   no picture for {silent:.0f} s" if old else self.name
+
+    @property
     def picture(self) -> Tuple[str, np.ndarray]:
-        """The name, and what there is to see."""
-        return self.name, pictures.blank(self.why.partition(";")[0]) if self.shown is None else self.shown
+        """The caption, and what there is to see."""
+        return self.caption, pictures.blank(self.why.partition(";")[0]) if self.shown is None else self.shown
 
 
 class Viewer:
@@ -141,11 +149,11 @@ class Viewer:
         label = tkinter.Label(window, borderwidth=0)
         label.pack()
         largest = int(_SHARE * window.winfo_screenwidth()), int(_SHARE * window.winfo_screenheight())
-        whys: List[str] = []
+        told: List[Tuple[str, str]] = []
         while not self._over():
             news = self._wait()
-            if news or whys != [topic.why for topic in self.topics]:
-                whys = [topic.why for topic in self.topics]
+            if news or told != [(topic.why, topic.caption) for topic in self.topics]:
+                told = [(topic.why, topic.caption) for topic in self.topics]
                 picture = pictures.tile([topic.picture for topic in self.topics], largest)
                 image = tkinter.PhotoImage(data=cv2.imencode(".ppm", picture)[1].tobytes())
                 label.configure(image=image)
