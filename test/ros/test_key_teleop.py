@@ -121,11 +121,16 @@ class KeyTeleop(unittest.TestCase):
         self.wait_for_command(0.0)
 
     def test_keys_while_it_starts_do_not_end_it(self):
-        while "command  vx" not in self.terminal.shown:
+        typed, before = 0, len(self.sent.messages)
+        while "stop the drone and leave" not in self.terminal.shown:
             self.terminal.type(UP, b"\x1b", b"[A", delay=0.03)
             self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
-        self.ready()
+            typed += 2
+        self.assertGreater(typed, 6)
+        self.terminal.wait_for("state    flying", "command  vx")
+        time.sleep(0.5)  # the input has been flushed by now
         self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
+        self.assertLess(max(m.linear.x for m in [Twist(), *self.sent.messages[before:]]), 0.35)  # but for the last ones
         self.terminal.type(b"q")
         self.assert_it_says_stop()
 
@@ -133,7 +138,7 @@ class KeyTeleop(unittest.TestCase):
         self.ready()
         self.terminal.type(UP, LEFT, delay=0)
         self.wait_for_command(0.1, 0.1)
-        self.terminal.type(b"\x1b", b"[", b"A")
+        self.terminal.type(b"\x1b", b"[", b"A", delay=0.3)
         self.wait_for_command(0.2, 0.1)
         self.terminal.type(b"\x1b[6~", b"z")
         self.terminal.wait_for("no such key")
