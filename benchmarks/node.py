@@ -6,6 +6,7 @@ The bare node has one core and its listeners the other; what the launch file sta
 import contextlib
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -121,8 +122,9 @@ def _factor(run: Callable[[], ContextManager[List[str]]], heard: bool, seconds: 
 
 
 def _flew(lines: List[str]) -> "re.Match[str]":
-    """Return what the node says at its end: seconds flown, factor, late steps."""
-    flew = re.search(r"flew ([\d.]+) s at ([\d.]+) times real time, (\d+) late steps", "".join(lines))
+    """Return what the node says at its end: seconds flown, factor, late steps, by how many ms."""
+    said = r"flew ([\d.]+) s at ([\d.]+) times real time, (\d+) late steps, by (\d+) ms"
+    flew = re.search(said, "".join(lines))
     if flew is None:
         raise RuntimeError("the node said nothing of its flight:\n" + "".join(lines))
     return flew
@@ -189,6 +191,59 @@ def latencies(seconds: float = 20.0) -> List[Row]:
     ]
 
 
+def late_steps(seconds: float = 60.0) -> List[Row]:
+    """At real time, the launch file with the front camera heard and a bag of everything; with rviz if it is there."""
+    rows = []
+    for rviz in (False, True):
+        name = f"drone.launch {'with' if rviz else 'without'} rviz, camera, bag"
+        if rviz and not (shutil.which("Xvfb") and shutil.which("rviz")):
+            print(f"  {name}: left out, it needs rviz and Xvfb", file=sys.stderr, flush=True)
+            continue
+        print(f"  {name}, for {seconds:g} s of real time", file=sys.stderr, flush=True)
+        with screen() if rviz else contextlib.nullcontext(), tempfile.TemporaryDirectory() as folder:
+            flew = _recorded(f"rviz:={str(rviz).lower()}", folder, seconds)
+        rows.append({"name": name, "late_steps": int(flew.group(3)), "worst_ms": float(flew.group(4))})
+    return rows
+
+
+def _recorded(argument: str, folder: str, seconds: float) -> "re.Match[str]":
+    from sensor_msgs.msg import Image
+
+    with launched(argument) as lines:
+        recorder = subprocess.Popen(
+            ["rosbag", "record", "-a", "-q", "-O", f"{folder}/all.bag"], stdout=subprocess.DEVNULL
+        )
+        subscriber = _listen("/drone/front", Image)
+        time.sleep(seconds)
+        subscriber.unregister()
+        recorder.send_signal(signal.SIGINT)
+        recorder.wait()
+    return _flew(lines)
+
+
+@contextlib.contextmanager
+def screen() -> Iterator[None]:
+    """Have a display without a screen, drawn by the processor, as DISPLAY."""
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1600x1000x24"],
+        pass_fds=[write],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    before = os.environ.get("DISPLAY")
+    with os.fdopen(read) as number:
+        os.environ["DISPLAY"] = f":{number.readline().strip()}"
+    try:
+        yield
+    finally:
+        server.terminate()
+        server.wait()
+        del os.environ["DISPLAY"]
+        if before is not None:
+            os.environ["DISPLAY"] = before
+
+
 def _spread(name: str, seconds: Any) -> Row:
     median, high = np.percentile(1e3 * np.asarray(seconds), [50, 95])
     return {"name": name, "median_ms": float(median), "p95_ms": float(high), "samples": len(seconds)}
@@ -200,6 +255,6 @@ def measure() -> List[Row]:
 
     with master():
         rospy.init_node("benchmark", disable_signals=True)
-        rows = real_time_factors() + latencies()
+        rows = real_time_factors() + latencies() + late_steps()
         rospy.signal_shutdown("done")
         return rows

@@ -100,7 +100,9 @@ def _be_the_guardian(read: int, write: int, process: int, name: str) -> None:
             with contextlib.suppress(OSError):
                 os.close(unused)
         if _outlasts_its_time(read):
-            _say(f"{name}: killed: a script, a file or the ROS master kept it busy for {PATIENCE:g} s when it had to end")
+            _say(
+                f"{name}: killed: a script, a file or the ROS master kept it busy for {PATIENCE:g} s when it had to end"
+            )
             os.kill(process, signal.SIGKILL)
     finally:
         os._exit(0)

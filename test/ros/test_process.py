@@ -135,10 +135,9 @@ class Process(unittest.TestCase):
             ("ROS_HOSTNAME", "no.such.host.invalid", "ROS_HOSTNAME = 'no.such.host.invalid': is not known here"),
             ("ROS_IP", "300.1.1.1", "ROS_IP = '300.1.1.1': is not known here"),
         ):
-            with self.subTest(value):
-                with mock.patch.dict(os.environ):
-                    os.environ.pop("ROS_HOSTNAME", None)
-                    self.assert_refused(simulator(**{name: value}), expected)
+            with self.subTest(value), mock.patch.dict(os.environ):
+                os.environ.pop("ROS_HOSTNAME", None)
+                self.assert_refused(simulator(**{name: value}), expected)
 
     def assert_refused(self, node, expected):
         output, _ = node.communicate(timeout=HANGS)
@@ -170,9 +169,9 @@ class Process(unittest.TestCase):
         return said
 
     def test_it_ends_whatever_it_does(self):
-        for what, number in ((("advance", HOLDS_THE_LOCK), signal.SIGINT), (("__init__", HOLDS_THE_LOCK), signal.SIGTERM)):
-            with self.subTest(what):
-                node = stuck(*what)
+        for function, number in (("advance", signal.SIGINT), ("__init__", signal.SIGTERM)):
+            with self.subTest(function):
+                node = stuck(function, HOLDS_THE_LOCK)
                 said = self.said_until(node, "flying into it")
                 node.send_signal(number)
                 self.assert_killed(node, said + node.communicate(timeout=HANGS)[0])

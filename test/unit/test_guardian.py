@@ -67,7 +67,8 @@ def test_what_does_not_look_is_killed_after_one_line(start, busy, number):
 
 
 def test_more_signals_give_no_more_time(start):
-    process = start("guardian.ready()\nprint('begun')\nwhile True: time.sleep(0.1); os.kill(os.getpid(), signal.SIGINT)")
+    again = "while True: time.sleep(0.1); os.kill(os.getpid(), signal.SIGINT)"
+    process = start(f"guardian.ready()\nprint('begun')\n{again}")
     assert ended(process)[0] == -signal.SIGKILL
 
 

@@ -58,7 +58,7 @@ def test_who_asks_gets_the_answer_or_the_error():
 
 def test_a_request_that_timed_out_is_not_carried_out_later():
     inbox, done = Inbox(patience=0.05), []
-    with pytest.raises(TimeoutError, match="no answer within 0.05 s: it will not be carried out"):
+    with pytest.raises(TimeoutError, match=r"no answer within 0\.05 s: it will not be carried out"):
         inbox.ask(lambda: done.append(1) or "")
     inbox.empty()
     assert not done

@@ -51,6 +51,7 @@ def test_an_overrun_is_counted_and_not_caught_up():
     pacer, clock = make()
     assert passes(pacer, clock, [0.01, 0.12, 0.01, 0.01]) == [0.05, 0.1, 0.22, 0.27]
     assert pacer.overruns == 1
+    assert round(pacer.worst, 9) == 0.07
 
 
 def test_as_fast_as_it_can():
