@@ -2,6 +2,7 @@
 """Paused in simulated time: single steps are told of, and what is moved is seen, although the clock stands still."""
 
 import sys
+import tempfile
 import threading
 import unittest
 
@@ -21,6 +22,17 @@ from drone_sim.ros.node import Node
 SMALL = {name: {"width": 64, "height": 48} for name in ("front", "depth", "track", "floor")}
 
 
+SCRIPT = """
+def sysCall_init():
+    self.camera = sim.getObject('/FrontVision')
+    self.image = simROS.imageTransportAdvertise('/script/image')
+
+def sysCall_sensing():
+    pixels, width, height = sim.getVisionSensorCharImage(self.camera)
+    simROS.imageTransportPublish(self.image, pixels, width, height, 'front_optical')
+"""
+
+
 class Standing(unittest.TestCase):
     """A node that runs in this process; this process hears its clock as any message."""
 
@@ -30,7 +42,8 @@ class Standing(unittest.TestCase):
         cls.thread.start()
         cls.clock, cls.odometry = Listener("/clock", Clock), Listener("/drone/odom", Odometry)
         cls.front, cls.transforms = Listener("/drone/front", Image), Listener("/tf", TFMessage)
-        for listener in (cls.odometry, cls.front, cls.transforms):
+        cls.scripts = Listener("/script/image", Image)
+        for listener in (cls.odometry, cls.front, cls.transforms, cls.scripts):
             listener.wait_for()
         cls.poses = connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=1))
         cls.commands = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1000))
@@ -43,9 +56,13 @@ class Standing(unittest.TestCase):
     @classmethod
     def run_node(cls):
         """Make and run it in one thread, which OpenGL belongs to."""
-        cls.node = Node(parameters.load({"cameras": SMALL, "real_time_factor": 10.0}))
-        cls.node.run()
-        cls.node.close()
+        with tempfile.NamedTemporaryFile("w", suffix=".py") as script:
+            script.write(SCRIPT)
+            script.flush()
+            settings = {"cameras": SMALL, "real_time_factor": 10.0, "script": script.name}
+            cls.node = Node(parameters.load(settings))
+            cls.node.run()
+            cls.node.close()
 
     def setUp(self):
         self.call("start")
@@ -67,20 +84,24 @@ class Standing(unittest.TestCase):
 
     def test_every_single_step_is_told_of(self):
         expected = [self.stamp(number) for number in (1, 2, 3, 4, 5)]
-        listeners = (self.clock, self.odometry, self.transforms, self.front)
+        listeners = (self.clock, self.odometry, self.transforms, self.front, self.scripts)
         before = {listener: len(listener.messages) for listener in listeners}
         asking = [threading.Thread(target=self.call, args=("step",)) for _ in expected]
         for thread in asking:
             thread.start()
         for thread in asking:
             thread.join()
-        for listener in (self.odometry, self.front):
+        for listener in (self.odometry, self.front, self.scripts):
             listener.wait_for(lambda m: m.header.stamp == expected[-1], after=before[listener])
         self.clock.wait_for(lambda c: c.clock == expected[-1], after=before[self.clock])
         self.transforms.wait_for(lambda m: m.transforms[0].header.stamp == expected[-1], after=before[self.transforms])
         since = {listener: listener.messages[count:] for listener, count in before.items()}
         self.assertEqual([c.clock for c in since[self.clock] if c.clock >= expected[0]], expected)
         self.assertEqual([o.header.stamp for o in since[self.odometry] if o.header.stamp >= expected[0]], expected)
+        pictures = {m.header.stamp: m.data for m in since[self.front]}
+        for image in since[self.scripts]:
+            if image.header.stamp in pictures:
+                self.assertEqual(image.data, pictures[image.header.stamp])
         sent = [m.transforms[0].header.stamp for m in since[self.transforms]]
         self.assertEqual([stamp for stamp in sent if stamp >= expected[0]], expected)
 

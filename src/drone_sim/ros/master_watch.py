@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from typing import Any, Dict, Optional
 
@@ -50,11 +51,15 @@ class MasterWatch(threading.Thread):
         try:
             pid = self._master.getPid()
             if pid == getattr(self, "_pid", pid):
-                names = [name for name in (rospy.get_name(), _USE_SIM_TIME) if self._master.hasParam(name)]
-                self._parameters = {name: self._master.getParam(name) for name in names}
+                self._remember()
             return pid
         except (OSError, rosgraph.MasterException):
             return None
+
+    def _remember(self) -> None:
+        for name in (rospy.get_name(), _USE_SIM_TIME):
+            with contextlib.suppress(rosgraph.MasterException):  # there is no such parameter
+                self._parameters[name] = self._master.getParam(name)
 
     def _register_again(self) -> bool:
         """Tell a new master all that the first one knew of this process; return False where it goes meanwhile.

@@ -120,7 +120,6 @@ class Node:
 
     def step(self) -> bool:
         """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
-        self._time.begin()
         self._inbox.empty()
         return self.player.playing and self.player.step()
 
