@@ -13,7 +13,7 @@ say() { printf '\033[1m[dev.sh]\033[0m %s\n' "$*" >&2; }
 fail() { say "$*"; exit 1; }
 
 packages() {
-  local common="python3-venv build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri"
+  local common="python3-venv python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri"
   if [ -f /opt/ros/noetic/setup.bash ]; then
     echo "$common $(printf 'ros-noetic-%s ' catkin rospy roslaunch rostest rosbash cv-bridge tf2-ros robot-state-publisher \
       rviz dynamic-reconfigure interactive-markers std-srvs geometry-msgs nav-msgs sensor-msgs std-msgs)"

@@ -207,6 +207,14 @@ class Process(unittest.TestCase):
         watchdog.cancel()
         self.assertEqual(node.returncode, 0)
 
+    def test_an_argument_that_the_launch_file_does_not_have_ends_it_with_one_line(self):
+        command = ["roslaunch", "drone_sim", "drone.launch", "rviz:=false", "scrpt:=mine.py"]
+        launched = subprocess.run(command, capture_output=True, text=True, timeout=2 * HANGS, check=False)
+        said = "scrpt:=mine.py: drone.launch has no argument scrpt; near names are script"
+        self.assertEqual(launched.stderr.count(said) + launched.stdout.count(said), 1, launched.stderr)
+        self.assertNotIn("Traceback", launched.stderr)
+        rospy.delete_param("/drone_sim")
+
     def assert_ends_cleanly(self, end):
         """Let it fly as fast as it can, with somebody listening, and end it by `end(process)`."""
         node = simulator("_real_time_factor:=0")

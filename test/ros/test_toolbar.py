@@ -13,11 +13,11 @@ import rospy
 import rostest
 import trimesh
 import yaml
-from geometry_msgs.msg import PoseStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
 from listening import Listener, connected
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerUpdate, Marker, MarkerArray
 
@@ -118,6 +118,46 @@ class Toolbar(unittest.TestCase):
         self.odometry.wait_for()
         self.call("stop")
         self.pause(True, expected=False)
+
+    def test_the_state_is_told_at_once_and_to_whoever_comes_late(self):
+        states = Listener("~state", String)
+        states.wait_for(lambda m: m.data == "flying", after=0)
+        expected = ["flying"]
+        for action, after in (
+            (lambda: self.pause(True), ["paused"]),
+            (lambda: self.call("step"), []),
+            (lambda: self.pause(False), ["flying"]),
+            (lambda: self.call("restart"), ["stopped", "flying"]),
+            (lambda: self.call("stop"), ["stopped"]),
+            (lambda: self.call("restart"), ["flying"]),
+            (lambda: self.pause(True), ["paused"]),
+            (lambda: self.script.write_text("def sysCall_actuation():\n    1 / 0\n"), []),
+            (lambda: self.call("restart"), ["stopped", "flying", "stopped"]),
+        ):
+            action()
+            expected += after
+            states.wait_for(lambda m, last=expected[-1]: m.data == last, after=len(expected) - 1)
+        self.assertEqual([m.data for m in states.messages], expected)
+        Listener("~state", String).wait_for(lambda m: m.data == "stopped", after=0)
+        self.script.write_text("def sysCall_cleanup():\n    1 / 0\n")
+        self.call("start")
+        self.script.write_text(SCRIPT)
+        self.call("restart")  # what cleanup gets wrong is said, and the edited script runs
+        self.log.wait_for(lambda m: "[cleanup]" in m.msg, after=0)
+        self.assertTrue(self.simulation.running)
+
+    def test_the_command_in_force(self):
+        commands = Listener("/drone/command", TwistStamped)
+        commander = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1))
+        twist = Twist()
+        for vx, change in ((0.5, lambda: None), (0.25, lambda: self.pause(True)), (0.125, lambda: self.call("stop"))):
+            change()
+            twist.linear.x, twist.angular.z = vx, -vx
+            commander.publish(twist)
+            said = commands.wait_for(lambda m, vx=vx: m.twist.linear.x == vx)
+            self.assertEqual((said.twist.angular.z, said.header.frame_id), (-vx, "Track_base"))
+        self.call("start")
+        commands.wait_for(lambda m: m.twist == Twist())
 
     def test_a_broken_script_stops_and_the_edited_one_starts(self):
         for broken, message in (

@@ -1,151 +1,153 @@
-"""Fly from the keyboard: the keys of the tutorial's teleop node, and height, stop, and a read-out.
+"""Fly from the keyboard: the keys of the tutorial's teleop node, and height, the simulation's toolbar, a read-out.
 
 A command holds until the next key, as on the topic. Leaving in any way sends a stop.
 """
 
 from __future__ import annotations
 
+import contextlib
 import curses
-import math
 import os
+import select
 import signal
 import sys
-from typing import Any, List, NamedTuple, Optional
+import termios
+import time
+from typing import Any, List
 
 import rospy
-from geometry_msgs.msg import Twist
-from nav_msgs.msg import Odometry
 
+from drone_sim.ros import keys
+from drone_sim.ros.keys import KeyDecoder
 from drone_sim.ros.starting import init_node, reported
+from drone_sim.ros.teleop import Teleop
 
-_STEP = 0.1  # m/s, per key press
-_TURN_STEP = 0.2  # rad/s, per key press
+_NAME = "key_teleop"
 _PERIOD = 0.1  # s between read-outs
-_ESCAPE = 27
+_CONNECTING = 1.0  # s at most, before the first key counts
+_LEAVE = (keys.ESCAPE, "q")
+# Ctrl-C, Ctrl-\ and Ctrl-Z among them: a command would hold while nobody is at the keys.
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+_INPUT_FLAGS = 0  # where they stand in what termios tells
 
 HELP = (
-    "UP / DOWN     forward / backward",
-    "LEFT / RIGHT  left / right",
-    "e / r         turn left / right",
+    "UP / DOWN     forward / backward      s          start / stop the simulation",
+    "LEFT / RIGHT  left / right            p          pause / go on",
+    "e / r         turn left / right       backspace  restart",
     "u / d         up / down",
-    "space         stop",
-    "ESC, q        stop and leave",
+    "space         stop the drone          q, ESC     stop the drone and leave",
 )
 
 
-class Command(NamedTuple):
-    """Speeds forward, left and up (m/s), and turning left (rad/s)."""
+class Screen:
+    """Reads keys and shows the read-out, until somebody wants to leave or the terminal is gone."""
 
-    vx: float = 0.0
-    vy: float = 0.0
-    vz: float = 0.0
-    wz: float = 0.0
+    def __init__(self, teleop: Teleop):
+        """Take what does the work."""
+        self._teleop = teleop
+        self._decoder = KeyDecoder()
+        self._terminal = sys.stdin.fileno()
+        self._unknown = False  # whether the last key was
 
-    def after(self, key: int) -> Command:
-        """Return the command after a key press; a key without a meaning changes nothing."""
-        if key not in _KEYS:
-            return self
-        changed = (round(old + change, 6) for old, change in zip(self, _KEYS[key]))
-        return Command(*changed) if key != ord(" ") else Command()
+    def run(self, screen: Any) -> None:
+        """Run in a curses screen."""
+        self._screen = screen
+        with contextlib.suppress(OSError, termios.error):  # the terminal is gone
+            _ignore_control_s(self._terminal)
+            self._connect()
+            self._fly()
 
-    def message(self) -> Twist:
-        """Return it as a message."""
-        twist = Twist()
-        twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.z = self
-        return twist
-
-
-_KEYS = {
-    curses.KEY_UP: (_STEP, 0, 0, 0),
-    curses.KEY_DOWN: (-_STEP, 0, 0, 0),
-    curses.KEY_LEFT: (0, _STEP, 0, 0),
-    curses.KEY_RIGHT: (0, -_STEP, 0, 0),
-    ord("u"): (0, 0, _STEP, 0),
-    ord("d"): (0, 0, -_STEP, 0),
-    ord("e"): (0, 0, 0, _TURN_STEP),
-    ord("r"): (0, 0, 0, -_TURN_STEP),
-    ord(" "): (0, 0, 0, 0),
-}
-
-
-class Teleop:
-    """The node behind the keys."""
-
-    def __init__(self) -> None:
-        """Publish `<drone>/cmd_vel`, follow `<drone>/odom`; the private parameter `drone` names it."""
-        self.command = Command()
-        self._odometry: Optional[Odometry] = None
-        drone = rospy.get_param("~drone", "drone")
-        self._publisher = rospy.Publisher(f"{drone}/cmd_vel", Twist, queue_size=1)
-        rospy.Subscriber(f"{drone}/odom", Odometry, self._keep, queue_size=1)
-
-    def _keep(self, message: Odometry) -> None:
-        self._odometry = message
-
-    def press(self, key: int) -> None:
-        """Take a key and publish the command that follows."""
-        self.command = self.command.after(key)
-        self._publisher.publish(self.command.message())
-
-    def stop(self) -> None:
-        """Publish a zero command."""
-        self.press(ord(" "))
-
-    def lines(self) -> List[str]:
-        """Return the read-out: who listens, command, pose."""
-        topic = self._publisher.resolved_name
-        heard = "" if self._publisher.get_num_connections() else "   (nobody listens yet)"
-        command = "vx {:+.1f}  vy {:+.1f}  vz {:+.1f} m/s   wz {:+.1f} rad/s".format(*self.command)
-        return [f"{topic}{heard}", f"command  {command}", f"drone    {self._pose()}"]
-
-    def _pose(self) -> str:
-        if self._odometry is None:
-            return "no odometry yet"
-        pose = self._odometry.pose.pose
-        q = pose.orientation
-        yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
-        place = pose.position
-        return f"x {place.x:+.2f}  y {place.y:+.2f}  z {place.z:+.2f} m   yaw {math.degrees(yaw):+.0f} deg"
-
-
-def _draw(screen: Any, lines: List[str]) -> None:
-    screen.erase()
-    height, width = screen.getmaxyx()
-    for row, line in enumerate(lines[:height]):
-        screen.addnstr(row, 0, line, width - 1)
-    screen.refresh()
-
-
-def _fly(screen: Any) -> None:
-    screen.timeout(int(_PERIOD * 1000))  # getch returns -1 after this long: the read-out stays live
-    teleop = Teleop()
-    try:
+    def _fly(self) -> None:
         while not rospy.is_shutdown():
-            _draw(screen, [*HELP, "", *teleop.lines()])
-            key = screen.getch()
-            if key in (_ESCAPE, ord("q")):
-                return
-            if key in _KEYS:
-                teleop.press(key)
-    except KeyboardInterrupt:
-        return
+            self._draw()
+            for key in self._read():
+                if key in _LEAVE:
+                    return
+                self._unknown = not self._teleop.press(key)
+
+    def _connect(self) -> None:
+        """Give the topics a moment to connect, and forget what was typed meanwhile, sequences cut in two among it."""
+        deadline = time.monotonic() + _CONNECTING
+        while not self._teleop.connected and time.monotonic() < deadline and not rospy.is_shutdown():
+            self._teleop.said = "connecting ..."
+            self._draw()
+            time.sleep(_PERIOD / 2)
+        self._teleop.said = ""
+        termios.tcflush(self._terminal, termios.TCIFLUSH)
+
+    def _read(self) -> List[str]:
+        """Wait a little for keys, and return them. Raises OSError when there will be none any more."""
+        if not select.select([self._terminal], [], [], _PERIOD)[0]:
+            return self._decoder.feed(b"")
+        data = os.read(self._terminal, 1024)
+        if not data:
+            raise OSError("the terminal is gone")
+        return self._decoder.feed(data)
+
+    def _draw(self) -> None:
+        size = os.get_terminal_size(self._terminal)
+        if curses.is_term_resized(size.lines, size.columns):
+            curses.resizeterm(size.lines, size.columns)
+        height, width = self._screen.getmaxyx()
+        lines = self._teleop.lines()
+        room = height > len(HELP) + len(lines)
+        if self._unknown:
+            lines[-1] = "no such key; the keys are above" if room else "no such key; a larger window shows the keys"
+        if not room:
+            lines = [line for line in (lines[-1], *lines[:-1]) if line]  # what there is to say comes first
+        self._screen.erase()
+        if room:
+            self._write(0, list(HELP), width, curses.A_BOLD if self._unknown else curses.A_NORMAL)
+        self._write(len(HELP) + 1 if room else 0, lines[:height], width, curses.A_NORMAL)
+        self._screen.refresh()
+
+    def _write(self, first: int, lines: List[str], width: int, look: int) -> None:
+        for row, line in enumerate(lines, start=first):
+            self._screen.addnstr(row, 0, line, width - 1, look)  # curses cannot fill the last corner
+
+
+def _ignore_control_s(terminal: int) -> None:
+    """Let Ctrl-S not hold up the output, and with it the keys, while the drone flies on."""
+    settings = termios.tcgetattr(terminal)
+    settings[_INPUT_FLAGS] &= ~termios.IXON
+    termios.tcsetattr(terminal, termios.TCSANOW, settings)
+
+
+def _fly(teleop: Teleop) -> None:
+    """Show the screen until it is left in any way, and stop the drone."""
+    try:
+        for number in _SIGNALS:
+            signal.signal(number, signal.default_int_handler)
+        curses.wrapper(Screen(teleop).run)
+    except (KeyboardInterrupt, curses.error):  # the latter where there is no terminal any more to leave
+        pass
     finally:
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
         teleop.stop()
-        # The message leaves in rospy's own time; a node that is gone delivers nothing.
-        curses.napms(200)
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_DFL)  # where the master does not answer, another one ends it
 
 
 def main() -> int:
-    """Run the node until ESC, q, Ctrl-C, or the terminal closes; return its exit status."""
+    """Run the node until ESC, q, a signal, or the terminal closes; return its exit status."""
     if not sys.stdin.isatty() or not sys.stdout.isatty():
-        print("key_teleop: needs a terminal to read keys from", file=sys.stderr)
+        print(f"{_NAME}: needs a terminal to read keys from", file=sys.stderr)
         return 1
-    # rospy's own handlers would close the topics before the last stop is sent.
-    if not init_node("key_teleop", anonymous=True, disable_signals=True):
+    try:
+        curses.setupterm()
+    except curses.error as error:
+        print(f"{_NAME}: TERM = '{os.environ.get('TERM', '')}': {error}", file=sys.stderr)
         return 1
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
-    os.environ.setdefault("ESCDELAY", "25")  # ms; curses waits a second for what may follow an ESC
-    status = reported("key_teleop", lambda: curses.wrapper(_fly))
+    # rospy's own handlers would close the topics before the last stop is sent, and its time may stand still.
+    if not init_node(_NAME, anonymous=True, disable_signals=True, disable_rostime=True):
+        return 1
+    teleop = Teleop()
+    status = reported(_NAME, lambda: _fly(teleop))
+    rest_of_line = (curses.tigetstr("el") or b"").decode()  # what was typed before it began stands there
+    try:
+        print(f"\r{rest_of_line}{_NAME}: {teleop.farewell}", flush=True)
+    except OSError:  # the terminal is gone
+        status = 1
     rospy.signal_shutdown("left")
     return status

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Mapping, Sequence
 
 import rospy
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, JointState
 from std_msgs.msg import Float32MultiArray, MultiArrayDimension, MultiArrayLayout
@@ -13,7 +13,7 @@ from std_msgs.msg import Float32MultiArray, MultiArrayDimension, MultiArrayLayou
 from drone_sim import frames
 from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.frames import Matrix
-from drone_sim.state import State
+from drone_sim.state import State, Twist
 
 WORLD = "world"
 
@@ -48,6 +48,14 @@ def camera_info(intrinsics: Intrinsics, frame: str) -> CameraInfo:
     message.D = [0.0] * 5
     message.K, message.P = intrinsics.K, intrinsics.P
     message.R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    return message
+
+
+def command(stamp: rospy.Time, twist: Twist, frame: str) -> TwistStamped:
+    """Return the command in force, in its frame."""
+    message = TwistStamped()
+    message.header.stamp, message.header.frame_id = stamp, frame
+    message.twist.linear, message.twist.angular = Vector3(*twist.linear), Vector3(*twist.angular)
     return message
 
 

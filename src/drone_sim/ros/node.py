@@ -26,6 +26,7 @@ from drone_sim.ros.drawing_markers import DrawingMarkers
 from drone_sim.ros.ending import Ending
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput
+from drone_sim.ros.launch_arguments import check_launch_arguments
 from drone_sim.ros.markers import Handles
 from drone_sim.ros.master_watch import MasterWatch
 from drone_sim.ros.outputs import DroneOutput
@@ -166,6 +167,7 @@ class Node:
         self._shown = self.simulation.world.changes
 
     def _show_to_eyes(self) -> None:
+        self._output.publish_command(self._time.stamp)
         self._handles.update()
         for markers in self._markers:
             markers.update()
@@ -195,6 +197,7 @@ def main(guardian: Guardian) -> int:
     nodes = []
 
     def run() -> None:
+        check_launch_arguments()
         nodes.append(Node(read_parameters()))
         MasterWatch().start()
         nodes[0].run(ending.asked)

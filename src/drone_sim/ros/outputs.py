@@ -6,6 +6,7 @@ from typing import Callable
 
 import rospy
 import tf2_ros
+from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray
@@ -20,7 +21,7 @@ _EYES = 1 / 30  # s of real time, between two messages that are for eyes
 
 
 class DroneOutput:
-    """Odometry, propellers, joint states and transforms of one drone."""
+    """Odometry, command, propellers, joint states and transforms of one drone."""
 
     def __init__(self, simulation: Simulation):
         """Advertise in the drone's namespace."""
@@ -28,6 +29,7 @@ class DroneOutput:
         drone = simulation.drone
         self._mounted = [camera for camera in simulation.parameters.cameras.values() if camera.mount is not None]
         self._odometry = rospy.Publisher(f"{drone.name}/odom", Odometry, queue_size=10)
+        self._command = rospy.Publisher(f"{drone.name}/command", TwistStamped, queue_size=10)
         self._propellers = rospy.Publisher(f"{drone.name}/propellers", Float32MultiArray, queue_size=10)
         self._joints = rospy.Publisher(f"{drone.name}/joint_states", JointState, queue_size=10)
         self._transforms = tf2_ros.TransformBroadcaster()
@@ -59,3 +61,8 @@ class DroneOutput:
         if self._propellers.get_num_connections():
             stamp()  # /clock before the message
             self._propellers.publish(messages.propellers(drone.particle_velocities))
+
+    def publish_command(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish the command in force, under what `stamp` returns; it may change while the simulation stands."""
+        if self._command.get_num_connections():
+            self._command.publish(messages.command(stamp(), self._simulation.drone.command, TRACK_BASE))

@@ -5,13 +5,17 @@ from __future__ import annotations
 from typing import Callable, Optional
 
 import rospy
+from std_msgs.msg import String
 
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Diverged, Simulation
 
 
 class Player:
-    """Plays a simulation; the thread that owns the simulation calls all of this."""
+    """Plays a simulation; the thread that owns the simulation calls all of this.
+
+    The latched topic ~state tells at once whether it is `flying`, `paused` or `stopped`.
+    """
 
     def __init__(self, simulation: Simulation, step: Callable[[], None], simulated_time: bool):
         """Begin stopped. `step` runs one step and shows it.
@@ -23,6 +27,15 @@ class Player:
         self.paused = False
         self.begun = False  # since this was last set to False
         self._simulated_time = simulated_time
+        self._publisher = rospy.Publisher("~state", String, queue_size=10, latch=True)
+        self._told = ""
+        self._tell_state()
+
+    def _tell_state(self) -> None:
+        state = "flying" if self.playing else "paused" if self.simulation.running else "stopped"
+        if state != self._told:
+            self._told = state
+            self._publisher.publish(state)
 
     @property
     def playing(self) -> bool:
@@ -43,15 +56,28 @@ class Player:
         """Run the script's cleanup, and restore the initial scene. Raises ScriptError."""
         if not self.simulation.running:
             return "is stopped already"
-        self.simulation.stop()
+        try:
+            self.simulation.stop()
+        finally:
+            self._tell_state()
         self._say_that_the_clock_stands("stopped")
         return "stopped"
+
+    def restart(self) -> str:
+        """Stop and start. Raises what `start` does; errors in the script's cleanup are said and do not hinder it."""
+        if self.simulation.running:
+            try:
+                self.stop()
+            except ScriptError as error:
+                rospy.logerr(f"script error: {error}")
+        return self.start()
 
     def pause(self, on: bool) -> str:
         """Pause or go on. Raises ValueError when stopped."""
         if not self.simulation.running:
             raise ValueError("is stopped: start it first")
         self.paused = on
+        self._tell_state()
         if on:
             self._say_that_the_clock_stands("paused")
         else:
@@ -85,6 +111,8 @@ class Player:
                 rospy.logerr(f"script error: {second}")
             self._say_that_the_clock_stands("stopped; `start` runs the edited file")
             raise
+        finally:
+            self._tell_state()
 
     def _say_that_the_clock_stands(self, state: str) -> None:
         if self._simulated_time:

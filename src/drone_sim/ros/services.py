@@ -20,7 +20,7 @@ _HOME = Path("~/.ros/drone_sim/scene.yaml")
 
 
 class Services:
-    """~start, ~stop, ~step, ~pause; ~save_scene, ~load_scene; ~snapshot, ~restore.
+    """~start, ~stop, ~restart, ~step, ~pause; ~save_scene, ~load_scene; ~snapshot, ~restore.
 
     Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`.
     """
@@ -30,7 +30,7 @@ class Services:
         self._player = player
         self._inbox = inbox
         self._snapshot: Optional[Snapshot] = None
-        for name in ("start", "stop", "step", "save_scene", "load_scene", "snapshot", "restore"):
+        for name in ("start", "stop", "restart", "step", "save_scene", "load_scene", "snapshot", "restore"):
             rospy.Service(f"~{name}", Trigger, self._trigger(getattr(self, name)))
         rospy.Service("~pause", SetBool, self._on_pause)
 
@@ -57,6 +57,10 @@ class Services:
     def stop(self) -> str:
         """Run cleanup, and restore the initial scene."""
         return self._player.stop()
+
+    def restart(self) -> str:
+        """Stop, and start."""
+        return self._player.restart()
 
     def step(self) -> str:
         """Run one step while paused."""

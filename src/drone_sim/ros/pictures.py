@@ -1,0 +1,91 @@
+"""Pictures of messages, as a screen shows them, and several of them in one."""
+
+from __future__ import annotations
+
+import math
+from typing import List, Optional, Tuple, Union
+
+import cv2
+import numpy as np
+from cv_bridge import CvBridge, CvBridgeError
+from sensor_msgs.msg import CompressedImage, Image
+
+_GREY, _WHITE = (60, 60, 60), (255, 255, 255)
+_EMPTY = (240, 320)  # px, height and width of what is not there yet
+_CAPTION = 24  # px, height
+_HALF = 3.0  # m, at which depth is shown half as bright as right in front
+_DEPTHS = ("32FC1", "16UC1")
+_MILLIMETRES = 1e-3  # ROS's unit of depth in 16UC1
+
+Size = Tuple[int, int]
+
+
+def decode(message: Union[Image, CompressedImage]) -> np.ndarray:
+    """Return a message's picture, BGR (height, width, 3); depth is the darker the farther, and black where it is none.
+
+    Raises ValueError, in one line, for one that cannot be shown.
+    """
+    if hasattr(message, "encoding"):
+        return _decode_raw(message)
+    if "compressedDepth" in message.format:
+        raise ValueError("compressedDepth is not shown")
+    picture = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR) if message.data else None
+    if picture is None:
+        raise ValueError(f"not a picture: format '{message.format}'")
+    return picture
+
+
+def _decode_raw(message: Image) -> np.ndarray:
+    try:
+        if message.encoding not in _DEPTHS:
+            return CvBridge().imgmsg_to_cv2(message, "bgr8")
+        depth = CvBridge().imgmsg_to_cv2(message).astype(float)
+    except (CvBridgeError, TypeError, ValueError, cv2.error) as error:
+        raise ValueError(f"encoding '{message.encoding}': {' '.join(str(error).split())}") from None
+    if message.encoding == "16UC1":
+        depth = np.where(depth == 0, np.nan, depth * _MILLIMETRES)
+    with np.errstate(invalid="ignore"):
+        grey = 255 / (1 + np.maximum(np.nan_to_num(depth, nan=np.inf), 0) / _HALF)
+    return cv2.cvtColor(grey.astype(np.uint8), cv2.COLOR_GRAY2BGR)
+
+
+def blank(text: str) -> np.ndarray:
+    """Return a grey picture that says something, BGR."""
+    picture = np.full((*_EMPTY, 3), _GREY, np.uint8)
+    _write(picture, text, _EMPTY[0] // 2)
+    return picture
+
+
+def tile(pictures: List[Tuple[str, np.ndarray]], largest: Optional[Size] = None) -> np.ndarray:
+    """Return named pictures (BGR) side by side and below each other, no larger than `largest` (width, height)."""
+    columns = math.ceil(math.sqrt(len(pictures)))
+    width = max(picture.shape[1] for _, picture in pictures)
+    height = max(picture.shape[0] for _, picture in pictures)
+    cells = [_cell(name, picture, width, height) for name, picture in pictures]
+    cells += [np.zeros_like(cells[0])] * (-len(cells) % columns)
+    rows = [np.hstack(cells[first : first + columns]) for first in range(0, len(cells), columns)]
+    return _shrunk(np.vstack(rows), largest)
+
+
+def _cell(name: str, picture: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Return a picture as large as fits, in the middle, below its name."""
+    cell = np.zeros((_CAPTION + height, width, 3), np.uint8)
+    _write(cell, name, _CAPTION - 7)
+    factor = min(width / picture.shape[1], height / picture.shape[0])
+    size = max(1, round(picture.shape[1] * factor)), max(1, round(picture.shape[0] * factor))
+    left, top = (width - size[0]) // 2, _CAPTION + (height - size[1]) // 2
+    fitted = picture if factor == 1 else cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)
+    cell[top : top + size[1], left : left + size[0]] = fitted
+    return cell
+
+
+def _shrunk(picture: np.ndarray, largest: Optional[Size]) -> np.ndarray:
+    factor = min(largest[0] / picture.shape[1], largest[1] / picture.shape[0]) if largest else 1.0
+    if factor >= 1:
+        return picture
+    size = max(1, int(picture.shape[1] * factor)), max(1, int(picture.shape[0] * factor))
+    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+
+
+def _write(picture: np.ndarray, text: str, row: int) -> None:
+    cv2.putText(picture, text, (6, row), cv2.FONT_HERSHEY_SIMPLEX, 0.45, _WHITE, 1, cv2.LINE_AA)

@@ -1,0 +1,43 @@
+"""roslaunch's command line: a wrong argument of drone.launch is told, and nothing else is touched."""
+
+import pytest
+
+from drone_sim.parameters import ParameterError
+from drone_sim.resources import package_path
+from drone_sim.ros.launch_arguments import check
+
+LAUNCH = package_path() / "launch"
+ROSLAUNCH = ["/usr/bin/python3", "/usr/bin/roslaunch"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        [*ROSLAUNCH, "drone_sim", "drone.launch", "scrpt:=x.py"],
+        [*ROSLAUNCH, "-p", "11841", "drone_sim", "drone.launch", "rviz:=false", "scrpt:=x.py"],
+        [*ROSLAUNCH, "drone.launch", "scrpt:=x.py", "--screen"],
+        [*ROSLAUNCH, str(LAUNCH / "drone.launch"), "scrpt:=x.py"],
+        ["roslaunch", "../launch/drone.launch", "scrpt:=x.py"],
+    ],
+)
+def test_a_wrong_argument_is_told_with_near_names(command):
+    with pytest.raises(ParameterError, match=r"scrpt:=x.py: drone.launch has no argument scrpt; near names are script"):
+        check(command, LAUNCH)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        [*ROSLAUNCH, "drone_sim", "drone.launch"],
+        [*ROSLAUNCH, "drone_sim", "drone.launch", "script:=x.py", "scene:=a.launch", "__name:=y", ""],
+        [*ROSLAUNCH, "other", "drone.launch", "scrpt:=x.py"],
+        [*ROSLAUNCH, "my.launch", "scrpt:=x.py"],
+        [*ROSLAUNCH, "drone_sim", "drone.launch", "my.launch", "scrpt:=x.py"],
+        [*ROSLAUNCH, "-c", "client-1", "-u", "http://localhost:4321", "--run_id", "1"],
+        ["/usr/bin/python3", "/usr/bin/rostest", "drone_sim", "drone.launch", "scrpt:=x.py"],
+        ["bash"],
+        [""],
+    ],
+)
+def test_everything_else_is_left_alone(command, tmp_path):
+    check(command, tmp_path)
