@@ -36,7 +36,6 @@ class Ending:
     def complete(self) -> None:
         """Say that the node has taken its last step and cleaned up; return when rospy has closed its topics."""
         self._done.set()
-        self._guardian.count()
         rospy.signal_shutdown("the node ends")  # where another thread does that already, it returns at once
         self._closed.wait(_PATIENCE)
 

@@ -12,6 +12,7 @@ from geometry_msgs.msg import Twist as TwistMessage
 from drone_sim import checks
 from drone_sim.drone_objects import TARGET
 from drone_sim.parameters import Parameters
+from drone_sim.resources import shown
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.messages import WORLD
 from drone_sim.simulation import Simulation
@@ -99,7 +100,7 @@ def move_target(simulation: Simulation, pose: Pose) -> None:
 
 def _check_frame(frame: str) -> None:
     if frame.lstrip("/") not in ("", WORLD):
-        raise checks.Refused(f"frame_id '{frame}': must be '{WORLD}'")
+        raise checks.Refused(f"frame_id {shown(frame)}: must be '{WORLD}'")
 
 
 def _numbers(message: PoseMessage) -> Sequence[float]:
