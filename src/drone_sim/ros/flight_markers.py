@@ -12,10 +12,10 @@ from visualization_msgs.msg import Marker
 from drone_sim import frames
 from drone_sim.frames import Vector
 from drone_sim.pacing import Throttle
-from drone_sim.ros.marker_topic import EYES, WORDS, MarkerTopic, shape
+from drone_sim.ros.marker_topic import EYES, WORDS, MarkerTopic, beside, shape
 from drone_sim.ros.player import Player
 from drone_sim.simulation import Simulation
-from drone_sim.state import Twist
+from drone_sim.state import State, Twist
 
 _ABOVE_FLOOR = 0.004  # m, so that the shadow is not hidden by it
 _SHADOW = 0.24, 0.05  # m, its radius, and what a metre of height adds to it
@@ -25,10 +25,10 @@ _TICK = 0.5  # m
 _TICKS = 40
 _THIN = 0.006  # m
 _INK = (0.10, 0.12, 0.16, 1.0)
-_METRES_PER_SPEED = 0.5  # an arrow's length in m for each m/s
+_SECONDS = 1.0  # an arrow is as long as the way that is commanded for this time
 _BLUE = (0.05, 0.35, 0.95, 1.0)
 _AWAY = 0.3  # m, from the drone's middle: what is about the drone must not hide it
-_TEXT_ABOVE, _TEXT_SIZE = 0.42, 0.06  # m
+_TEXT_ABOVE, _TEXT_SIZE = 0.4, 0.06  # m
 
 
 class HeightMarkers:
@@ -38,14 +38,15 @@ class HeightMarkers:
         """Advertise in the drone's namespace."""
         self._simulation = simulation
         self._topic = MarkerTopic(f"{simulation.drone.name}/view/height", EYES)
-        self._shown: Optional[Vector] = None
+        self._shown: Optional[State] = None
 
     def update(self) -> None:
         """Publish where the drone has moved, if anybody listens."""
-        place = self._simulation.drone.state.position
-        if place != self._shown and self._topic.due():
-            self._shown = place
-            self._topic.show([_shadow(place), _plumb_line(place)] if place[2] > 0 else [None, None])
+        state = self._simulation.drone.state
+        if state != self._shown and self._topic.due():
+            self._shown = state
+            above = state.position[2] > 0
+            self._topic.show([_shadow(state), beside(state, _plumb_line(state.position[2]))] if above else [None, None])
 
 
 class CommandMarkers:
@@ -55,17 +56,16 @@ class CommandMarkers:
         """Advertise in the drone's namespace."""
         self._simulation = simulation
         self._topic = MarkerTopic(f"{simulation.drone.name}/view/command", EYES)
-        self._shown: Optional[Tuple[Twist, frames.Matrix]] = None
+        self._shown: Optional[Tuple[Twist, frames.Matrix, State]] = None
 
     def update(self) -> None:
         """Publish command and place where they have changed, if anybody listens."""
         drone = self._simulation.drone
-        x, y, z = drone.state.position
-        r = drone.track
-        state = drone.command, (*r[:3], x, *r[4:7], y, *r[8:11], z)
-        if state != self._shown and self._topic.due():
-            self._shown = state
-            self._topic.show([_arrow(*state), *_turn(*state)])
+        seen = command, base, state = drone.command, drone.track, drone.state
+        if seen != self._shown and self._topic.due():
+            self._shown = seen
+            markers = [_arrow(command, base), *_turn(command, base)]
+            self._topic.show([marker and beside(state, marker) for marker in markers])
 
 
 class StateText:
@@ -78,21 +78,20 @@ class StateText:
         self._topic = MarkerTopic(f"{simulation.drone.name}/view/state", EYES)
         self._words = Throttle(WORDS)
         self._text = ""
-        self._shown: Optional[Tuple[str, Vector]] = None
+        self._shown: Optional[Tuple[str, State]] = None
 
     def update(self) -> None:
         """Publish text and place where they have changed, if anybody listens."""
-        place = self._simulation.drone.state.position
+        state = self._simulation.drone.state
         if not self._topic.due():
             return
         if self._words.passes():
             self._text = self._say()
-        if (self._text, place) != self._shown:
-            self._shown = self._text, place
+        if (self._text, state) != self._shown:
+            self._shown = self._text, state
             marker = shape(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
-            marker.text = self._text
-            marker.pose.position = Point(place[0], place[1], place[2] + _TEXT_ABOVE)
-            self._topic.show([marker])
+            marker.text, marker.pose.position.z = self._text, _TEXT_ABOVE
+            self._topic.show([beside(state, marker)])
 
     def _say(self) -> str:
         simulation, state = self._simulation, self._simulation.drone.state
@@ -100,12 +99,12 @@ class StateText:
             return "stopped"
         doing = "paused" if self._player.paused else "flying"
         speed = math.hypot(*state.linear_velocity)
-        return f"{doing}   {simulation.time:.1f} s\nheight {state.position[2]:.2f} m   speed {speed:.2f} m/s"
+        return f"{doing}  {simulation.time:.1f} s\nheight {state.position[2]:.2f} m  speed {speed:.2f} m/s"
 
 
-def _shadow(place: Vector) -> Marker:
+def _shadow(state: State) -> Marker:
     """Return a disc on the floor, dark in the middle, wider and paler with the height."""
-    x, y, height = place
+    x, y, height = state.position
     radius = _SHADOW[0] + _SHADOW[1] * height
     angles = [2 * math.pi * number / _RIM for number in range(_RIM)]
     rim = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
@@ -120,34 +119,34 @@ def _shadow(place: Vector) -> Marker:
     return marker
 
 
-def _plumb_line(place: Vector) -> Marker:
-    x, y, height = place
-    points: List[Vector] = [place, (x, y, 0.0)]
+def _plumb_line(height: float) -> Marker:
+    """Return it as seen from the drone."""
+    points: List[Vector] = [(0.0, 0.0, 0.0), (0.0, 0.0, -height)]
     for number in range(1, min(_TICKS, math.ceil(height / _TICK))):
-        half, up = (0.05 if number % 2 else 0.1), number * _TICK
-        points += [(x - half, y, up), (x + half, y, up), (x, y - half, up), (x, y + half, up)]
+        half, z = (0.05 if number % 2 else 0.1), number * _TICK - height
+        points += [(-half, 0.0, z), (half, 0.0, z), (0.0, -half, z), (0.0, half, z)]
     marker = shape(Marker.LINE_LIST, _INK, (_THIN, 0, 0), points)
     marker.ns = "plumb line"
     return marker
 
 
 def _arrow(command: Twist, base: frames.Matrix) -> Optional[Marker]:
+    """Return it as seen from the drone; a command counts in `base`, Track_base."""
     speed = math.hypot(*command.linear)
     if not speed:
         return None
-    start = frames.transform(base, [_AWAY * part / speed for part in command.linear])
-    ahead = frames.rotate(base, [_METRES_PER_SPEED * part for part in command.linear])
-    end = [one + other for one, other in zip(start, ahead)]
-    return shape(Marker.ARROW, _BLUE, (0.03, 0.07, 0.09), [start, end])
+    ends = (_AWAY, _AWAY + _SECONDS * speed)
+    points = [frames.rotate(base, [end * part / speed for part in command.linear]) for end in ends]
+    return shape(Marker.ARROW, _BLUE, (0.03, 0.07, 0.09), points)
 
 
 def _turn(command: Twist, base: frames.Matrix) -> Sequence[Optional[Marker]]:
-    """Return an arc from the front, as long as the drone turns in a second, and its head."""
-    turn = max(-3.0, min(3.0, command.angular[2]))
+    """Return an arc from the front, as far as the turn that is commanded goes, and its head."""
+    turn = max(-3.0, min(3.0, _SECONDS * command.angular[2]))
     if not turn:
         return None, None
     angles = [turn * number / 24 for number in range(25)]
-    points = [frames.transform(base, (_AWAY * math.cos(a), _AWAY * math.sin(a), 0.0)) for a in angles]
+    points = [frames.rotate(base, (_AWAY * math.cos(a), _AWAY * math.sin(a), 0.0)) for a in angles]
     along = math.copysign(0.09, turn)
     last, x, y = points[-1], -along * math.sin(turn), along * math.cos(turn)
     tip = [one + other for one, other in zip(last, frames.rotate(base, (x, y, 0.0)))]

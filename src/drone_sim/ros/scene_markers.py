@@ -13,6 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from drone_sim import frames
 from drone_sim.camera.mesh import WHITE
 from drone_sim.pacing import Throttle
+from drone_sim.ros import boxes
 from drone_sim.ros.mesh_files import MeshFiles
 from drone_sim.ros.messages import WORLD
 from drone_sim.simulation import Simulation
@@ -70,7 +71,9 @@ def _markers(visual: Visual, matrix: frames.Matrix) -> Sequence[Marker]:
     """Return what rviz makes of one visual: one marker, three for a capsule."""
     size, rgba = visual.size, visual.rgba
     if visual.shape == "box":
-        return [_marker(Marker.CUBE, matrix, size, rgba)]
+        box = _marker(Marker.TRIANGLE_LIST, matrix, size, rgba)
+        boxes.paint(box, matrix, rgba)
+        return [box]
     if visual.shape == "plane":
         return [_marker(Marker.CUBE, matrix, (_WIDE, _WIDE, _FLAT), rgba)]
     if visual.shape == "mesh":

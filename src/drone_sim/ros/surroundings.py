@@ -20,9 +20,14 @@ from drone_sim.visual import Visual
 _SKY = 5000.0  # m, its radius
 _BELOW = -0.06  # m, where the ground lies: the floor stands out of it
 _SECTORS = 48
-_SOIL = (0.33, 0.36, 0.33)
-# The ground fades into the haze: metres beyond the floor, and the share of the haze there.
-_FADING = ((0.0, 0.0), (12.0, 0.12), (40.0, 0.45), (120.0, 0.85), (400.0, 1.0))
+# The ground, by metres beyond the floor: darker than it, and far away what the sky is at the horizon.
+_GROUND = (
+    (0.0, (0.40, 0.43, 0.39)),
+    (12.0, (0.45, 0.48, 0.45)),
+    (40.0, (0.58, 0.60, 0.59)),
+    (120.0, (0.70, 0.72, 0.735)),
+    (600.0, (0.762, 0.79, 0.813)),
+)
 _OPAQUE = (1.0, 1.0, 1.0, 1.0)
 _GREY = (0.6, 0.6, 0.6, 1.0)
 
@@ -68,11 +73,11 @@ def _sky() -> Marker:
 
 
 def _ground(half: float) -> Marker:
-    """Return a disc, darker than the floor, that fades into the haze; `half` is half of the floor's side, m."""
+    """Return a disc, darker than the floor, that fades into the sky; `half` is half of the floor's side, m."""
     angles = np.linspace(0.0, 2.0 * np.pi, _SECTORS + 1)
-    rings = [[(0.0, 0.0, _BELOW, *_SOIL)] * len(angles)]
-    for beyond, share in _FADING:
-        radius, colour = half + beyond, np.multiply(_SOIL, 1 - share) + np.multiply(sky.HAZE, share)
+    rings = [[(0.0, 0.0, _BELOW, *_GROUND[0][1])] * len(angles)]
+    for beyond, colour in _GROUND:
+        radius = half + beyond
         rings.append([(radius * np.cos(a), radius * np.sin(a), _BELOW, *colour) for a in angles])
     corners: List[Sequence[float]] = []
     for near, far in zip(rings, rings[1:]):
