@@ -104,6 +104,13 @@ lint() {
   lint_catkin "$bin/catkin_lint"
 }
 
+# ROS knows no passwords: without a word from the user, nobody outside this machine is let in.
+stay_on_this_machine() {
+  local default=http://localhost:11311 # which a sourced setup.bash sets, too
+  if [ "${ROS_MASTER_URI-$default}" != $default ] || [ -n "${ROS_IP+set}${ROS_HOSTNAME+set}" ]; then return; fi
+  export ROS_MASTER_URI=$default ROS_HOSTNAME=localhost
+}
+
 run_tests() {
   make_venv requirements-dev.txt
   # Every core tests; the tests with a master run one after another.
@@ -114,7 +121,7 @@ command=${1:-help}
 shift || true
 case "$command" in
   setup) setup; say "ready: source $root/devel/setup.bash" ;;
-  run) setup; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
+  run) stay_on_this_machine; setup; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   lint) setup; lint ;;
   bench) setup; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;

@@ -1,8 +1,12 @@
-"""The node as a process on one core, with a master of its own: real-time factors and latencies."""
+"""The node as a process, with a master of its own: real-time factors and latencies.
+
+The bare node has one core and its listeners the other; what the launch file starts shares them all, as a user's does.
+"""
 
 import contextlib
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -11,7 +15,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Any, Dict, Iterator, List
+from typing import Any, Callable, ContextManager, Dict, Iterator, List
 
 import numpy as np
 
@@ -36,12 +40,21 @@ def master() -> Iterator[None]:
         process.wait()
 
 
-@contextlib.contextmanager
-def node(*arguments: str, program: str = "") -> Iterator[List[str]]:
+def node(*arguments: str, program: str = "") -> ContextManager[List[str]]:
     """Run the simulator, or a python program, on one core until the block ends; yield its lines of output."""
     what = [sys.executable, "-c", program] if program else ["rosrun", "drone_sim", "simulator"]
+    return _running("taskset", "-c", CORE, *what, *arguments)
+
+
+def launched(*arguments: str) -> ContextManager[List[str]]:
+    """Run all of the launch file until the block ends; yield its lines of output."""
+    return _running("roslaunch", "drone_sim", "drone.launch", *arguments)
+
+
+@contextlib.contextmanager
+def _running(*command: str) -> Iterator[List[str]]:
     process = subprocess.Popen(
-        ["taskset", "-c", CORE, *what, *arguments],
+        command,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -69,25 +82,52 @@ def node(*arguments: str, program: str = "") -> Iterator[List[str]]:
         reader.join()
 
 
-def real_time_factors(seconds: float = 6.0) -> List[Row]:
-    """As fast as it can, heard by nobody, and with the front camera published to a subscriber."""
+def real_time_factors(rounds: int = 3, seconds: float = 6.0) -> List[Row]:
+    """As fast as it can, by turns: the bare node, and the launch file in real and in simulated time.
+
+    Heard by nobody, and with the front camera and odometry heard by another process. Medians, lowest and highest.
+    """
+    free = "real_time_factor:=0"
+    running: Dict[str, Callable[[], ContextManager[List[str]]]] = {
+        "bare node": lambda: node(f"_{free}"),
+        "drone.launch": lambda: launched("rviz:=false", free),
+        "drone.launch, use_sim_time": lambda: launched("rviz:=false", free, "use_sim_time:=true"),
+    }
+    factors: Dict[str, List[float]] = {}
+    for _ in range(rounds):
+        for name, run in running.items():
+            for heard in (False, True):
+                row = f"{name}, {'front camera and odometry heard' if heard else 'nobody listens'}"
+                print(f"  {row}", file=sys.stderr, flush=True)
+                factors.setdefault(row, []).append(_factor(run, heard, seconds))
+    return [
+        {"name": name, "factor": median, "low": min(some), "high": max(some), "step_ms": 50 / median}
+        for name, some in factors.items()
+        for median in [float(np.median(some))]
+    ]
+
+
+def _factor(run: Callable[[], ContextManager[List[str]]], heard: bool, seconds: float) -> float:
+    from nav_msgs.msg import Odometry
     from sensor_msgs.msg import Image
 
-    rows = []
-    for name, topics in (("node, nobody listens", []), ("node, front camera published", ["/drone/front"])):
-        print(f"  {name}", file=sys.stderr, flush=True)
-        with node("_real_time_factor:=0") as lines:
-            listening = [_listen(topic, Image) for topic in topics]
-            time.sleep(seconds)
-            for subscriber in listening:
-                subscriber.unregister()
-            # The factor counts the whole run; ending at once keeps the unheard rest short.
-        flew = re.search(r"flew ([\d.]+) s at ([\d.]+) times real time", "".join(lines))
-        if flew is None:
-            raise RuntimeError("the node said nothing of its flight:\n" + "".join(lines))
-        factor = float(flew.group(2))
-        rows.append({"name": name, "factor": factor, "step_ms": 50 / factor})
-    return rows
+    with run() as lines:
+        # Another process than the node's, as a user's program is.
+        listening = [_listen("/drone/front", Image), _listen("/drone/odom", Odometry)] if heard else []
+        time.sleep(seconds)
+        for subscriber in listening:
+            subscriber.unregister()
+        # The factor counts the whole run; ending at once keeps the unheard rest short.
+    return float(_flew(lines).group(2))
+
+
+def _flew(lines: List[str]) -> "re.Match[str]":
+    """Return what the node says at its end: seconds flown, factor, late steps, by how many ms."""
+    said = r"flew ([\d.]+) s at ([\d.]+) times real time, (\d+) late steps, by (\d+) ms"
+    flew = re.search(said, "".join(lines))
+    if flew is None:
+        raise RuntimeError("the node said nothing of its flight:\n" + "".join(lines))
+    return flew
 
 
 def _listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
@@ -143,13 +183,65 @@ def latencies(seconds: float = 20.0) -> List[Row]:
                 time.sleep(random.uniform(0.03, 0.07))
             subscriber.unregister()
         delays = [float(line) for line in path.read_text().split()]
-    late = re.search(r"(\d+) late steps", "".join(lines))
     jitter = np.abs(np.diff(came) - 0.05)
     return [
         _spread("cmd_vel published -> seen by the loop", delays),
         _spread("image stamped -> in the subscriber's callback", ages),
-        {**_spread("jitter of the 20 Hz images", jitter), "late_steps": int(late.group(1)) if late else -1},
+        {**_spread("jitter of the 20 Hz images", jitter), "late_steps": int(_flew(lines).group(3))},
     ]
+
+
+def late_steps(seconds: float = 60.0) -> List[Row]:
+    """At real time, the launch file with the front camera heard and a bag of everything; with rviz if it is there."""
+    rows = []
+    for rviz in (False, True):
+        name = f"drone.launch {'with' if rviz else 'without'} rviz, camera, bag"
+        if rviz and not (shutil.which("Xvfb") and shutil.which("rviz")):
+            print(f"  {name}: left out, it needs rviz and Xvfb", file=sys.stderr, flush=True)
+            continue
+        print(f"  {name}, for {seconds:g} s of real time", file=sys.stderr, flush=True)
+        with screen() if rviz else contextlib.nullcontext(), tempfile.TemporaryDirectory() as folder:
+            flew = _recorded(f"rviz:={str(rviz).lower()}", folder, seconds)
+        rows.append({"name": name, "late_steps": int(flew.group(3)), "worst_ms": float(flew.group(4))})
+    return rows
+
+
+def _recorded(argument: str, folder: str, seconds: float) -> "re.Match[str]":
+    from sensor_msgs.msg import Image
+
+    with launched(argument) as lines:
+        recorder = subprocess.Popen(
+            ["rosbag", "record", "-a", "-q", "-O", f"{folder}/all.bag"], stdout=subprocess.DEVNULL
+        )
+        subscriber = _listen("/drone/front", Image)
+        time.sleep(seconds)
+        subscriber.unregister()
+        recorder.send_signal(signal.SIGINT)
+        recorder.wait()
+    return _flew(lines)
+
+
+@contextlib.contextmanager
+def screen() -> Iterator[None]:
+    """Have a display without a screen, drawn by the processor, as DISPLAY."""
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1600x1000x24"],
+        pass_fds=[write],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    before = os.environ.get("DISPLAY")
+    with os.fdopen(read) as number:
+        os.environ["DISPLAY"] = f":{number.readline().strip()}"
+    try:
+        yield
+    finally:
+        server.terminate()
+        server.wait()
+        del os.environ["DISPLAY"]
+        if before is not None:
+            os.environ["DISPLAY"] = before
 
 
 def _spread(name: str, seconds: Any) -> Row:
@@ -163,6 +255,6 @@ def measure() -> List[Row]:
 
     with master():
         rospy.init_node("benchmark", disable_signals=True)
-        rows = real_time_factors() + latencies()
+        rows = real_time_factors() + latencies() + late_steps()
         rospy.signal_shutdown("done")
         return rows

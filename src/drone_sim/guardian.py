@@ -43,7 +43,7 @@ class Guardian:
         # What nohup has the process ignore, it goes on to ignore.
         self._signals = [one for one in _SIGNALS if one != signal.SIGHUP or signal.getsignal(one) != signal.SIG_IGN]
         self._handle(signal.SIG_DFL)
-        os.register_at_fork(after_in_child=self._let_go)
+        os.register_at_fork(before=self._hold, after_in_parent=self._release, after_in_child=self._let_go)
 
     def ready(self, call: Callable[[], None] = lambda: None) -> None:
         """From now on a signal sets `asked` and calls `call`; then the process has PATIENCE to end."""
@@ -73,13 +73,21 @@ class Guardian:
         with contextlib.suppress(OSError):  # somebody has killed the guardian
             os.write(self._write, bytes([number]))
 
+    def _hold(self) -> None:
+        """Let signals wait while this thread forks: what is for the fork must not count here."""
+        signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
+
+    def _release(self) -> None:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, self._signals)
+
     def _let_go(self) -> None:
-        """In a fork: its signals and its life are its own."""
+        """In the fork: its signals and its life are its own."""
         if self._write >= 0:
             signal.set_wakeup_fd(-1)
             self._handle(signal.SIG_DFL)
             os.close(self._write)
             self._write = -1
+        self._release()
 
 
 def _be_the_guardian(read: int, write: int, process: int, name: str) -> None:
@@ -92,7 +100,9 @@ def _be_the_guardian(read: int, write: int, process: int, name: str) -> None:
             with contextlib.suppress(OSError):
                 os.close(unused)
         if _outlasts_its_time(read):
-            _say(f"{name}: killed: a script, a file or the ROS master kept it busy for {PATIENCE:g} s when it had to end")
+            _say(
+                f"{name}: killed: a script, a file or the ROS master kept it busy for {PATIENCE:g} s when it had to end"
+            )
             os.kill(process, signal.SIGKILL)
     finally:
         os._exit(0)

@@ -20,6 +20,7 @@ class Pacer:
     ):
         """Take the period in real seconds (0: as fast as it can), a monotonic clock, and a sleep."""
         self.overruns = 0
+        self.worst = 0.0  # s, of the overruns
         self._period = period
         self._clock = clock
         self._sleep = sleep
@@ -34,6 +35,7 @@ class Pacer:
         late = max(0.0, self._clock() - self._due) if self._period else 0.0
         if late:
             self.overruns += 1
+            self.worst = max(self.worst, late)
             self._due += late
         while self._due > self._clock() and not interrupted():
             self._sleep(min(_SLICE, max(0.0, self._due - self._clock())))

@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
-"""The node as a process: wrong parameters, signals, and repeatable flights."""
+"""The node as a process: wrong parameters, signals, masters that go, and repeatable flights."""
 
+import contextlib
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import rosnode
 import rospy
@@ -19,14 +22,77 @@ from nav_msgs.msg import Odometry
 HANGS = 30.0  # s; nothing here takes nearly as long unless it hangs
 
 
-def simulator(*arguments):
-    command = ["rosrun", "drone_sim", "simulator", *arguments]
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+# The simulator with a call into PyBullet that does not return.
+STUCK = """
+import sys, time
+from drone_sim.guardian import Guardian
+guardian = Guardian("drone_sim")
+from drone_sim.ros import node
+from drone_sim.world import World
+def stuck(*_arguments):
+    print("flying into it", flush=True)
+    {call}
+World.{function} = stuck
+sys.exit(node.main(guardian))
+"""
+HOLDS_THE_LOCK, LETS_GO_OF_IT = "sum(range(10**13))", "time.sleep(1000)"
+
+# Another node, which a new master introduces to the simulator.
+CLIENT = """
+import rospy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from std_srvs.srv import Trigger
+rospy.init_node("client")
+heights = []
+rospy.Subscriber("/drone/odom", Odometry, lambda o: heights.append(o.pose.pose.position.z))
+climb = Twist()
+climb.linear.z = 1.0
+rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1, latch=True).publish(climb)
+while not heights or heights[-1] < 2.0:
+    rospy.rostime.wallsleep(0.05)
+print(rospy.ServiceProxy("/drone_sim/stop", Trigger)().message, rospy.get_param("/drone_sim"))
+"""
+
+
+def started(*command, **environment):
+    return subprocess.Popen(
+        command,
+        env={**os.environ, "PYTHONUNBUFFERED": "1", **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def simulator(*arguments, **environment):
+    return started("rosrun", "drone_sim", "simulator", *arguments, **environment)
+
+
+def stuck(function, call):
+    return started(sys.executable, "-c", STUCK.format(function=function, call=call))
+
+
+@contextlib.contextmanager
+def master(port):
+    """Run a master of our own; it is killed, so that it says goodbye to nobody."""
+    process = subprocess.Popen(["rosmaster", "--core", "-p", port], stdout=subprocess.DEVNULL)
+    try:
+        while True:
+            with contextlib.suppress(OSError), socket.create_connection(("localhost", int(port)), timeout=HANGS):
+                break
+        yield
+    finally:
+        process.kill()
+        process.wait()
 
 
 class Process(unittest.TestCase):
     """What a user sees of a node that cannot start, and of one that is told to end."""
+
+    def tearDown(self):
+        if rospy.has_param("/drone_sim"):
+            rospy.delete_param("/drone_sim")
 
     def test_wrong_parameters_end_it_with_one_line(self):
         for argument, expected in (
@@ -45,7 +111,101 @@ class Process(unittest.TestCase):
                 self.assertIn(expected, output)
                 self.assertNotIn("Traceback", output)
                 self.assertEqual(len([line for line in output.splitlines() if "FATAL" in line]), 1, output)
-        rospy.delete_param("/drone_sim")
+
+    def test_parameters_that_are_none_end_it_with_one_line(self):
+        for name, value, expected in (
+            ("/drone_sim", 5, "parameter /drone_sim = 5: must hold parameters"),
+            ("/use_sim_time", "foo", "parameter /use_sim_time = foo: must be true or false"),
+            ("/drone_sim/script", "/" + "x" * 300 + ".py", "ile"),  # too long for a file, or just not there
+            ("/drone_sim/script", "/no/such.py", "/no/such.py: no such file"),
+        ):
+            with self.subTest(name):
+                rospy.set_param(name, value)
+                try:
+                    self.assert_refused(simulator(), expected)
+                finally:
+                    rospy.delete_param(name)
+
+    def test_surroundings_in_which_it_cannot_be_a_node(self):
+        for name, value, expected in (
+            ("ROS_MASTER_URI", "garbage", "ROS_MASTER_URI = 'garbage': must be like http://localhost:11311"),
+            ("ROS_MASTER_URI", "http://localhost:99999", "must be like http://localhost:11311"),
+            ("ROS_MASTER_URI", "http://localhost:1", "no ROS master at http://localhost:1"),
+            ("ROS_MASTER_URI", "http://no.such.host.invalid:11311", "the host 'no.such.host.invalid' is not known"),
+            ("ROS_HOSTNAME", "no.such.host.invalid", "ROS_HOSTNAME = 'no.such.host.invalid': is not known here"),
+            ("ROS_IP", "300.1.1.1", "ROS_IP = '300.1.1.1': is not known here"),
+        ):
+            with self.subTest(value), mock.patch.dict(os.environ):
+                os.environ.pop("ROS_HOSTNAME", None)
+                self.assert_refused(simulator(**{name: value}), expected)
+
+    def assert_refused(self, node, expected):
+        output, _ = node.communicate(timeout=HANGS)
+        self.assertEqual(node.returncode, 1, output)
+        self.assertEqual([expected in line for line in output.splitlines() if line], [True], output)
+
+    def test_an_error_in_cleanup_is_one_line(self):
+        with tempfile.NamedTemporaryFile("w", suffix=".py") as script:
+            script.write("def sysCall_cleanup():\n    1 / 0\n")
+            script.flush()
+            node = simulator(f"_script:={script.name}")
+            said = self.said_until(node, "flying")
+            node.send_signal(signal.SIGINT)
+            said += node.communicate(timeout=HANGS)[0]
+        self.assertEqual(node.returncode, 1)
+        self.assertNotIn("Traceback", said)
+        fatal = [line for line in said.splitlines() if "FATAL" in line]
+        self.assertEqual(len(fatal), 1, said)
+        self.assertIn("[cleanup]", fatal[0])
+        self.assertIn("ZeroDivisionError", fatal[0])
+
+    def said_until(self, node, what):
+        """Return what it says up to a line."""
+        said = ""
+        for line in node.stdout:
+            said += line
+            if what in line:
+                break
+        return said
+
+    def test_it_ends_whatever_it_does(self):
+        for function, number in (("advance", signal.SIGINT), ("__init__", signal.SIGTERM)):
+            with self.subTest(function):
+                node = stuck(function, HOLDS_THE_LOCK)
+                said = self.said_until(node, "flying into it")
+                node.send_signal(number)
+                self.assert_killed(node, said + node.communicate(timeout=HANGS)[0])
+
+    def test_rosnode_kill_ends_it_too_unless_it_holds_the_lock(self):
+        node = stuck("advance", LETS_GO_OF_IT)
+        said = self.said_until(node, "flying into it")
+        rosnode.kill_nodes(["/drone_sim"])
+        self.assert_killed(node, said + node.communicate(timeout=HANGS)[0])
+
+    def assert_killed(self, node, said):
+        self.assertEqual(node.returncode, -signal.SIGKILL, said)
+        self.assertNotIn("Traceback", said)
+        self.assertEqual(len([line for line in said.splitlines() if line.startswith("drone_sim: killed: ")]), 1, said)
+
+    def test_a_new_master_finds_it(self):
+        with socket.socket() as probe:
+            probe.bind(("localhost", 0))
+            port = str(probe.getsockname()[1])
+        surroundings = {"ROS_MASTER_URI": f"http://localhost:{port}"}
+        with master(port):
+            node = simulator("_real_time_factor:=5", **surroundings)
+            watchdog = threading.Timer(2 * HANGS, node.kill)
+            watchdog.start()
+            self.said_until(node, "flying")
+        with master(port):
+            self.assertIn("a new ROS master", self.said_until(node, "registered again"))
+            client = started(sys.executable, "-c", CLIENT, **surroundings)
+            said, _ = client.communicate(timeout=HANGS)
+            self.assertEqual(said, "stopped {'real_time_factor': 5}\n")
+            node.send_signal(signal.SIGINT)
+            node.communicate(timeout=HANGS)
+        watchdog.cancel()
+        self.assertEqual(node.returncode, 0)
 
     def assert_ends_cleanly(self, end):
         """Let it fly as fast as it can, with somebody listening, and end it by `end(process)`."""

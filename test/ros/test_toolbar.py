@@ -5,6 +5,7 @@ import math
 import sys
 import tempfile
 import threading
+import time
 import unittest
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Float64
 from std_srvs.srv import SetBool, Trigger
-from visualization_msgs.msg import InteractiveMarkerFeedback, Marker, MarkerArray
+from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerUpdate, Marker, MarkerArray
 
 from drone_sim import parameters
 from drone_sim.ros.node import Node
@@ -223,6 +224,32 @@ class Toolbar(unittest.TestCase):
             message.pose.orientation.w = 1.0
             feedback.publish(message)
         self.odometry.wait_for(lambda o: abs(o.pose.pose.position.y - 0.5) < 0.1)
+
+    def test_a_flood_of_input_makes_no_flood_of_output(self):
+        poses = connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=10))
+        self.pause(True)
+        self.odometry.wait_for()
+        before, began = len(self.odometry.messages), time.monotonic()
+        message = PoseStamped()
+        message.pose.orientation.w = 1.0
+        for number in range(1, 1001):
+            message.pose.position.z = float(number)
+            poses.publish(message)
+        self.odometry.wait_for(lambda o: o.pose.pose.position.z == 1000.0, after=before)
+        self.assertLessEqual(len(self.odometry.messages) - before, 3 + 20 * (time.monotonic() - began))
+
+    def test_a_handle_is_free_again_once_rviz_is_dead(self):
+        handles = Listener("/drone/markers/update", InteractiveMarkerUpdate)
+        feedback = connected(rospy.Publisher("/drone/markers/feedback", InteractiveMarkerFeedback, queue_size=10))
+        self.pause(True)
+        message = InteractiveMarkerFeedback(client_id="rviz", marker_name="Drone")
+        message.event_type = InteractiveMarkerFeedback.MOUSE_DOWN
+        feedback.publish(message)
+        held = self.node._handles._held
+        for expected in ({"Drone"}, set()):
+            while held.names() != expected:
+                rospy.rostime.wallsleep(0.01)
+        handles.wait_for(lambda m: any(pose.name == "Drone" for pose in m.poses))
 
     def test_target_pose_and_push(self):
         self.pause(True)

@@ -256,6 +256,34 @@ def sysCall_cleanup():
     assert {len(row) for row in rows} == {len(header)}
 
 
+@pytest.mark.parametrize(
+    ("does", "number", "status", "killed"),
+    [
+        ("try: time.sleep(0.01)\n    except KeyboardInterrupt: raise SystemExit", signal.SIGINT, 130, False),
+        ("pass", signal.SIGTERM, 143, False),
+        ("sum(range(10**13))", signal.SIGINT, -signal.SIGKILL, True),
+    ],
+    ids=["a script that would catch it", "SIGTERM", "a script that does not return"],
+)
+def test_a_signal_ends_the_flight_whatever_a_script_does(script, does, number, status, killed):
+    path = script(f"import time\n\ndef sysCall_actuation():\n    print('flying', flush=True)\n    {does}\n")
+    process = subprocess.Popen(
+        [sys.executable, str(ROOT / "scripts" / "fly"), "--script", path, "--duration", "1e6"],
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while "flying" not in process.stdout.readline():
+        assert process.poll() is None
+    process.send_signal(number)
+    printed, errors = process.communicate(timeout=60)
+    assert process.returncode == status, errors
+    assert errors.startswith("fly: killed: ") == killed
+    assert ("ended at" in printed) == (not killed)
+    assert "Traceback" not in errors
+
+
 def test_it_needs_no_ros(tmp_path):
     program = (
         "import sys\n"

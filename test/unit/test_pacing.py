@@ -1,6 +1,6 @@
 """Pacing against a clock that the test turns."""
 
-from drone_sim.pacing import Pacer
+from drone_sim.pacing import Beat, Pacer, Throttle
 
 
 class Clock:
@@ -51,6 +51,7 @@ def test_an_overrun_is_counted_and_not_caught_up():
     pacer, clock = make()
     assert passes(pacer, clock, [0.01, 0.12, 0.01, 0.01]) == [0.05, 0.1, 0.22, 0.27]
     assert pacer.overruns == 1
+    assert round(pacer.worst, 9) == 0.07
 
 
 def test_as_fast_as_it_can():
@@ -63,3 +64,23 @@ def test_a_long_sleep_ends_when_interrupted():
     pacer, clock = make(period=60.0)
     pacer.wait(lambda: clock.now > 101.0)
     assert 101.0 < clock.now < 101.2
+
+
+def test_a_throttle_passes_once_a_period():
+    clock = Clock()
+    throttle = Throttle(0.25, clock)
+    passed = []
+    for _ in range(9):
+        passed.append(throttle.passes())
+        clock.work(0.125)
+    assert passed == [True, False] * 4 + [True]
+
+
+def test_a_beat_is_soon_after_a_change_and_seldom_without_one():
+    clock = Clock()
+    beat = Beat(0.25, 1.0, clock)
+    assert (beat.left(changed=True), beat.left(changed=False)) == (0.25, 1.0)
+    clock.work(0.5)
+    assert (beat.left(changed=True), beat.left(changed=False)) == (0.0, 0.5)
+    beat.restart()
+    assert (beat.left(changed=True), beat.left(changed=False)) == (0.25, 1.0)

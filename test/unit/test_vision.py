@@ -9,6 +9,7 @@ import pytest
 
 from drone_sim import parameters
 from drone_sim.simulation import Simulation
+from drone_sim.state import Pose
 
 SCENE = {
     "scene": {"objects": [{"shape": "box", "size": [0.5, 0.5, 0.5], "position": [2, 0, 0.8], "color": [1, 0, 0, 1]}]}
@@ -20,6 +21,7 @@ import logging, sys
 import numpy as np
 from drone_sim import parameters
 from drone_sim.simulation import Simulation
+from drone_sim.state import Pose
 logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s")
 simulation = Simulation(parameters.load({scene!r}))
 pictures = {{name: simulation.cameras[name].take() for name in ("front", "depth", "front", "depth")}}
@@ -99,3 +101,74 @@ def test_the_track_camera_stays_level_while_its_parent_is_the_track_frame():
         level[parent] = abs(across) < 1e-6
         simulation.close()
     assert level == {"Track_base": True, "Quadricopter_base": False}
+
+
+SEES = """
+import numpy as np
+def sysCall_init():
+    self.camera = sim.getObject('/FrontVision')
+    sim.setStringSignal('init', sim.getVisionSensorCharImage(self.camera)[0])
+def sysCall_sensing():
+    sim.setStringSignal('sensing', sim.getVisionSensorCharImage(self.camera)[0])
+"""
+SMALL = {"cameras": {"front": {"width": 32, "height": 24}}, **SCENE}
+
+
+def as_script(picture):
+    return picture[::-1].tobytes()  # the bottom row first
+
+
+@pytest.fixture(name="simulation")
+def _simulation(tmp_path):
+    script = tmp_path / "sees.py"
+    script.write_text(SEES)
+    simulation = Simulation(parameters.load(SMALL), script=str(script))
+    yield simulation
+    simulation.close()
+
+
+def test_a_camera_sees_what_is_there_now(simulation):
+    front = simulation.cameras["front"]
+    front.watched = lambda: True
+    first = front.take()
+    assert simulation.drone.signals.getStringSignal("init") == as_script(first)
+    simulation.drone.move(Pose((-3, 0, 2)))
+    simulation.look()
+    moved = front.image
+    assert np.array_equal(moved, front.take()) and not np.array_equal(moved, first)
+    snapshot = simulation.snapshot()
+    simulation.step()
+    flown = front.image
+    assert simulation.drone.signals.getStringSignal("sensing") == as_script(flown)
+    assert np.array_equal(flown, front.take()) and not np.array_equal(flown, moved)
+    simulation.restore(snapshot)
+    simulation.look()
+    assert np.array_equal(front.image, moved)
+    simulation.stop()
+    simulation.look()
+    assert np.array_equal(front.image, first)
+    simulation.start()
+    assert simulation.drone.signals.getStringSignal("init") == as_script(first)
+
+
+def test_another_scene_is_seen_at_once(simulation, tmp_path):
+    front = simulation.cameras["front"]
+    first = front.look()
+    (tmp_path / "scene.yaml").write_text("objects: [{shape: box, size: [1, 1, 1], position: [3, 0, 0.8]}]")
+    simulation.start(str(tmp_path / "scene.yaml"))
+    now = simulation.drone.signals.getStringSignal("init")
+    assert now == as_script(front.take()) != as_script(first)
+
+
+def test_what_has_not_changed_is_not_drawn_again(simulation):
+    front = simulation.cameras["front"]
+    assert front.look() is front.look()
+    simulation.drone.move(Pose((0, 0, 1)))
+    assert front.look() is not None
+    again = front.look()
+    simulation.look()
+    assert front.look() is again
+    objects = simulation.drone.objects
+    camera = objects[objects.handle("FrontVision")]
+    camera.matrix = (*camera.matrix[:3], camera.matrix[3] + 0.5, *camera.matrix[4:])  # a script moves the camera
+    assert not np.array_equal(front.look(), again)

@@ -1,13 +1,23 @@
-"""Say it, once each way, when the ROS master goes and when it comes back."""
+"""Say it, once each way, when the ROS master goes and when it comes back; be found by a new one, too."""
 
 from __future__ import annotations
 
+import contextlib
 import threading
+from typing import Any, Dict, Optional
 
 import rosgraph
 import rospy
+import rospy.core
+from rospy.impl.registration import (
+    RegManager,
+    get_registration_listeners,
+    get_service_manager,
+    get_topic_manager,
+)
 
 _PERIOD = 2.0  # s
+_USE_SIM_TIME = "/use_sim_time"
 
 
 class MasterWatch(threading.Thread):
@@ -18,6 +28,7 @@ class MasterWatch(threading.Thread):
         super().__init__(name="master watch", daemon=True)
         self._done = threading.Event()
         self._master = rosgraph.Master(rospy.get_name())
+        self._parameters: Dict[str, Any] = {}
         self._pid = self._ask()
 
     def run(self) -> None:
@@ -30,15 +41,43 @@ class MasterWatch(threading.Thread):
                 rospy.logwarn("the ROS master is gone: flying on; connected nodes stay connected, new ones cannot join")
             elif pid is not None and lost and pid == self._pid:
                 rospy.logwarn("the ROS master answers again")
-            elif pid is not None and pid != self._pid:
+            elif pid is not None and pid != self._pid and self._register_again():
                 self._pid = pid
-                rospy.logwarn(
-                    "a new ROS master is there, which does not know this node: restart it to be found by others"
-                )
+                rospy.logwarn("a new ROS master is there: registered again, with the parameters as they were")
             lost = pid is None
 
-    def _ask(self) -> int | None:
+    def _ask(self) -> Optional[int]:
+        """Return the master's process number, None where it does not answer; remember what it knows of this node."""
         try:
-            return self._master.getPid()
+            pid = self._master.getPid()
+            if pid == getattr(self, "_pid", pid):
+                self._remember()
+            return pid
         except (OSError, rosgraph.MasterException):
             return None
+
+    def _remember(self) -> None:
+        for name in (rospy.get_name(), _USE_SIM_TIME):
+            with contextlib.suppress(rosgraph.MasterError):  # there is no such parameter
+                self._parameters[name] = self._master.getParam(name)
+
+    def _register_again(self) -> bool:
+        """Tell a new master all that the first one knew of this process; return False where it goes meanwhile.
+
+        rospy has no function for that. This is what it does itself when a node starts before its master.
+        """
+        uri = rospy.core.get_node_uri()
+        connector = next(one for one in get_registration_listeners().listeners if isinstance(one, RegManager))
+        try:
+            for name, value in self._parameters.items():
+                if not self._master.hasParam(name):
+                    self._master.setParam(name, value)
+            for name, kind in get_topic_manager().get_publications():
+                self._master.registerPublisher(name, kind, uri)
+            for name, kind in get_topic_manager().get_subscriptions():
+                connector.publisher_update(name, self._master.registerSubscriber(name, kind, uri))
+            for name, service in get_service_manager().get_services():
+                self._master.registerService(name, service, uri)
+        except (OSError, rosgraph.MasterException):
+            return False
+        return True

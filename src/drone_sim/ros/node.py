@@ -105,7 +105,8 @@ class Node:
                 self._pacer.restart()
         flown = steps * self._parameters.time_step
         factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
-        rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {self._pacer.overruns} late steps")
+        late = f"{self._pacer.overruns} late steps, by {self._pacer.worst * 1e3:.0f} ms at most"
+        rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {late}")
 
     def _wait(self, over: Callable[[], bool]) -> None:
         if self.player.begun:  # reading scene and script took its time, which no step is late for
@@ -117,7 +118,6 @@ class Node:
 
     def step(self) -> bool:
         """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
-        self._time.begin()
         self._inbox.empty()
         return self.player.playing and self.player.step()
 
@@ -151,7 +151,7 @@ class Node:
         self._show_to_eyes()
 
     def _show_at_the_same_time(self) -> None:
-        """Show what has changed under a stamp that was used before: no transforms, of which tf2 refuses a second one."""
+        """Show what has changed under a stamp that was used before: no transforms, which tf2 takes only once."""
         self._time.end(at_once=True)
         if self.simulation.world.changes != self._shown:
             self.simulation.look()

@@ -33,6 +33,7 @@ class Player:
         """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
         self.paused = False
         self.attempt(lambda: self.simulation.start(scene_file))
+        self.simulation.look()  # meshes and textures are read now, which the first step would be late for
         self.begun = True
         scene = self.simulation.parameters.scene_file
         rospy.loginfo(f"started{f' in {scene}' if scene else ''}")

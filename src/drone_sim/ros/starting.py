@@ -17,6 +17,7 @@ from drone_sim import parameters as parameters_module
 from drone_sim.parameters import ParameterError, Parameters
 from drone_sim.ros.paths import from_shell
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.load import script_path
 
 _MASTER_GONE = (ConnectionError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
 _EXPECTED = (ScriptError, ValueError, RuntimeError, OSError, rospy.ROSException)  # their messages are for the user
@@ -60,12 +61,13 @@ def _check_master() -> None:
 
 def _check_own_address() -> None:
     """Raise ValueError where other nodes could not find this one."""
-    host = rosgraph.network.get_host_name()
+    given = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if name in os.environ), None)
+    host = os.environ[given] if given else rosgraph.network.get_host_name()
     try:
-        socket.getaddrinfo(host, None)
+        socket.getaddrinfo(host or " ", None)
     except (OSError, UnicodeError):
-        given = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if os.environ.get(name) == host), "the host's name")
-        raise ValueError(f"{given} = '{host}': is not known here; ROS_HOSTNAME=localhost will do on one machine") from None
+        what = f"{given or 'the name of this machine'} = '{host}'"
+        raise ValueError(f"{what}: is not known here; ROS_HOSTNAME=localhost will do on one machine") from None
 
 
 def reported(name: str, action: Callable[[], Any]) -> int:
@@ -82,19 +84,22 @@ def reported(name: str, action: Callable[[], Any]) -> int:
 
 
 def read_parameters() -> Parameters:
-    """Return the node's private parameters. Raises ParameterError."""
+    """Return the node's private parameters. Raises ParameterError, and ScriptError for a script that is not there."""
     given: Dict[str, Any] = rospy.get_param("~", {})
     if not isinstance(given, dict):
-        raise ParameterError(f"parameter {rospy.get_name()} = {given!r}: must hold parameters, such as {rospy.get_name()}/script")
+        name = rospy.get_name()
+        raise ParameterError(f"parameter {name} = {str(given)[:80]}: must hold parameters, such as {name}/script")
     for key in ("script", "scene_file"):
         if isinstance(given.get(key), str):
             given[key] = from_shell(given[key])
-    return parameters_module.load(given)
+    parameters = parameters_module.load(given)
+    script_path(parameters.script)  # a file that is not there ends the node; an error in one that is stops the flight
+    return parameters
 
 
 def use_sim_time() -> bool:
     """Return ROS's parameter /use_sim_time. Raises ParameterError."""
     given = rospy.get_param("/use_sim_time", False)
     if not isinstance(given, bool):
-        raise ParameterError(f"parameter /use_sim_time = {given!r}: must be true or false")
+        raise ParameterError(f"parameter /use_sim_time = {str(given)[:80]}: must be true or false")
     return given

@@ -8,7 +8,7 @@ from rosgraph_msgs.msg import Clock
 from drone_sim.pacing import Throttle
 from drone_sim.simulation import Simulation
 
-_CLOCK_PERIOD = 1 / 400  # s of real time, between two of /clock while nothing else is sent
+_CLOCK_PERIOD = 1 / 200  # s of real time, between two of /clock while nothing else is sent
 
 
 class StepTime:

@@ -59,7 +59,7 @@ class Pictures:
             self._floor = -1
 
     def place(self, body: int, places: Mapping[int, Matrix]) -> bool:
-        """Move some of a body's visuals, by index, to places in their link's frame; return whether they were elsewhere."""
+        """Move some of a body's visuals, by index, to places in their link's frame; return whether any moves."""
         parts = self._of(body)
         others = {index: place for index, place in places.items() if parts[index].local != place}
         if others:

@@ -1,0 +1,109 @@
+"""Work from other threads: in order, answered, and never after its time. Needs no ROS."""
+
+import threading
+
+import pytest
+
+from drone_sim.ros.held import PATIENCE, Held
+from drone_sim.ros.inbox import Inbox
+
+
+def ask(inbox, job):
+    """Ask in a thread; return the thread, and what will hold the answer or the error."""
+    said = []
+
+    def run():
+        try:
+            said.append(inbox.ask(job))
+        except Exception as error:
+            said.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread, said
+
+
+def test_jobs_are_done_in_order_by_who_empties():
+    inbox, done = Inbox(), []
+    for number in range(3):
+        inbox.put(lambda number=number: done.append((number, threading.get_ident())))
+    assert not done
+    inbox.empty()
+    assert done == [(number, threading.get_ident()) for number in range(3)]
+
+
+def test_what_comes_while_it_empties_waits_for_the_next_time():
+    inbox, done = Inbox(), []
+
+    def again():
+        done.append(1)
+        inbox.put(again)
+
+    inbox.put(again)
+    inbox.empty()
+    assert done == [1]
+    inbox.empty()
+    assert done == [1, 1]
+
+
+def test_who_asks_gets_the_answer_or_the_error():
+    inbox = Inbox()
+    for job, expected in ((lambda: "done", "done"), (lambda: str(1 / 0), ZeroDivisionError)):
+        thread, said = ask(inbox, job)
+        inbox.wait(10)
+        inbox.empty()
+        thread.join(10)
+        assert said[0] == expected if expected == "done" else isinstance(said[0], expected)
+
+
+def test_a_request_that_timed_out_is_not_carried_out_later():
+    inbox, done = Inbox(patience=0.05), []
+    with pytest.raises(TimeoutError, match=r"no answer within 0\.05 s: it will not be carried out"):
+        inbox.ask(lambda: done.append(1) or "")
+    inbox.empty()
+    assert not done
+
+
+def test_a_request_that_has_begun_is_said_to_be_under_way():
+    inbox, answered = Inbox(patience=0.05), threading.Event()
+    thread, said = ask(inbox, lambda: str(answered.wait(10)))
+    inbox.wait(10)
+    worker = threading.Thread(target=inbox.empty)
+    worker.start()
+    thread.join(10)
+    answered.set()
+    worker.join(10)
+    assert "it is still being carried out" in str(said[0])
+
+
+class Clock:
+    def __init__(self):
+        self.now = 5.0
+
+    def __call__(self):
+        return self.now
+
+
+def test_a_handle_is_held_until_it_is_let_go_of():
+    held = Held(Clock())
+    held.take("Drone", "rviz 1")
+    held.take("Drone", "rviz 2")
+    held.let_go("Drone", "rviz 1")
+    assert held.names() == {"Drone"}
+    held.let_go("Drone", "rviz 2")
+    assert held.names() == set()
+
+
+def test_a_hand_that_says_nothing_has_let_go():
+    clock = Clock()
+    held = Held(clock)
+    held.take("Drone", "rviz")
+    for _ in range(10):
+        clock.now += 0.75 * PATIENCE
+        assert held.names() == {"Drone"}
+        held.keep("Drone", "rviz")
+        held.keep("Drone", "another rviz, which does not hold it")
+    clock.now += PATIENCE
+    assert held.names() == set()
+    held.keep("Drone", "rviz")
+    assert held.names() == set(), "it comes back only when it is taken again"
