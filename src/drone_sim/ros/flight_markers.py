@@ -1,10 +1,11 @@
-"""How high the drone is, what it is told to do, and how it fares, in rviz: `<drone>/view/height`, `command`, `state`."""
+"""How high the drone is, what it is told to do, how it fares, in rviz: `<drone>/view/height`, `command`, `state`."""
 
 from __future__ import annotations
 
 import math
 from typing import List, Optional, Sequence, Tuple
 
+import numpy as np
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
@@ -26,8 +27,9 @@ _TICKS = 40
 _THIN = 0.006  # m
 _INK = (0.10, 0.12, 0.16, 1.0)
 _SECONDS = 1.0  # an arrow is as long as the way that is commanded for this time
-_BLUE = (0.05, 0.35, 0.95, 1.0)
+_BLUE = (0.0, 0.30, 0.95, 1.0)
 _AWAY = 0.3  # m, from the drone's middle: what is about the drone must not hide it
+_HALF, _WIDE, _HEAD = 0.018, 0.065, 0.12  # m: half the width of an arrow and of its head, and the head's length
 _TEXT_ABOVE, _TEXT_SIZE = 0.4, 0.06  # m
 
 
@@ -64,8 +66,8 @@ class CommandMarkers:
         seen = command, base, state = drone.command, drone.track, drone.state
         if seen != self._shown and self._topic.due():
             self._shown = seen
-            markers = [_arrow(command, base), *_turn(command, base)]
-            self._topic.show([marker and beside(state, marker) for marker in markers])
+            markers = [_arrow(command, base), _turn(command, base)]
+            self._topic.show([beside(state, marker) if marker else None for marker in markers])
 
 
 class StateText:
@@ -135,22 +137,37 @@ def _arrow(command: Twist, base: frames.Matrix) -> Optional[Marker]:
     speed = math.hypot(*command.linear)
     if not speed:
         return None
-    ends = (_AWAY, _AWAY + _SECONDS * speed)
-    points = [frames.rotate(base, [end * part / speed for part in command.linear]) for end in ends]
-    return shape(Marker.ARROW, _BLUE, (0.03, 0.07, 0.09), points)
+    ahead = np.array(frames.rotate(base, command.linear)) / speed
+    aside = np.cross((0.0, 0.0, 1.0), ahead)
+    if not aside.any():  # straight up or down
+        aside = np.array(frames.rotate(base, (0.0, 1.0, 0.0)))
+    aside /= np.linalg.norm(aside)
+    reach = _SECONDS * speed
+    neck = max(reach - _HEAD, 0.0)
+    return _flat(np.array([ahead * _AWAY, ahead * (_AWAY + neck)]), np.array([aside, aside]), ahead * (_AWAY + reach))
 
 
-def _turn(command: Twist, base: frames.Matrix) -> Sequence[Optional[Marker]]:
-    """Return an arc from the front, as far as the turn that is commanded goes, and its head."""
+def _turn(command: Twist, base: frames.Matrix) -> Optional[Marker]:
+    """Return an arc from the front, as far as the turn that is commanded goes."""
     turn = max(-3.0, min(3.0, _SECONDS * command.angular[2]))
     if not turn:
-        return None, None
-    angles = [turn * number / 24 for number in range(25)]
-    points = [frames.rotate(base, (_AWAY * math.cos(a), _AWAY * math.sin(a), 0.0)) for a in angles]
-    along = math.copysign(0.09, turn)
-    last, x, y = points[-1], -along * math.sin(turn), along * math.cos(turn)
-    tip = [one + other for one, other in zip(last, frames.rotate(base, (x, y, 0.0)))]
-    return (
-        shape(Marker.LINE_STRIP, _BLUE, (0.025, 0, 0), points),
-        shape(Marker.ARROW, _BLUE, (0.025, 0.07, 0.088), [last, tip]),
-    )
+        return None
+    neck = turn - math.copysign(min(_HEAD / _AWAY, abs(turn)), turn)
+    rays = [(math.cos(a), math.sin(a), 0.0) for a in (*(neck * part / 24 for part in range(25)), turn)]
+    *asides, last = np.array([frames.rotate(base, ray) for ray in rays])
+    return _flat(_AWAY * np.array(asides), np.array(asides), _AWAY * last)
+
+
+def _flat(middle: np.ndarray, aside: np.ndarray, tip: np.ndarray) -> Marker:
+    """Return a flat arrow along points (n, 3), across unit vectors (n, 3), with its head from the last one to the tip.
+
+    rviz's own arrows are dark when they are seen from behind.
+    """
+    left, right = middle + _HALF * aside, middle - _HALF * aside
+    points: List[np.ndarray] = []
+    for one, other, next_one, next_other in zip(left, right, left[1:], right[1:]):
+        points += [one, other, next_other, one, next_other, next_one]
+    points += [middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]
+    marker = shape(Marker.TRIANGLE_LIST, _BLUE, (1, 1, 1), points)
+    marker.colors = [marker.color] * len(points)  # lights it from everywhere
+    return marker

@@ -61,6 +61,7 @@ def beside(state: State, marker: Marker) -> Marker:
     """
     back = frames.invert(frames.from_quaternion((0, 0, 0), state.orientation))
     marker.header.frame_id, marker.frame_locked = BASE_LINK, True
+    place = marker.pose.position
+    marker.pose.position = Point(*frames.rotate(back, (place.x, place.y, place.z)))
     marker.pose.orientation = Quaternion(*frames.to_quaternion(back))
-    marker.pose.position = Point(*frames.rotate(back, (marker.pose.position.x, marker.pose.position.y, marker.pose.position.z)))
     return marker

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
@@ -59,9 +59,8 @@ class Surroundings:
             marker.mesh_resource, marker.mesh_use_embedded_materials = self._files.resource(visual, glow=1.0), True
         except (ValueError, OSError) as error:
             rospy.logwarn(f"rviz gets a floor without texture: {error}")
-            half = self._simulation.parameters.scene.floor.size
-            marker.type, marker.color, marker.scale.x, marker.scale.y = Marker.CUBE, ColorRGBA(*_GREY), half, half
-            marker.scale.z = 1e-3
+            size = self._simulation.parameters.scene.floor.size
+            marker.type, marker.color, marker.scale = Marker.CUBE, ColorRGBA(*_GREY), Vector3(size, size, 1e-3)
         return marker
 
 
