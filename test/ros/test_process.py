@@ -194,13 +194,13 @@ class Process(unittest.TestCase):
         surroundings = {"ROS_MASTER_URI": f"http://localhost:{port}"}
         with master(port):
             node = simulator("_real_time_factor:=5", **surroundings)
-            watchdog = threading.Timer(2 * HANGS, node.kill)
+            watchdog = threading.Timer(4 * HANGS, node.kill)
             watchdog.start()
             self.said_until(node, "flying")
         with master(port):
             self.assertIn("a new ROS master", self.said_until(node, "registered again"))
             client = started(sys.executable, "-c", CLIENT, **surroundings)
-            said, _ = client.communicate(timeout=HANGS)
+            said, _ = client.communicate(timeout=2 * HANGS)
             self.assertEqual(said, "stopped {'real_time_factor': 5}\n")
             node.send_signal(signal.SIGINT)
             node.communicate(timeout=HANGS)

@@ -58,7 +58,7 @@ class MasterWatch(threading.Thread):
 
     def _remember(self) -> None:
         for name in (rospy.get_name(), _USE_SIM_TIME):
-            with contextlib.suppress(rosgraph.MasterError):  # there is no such parameter
+            with contextlib.suppress(rosgraph.MasterException):  # there is no such parameter
                 self._parameters[name] = self._master.getParam(name)
 
     def _register_again(self) -> bool:
