@@ -55,7 +55,7 @@ start() { # start CONFIG [ROSLAUNCH ARGUMENT...]: the simulation, then rviz with
 }
 
 # A busy computer is late with what rviz draws; what moves slowly is then still where it should be.
-slow_motion=real_time_factor:=0.4
+slow_motion=real_time_factor:=0.25
 
 place() { timeout 30 rostopic echo -n1 -p /drone/odom/pose/pose/position | tail -n1 | cut -d, -f2-3; }
 
@@ -73,7 +73,7 @@ rospy.Subscriber("/drone/odom", Odometry, lambda odometry: places.append(odometr
 publisher = rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1, latch=True)
 for x, y, z, turn, there in (
     (0.3, 0.3, 0.04, 0.0, lambda place: place.y > 0.35),
-    (0.6, -0.15, 0.0, 0.0, lambda place: place.x > 0.9),
+    (0.6, -0.15, 0.0, 0.0, lambda place: place.x > 0.8),
 ):
     publisher.publish(Twist(Vector3(x, y, z), Vector3(0, 0, turn)))
     while not (places and there(places[-1])):
@@ -96,7 +96,7 @@ for display in manager["Displays"]:
 manager["Tools"].sort(key=lambda tool: tool["Class"] != "rviz/Interact")
 manager["Views"]["Current"] = {
     **{"Class": "rviz/Orbit", "Name": "Standing still", "Target Frame": "world", "Value": "Orbit (rviz)"},
-    **{"Distance": 2.5, "Pitch": 0.6, "Yaw": 3.14159, "Focal Point": {"X": 0, "Y": 0, "Z": 0.8}},
+    **{"Distance": 2.4, "Pitch": 0.4, "Yaw": 3.14159, "Focal Point": {"X": 0, "Y": 0, "Z": 0.8}},
 }
 yaml.safe_dump(view, open(sys.argv[1], "w"))
 PYTHON
@@ -108,10 +108,10 @@ PYTHON
   for ((pixel = 10; pixel <= 200; pixel += 10)); do
     xdotool mousemove $((x - pixel)) $((y - pixel / 4)) sleep 0.02
   done
-  sleep 1.5
+  sleep 0.5
   import -window root "$folder/rviz_target.png"
   xdotool mouseup 1
-  sleep 10
+  sleep 15
   after=$(place)
   echo "rviz_target.png: dragged the sphere; the drone flew from x, y = $before to $after" >&2
   end

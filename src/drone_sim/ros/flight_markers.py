@@ -30,7 +30,7 @@ _SECONDS = 1.0  # an arrow is as long as the way that is commanded for this time
 _BLUE = (0.0, 0.30, 0.95, 1.0)
 _AWAY = 0.3  # m, from the drone's middle: what is about the drone must not hide it
 _HALF, _WIDE, _HEAD = 0.018, 0.065, 0.12  # m: half the width of an arrow and of its head, and the head's length
-_TEXT_ABOVE, _TEXT_SIZE = 0.4, 0.06  # m
+_TEXT_ABOVE, _TEXT_SIZE = 0.34, 0.042  # m
 
 
 class HeightMarkers:
@@ -164,10 +164,10 @@ def _flat(middle: np.ndarray, aside: np.ndarray, tip: np.ndarray) -> Marker:
     rviz's own arrows are dark when they are seen from behind.
     """
     left, right = middle + _HALF * aside, middle - _HALF * aside
-    points: List[np.ndarray] = []
-    for one, other, next_one, next_other in zip(left, right, left[1:], right[1:]):
+    points: List[Sequence[float]] = []
+    for one, other, next_one, next_other in zip(*(side.tolist() for side in (left, right, left[1:], right[1:]))):
         points += [one, other, next_other, one, next_other, next_one]
-    points += [middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]
+    points += np.array([middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]).tolist()
     marker = shape(Marker.TRIANGLE_LIST, _BLUE, (1, 1, 1), points)
     marker.colors = [marker.color] * len(points)  # lights it from everywhere
     return marker

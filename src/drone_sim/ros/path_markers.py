@@ -14,7 +14,7 @@ from drone_sim.simulation import Simulation
 _PERIOD = 0.1  # s of real time
 _SPACING = 0.05  # m between two points
 _LENGTH = 1500  # points; the oldest go
-_WIDTH = 0.016  # m
+_WIDTH = 0.012  # m
 _ORANGE = (1.0, 0.42, 0.0, 1.0)
 
 
