@@ -57,6 +57,7 @@ class Drone:
         self._shapes = {name: frames.multiply(inertial_from_root, link) for name, link in [(DRONE, IDENTITY), *shapes]}
         self.script: load.Script = load.NoScript()
         self.drawings: Optional[Drawings] = None
+        self.jumps = 0  # how often it was put somewhere else
         self.reset()
 
     def reset(self) -> None:
@@ -154,6 +155,7 @@ class Drone:
 
     def move(self, pose: Pose) -> None:
         """Put the drone somewhere else, at rest."""
+        self.jumps += 1
         self._world.set_pose(self._id, pose)
         self.refresh()
 
@@ -178,6 +180,7 @@ class Drone:
                 self.script_parameters[name].update(values)
             for one in others:
                 one()
+            self.jumps += 1
             self.refresh()
 
         return recall

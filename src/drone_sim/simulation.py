@@ -177,6 +177,11 @@ class Simulation:
     # ---- stepping
 
     @property
+    def run(self) -> int:
+        """Number of the run: another one after every start and every stop."""
+        return self._runs
+
+    @property
     def time(self) -> float:
         """Simulated time in seconds: counted, not summed, so that it does not drift."""
         return self.steps * self.parameters.time_step

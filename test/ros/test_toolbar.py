@@ -215,7 +215,7 @@ class Toolbar(unittest.TestCase):
         self.call("load_scene")
         scene = Listener("/drone/scene", MarkerArray)
         _, box, sphere, cylinder, mesh = scene.wait_for(lambda m: len(m.markers) == 5, after=0).markers
-        kinds = [Marker.CUBE, Marker.SPHERE, Marker.CYLINDER, Marker.MESH_RESOURCE]
+        kinds = [Marker.TRIANGLE_LIST, Marker.SPHERE, Marker.CYLINDER, Marker.MESH_RESOURCE]
         self.assertEqual([marker.type for marker in (box, sphere, cylinder, mesh)], kinds)
         self.assertEqual((box.scale.x, box.scale.y, box.scale.z), (1, 2, 3))
         self.assertEqual((box.color.r, box.color.g, box.color.b, box.color.a), (1, 0, 0, 0.5))

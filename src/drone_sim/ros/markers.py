@@ -107,11 +107,12 @@ def _ring() -> Marker:
     """Return a flat ring around the drone, wide enough to be caught and not in the way of what is inside it."""
     ring = Marker(type=Marker.TRIANGLE_LIST)
     ring.scale.x = ring.scale.y = ring.scale.z = 1.0
-    ring.color.r, ring.color.g, ring.color.a = 1.0, 0.6, 0.5
+    ring.color.r, ring.color.g, ring.color.a = 1.0, 0.6, 0.45
     angles = [2 * math.pi * index / 48 for index in range(49)]
     inner, outer = ([Point(r * math.cos(a), r * math.sin(a), 0.0) for a in angles] for r in (0.22, 0.26))
     for i, o, next_i, next_o in zip(inner, outer, inner[1:], outer[1:]):
         ring.points += [i, o, next_o, i, next_o, next_i]
+    ring.colors = [ring.color] * len(ring.points)  # lights it from everywhere
     return ring
 
 

@@ -22,7 +22,6 @@ from drone_sim.guardian import Guardian
 from drone_sim.pacing import Beat, Pacer
 from drone_sim.parameters import Parameters
 from drone_sim.ros.cameras import CameraOutput
-from drone_sim.ros.drawing_markers import DrawingMarkers
 from drone_sim.ros.ending import Ending
 from drone_sim.ros.inbox import Inbox
 from drone_sim.ros.inputs import DroneInput
@@ -31,7 +30,7 @@ from drone_sim.ros.markers import Handles
 from drone_sim.ros.master_watch import MasterWatch
 from drone_sim.ros.outputs import DroneOutput
 from drone_sim.ros.player import Player
-from drone_sim.ros.scene_markers import SceneMarkers
+from drone_sim.ros.rviz_view import RvizView
 from drone_sim.ros.script_topics import RosBackend
 from drone_sim.ros.services import Services
 from drone_sim.ros.starting import init_node, read_parameters, reported, use_sim_time
@@ -70,7 +69,7 @@ class Node:
         self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
         inputs = DroneInput(self.simulation, self._inbox)
         self._handles = Handles(self.simulation, inputs, self._inbox)
-        self._markers = (SceneMarkers(self.simulation), DrawingMarkers(drone, drawings))
+        self._view = RvizView(self.simulation, self.player, drawings)
         self._cameras = [
             CameraOutput(drone, camera, parameters.cameras[name]) for name, camera in self.simulation.cameras.items()
         ]
@@ -169,15 +168,15 @@ class Node:
     def _show_to_eyes(self) -> None:
         self._output.publish_command(self._time.stamp)
         self._handles.update()
-        for markers in self._markers:
-            markers.update()
+        self._view.update()
         if self._parameters.gui:
             track = self.simulation.drone.track
             self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
         self._beat.restart()
 
     def close(self) -> None:
-        """Run the script's cleanup and free the world. Raises ScriptError."""
+        """Run the script's cleanup, remove what rviz read, and free the world. Raises ScriptError."""
+        self._view.close()
         self.simulation.close()
 
 

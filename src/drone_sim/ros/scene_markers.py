@@ -13,22 +13,27 @@ from visualization_msgs.msg import Marker, MarkerArray
 from drone_sim import frames
 from drone_sim.camera.mesh import WHITE
 from drone_sim.pacing import Throttle
+from drone_sim.ros import boxes
 from drone_sim.ros.messages import WORLD
+from drone_sim.ros.rviz_meshes import RvizMeshes
 from drone_sim.simulation import Simulation
 from drone_sim.visual import Visual
 
 _PERIOD = 0.19  # s of real time, between two looks at what has moved
 _FLAT = 1e-3  # m, thickness of a plane
 _WIDE = 200.0  # m, its side
+_GLOW = 0.6  # of what is seen from behind the lamp
+_TEXTURED = ("box", "mesh")
 _FROM_ITS_FILE = (0.0, 0.0, 0.0, 0.0)  # the color by which rviz keeps a mesh's own
 
 
 class SceneMarkers:
-    """Shows the objects of the scene as they stand. The floor is left to rviz's grid."""
+    """Shows the objects of the scene as they stand. The floor is not among them."""
 
-    def __init__(self, simulation: Simulation):
+    def __init__(self, simulation: Simulation, files: RvizMeshes):
         """Advertise in the drone's namespace."""
         self._simulation = simulation
+        self._files = files
         self._throttle = Throttle(_PERIOD)
         self._shown: Optional[Tuple[List[Visual], np.ndarray]] = None
         name = f"{simulation.drone.name}/scene"
@@ -44,18 +49,31 @@ class SceneMarkers:
         self._shown = visuals, poses
         markers = [Marker(action=Marker.DELETEALL)]
         for visual, pose in zip(visuals, poses):
-            markers += _markers(visual, tuple(pose[:3].ravel().tolist()))
+            markers += self._textured(visual, tuple(pose[:3].ravel().tolist()))
         for number, marker in enumerate(markers):
             marker.header.frame_id, marker.ns, marker.id = WORLD, "scene", number
             marker.frame_locked = True
         self._publisher.publish(MarkerArray(markers))
+
+    def _textured(self, visual: Visual, matrix: frames.Matrix) -> Sequence[Marker]:
+        """Return what rviz makes of one visual, with its texture where the cameras show one, too."""
+        if visual.texture and visual.shape in _TEXTURED:
+            try:
+                marker = _marker(Marker.MESH_RESOURCE, matrix, (1, 1, 1), _FROM_ITS_FILE)
+                marker.mesh_resource, marker.mesh_use_embedded_materials = self._files.resource(visual, _GLOW), True
+                return [marker]
+            except (ValueError, OSError) as error:
+                rospy.logwarn_throttle(5, f"rviz gets an object without texture: {error}")
+        return _markers(visual, matrix)
 
 
 def _markers(visual: Visual, matrix: frames.Matrix) -> Sequence[Marker]:
     """Return what rviz makes of one visual: one marker, three for a capsule."""
     size, rgba = visual.size, visual.rgba
     if visual.shape == "box":
-        return [_marker(Marker.CUBE, matrix, size, rgba)]
+        box = _marker(Marker.TRIANGLE_LIST, matrix, size, rgba)
+        boxes.paint(box, matrix, rgba)
+        return [box]
     if visual.shape == "plane":
         return [_marker(Marker.CUBE, matrix, (_WIDE, _WIDE, _FLAT), rgba)]
     if visual.shape == "mesh":
