@@ -10,6 +10,7 @@ from typing import Any, Callable, Dict, List
 
 from benchmarks import loop, node, plot, render
 from benchmarks.cores import one_core
+from drone_sim import writing
 from drone_sim.camera.renderer import Renderer
 
 Row = Dict[str, Any]
@@ -61,7 +62,7 @@ def _fill_readme(results: Dict[str, Any]) -> None:
     tables = [f"{name}\n{table(results[name])}" for name in BENCHMARKS if name in results]
     block = "```text\n" + "\n\n".join([f"on {results['machine']}", *tables]) + "\n```\n"
     before, _, rest = README.read_text().partition(begin)
-    README.write_text(before + begin + block + end + rest.partition(end)[2])
+    writing.write(README, before + begin + block + end + rest.partition(end)[2])
 
 
 def main() -> int:
@@ -81,7 +82,7 @@ def main() -> int:
         print(f"measuring: {name} ...", file=sys.stderr, flush=True)
         results[name] = BENCHMARKS[name]()
         print(f"{name}\n{table(results[name])}\n", flush=True)
-        RESULTS.write_text(json.dumps(results, indent=1) + "\n")
+        writing.write(RESULTS, json.dumps(results, indent=1) + "\n")
     if arguments.plot:
         plot.draw(results, arguments.plot)
     if arguments.readme:

@@ -1,5 +1,6 @@
 """The results of a benchmark run as one picture."""
 
+from pathlib import Path
 from typing import Any, Dict
 
 import matplotlib
@@ -7,6 +8,8 @@ import matplotlib
 matplotlib.use("Agg")
 
 from matplotlib import pyplot
+
+from drone_sim import writing
 
 
 def draw(results: Dict[str, Any], file: str) -> None:
@@ -26,7 +29,8 @@ def draw(results: Dict[str, Any], file: str) -> None:
     right.margins(y=0.4)  # room for the legend
     right.grid(alpha=0.3)
     figure.suptitle(results.get("machine", ""))
-    figure.savefig(file, dpi=90)
+    with writing.replacing(file, binary=True) as picture:
+        figure.savefig(picture, dpi=90, format=Path(file).suffix[1:] or "png")
 
 
 def _bars(axes: Any, rows: Any, key: str, label: str) -> None:

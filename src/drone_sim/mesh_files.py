@@ -24,8 +24,11 @@ MAX_COORDINATE = 1e6  # m from the mesh's origin
 WHITE = (1.0, 1.0, 1.0, 1.0)
 # How often a word may stand in a file; each <instance_node> may double what is drawn.
 _MOST = {
-    ".obj": {rb"usemtl": MAX_PARTS, rb"\nf": MAX_TRIANGLES},
-    ".dae": {rb"<(?:\w+:)?instance_node": 16, rb"<(?:\w+:)?instance_geometry": MAX_PARTS},
+    ".obj": {"usemtl": (rb"usemtl", MAX_PARTS), "f": (rb"\nf", MAX_TRIANGLES)},
+    ".dae": {
+        "instance_node": (rb"<(?:\w+:)?instance_node", 16),
+        "instance_geometry": (rb"<(?:\w+:)?instance_geometry", MAX_PARTS),
+    },
 }
 _HULL = 256  # corners that a hull may have
 _Colour = Tuple[float, float, float, float]
@@ -169,9 +172,9 @@ def _check_text(content: bytes, kind: str) -> None:
             raise ValueError("must be XML in UTF-8")
         if b"<!DOCTYPE" in content:
             raise ValueError("must have no DOCTYPE")
-    for word, most in _MOST.get(kind, {}).items():
-        if len(re.findall(word, content)) > most:
-            raise ValueError(f"more than {most} times `{word.rpartition(b')?')[2].decode().lstrip(chr(92) + 'n')}`")
+    for word, (pattern, most) in _MOST.get(kind, {}).items():
+        if len(re.findall(pattern, content)) > most:
+            raise ValueError(f"more than {most} times `{word}`")
 
 
 def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:

@@ -53,12 +53,13 @@ def resolve(name: str) -> Path:
     """
     path = locate(name)
     try:
-        found = path.is_file()
+        if path.is_file():
+            return path.resolve()
+        odd = " (it is no regular file)" if path.exists() else ""
     except (OSError, ValueError):  # too long a name, a NUL in it
-        found = False
-    if not found:
-        raise FileNotFoundError(f"no such file: {name}" if name.isprintable() and len(name) < 300 else "no such file")
-    return path.resolve()
+        odd = ""
+    named = f": {name}" if name.isprintable() and len(name) < 300 else ""
+    raise FileNotFoundError(f"no such file{named}{odd}")
 
 
 def read_bytes(path: Union[str, Path], limit: int) -> bytes:

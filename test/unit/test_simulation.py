@@ -252,3 +252,17 @@ def test_a_script_that_has_gone_is_refused_at_the_start_and_the_simulation_stand
         simulation.start()
     simulation.stop()
     assert not simulation.running
+
+
+def test_a_world_with_a_window_is_filled_anew_and_flies_alike(simulate, tmp_path):
+    """There is one window in a process; here it is one that cannot be seen."""
+    simulation = simulate(scene={"objects": CLUTTER})
+    simulation._gui = True
+    world, path = simulation.world, fly(simulation, 10)
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 1]}]")
+    with pytest.raises(parameters.ParameterError, match="named 'Drone' is there already"):
+        simulation.start(scene_file=str(scene))
+    simulation.start()
+    assert simulation.world is world
+    assert fly(simulation, 10) == path
