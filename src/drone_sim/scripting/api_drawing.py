@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Any, Dict, Optional, Sequence, Set
 
 from drone_sim.objects import WORLD
-from drone_sim.scripting.script_log import LOG
 from drone_sim.scripting.calls import Function, numbers
 from drone_sim.scripting.drawings import MOST
 from drone_sim.scripting.host import Host
+from drone_sim.scripting.script_log import LOG
 
 Handle = int
 Number = float
