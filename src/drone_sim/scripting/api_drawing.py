@@ -77,13 +77,8 @@ class Drawing:
                 self._say("addDrawingObject", "the parent is ignored: items stay where they are drawn")
             if maxItemCount > MOST:
                 self._say("addDrawingObject", f"{maxItemCount} items are too many: {MOST} are kept")
-            self._drawings.make(
-                self._host.drawings_made,
-                int(objectType),
-                *numbers((size, duplicateTolerance), 2),
-                int(maxItemCount),
-                rgb,
-            )
+            extent, tolerance = numbers((size, duplicateTolerance), 2)
+            self._drawings.make(self._host.drawings_made, int(objectType), extent, tolerance, int(maxItemCount), rgb)
         return self._host.drawings_made
 
     def addDrawingObjectItem(self, handle: Handle, item: Optional[Numbers] = None) -> None:
