@@ -165,7 +165,7 @@ class Drone:
         return frames.multiply(sensor, drone_objects.OPTICAL_FROM_SENSOR)
 
     def remember(self) -> Callable[[], None]:
-        """Return a function that brings back all that the drone's body is not: propellers, objects, script, messages that wait."""
+        """Return a function that brings back what the drone's body is not: propellers, objects, script, messages."""
         own = (self.command, self._command_age, self.drawings_made, list(self._pushes), dict(self._joint_angles))
         parameters = copy.deepcopy(self.script_parameters)
         parts = (self._propellers, self.objects, self.signals, self.bus, self.drawings, self.script)

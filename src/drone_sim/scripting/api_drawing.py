@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Any, Dict, Optional, Sequence, Set
 
 from drone_sim.objects import WORLD
-from drone_sim.scripting.script_log import LOG
 from drone_sim.scripting.calls import Function, numbers
 from drone_sim.scripting.drawings import MOST
 from drone_sim.scripting.host import Host
+from drone_sim.scripting.script_log import LOG
 
 Handle = int
 Number = float
@@ -77,13 +77,8 @@ class Drawing:
                 self._say("addDrawingObject", "the parent is ignored: items stay where they are drawn")
             if maxItemCount > MOST:
                 self._say("addDrawingObject", f"{maxItemCount} items are too many: {MOST} are kept")
-            self._drawings.make(
-                self._host.drawings_made,
-                int(objectType),
-                *numbers((size, duplicateTolerance), 2),
-                int(maxItemCount),
-                rgb,
-            )
+            extent, tolerance = numbers((size, duplicateTolerance), 2)
+            self._drawings.make(self._host.drawings_made, int(objectType), extent, tolerance, int(maxItemCount), rgb)
         return self._host.drawings_made
 
     def addDrawingObjectItem(self, handle: Handle, item: Optional[Numbers] = None) -> None:

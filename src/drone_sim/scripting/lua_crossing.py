@@ -132,7 +132,12 @@ local function with_lists(f, name, kind_a, kind_b, kind_c, a, b, c)
 end
 
 local function define(place, key, name, f)
+  local shortcut = shortcuts[name]
   rawset(place, key, function(a, b, c, ...)
+    if shortcut and c == nil then
+      local result = shortcut(a, b)
+      if result then return result end
+    end
     if memory('count') > SOFT then check_memory() end
     local kind_a, kind_b, kind_c = SCALAR[type(a)], 1, 1
     if b ~= nil or c ~= nil then kind_b, kind_c = SCALAR[type(b)], SCALAR[type(c)] end

@@ -7,6 +7,7 @@ Finalizers run with hooks switched off, and so do the handlers of Lua's own xpca
 """
 
 from drone_sim.scripting.lua_crossing import CROSSING
+from drone_sim.scripting.lua_matrices import MATRICES
 from drone_sim.scripting.lua_snapshots import SNAPSHOTS
 
 _LIMITS = r"""
@@ -100,13 +101,14 @@ local function phases()
   return found
 end
 
--- Run f; return which phases there are, then true and what f returned, or the number of the limit and the line,
--- or false and a message (which may begin with the line).
+-- Run f; return which phases there are, and then nothing; or true and what f returned; or the number of the limit and
+-- the line; or false and a message, which may begin with the line.
 local function run(f, ...)
   stopped = false
   local ok, value = pcall(f, ...)
   if memory('count') > SOFT then pcall(check_memory) end
   if stopped then return phases(), stopped, stopped_at end
+  if ok and value == nil then return phases() end
   if ok then return phases(), true, value end
   if type(value) == 'userdata' then error(value, 0) end
   return phases(), false, message_of(value)
@@ -263,4 +265,4 @@ return {
 }
 """
 
-PRELUDE = _LIMITS + CROSSING + _PHASES + SNAPSHOTS + _GLOBALS
+PRELUDE = _LIMITS + MATRICES + CROSSING + _PHASES + SNAPSHOTS + _GLOBALS

@@ -14,7 +14,7 @@ import logging
 import re
 import weakref
 from pathlib import Path
-from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple
+from typing import Any, Callable, Mapping, Set, Tuple
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import script_log
@@ -40,7 +40,7 @@ _NAME_LENGTH = 50  # Lua cuts longer chunk names
 _NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
 _TIME, _OVER_MEMORY, _MISSING = 1, 2, 3  # why Lua stopped a script, or called nothing (lua_sandbox.py)
 _AS_STREAM, _STOPPED = (AS_STREAM,), (FAILED, b"stopped")
-_TOO_MUCH = f"not enough memory: a Lua script may use {_MEMORY // _MIB} MiB, this one uses more than {_MEMORY // _MIB} MiB"
+_TOO_MUCH = f"not enough memory: the script uses more than {_MEMORY // _MIB} MiB"
 
 
 class LuaScript:
@@ -131,7 +131,7 @@ class LuaScript:
         if self._end:
             raise self._error(phase, self._end)
         try:
-            self._phases, how, *rest = self._thread.run(function, *arguments)
+            outcome = self._thread.run(function, *arguments)
         except LeftBehind:
             self._end = str(self._limit)
             raise self._error(phase, self._end) from None
@@ -139,18 +139,23 @@ class LuaScript:
             raise self._error(phase, str(error) or type(error).__name__) from None
         finally:
             script_log.end_call()
+        if not isinstance(outcome, tuple):
+            self._phases = outcome
+            return None
+        self._phases, how, *rest = outcome
         if how is True:
-            return rest[0] if rest else None
-        raise self._failure(phase, how, rest)
+            return rest[0]
+        raise self._failure(phase, how, *rest)
 
-    def _failure(self, phase: str, how: Any, rest: Any) -> ScriptError:
+    def _failure(self, phase: str, how: Any, found: Any = None) -> ScriptError:
+        """Return the error that Lua tells of: `found` is a message, or the line where the script was stopped."""
         if how is False:
-            return self._error_with_line(phase, rest[0])
+            return self._error_with_line(phase, found)
         if how == _TIME:
-            return self._error(phase, str(self._limit), rest[0])
+            return self._error(phase, str(self._limit), found)
         if how == _OVER_MEMORY:
             self._end = _TOO_MUCH
-            return self._error(phase, self._end, rest[0])
+            return self._error(phase, self._end, found)
         return self._error(phase, f"the script has no function '{phase}' to call back")
 
     def _error(self, phase: str, message: str, line: int = 0) -> ScriptError:

@@ -19,7 +19,6 @@ _LARGEST = 2**63  # whole numbers beyond are floats in Lua
 FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM = range(5)
 
 
-
 # What functions of the API return, most often, and the answer that it is.
 _ANSWERS: Dict[Any, Callable[[Any], Tuple[Any, ...]]] = {
     "None": lambda _: (PLAIN,),
@@ -106,17 +105,17 @@ class Values:
         return [self._to_lua(item) for item in value] if unpacked else self._to_lua(value)
 
     def _to_lua(self, value: Any) -> Any:
-        kind = type(value)
-        if kind is int:
+        if type(value) is int:
             return value if -_LARGEST <= value < _LARGEST else _as_float(value)
-        if value is None or kind in _NUMBERS or isinstance(value, bytes):
+        if value is None or isinstance(value, (float, bool, bytes)):
             return value
         if isinstance(value, str):
             return value.encode("utf-8", "replace")
         if isinstance(value, Real):
             return float(value)
-        if hasattr(value, "to_sec"):  # ROS's times
-            return value.to_sec()
+        return value.to_sec() if hasattr(value, "to_sec") else self._table(value)  # ROS's times
+
+    def _table(self, value: Any) -> Any:
         if isinstance(value, (bytearray, memoryview)):
             return bytes(value)
         named = fields(value)

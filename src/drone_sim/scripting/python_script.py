@@ -131,8 +131,11 @@ class PythonScript:
         return line, mistake(error, self._modules.values()) or (f"{name}: {text}" if text else name)
 
     def _line(self, error: BaseException) -> int:
-        lines = [line for frame, line in traceback.walk_tb(error.__traceback__) if frame.f_code.co_filename == self._path]
-        return lines[-1] if lines else 0
+        found = 0
+        for frame, line in traceback.walk_tb(error.__traceback__):
+            if frame.f_code.co_filename == self._path:
+                found = line
+        return found
 
 
 def _copied(variables: Mapping[str, Any]) -> Dict[str, Any]:

@@ -1,0 +1,241 @@
+"""No script ends or blocks the process, however it tries: each attack runs in a process of its own.
+
+After it the simulation is in hand: the attack got one line at most, and the next start works.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).resolve().parents[2] / "src"
+STOPPED = "without returning (script_time_limit)"
+HANGS = 60  # s, on a busy machine; what is stopped takes about one
+PROLOGUE = {"5.1": "local _ = function() simGetSimulationTime() end\n", "newest": "local _ = sim.getSimulationTime\n"}
+
+# Runs in the child: flies a script for three steps with a command, then an empty one.
+CHILD = """
+import json, logging, sys, threading
+from drone_sim import parameters
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist
+
+path, where = sys.argv[1:]
+lines = []
+class Log(logging.Handler):
+    def emit(self, record):
+        lines.append(record.getMessage())
+logging.getLogger("drone_sim.script").addHandler(Log())
+
+def fly(limit=0.5):
+    said, simulation = [], None
+    def attempt(function):
+        try:
+            return function()
+        except ScriptError as error:
+            said.append(str(error))
+    def steps():
+        simulation.drone.receive(Twist())
+        for _ in range(3):
+            simulation.step()
+            simulation.restore(simulation.snapshot())
+    simulation = attempt(lambda: Simulation(parameters.load({"script_time_limit": limit}), script=path))
+    if simulation is not None:
+        attempt(steps)
+        attempt(simulation.close)
+    return said
+
+def test():
+    first = fly()
+    open(path, "w").write("")
+    out.write(json.dumps({"first": first, "second": fly(10), "lines": len(lines), "bytes": sum(map(len, lines))}))
+    out.flush()
+
+out = sys.stdout
+if where == "main":
+    test()
+else:
+    thread = threading.Thread(target=test)
+    thread.start()
+    thread.join()
+"""
+
+
+def attack(path, source, where="main"):
+    path.write_text(source, encoding="utf-8")
+    command = [sys.executable, "-c", CHILD, str(path), where]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=HANGS, check=False, stdin=subprocess.DEVNULL,
+        env={"PYTHONPATH": str(SOURCE), "PATH": "/usr/bin:/bin"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-500:]
+    found = json.loads(done.stdout)
+    assert found["second"] == [], "the next start works"
+    assert found["lines"] < 5000 and found["bytes"] < 5_000_000
+    assert len(found["first"]) <= 1 and all("\n" not in line and len(line) < 1000 for line in found["first"])
+    return (found["first"] or [""])[0]
+
+
+IN_LUA = [
+    # loops in C: the thread is left behind
+    ("string.find(('x'):rep(250000), '.-.-.-.-.-y')", STOPPED),
+    ("function sysCall_sensing() string.find(('x'):rep(250000), '.-.-.-.-.-y') end", STOPPED),
+    ("simROS.subscribe('cmd_vel', 'T', function() string.find(('x'):rep(250000), '.-.-.-.-.-y') end)", STOPPED),
+    ("(table.move or string.find)(table.move and {} or ('x'):rep(250000), table.move and 1 or '.-.-.-.-.-y', 2^53, 2, {})", ""),
+    ("table.insert(setmetatable({}, {__len = function() return 2^52 end}), 1, 1)", ""),
+    ("string.find(('a'):rep(2e7), ('a'):rep(1e7) .. 'b', 1, true)", ""),
+    ("load(('x=1 '):rep(5e7))", ""),
+    ("for _ = 1, 1e9 do string.rep('x', 1e7) end", STOPPED),
+    ("string.find(('a'):rep(3000000), ('a?'):rep(3000000))", "pattern too"),
+    ("while true do pcall(string.find, ('x'):rep(250000), '.-.-.-.-.-y') end", STOPPED),
+    ("coroutine.wrap(function() string.find(('x'):rep(250000), '.-.-.-.-.-y') end)()", STOPPED),
+    # the globals, and what hangs on them
+    ("setmetatable(_G, {__index = function(_, n) error(n) end}) function sysCall_sensing() x() end", ": x"),
+    ("setmetatable(_G, {__newindex = function() error('no') end}) y = 1", ": no"),
+    ("for k in pairs(_G) do _G[k] = nil end", ""),
+    ("for k in pairs(getmetatable('').__index) do getmetatable('').__index[k] = nil end error('x')", ": x"),
+    ("getmetatable('').__index = function() while true do end end print(('x').y)", STOPPED),
+    ("sysCall_sensing = setmetatable({}, {__call = function() end})", ""),
+    # memory
+    ("x = string.rep('x', 1e9)", "not enough memory"),
+    ("x = {} for i = 1, 10 do x[i] = string.rep(tostring(i), 4e7) end", "uses more than 256 MiB"),
+    ("x = {} while true do x[#x + 1] = {} end", ""),
+    ("x = {} while true do pcall(function() x[#x + 1] = string.rep(tostring(#x), 1e7) end) end", ""),
+    *(
+        (f"x = {{}} for i = 1, 300 do pcall(function() x[i] = string.rep(tostring(i), 2e6) end) end {crossing}", "")
+        for crossing in (
+            "while true do sim.getObjectMatrix(0) end",
+            "sim.setStringSignal('x', x[1])",
+            "sim.getObject(x[1])",
+            "error(x[1])",
+            "print(x[1])",
+            "sim.setObjectPosition(0, {1, 2, x})",
+            "sim.getVisionSensorCharImage(sim.getObject('/FrontVision'))",
+            "coroutine.wrap(function() sim.getObjectMatrix(0) end)()",
+            "collectgarbage('stop') while true do sim.getObjectMatrix(0) end",
+        )
+    ),
+    ("x = string.rep('x', 2.4e8) function sysCall_sensing() sim.getObjectMatrix(0) error(x) end", ""),
+    # values
+    ("local t = {} t[1] = t sim.setScriptSimulationParameter(sim.handle_self, 'x', t)", "nested too deeply"),
+    ("local t = {} t.x = t sim.setScriptSimulationParameter(sim.handle_self, 'x', t)", "nested too deeply"),
+    ("local t = {} for _ = 1, 1e5 do t = {t} end simROS.publish(simROS.advertise('x', 'T'), t)", "nested too deeply"),
+    ("sim.setScriptSimulationParameter(sim.handle_self, 'x', {[{}] = 1})", "a table cannot be a key"),
+    ("local t = {} for _ = 1, 15 do t = {t, t, t, t, t, t, t, t, t, t} end sim.getObject(t)", ""),
+    ("local t = {} for i = 1, 53 do t[2^i] = 1 end sim.getObject(t)", ""),
+    ("sim.setStringSignal('x', ('x'):rep(1e8))", "more than 67108864 bytes are too many"),
+    ("for i = 1, 9 do sim.setStringSignal('x' .. i, ('x'):rep(1e7)) end", "string signals may hold 67108864 bytes"),
+    ("for i = 1, 1e5 do sim.setFloatSignal('x' .. i, 1) end", "10000 signals of a kind"),
+    ("sim.setFloatSignal(('x'):rep(1000), 1)", "at most 200 characters"),
+    ("sim.setInt32Signal('x', 1e300)", "a whole number within +-2147483647"),
+    ("for i = 1, 1e5 do sim.setScriptSimulationParameter(0, 'x' .. i, 1) end", "at most 1000 parameters"),
+    ("for i = 1, 1e5 do simROS.subscribe('x', 'T', 'f') end", "at most 200 subscriptions and publishers"),
+    ("for i = 1, 1e5 do simROS.advertise('x', 'T') end", "at most 200 subscriptions and publishers"),
+    ("sim.setObjectPosition(0, {1, 2, coroutine.create(print)})", "a thread cannot be handed over"),
+    # log and errors
+    ("while true do print(('x'):rep(1e5)) end", STOPPED),
+    ("while true do sim.addStatusbarMessage('x') end", STOPPED),
+    ("error(('x\\n'):rep(1e7))", "x x x"),
+    ("error(setmetatable({}, {__tostring = function() while true do end end}))", "an error that is a table"),
+    ("error()", "error"),
+    ("local function f() return f() end f()", STOPPED),
+    ("local function f() f() end f()", "stack overflow"),
+    ("local function f() coroutine.wrap(f)() end f()", "C stack overflow"),
+    ("local t = {} for _ = 1, 1e5 do t = {t} end x = t", ""),  # snapshots walk it
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("dialect", PROLOGUE)
+@pytest.mark.parametrize("source, words", IN_LUA, ids=[source[:60] for source, _ in IN_LUA])
+def test_lua_stays_in_hand(tmp_path, dialect, source, words):
+    assert words in attack(tmp_path / "script.lua", PROLOGUE[dialect] + source)
+
+
+DEEP = "import sys\nsys.setrecursionlimit(10000)\n"
+IN_PYTHON = [
+    ("raise KeyboardInterrupt", "KeyboardInterrupt"),
+    ("raise SystemExit", "SystemExit"),
+    ("raise GeneratorExit", "GeneratorExit"),
+    ("def sysCall_sensing():\n    raise KeyboardInterrupt", "KeyboardInterrupt"),
+    ("class E(BaseException): pass\nraise E('x')", ": E: x"),
+    ("raise BaseExceptionGroup('x', [KeyboardInterrupt()])" if sys.version_info >= (3, 11) else "raise E", ""),
+    ("class E(Exception):\n    def __str__(self): raise ValueError\nraise E", "cannot be shown"),
+    ("class E(Exception):\n    def __str__(self): raise KeyboardInterrupt\nraise E", "cannot be shown"),
+    ("class E(Exception):\n    def __str__(self):\n        while True: pass\nraise E", "cannot be shown"),
+    ("class M(type):\n    def __getattribute__(c, n): raise OSError\nclass E(Exception, metaclass=M): pass\nraise E", ""),
+    ("raise ValueError('x' * 10**8)", "ValueError: xxx"),
+    ("import time\ntime.sleep(1000)", STOPPED),
+    ("def sysCall_sensing():\n    import time\n    time.sleep(1000)", STOPPED),
+    ("import threading\nlock = threading.Lock()\nlock.acquire()\nlock.acquire()", STOPPED),
+    ("import re\nre.match(r'(a+)+$', 'a' * 40 + 'b')", STOPPED),
+    ("import socket\na, b = socket.socketpair()\na.recv(1)", STOPPED),
+    ("import subprocess\nsubprocess.run(['sleep', '100'])", STOPPED),
+    ("10 ** 10 ** 8", STOPPED),
+    ("from contextlib import suppress\nwhile True:\n    with suppress(BaseException):\n        while True: pass", STOPPED),
+    ("import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nimport time\ntime.sleep(100)", STOPPED),
+    ("import sys\nsys.settrace(lambda *_: None)\nwhile True: pass", STOPPED),
+    ("input()", "EOFError"),
+    ("def f(): f()\nf()", "RecursionError"),
+    ("import sys\nsys.setrecursionlimit(10 ** 9)", "recursion limit is 10000 at most, not 1000000000"),
+    (DEEP + "class B:\n    def __repr__(self): return repr(B())\nrepr(B())", "RecursionError"),
+    (DEEP + "class B:\n    def __eq__(self, o): return [B()] == [B()]\nB() == B()", "RecursionError"),
+    (DEEP + "f = lambda x: max([x], key=f)\nf(1)", "RecursionError"),
+    ("[0] * 10 ** 13", "MemoryError"),
+    ("exec('(' * 1000)", "SyntaxError"),
+    ("x = " + "(" * 300, "SyntaxError"),
+    ("x = 1" + " + 1" * 30000, ""),
+    ("import sys\nsys.stdout = sys.stderr = None\nprint(1)", ""),
+    ("import threading\nthreading.Thread(target=lambda: [0 for _ in iter(int, 1)], daemon=True).start()", ""),
+    ("while True: print('x' * 10 ** 4)", STOPPED),
+    ("x = []\nx.append(x)\nsimROS.publish(simROS.advertise('a', 'T'), {'a': x})", "nested too deeply"),
+    ("x = []\nfor _ in range(15): x = [x] * 10\nsimROS.publish(simROS.advertise('a', 'T'), {'a': x})", "too"),
+    ("x = []\nfor _ in range(15): x = [x] * 10\nsim.getObjectPosition(x)", "wrong kind of value: got ([[[...]"),
+    ("x = []\nx.append(x)\nsim.setScriptSimulationParameter(0, 'x', x)", "nested too deeply"),
+    ("class E:\n    def __repr__(self): raise ValueError\nsim.getObjectPosition(E())", "got (a E, -1)"),
+    ("sim.getObjectPosition(10 ** 5000)", "sim.getObjectPosition"),
+    ("sim.setInt32Signal('a', 10 ** 400)", "a whole number within"),
+    ("while True: sim.addDrawingObject(sim.drawing_points, 1)", STOPPED),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("source, words", IN_PYTHON, ids=[source[:60] for source, _ in IN_PYTHON])
+def test_python_stays_in_hand(tmp_path, source, words):
+    assert words in attack(tmp_path / "script.py", source)
+
+
+@pytest.mark.parametrize(
+    "ending, source, words",
+    [
+        ("lua", "string.find(('x'):rep(250000), '.-.-.-.-.-y')", STOPPED),
+        ("lua", "while true do end", STOPPED),
+        ("lua", "sim.getVisionSensorCharImage(sim.getObject('/FrontVision'))", ""),
+        ("py", "while True: pass", STOPPED),
+        ("py", "raise KeyboardInterrupt", "KeyboardInterrupt"),
+    ],
+)
+def test_a_simulation_in_another_thread_stays_in_hand(tmp_path, ending, source, words):
+    assert words in attack(tmp_path / f"script.{ending}", source, "thread")
+
+
+def test_ctrl_c_ends_the_wait_for_lua(tmp_path):
+    """KeyboardInterrupt leaves the simulation's call while Lua hangs, and nothing of the script goes on."""
+    path = tmp_path / "script.lua"
+    path.write_text("while true do end", encoding="utf-8")
+    child = (
+        "import signal, sys, threading\n"
+        "from drone_sim import parameters\n"
+        "from drone_sim.simulation import Simulation\n"
+        "threading.Timer(0.5, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT)).start()\n"
+        "try:\n"
+        "    Simulation(parameters.load({'script_time_limit': 0}), script=sys.argv[1])\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted')\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", child, str(path)], capture_output=True, text=True, timeout=HANGS, check=False,
+        env={"PYTHONPATH": str(SOURCE), "PATH": "/usr/bin:/bin"},
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "interrupted\n"), done.stderr[-500:]
