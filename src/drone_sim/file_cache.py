@@ -7,7 +7,7 @@ from collections import OrderedDict
 from typing import Any, Callable, Dict, Generic, Iterable, NamedTuple, Optional, Tuple, TypeVar
 
 T = TypeVar("T")
-_Identity = Optional[Tuple[int, int, int]]
+Identity = Optional[Tuple[int, int, int]]  # modification time (ns), size (bytes), inode
 
 
 class Reading(NamedTuple):
@@ -25,15 +25,15 @@ class FileCache(Generic[T]):
         """Take what reads a file."""
         self._read = read
         self._limit = limit
-        self._kept: OrderedDict[str, Tuple[Reading, Dict[str, _Identity]]] = OrderedDict()
+        self._kept: OrderedDict[str, Tuple[Reading, Dict[str, Identity]]] = OrderedDict()
 
     def get(self, path: str) -> T:
         """Return what is in a file now. Raises what `read` raises."""
         kept = self._kept.get(path)
-        if kept is None or any(_identity(file) != identity for file, identity in kept[1].items()):
-            before = _identity(path)
+        if kept is None or any(identity_of(file) != identity for file, identity in kept[1].items()):
+            before = identity_of(path)
             reading = self._read(path)
-            kept = (reading, {path: before, **{file: _identity(file) for file in reading.files}})
+            kept = (reading, {path: before, **{file: identity_of(file) for file in reading.files}})
             self._kept[path] = kept
         self._kept.move_to_end(path)
         while len(self._kept) > 1 and sum(one.size for one, _ in self._kept.values()) > self._limit:
@@ -42,7 +42,8 @@ class FileCache(Generic[T]):
         return value
 
 
-def _identity(path: str) -> _Identity:
+def identity_of(path: str) -> Identity:
+    """Return what changes when a file is written anew; None where there is no such file."""
     try:
         status = os.stat(path)
     except (OSError, ValueError):

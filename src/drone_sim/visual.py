@@ -20,6 +20,7 @@ class Visual:
     rgba: 0..1, multiplied with what the mesh's own material says; white leaves the material as it is.
     file: path of the mesh.
     texture: path of an image that replaces the mesh's own texture.
+    edition: another one after these files have been written anew.
     floor: receives the shadows; a horizontal surface whose top is the top of its geometry.
     ground: what is around the floor, as far as one sees; receives the shadows, too.
     """
@@ -30,5 +31,6 @@ class Visual:
     rgba: Tuple[float, float, float, float]
     file: str = ""
     texture: str = ""
+    edition: Hashable = None
     floor: bool = False
     ground: bool = False

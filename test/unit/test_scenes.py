@@ -203,3 +203,21 @@ def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
     world.remove(second)
     np.testing.assert_array_equal(picture(), empty)
     world.close()
+
+
+def test_a_mesh_written_anew_is_seen_anew(tmp_path):
+    """Its file is the same; what is in it is another thing after the next start."""
+    mesh, scene = tmp_path / "thing.stl", tmp_path / "scene.yaml"
+    scene.write_text("objects: [{shape: mesh, file: thing.stl, position: [2, 0, 0.8], color: [1, 0, 0, 1]}]\n")
+    trimesh.creation.box((0.2, 0.2, 0.2)).export(mesh)
+    simulation = Simulation(parameters.load({"scene_file": str(scene)}))
+
+    def red():
+        picture = simulation.cameras["front"].look().astype(int)
+        return int((picture[:, :, 0] > picture[:, :, 1] + 60).sum())
+
+    small = red()
+    trimesh.creation.box((0.8, 0.8, 0.8)).export(mesh)
+    simulation.start()
+    assert red() > 8 * small > 0
+    simulation.close()

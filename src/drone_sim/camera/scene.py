@@ -234,7 +234,7 @@ class Scene:
 
 def _shared(visual: Visual) -> Tuple[Visual, Tuple[float, ...]]:
     """The geometry to upload, one for all that share it, and the scale that makes it this visual's."""
-    form = Visual(None, visual.shape, (), mesh.WHITE, texture=visual.texture)
+    form = Visual(None, visual.shape, (), mesh.WHITE, texture=visual.texture, edition=visual.edition)
     if visual.shape == "box":
         return replace(form, size=(1.0, 1.0, 1.0)), visual.size
     if visual.shape == "sphere":

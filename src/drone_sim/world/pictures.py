@@ -7,6 +7,7 @@ from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Seq
 import numpy as np
 import pybullet
 
+from drone_sim.file_cache import identity_of
 from drone_sim.frames import Matrix, from_quaternion, multiply
 from drone_sim.state import Pose, compose
 from drone_sim.visual import Visual
@@ -116,13 +117,16 @@ class Pictures:
     def _part(self, key: Tuple[int, int], row: Sequence[Any]) -> _Part:
         _, link, kind, dimensions, file, position, orientation, rgba = row[:8]
         shape, size = _shape_and_size(kind, dimensions)
+        source = self._origin(file.decode()) if shape == "mesh" else ""
+        texture = self._textures.get(key[0], "")
         visual = Visual(
             key=key,
             shape=shape,
             size=size,
             rgba=tuple(rgba),
-            file=self._origin(file.decode()) if shape == "mesh" else "",
-            texture=self._textures.get(key[0], ""),
+            file=source,
+            texture=texture,
+            edition=tuple(identity_of(one) if one else None for one in (source, texture)),
             floor=key[0] == self._floor,
             ground=key[0] == self._ground,
         )
