@@ -16,7 +16,8 @@ MAX_PIXELS = 4096 * 4096  # of all cameras together
 # What the drone publishes and hears in its namespace, beside its cameras.
 RESERVED_TOPICS = (
     *("cmd_vel", "set_pose", "initialpose", "push", "target_pose", "odom", "propellers", "joint_states"),
-    *("scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
+    *("command", "scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
+    *(f"view/{what}" for what in ("surroundings", "path", "height", "command", "state")),
 )
 
 
