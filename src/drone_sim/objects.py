@@ -11,6 +11,7 @@ from drone_sim.state import Pose, State
 
 # V-REP's handles that are no object's: the world, and the parent of the object that is spoken of.
 WORLD, PARENT = -1, -11
+_MOST_NAMES = 12  # in an error message
 
 
 class Body(Protocol):
@@ -216,7 +217,10 @@ class ObjectTree:
 
 
 def near_names(name: str, known: Iterable[str]) -> str:
-    """Return 'near names are a, b' for an error message, or all that is known where nothing is near."""
+    """Return 'near names are a, b' for an error message, or what is known where nothing is near."""
     known = sorted(known)
     near = difflib.get_close_matches(name, known, n=4, cutoff=0.5)
-    return f"near names are {', '.join(near)}" if near else f"known are {', '.join(known)}"
+    if near:
+        return f"near names are {', '.join(near)}"
+    more = f" and {len(known) - _MOST_NAMES} more" if len(known) > _MOST_NAMES else ""
+    return f"known are {', '.join(known[:_MOST_NAMES])}{more}"

@@ -28,6 +28,7 @@ from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.messages import Backend
 from drone_sim.world import World
 
+MAX_OVERLAPS = 500  # pairs of moving bodies, at the start: with more a step takes seconds
 _NOWHERE = 1e9  # m, m/s and rad/s, summed
 
 
@@ -253,6 +254,9 @@ class _Built:
             self.scene.name_objects(self.drone.objects)
             if not world.is_finite():
                 raise ParameterError("the scene as it begins: a position or a velocity is not finite")
+            overlaps = world.overlaps()
+            if overlaps > MAX_OVERLAPS:
+                raise ParameterError(f"scene/objects: {overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may")
         except BaseException:
             world.close()
             raise

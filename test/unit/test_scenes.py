@@ -221,3 +221,11 @@ def test_a_mesh_written_anew_is_seen_anew(tmp_path):
     simulation.start()
     assert red() > 8 * small > 0
     simulation.close()
+
+
+def test_a_heap_that_would_take_seconds_a_step_is_refused():
+    box = {"shape": "box", "size": [1, 1, 1], "position": [0, 0, 5], "mass": 1}
+    assert Simulation(parameters.load({"scene": {"objects": [box] * 20}})).world.overlaps() == 190
+    Simulation(parameters.load({"scene": {"objects": [{**box, "mass": 0}] * 100}})).close()  # what stands may
+    with pytest.raises(ParameterError, match="4950 pairs of moving ones touch or overlap, at most 500 may"):
+        Simulation(parameters.load({"scene": {"objects": [box] * 100}}))

@@ -111,8 +111,8 @@ def create_ground(client: int, files: OwnFiles, hole: float) -> int:
     """Add bare ground around a floor of `hole` metres a side, its top at z = 0, too; return its body id."""
     reach, half, depth = _GROUND_REACH, hole / 2, _FLOOR_THICKNESS / 2
     wide = (reach - half) / 2
-    sides = [(reach, wide, 0, half + wide), (reach, wide, 0, -half - wide)]
-    sides += [(wide, half, half + wide, 0), (wide, half, -half - wide, 0)]
+    sides = [(reach, wide, 0.0, half + wide), (reach, wide, 0.0, -half - wide)]
+    sides += [(wide, half, half + wide, 0.0), (wide, half, -half - wide, 0.0)]
     solid = pybullet.createCollisionShapeArray(
         shapeTypes=[pybullet.GEOM_BOX] * len(sides),
         halfExtents=[[x, y, depth] for x, y, _, _ in sides],

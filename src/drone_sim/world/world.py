@@ -171,6 +171,18 @@ class World:
         states = [self.state(body) for body in self._inertial_frames]
         return bool(np.isfinite([number for state in states for part in state for number in part]).all())
 
+    def overlaps(self) -> int:
+        """Return how many pairs of moving bodies have bounds that overlap."""
+        bounds, moves = [], []
+        for body in self._inertial_frames:
+            joints = pybullet.getNumJoints(body, self._client)
+            boxes = [pybullet.getAABB(body, link, self._client) for link in range(-1, joints)]
+            bounds.append((np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)))
+            moves.append(joints > 0 or pybullet.getDynamicsInfo(body, -1, self._client)[0] > 0)
+        low, high, moving = np.array(bounds)[:, 0], np.array(bounds)[:, 1], np.array(moves)
+        meet = (low[:, None] <= high[None]).all(axis=2)
+        return int(np.triu(meet & meet.T & moving[:, None] & moving, k=1).sum())
+
     def set_pose(self, body: int, pose: Pose) -> None:
         """Move a body's root link to `pose` and stop it."""
         inertial = self._inertial_frames[body][0]
