@@ -38,6 +38,7 @@ _FLAT = {"simROS": "simExtRosInterface_"}
 _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NAME_LENGTH = 50  # Lua cuts longer chunk names
 _NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
+_EVERY_STEP = ("actuation", "sensing")
 _TIME, _OVER_MEMORY, _MISSING = 1, 2, 3  # why Lua stopped a script, or called nothing (lua_sandbox.py)
 _AS_STREAM, _STOPPED = (AS_STREAM,), (FAILED, b"stopped")
 _TOO_MUCH = f"not enough memory: the script uses more than {_MEMORY // _MIB} MiB"
@@ -104,12 +105,12 @@ class LuaScript:
         if self._phases & 1 << number - 1:
             if self._end and phase == "cleanup":  # said when it happened
                 return
-            self._run(phase, self._phase, number)
+            self._run(phase, self._phase, number, near=phase in _EVERY_STEP)
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call the script's function of that name with a message; raises ScriptError."""
         name = callback if isinstance(callback, str) else "callback"
-        self._run(name, self._call_back, callback.encode() if isinstance(callback, str) else callback, message)
+        self._run(name, self._call_back, callback.encode() if isinstance(callback, str) else callback, message, near=True)
 
     def _call_back(self, callback: Any, message: Any) -> Any:
         return self._called_back(callback, self._values.to_lua(message))
@@ -126,12 +127,12 @@ class LuaScript:
         self._phases = 0
         self._phase = self._called_back = self._remember = self._recall = None
 
-    def _run(self, phase: str, function: Any, *arguments: Any) -> Any:
-        """Call a function in Lua's thread; return what it returns."""
+    def _run(self, phase: str, function: Any, *arguments: Any, near: bool = False) -> Any:
+        """Call a function in Lua's thread (`near`: see there); return what it returns."""
         if self._end:
             raise self._error(phase, self._end)
         try:
-            outcome = self._thread.run(function, *arguments)
+            outcome = self._thread.run(function, *arguments, near=near)
         except LeftBehind:
             self._end = str(self._limit)
             raise self._error(phase, self._end) from None

@@ -15,6 +15,7 @@ import time
 from types import CodeType
 from typing import Any, Callable, List, Optional, Tuple
 
+from drone_sim.scripting.cores import Cores
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
 
 _GRACE = 0.25  # s of the thread's own CPU time beyond the time limit, for what the hook ends
@@ -58,18 +59,25 @@ class LuaThread:
         self._outcome: Tuple[Any, Optional[BaseException]] = (None, None)
         self._thread = threading.Thread(target=self._work, name="Lua script", daemon=True)
         self._thread.start()
+        self._cores = Cores(self._thread.native_id or 0)
 
     # ---- in the simulation's thread
 
-    def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a function in the thread; raises what it raises, and LeftBehind where it does not come back."""
+    def run(self, function: Callable[..., Any], *arguments: Any, near: bool = False) -> Any:
+        """Call a function in the thread; raises what it raises, and LeftBehind where it does not come back.
+
+        `near` is for what is called in every step: for as long as it takes, both threads share a core.
+        """
         if self.closed:
             raise LeftBehind
         self._job = (function, arguments)
         self._limit.start()
-        self._go.release()
         try:
+            if near:
+                self._cores.share()
+            self._go.release()
             came = self._done.acquire(timeout=self._seconds)
+            self._cores.part()
             if not came or self._errand is not None:
                 self._wait(came)
         except BaseException:  # LeftBehind, or what a signal's handler raised
@@ -130,6 +138,7 @@ class LuaThread:
 
     def _end(self) -> None:
         """Stop what runs, or leave it behind."""
+        self._cores.part()
         if not self.closed:
             self._limit.expire()
             try:
@@ -148,6 +157,7 @@ class LuaThread:
                 break
         else:
             _left.append(self._thread)
+            self._cores.free()
             with contextlib.suppress(OSError, TypeError):
                 os.setpriority(os.PRIO_PROCESS, self._thread.native_id, _NICE)  # type: ignore[arg-type]
         raise LeftBehind
