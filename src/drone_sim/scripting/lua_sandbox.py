@@ -35,7 +35,10 @@ end
 
 ---- errors, and the limits of time and memory
 
-local INSTRUCTIONS = 10000 -- between two looks at the clock: some 0.1 ms
+local INSTRUCTIONS = 1000 -- between two hooks: some 10 us, or far more where they handle long strings
+local HOOKS = 10 -- between two looks at the clock, for which Python is called, unless there are such strings
+local SMALL = 4096 -- KiB
+local hooks = 0
 local SOFT = bridge.memory / 1024 -- KiB that the script may use
 local TIME, MEMORY, MISSING = 1, 2, 3 -- why it was stopped, or not called
 local stopped, stopped_at = false, 0
@@ -63,6 +66,9 @@ end
 local function hook()
   if stopped then error('stopped', 0) end
   check_memory()
+  hooks = hooks + 1
+  if hooks < HOOKS and memory('count') < SMALL then return end
+  hooks = 0
   if exceeded() then stop(TIME) end
 end
 sethook(hook, '', INSTRUCTIONS)
