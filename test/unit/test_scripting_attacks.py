@@ -23,14 +23,14 @@ from drone_sim.scripting.errors import ScriptError
 from drone_sim.simulation import Simulation
 from drone_sim.state import Twist
 
-path, where = sys.argv[1:]
+path, where, limit = sys.argv[1:]
 lines = []
 class Log(logging.Handler):
     def emit(self, record):
         lines.append(record.getMessage())
 logging.getLogger("drone_sim.script").addHandler(Log())
 
-def fly(limit=0.5):
+def fly(limit):
     said, simulation = [], None
     def attempt(function):
         try:
@@ -49,9 +49,9 @@ def fly(limit=0.5):
     return said
 
 def test():
-    first = fly()
+    first = fly(float(limit))
     open(path, "w").write("")
-    out.write(json.dumps({"first": first, "second": fly(10), "lines": len(lines), "bytes": sum(map(len, lines))}))
+    out.write(json.dumps({"first": first, "second": fly(20), "lines": len(lines), "bytes": sum(map(len, lines))}))
     out.flush()
 
 out = sys.stdout
@@ -64,9 +64,10 @@ else:
 """
 
 
-def attack(path, source, where="main"):
+def attack(path, source, words, where="main"):
+    """Fly the source; its message has to hold the words. What is not stopped may take its time."""
     path.write_text(source, encoding="utf-8")
-    command = [sys.executable, "-c", CHILD, str(path), where]
+    command = [sys.executable, "-c", CHILD, str(path), where, "0.5" if words in (STOPPED, "") else "20"]
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=HANGS, check=False, stdin=subprocess.DEVNULL,
         env={"PYTHONPATH": str(SOURCE), "PATH": "/usr/bin:/bin"},
@@ -76,7 +77,7 @@ def attack(path, source, where="main"):
     assert found["second"] == [], "the next start works"
     assert found["lines"] < 5000 and found["bytes"] < 5_000_000
     assert len(found["first"]) <= 1 and all("\n" not in line and len(line) < 1000 for line in found["first"])
-    return (found["first"] or [""])[0]
+    assert words in (found["first"] or [""])[0]
 
 
 IN_LUA = [
@@ -84,7 +85,7 @@ IN_LUA = [
     ("string.find(('x'):rep(250000), '.-.-.-.-.-y')", STOPPED),
     ("function sysCall_sensing() string.find(('x'):rep(250000), '.-.-.-.-.-y') end", STOPPED),
     ("simROS.subscribe('cmd_vel', 'T', function() string.find(('x'):rep(250000), '.-.-.-.-.-y') end)", STOPPED),
-    ("(table.move or string.find)(table.move and {} or ('x'):rep(250000), table.move and 1 or '.-.-.-.-.-y', 2^53, 2, {})", ""),
+    ("table.move({}, 1, 2^53, 2, {})", ""),
     ("table.insert(setmetatable({}, {__len = function() return 2^52 end}), 1, 1)", ""),
     ("string.find(('a'):rep(2e7), ('a'):rep(1e7) .. 'b', 1, true)", ""),
     ("load(('x=1 '):rep(5e7))", ""),
@@ -92,6 +93,12 @@ IN_LUA = [
     ("string.find(('a'):rep(3000000), ('a?'):rep(3000000))", "pattern too"),
     ("while true do pcall(string.find, ('x'):rep(250000), '.-.-.-.-.-y') end", STOPPED),
     ("coroutine.wrap(function() string.find(('x'):rep(250000), '.-.-.-.-.-y') end)()", STOPPED),
+    # what could loop in C is not there for a script that does not name it
+    ("string['fi' .. 'nd'](('x'):rep(250000), '.-.-.-.-.-y')", "attempt to call"),
+    ("(''):rep(1e15)", ""),
+    ("table.insert(setmetatable({}, {['__l' .. 'en'] = function() return 2^52 end}), 1, 1)", ""),
+    ("x = 'x' while #x < 1e8 do x = x .. x end y = x .. '' while true do local z = x == y end", ""),
+    ("x = {} for i = 1, 1e6 do x[i] = i end for i = 1, 1e6 do x[i] = nil end while true do next(x) end", ""),
     # the globals, and what hangs on them
     ("setmetatable(_G, {__index = function(_, n) error(n) end}) function sysCall_sensing() x() end", ": x"),
     ("setmetatable(_G, {__newindex = function() error('no') end}) y = 1", ": no"),
@@ -151,7 +158,7 @@ IN_LUA = [
 @pytest.mark.parametrize("dialect", PROLOGUE)
 @pytest.mark.parametrize("source, words", IN_LUA, ids=[source[:60] for source, _ in IN_LUA])
 def test_lua_stays_in_hand(tmp_path, dialect, source, words):
-    assert words in attack(tmp_path / "script.lua", PROLOGUE[dialect] + source)
+    attack(tmp_path / "script.lua", PROLOGUE[dialect] + source, words)
 
 
 DEEP = "import sys\nsys.setrecursionlimit(10000)\n"
@@ -203,7 +210,7 @@ IN_PYTHON = [
 
 @pytest.mark.parametrize("source, words", IN_PYTHON, ids=[source[:60] for source, _ in IN_PYTHON])
 def test_python_stays_in_hand(tmp_path, source, words):
-    assert words in attack(tmp_path / "script.py", source)
+    attack(tmp_path / "script.py", source, words)
 
 
 @pytest.mark.parametrize(
@@ -217,7 +224,7 @@ def test_python_stays_in_hand(tmp_path, source, words):
     ],
 )
 def test_a_simulation_in_another_thread_stays_in_hand(tmp_path, ending, source, words):
-    assert words in attack(tmp_path / f"script.{ending}", source, "thread")
+    attack(tmp_path / f"script.{ending}", source, words, "thread")
 
 
 def test_ctrl_c_ends_the_wait_for_lua(tmp_path):

@@ -35,13 +35,16 @@ end
 
 ---- errors, and the limits of time and memory
 
-local INSTRUCTIONS = 1000 -- between two hooks: some 10 us, or far more where they handle long strings
-local HOOKS = 10 -- between two looks at the clock, for which Python is called, unless there are such strings
-local SMALL = 4096 -- KiB
+-- In the simulation's own thread what takes long in C (comparing or joining strings of 100 MB, say) may take so only
+-- a few times between two hooks; but the clock, for which Python is called, is looked at as seldom as in a thread.
+local direct = bridge.direct
+local INSTRUCTIONS = direct and 100 or 1000 -- between two hooks: 1000 are some 10 us
+local HOOKS = direct and 50 or 10 -- between two looks at the clock, while the memory is small
+local SMALL = 4 * 1024 -- KiB
 local hooks = 0
 local SOFT = bridge.memory / 1024 -- KiB that the script may use
 local TIME, MEMORY, MISSING = 1, 2, 3 -- why it was stopped, or not called
-local stopped, stopped_at = false, 0
+local running, stopped, stopped_at = false, false, 0
 
 local function line_in_script()
   for level = 3, 250 do
@@ -64,6 +67,7 @@ local function check_memory()
 end
 
 local function hook()
+  if not running then return end
   if stopped then error('stopped', 0) end
   check_memory()
   hooks = hooks + 1
@@ -110,8 +114,9 @@ end
 -- Run f; return which phases there are, and then nothing; or true and what f returned; or the number of the limit and
 -- the line; or false and a message, which may begin with the line.
 local function run(f, ...)
-  stopped = false
+  running, stopped = true, false
   local ok, value = pcall(f, ...)
+  running = false
   if memory('count') > SOFT then pcall(check_memory) end
   if stopped then return phases(), stopped, stopped_at end
   if ok and value == nil then return phases() end
@@ -257,12 +262,30 @@ if not newer then -- whose matcher takes a piece of the C stack for each item of
     end
   end
 end
+for _, name in pairs{'insert', 'remove', 'concat'} do
+  local f = table[name]
+  table[name] = function(t, ...)
+    local meta = type(t) == 'table' and getmeta(t)
+    if meta and rawget(meta, '__len') ~= nil then error('table.' .. name .. ': not with a table that has __len', 2) end
+    return f(t, ...)
+  end
+end
+local rep = string.rep
+function string.rep(text, count, separator)
+  if text == '' and (separator or '') == '' then return '' end -- which would be joined one by one
+  return rep(text, count, separator)
+end
+if direct then -- see lua_source.py
+  for _, name in pairs{'find', 'match', 'gmatch', 'gfind', 'gsub'} do string[name] = nil end
+  table.sort, table.move = nil, nil
+  env.os.date, env.load, env.loadstring, env.collectgarbage, env.utf8, modules.utf8 = nil, nil, nil, nil, nil, nil
+end
 env.unpack, table.unpack = unpack, unpack
 math.mod = math.mod or math.fmod
 math.fmod = math.fmod or math.mod
 math.pow = math.pow or function(x, y) return x ^ y end
 table.getn = table.getn or function(t) return #t end
-string.gfind = string.gfind or string.gmatch
+string.gfind = string.gmatch and (string.gfind or string.gmatch)
 math.randomseed(1) -- the same flight every time
 
 return {

@@ -14,7 +14,7 @@ import logging
 import re
 import weakref
 from pathlib import Path
-from typing import Any, Callable, Mapping, Set, Tuple
+from typing import Any, Callable, Mapping, Set, Tuple, Union
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import script_log
@@ -23,10 +23,12 @@ from drone_sim.scripting.constants import PHASES
 from drone_sim.scripting.errors import LONGEST_MESSAGE, ScriptError
 from drone_sim.scripting.lua_sandbox import PRELUDE
 from drone_sim.scripting.lua_source import LuaSource
-from drone_sim.scripting.lua_thread import MOST_LEFT, LeftBehind, LuaThread, left_behind
+from drone_sim.scripting.lua_thread import MOST_LEFT, LeftBehind, LuaThread, SameThread, left_behind
 from drone_sim.scripting.lua_values import AS_STREAM, FAILED, Values
 from drone_sim.scripting.messages import Callback
 from drone_sim.scripting.time_limit import TimeLimit
+
+Door = Union[LuaThread, SameThread]
 
 _LOG = logging.getLogger(__name__)
 _MIB = 1024 * 1024
@@ -54,10 +56,10 @@ class LuaScript:
         self._end = ""  # why nothing can be called any more
         self._phases = 0
         self._name = Path(path).name[:_NAME_LENGTH]
-        if left_behind() >= MOST_LEFT:
-            raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
         text = LuaSource(source)
-        self._thread = LuaThread(limit)
+        if text.loops_in_c and left_behind() >= MOST_LEFT:
+            raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
+        self._thread: Door = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
             dialect = "lua51" if text.per_phase or text.flat else _newest()
             sandbox = self._thread.run(self._build, dialect, modules)
@@ -87,6 +89,7 @@ class LuaScript:
             "exceeded": _hook(self._thread, self._limit),
             "log": _log(self._thread),
             "memory": _MEMORY,
+            "direct": isinstance(self._thread, SameThread),
             "longest_message": 4 * LONGEST_MESSAGE,
             "longest_line": 4 * script_log.LONGEST,
             "phases": _phase_functions,
@@ -137,7 +140,8 @@ class LuaScript:
             self._end = str(self._limit)
             raise self._error(phase, self._end) from None
         except Exception as error:  # lupa's own, or a message that cannot be handed over
-            raise self._error(phase, str(error) or type(error).__name__) from None
+            late = str(error) == "stopped"  # by a hook just behind the script's end
+            raise self._error(phase, str(self._limit) if late else str(error) or type(error).__name__) from None
         finally:
             script_log.end_call()
         if not isinstance(outcome, tuple):
@@ -210,7 +214,7 @@ def _newest() -> str:
     raise ImportError("lupa has no Lua")
 
 
-def _lua_function(name: str, function: Function, values: Values, thread: LuaThread) -> Function:
+def _lua_function(name: str, function: Function, values: Values, thread: Door) -> Function:
     """Return a function that answers Lua's calls; one of a script that was left behind does nothing."""
     readers, answer = values.readers(), values.answer_of(function)
 
@@ -226,18 +230,16 @@ def _lua_function(name: str, function: Function, values: Values, thread: LuaThre
             return answer(function(*arguments))
         except Exception as error:
             return FAILED, explain(name, function, arguments, error).encode("utf-8", "replace")
-        except BaseException:  # a signal's handler, in the simulation's thread
-            return _STOPPED
 
     thread.api_code = call.__code__
     return call
 
 
-def _hook(thread: LuaThread, limit: TimeLimit) -> Callable[[], bool]:
+def _hook(thread: Door, limit: TimeLimit) -> Callable[[], bool]:
     return lambda: thread.closed or limit.exceeded()
 
 
-def _log(thread: LuaThread) -> Callable[[bytes], None]:
+def _log(thread: Door) -> Callable[[bytes], None]:
     def log(line: bytes) -> None:
         if not thread.closed:
             script_log.say(line)
@@ -249,7 +251,7 @@ def _phase_functions() -> Tuple[bytes, ...]:
     return tuple(f"sysCall_{phase}".encode() for phase in PHASES)
 
 
-def _free(thread: LuaThread, values: Values) -> None:
+def _free(thread: Door, values: Values) -> None:
     thread.close()
     values.close()
 

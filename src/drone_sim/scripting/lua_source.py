@@ -7,11 +7,20 @@ from typing import List
 
 _COMMENT = re.compile(rb"--(?:\[(=*)\[)?")
 _PER_PHASE = re.compile(rb"\bsim_call_type\b")
+# Functions that can loop in C for good, where no hook ends them. Whoever names none of them gets none of them.
+_LOOP_IN_C = (
+    *("find", "match", "gmatch", "gfind", "gsub", "sort", "move", "load", "loadstring", "collectgarbage"),
+    *("date", "utf8"),
+)
+_LOOPS_IN_C = re.compile(rb"\b(?:" + "|".join(_LOOP_IN_C).encode() + rb")\b")
 _FLAT_CALL = re.compile(rb"(?<![.:\w])sim[A-Z]\w{0,200}[ \t\r\n]{0,200}\(")
 
 
 class LuaSource:
-    """A script's text; `per_phase` if it looks at sim_call_type, `flat` if it calls V-REP 3.x's functions."""
+    """A script's text; `per_phase` if it looks at sim_call_type, `flat` if it calls V-REP 3.x's functions.
+
+    `loops_in_c` if it names a function of Lua's that may not come back.
+    """
 
     def __init__(self, text: bytes):
         """Take the file's contents, which may begin with a #! line."""
@@ -19,6 +28,7 @@ class LuaSource:
         bare = _without_comments(self.text)
         self.per_phase = _PER_PHASE.search(bare) is not None
         self.flat = _FLAT_CALL.search(bare) is not None
+        self.loops_in_c = _LOOPS_IN_C.search(bare) is not None
 
 
 def _without_comments(text: bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""The thread that a Lua state lives in: the one door through which everything enters Lua.
+"""The one door through which everything enters Lua: most often the thread that a Lua state lives in.
 
 Lua does not hold Python's lock while it runs, so the simulation's thread can wait for it, with a limit. A hook
 inside Lua ends what loops in Lua. What loops in C, such as string.find with an evil pattern, cannot be ended
@@ -36,6 +36,25 @@ def left_behind() -> int:
     """Return how many threads of this process hang in Lua."""
     _left[:] = [thread for thread in _left if thread.is_alive()]
     return len(_left)
+
+
+class SameThread:
+    """Runs functions in the caller's thread: for scripts that have nothing which loops in C."""
+
+    def __init__(self, limit: TimeLimit):
+        """Take the limit, which the hook looks at."""
+        self.closed = False
+        self.api_code: Optional[CodeType] = None
+        self._limit = limit
+
+    def run(self, function: Callable[..., Any], *arguments: Any, near: bool = False) -> Any:
+        """Call a function; raises what it raises."""
+        self._limit.start()
+        return function(*arguments)
+
+    def close(self) -> None:
+        """Close the API."""
+        self.closed = True
 
 
 class LuaThread:
