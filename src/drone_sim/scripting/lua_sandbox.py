@@ -7,6 +7,7 @@ Finalizers run with hooks switched off, and so do the handlers of Lua's own xpca
 """
 
 from drone_sim.scripting.lua_crossing import CROSSING
+from drone_sim.scripting.lua_functions import FUNCTIONS
 from drone_sim.scripting.lua_snapshots import SNAPSHOTS
 
 _LIMITS = r"""
@@ -15,7 +16,7 @@ local bridge, source = ...
 local pcall, error, type, tostring, select, next, pairs = pcall, error, type, tostring, select, next, pairs
 local rawget, rawset, rawlen, setmetatable = rawget, rawset, rawlen, setmetatable
 local unpack = table.unpack or unpack
-local concat, byte, sub = table.concat, string.byte, string.sub
+local concat, byte, sub, match = table.concat, string.byte, string.sub, string.match
 local load, loadstring, setfenv = load, loadstring, setfenv
 local collectgarbage, memory = collectgarbage, collectgarbage
 local getinfo, sethook = debug.getinfo, debug.sethook
@@ -25,7 +26,7 @@ local create, resume, close = coroutine.create, coroutine.resume, coroutine.clos
 local exceeded, log = bridge.exceeded, bridge.log
 local newer = _VERSION ~= 'Lua 5.1'
 debug = nil -- or lupa looks up its traceback in every call
-local name_of_script = sub(source, 2) -- source is '=name'
+local sources = {[source] = sub(source, 2)} -- of the script and what it requires: '=name' -> 'name'
 rawlen = rawlen or function(t) return #t end -- which knows no __len in 5.1
 
 local function pack(...)
@@ -37,19 +38,20 @@ end
 local INSTRUCTIONS = 10000 -- between two looks at the clock: some 0.1 ms
 local SOFT = bridge.memory / 1024 -- KiB that the script may use
 local TIME, MEMORY, MISSING = 1, 2, 3 -- why it was stopped, or not called
-local stopped, stopped_at = false, 0
+local stopped, stopped_at, stopped_in = false, 0, ''
 
-local function line_in_script()
+local function place_in_script()
   for level = 3, 250 do
     local info = getinfo(level, 'Sl')
-    if not info then return 0 end
-    if info.source == source and info.currentline > 0 then return info.currentline end
+    if not info then break end
+    if sources[info.source] and info.currentline > 0 then return info.currentline, sources[info.source] end
   end
-  return 0
+  return 0, sources[source]
 end
 
 local function stop(why)
-  stopped, stopped_at = why, line_in_script()
+  stopped = why
+  stopped_at, stopped_in = place_in_script()
   error('stopped', 0)
 end
 
@@ -101,12 +103,12 @@ local function phases()
 end
 
 -- Run f; return which phases there are, then true and what f returned, or the number of the limit and the line,
--- or false and a message (which may begin with the line).
+-- and the name of the file, or false and a message (which may begin with the line).
 local function run(f, ...)
   stopped = false
   local ok, value = pcall(f, ...)
   if memory('count') > SOFT then pcall(check_memory) end
-  if stopped then return phases(), stopped, stopped_at end
+  if stopped then return phases(), stopped, stopped_at, stopped_in end
   if ok then return phases(), true, value end
   if type(value) == 'userdata' then error(value, 0) end
   return phases(), false, message_of(value)
@@ -155,7 +157,7 @@ for _, name in pairs{'_VERSION', 'assert', 'collectgarbage', 'error', 'getmetata
 end
 env._G = env
 env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.difftime}
-local modules = {math = math, string = string, table = table, coroutine = coroutine, os = env.os, utf8 = utf8}
+for _, name in pairs{'math', 'string', 'table', 'coroutine', 'os', 'utf8'} do modules[name] = env[name] end
 string.dump = nil
 
 function env.print(...)
@@ -230,11 +232,7 @@ function env.load(text, name, mode, ...)
 end
 env.loadstring = env.load
 
-function env.require(name)
-  local module = modules[name]
-  if module == nil then error("no module '" .. tostring(name) .. "'", 2) end
-  return module
-end
+env.require = require
 
 ---- what Lua 5.1 and newer call differently
 
@@ -259,8 +257,8 @@ math.randomseed(1) -- the same flight every time
 
 return {
   phase = phase, called_back = called_back, open = open, remember = remember, recall = recall, define = define,
-  list = list, modules = modules, globals = env,
+  list = list, modules = modules, globals = env, has = has, functions = functions,
 }
 """
 
-PRELUDE = _LIMITS + CROSSING + _PHASES + SNAPSHOTS + _GLOBALS
+PRELUDE = _LIMITS + CROSSING + _PHASES + FUNCTIONS + SNAPSHOTS + _GLOBALS

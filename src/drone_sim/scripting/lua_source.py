@@ -7,18 +7,27 @@ from typing import List
 
 _COMMENT = re.compile(rb"--(?:\[(=*)\[)?")
 _PER_PHASE = re.compile(rb"\bsim_call_type\b")
+_CALL_TYPE = re.compile(rb"\bsim[._](childscriptcall_\w{0,60})")
 _FLAT_CALL = re.compile(rb"(?<![.:\w])sim[A-Z]\w{0,200}[ \t\r\n]{0,200}\(")
 
 
 class LuaSource:
-    """A script's text; `per_phase` if it looks at sim_call_type, `flat` if it calls V-REP 3.x's functions."""
+    """A script's text; `per_phase` if it looks at sim_call_type, `flat` if it calls V-REP 3.x's functions.
+
+    `call_types` are the constants that it compares sim_call_type with, without `sim_`.
+    """
 
     def __init__(self, text: bytes):
         """Take the file's contents, which may begin with a #! line."""
         self.text = b"--" + text if text.startswith(b"#") else text
         bare = _without_comments(self.text)
         self.per_phase = _PER_PHASE.search(bare) is not None
+        self.call_types = sorted({name.decode() for name in _CALL_TYPE.findall(bare)})
         self.flat = _FLAT_CALL.search(bare) is not None
+
+    def line(self, word: str) -> int:
+        """Return the first line with a word in it."""
+        return self.text.count(b"\n", 0, self.text.find(word.encode())) + 1
 
 
 def _without_comments(text: bytes) -> bytes:
