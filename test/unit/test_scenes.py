@@ -98,7 +98,9 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         assert ours.model_dump(exclude={"position", "rpy"}) == theirs.model_dump(exclude={"position", "rpy"})
     assert loaded.parameters.scene.floor == simulation.parameters.scene.floor
     # The body's own number does not count, nor does where a propeller's blades stand.
-    np.testing.assert_allclose(loaded.world.visual_poses()[:10], simulation.world.visual_poses()[:10], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        loaded.world.visual_poses()[:10], simulation.world.visual_poses()[:10], rtol=0, atol=1e-9
+    )
     looks = [[visual.shape, visual.size, visual.rgba, visual.texture] for visual in simulation.world.visuals()[1:10]]
     assert [[v.shape, v.size, v.rgba, v.texture] for v in loaded.world.visuals()[1:10]] == looks
 
@@ -120,7 +122,10 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: [{shape: cone, size: [1], position: [0, 0, 0]}]", "'box', 'cylinder', 'sphere', 'mesh', 'urdf'"),
         ("objects: [{size: [1], position: [0, 0, 0]}]", "discriminator"),
         ("objects: [{shape: box, size: [1, 1], position: [0, 0, 0]}]", "scene/objects/0/box/size"),
-        ("objects: [{shape: sphere, size: [-1], position: [0, 0, 0]}]", "size/0 = -1: input should be greater than or equal to 0.0001"),
+        (
+            "objects: [{shape: sphere, size: [-1], position: [0, 0, 0]}]",
+            "size/0 = -1: input should be greater than or equal to 0.0001",
+        ),
         ("objects: [{shape: sphere, size: [.inf], position: [0, 0, 0]}]", "size/0 = inf: input should be a finite"),
         ("objects: [{shape: sphere, size: [1], position: [0, 0, 0], mass: -1}]", "mass = -1"),
         (

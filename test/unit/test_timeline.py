@@ -119,7 +119,10 @@ def test_end_counts_the_longest_push():
             "entry 1: pose.position.z = -1.0: must lie within 0.0 and 1000.0 m",
         ),
         ("[{at: 1, push: {force: [1, 0, 0]}}]", "entry 1: push.duration: missing"),
-        ("[{at: 1, push: {duration: 0}}]", "entry 1: push.duration = 0: input should be greater than or equal to 0.0001"),
+        (
+            "[{at: 1, push: {duration: 0}}]",
+            "entry 1: push.duration = 0: input should be greater than or equal to 0.0001",
+        ),
         ("[{at: 1, push: {duration: 1, torque: [0, .inf, 0]}}]", "entry 1: push.torque = [0, inf, 0]: must be three"),
     ],
 )

@@ -114,7 +114,11 @@ class Scripts:
         of_propellers = set().union(*(names for number, names in enumerate(self._read) if number != self._own))
         if list(scripts) == [self._own]:
             if name in of_propellers:
-                _LOG.warning("'%s' is a parameter of the propellers; in the script of %s nothing reads it", name, self._names[self._own])
+                _LOG.warning(
+                    "'%s' is a parameter of the propellers; in the script of %s nothing reads it",
+                    name,
+                    self._names[self._own],
+                )
             return
         if name in of_propellers or name in self._read[self._own]:
             return

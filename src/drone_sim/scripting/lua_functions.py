@@ -11,6 +11,7 @@ local function load_module(name)
   local found, text, chunk_name = bridge.module(name)
   if not found then error(text, 3) end
   check_memory()
+  if byte(text) == 27 then error('precompiled code: ' .. chunk_name, 3) end
   local f, message = compile(text, '=' .. chunk_name)
   if not f then error(message, 0) end
   sources['=' .. chunk_name] = chunk_name

@@ -39,7 +39,9 @@ _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
 _TIME, _OVER_MEMORY, _MISSING = 1, 2, 3  # why Lua stopped a script, or called nothing (lua_sandbox.py)
 _AS_STREAM, _STOPPED = (AS_STREAM,), (FAILED, b"stopped")
-_TOO_MUCH = f"not enough memory: a Lua script may use {_MEMORY // _MIB} MiB, this one uses more than {_MEMORY // _MIB} MiB"
+_TOO_MUCH = (
+    f"not enough memory: a Lua script may use {_MEMORY // _MIB} MiB, this one uses more than {_MEMORY // _MIB} MiB"
+)
 
 
 class LuaScript:

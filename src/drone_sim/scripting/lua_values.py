@@ -19,7 +19,6 @@ _LARGEST = 2**63  # whole numbers beyond are floats in Lua
 FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM = range(5)
 
 
-
 # What functions of the API return, most often, and the answer that it is.
 _ANSWERS: Dict[Any, Callable[[Any], Tuple[Any, ...]]] = {
     "None": lambda _: (PLAIN,),

@@ -19,7 +19,18 @@ _LONGEST = 60  # characters of a name that is looked at
 _ELSEWHERE = frozenset(
     _PREFIX + name
     for name in (
-        *("thread", "threadmain", "nonSimulation", "realTimeIdle", "info", "msg", "event", "data", "ext", "moduleEntry"),
+        *(
+            "thread",
+            "threadmain",
+            "nonSimulation",
+            "realTimeIdle",
+            "info",
+            "msg",
+            "event",
+            "data",
+            "ext",
+            "moduleEntry",
+        ),
         *("beforeMainScript", "beforeSimulation", "afterSimulation", "suspend", "suspended", "resume"),
         *("beforeInstanceSwitch", "afterInstanceSwitch", "beforeSave", "afterSave", "beforeCopy", "afterCopy"),
         *("beforeDelete", "afterDelete", "afterCreate", "selChange", "userConfig", "addOnScriptRun"),

@@ -112,7 +112,10 @@ class Helpers:
             for file, inner in ((folder / last / "__init__.py", within), (folder / f"{last}.py", None)):
                 if file.is_file():
                     return importlib.util.spec_from_file_location(
-                        name, file, loader=self, submodule_search_locations=inner  # type: ignore[arg-type]
+                        name,
+                        file,
+                        loader=self,
+                        submodule_search_locations=inner,  # type: ignore[arg-type]
                     )
             if (folder / last).is_dir():
                 spec = ModuleSpec(name, None, is_package=True)
