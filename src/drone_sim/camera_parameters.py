@@ -59,9 +59,14 @@ def check_together(cameras: Mapping[str, CameraParameters]) -> None:
     for name, camera in cameras.items():
         here = f"parameter cameras/{name}"
         if camera.near >= camera.far:
-            raise ParameterError(f"{here}/near = {camera.near}: must be less than far = {camera.far}", ("cameras", name, "near"))
+            raise ParameterError(
+                f"{here}/near = {camera.near}: must be less than far = {camera.far}", ("cameras", name, "near")
+            )
         if camera.object in objects:
-            raise ParameterError(f"{here}/object = '{camera.object}': is that of cameras/{objects[camera.object]} too", ("cameras", name, "object"))
+            raise ParameterError(
+                f"{here}/object = '{camera.object}': is that of cameras/{objects[camera.object]} too",
+                ("cameras", name, "object"),
+            )
         objects[camera.object] = name
         for topic, what in _topics(camera):
             if topic in topics:

@@ -155,7 +155,9 @@ def _problem(error: Any, place: _Place) -> Problem:
     if error["type"] == "missing":  # a number of a list
         location = location[:-1]
     if error["type"] == "union_tag_not_found":
-        return Problem((*location, "shape"), f"parameter {readable_key((*location, 'shape'))}: missing{_shapes(place)}", True)
+        return Problem(
+            (*location, "shape"), f"parameter {readable_key((*location, 'shape'))}: missing{_shapes(place)}", True
+        )
     if error["type"] == "union_tag_invalid":
         location, value = (*location, "shape"), value["shape"]
     key = f"parameter {readable_key(location)}"

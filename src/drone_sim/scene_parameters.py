@@ -76,7 +76,11 @@ class MeshParameters(_ObjectParameters):
 
     shape: Literal["mesh"]
     file: File
-    size: Annotated[Tuple[_Scale, _Scale, _Scale], Field(description="3 numbers, its scale along [x, y, z]")] = (1, 1, 1)
+    size: Annotated[Tuple[_Scale, _Scale, _Scale], Field(description="3 numbers, its scale along [x, y, z]")] = (
+        1,
+        1,
+        1,
+    )
     color: Color = (1.0, 1.0, 1.0, 1.0)
 
 

@@ -113,15 +113,27 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("boxes: []", "scene.yaml: line 1: unknown key boxes; known are drone, floor, objects"),
         ("1: 2", "key '1' must be a text (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
-        ("objects: [5]", "scene.yaml: line 1: parameter objects/0 = 5: must hold `key: value` lines, of which one is `shape`"),
+        (
+            "objects: [5]",
+            "scene.yaml: line 1: parameter objects/0 = 5: must hold `key: value` lines, of which one is `shape`",
+        ),
         ("drone:", "parameter drone = None"),
         ("drone: {position: [0, 0, .nan]}", "drone/position/2 = nan: input should be a finite number"),
-        ("floor: {size: -1}", "scene.yaml: line 1: parameter floor/size = -1: input should be greater than or equal to 0.01"),
+        (
+            "floor: {size: -1}",
+            "scene.yaml: line 1: parameter floor/size = -1: input should be greater than or equal to 0.01",
+        ),
         ("floor: {texture: no.png}", "no.png': no such file"),
         ("floor: {texture: nonsense.png}", "nonsense.png: cannot be read"),
         ("objects: [{shape: cone, size: [1], position: [0, 0, 0]}]", "'box', 'cylinder', 'sphere', 'mesh', 'urdf'"),
-        ("objects: [{size: [1], position: [0, 0, 0]}]", "parameter objects/0/shape: missing; must be one of 'box', 'cylinder', 'sphere', 'mesh', 'urdf'"),
-        ("objects: [{shape: box, size: [1, 1], position: [0, 0, 0]}]", "parameter objects/0/size = [1, 1]: must be 3 numbers, [length, width, height] in m"),
+        (
+            "objects: [{size: [1], position: [0, 0, 0]}]",
+            "parameter objects/0/shape: missing; must be one of 'box', 'cylinder', 'sphere', 'mesh', 'urdf'",
+        ),
+        (
+            "objects: [{shape: box, size: [1, 1], position: [0, 0, 0]}]",
+            "parameter objects/0/size = [1, 1]: must be 3 numbers, [length, width, height] in m",
+        ),
         (
             "objects: [{shape: sphere, size: [-1], position: [0, 0, 0]}]",
             "size/0 = -1: input should be greater than or equal to 0.0001",
@@ -139,7 +151,10 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         (f"objects: [{BLOCK.replace('block.obj', 'nonsense.png')}]", "must be one of .obj, .stl, .dae"),
         (f"objects: [{BLOCK.replace('block.obj', 'package://nowhere_at_all/a.obj')}]", "no ROS package nowhere_at_all"),
         ("objects: [{shape: urdf, file: nonsense.urdf, position: [0, 0, 0]}]", "nonsense.urdf: syntax error"),
-        ("objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 0]}]", "scene.yaml: line 1: an object named 'Drone' is there already"),
+        (
+            "objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 0]}]",
+            "scene.yaml: line 1: an object named 'Drone' is there already",
+        ),
     ],
 )
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -205,7 +220,9 @@ def test_what_is_not_the_scene_files_has_no_line_of_it(write):
 
 def test_a_color_of_three_numbers_is_opaque(write):
     thing = "{shape: box, size: [1, 1, 1], position: [0, 0, 1], color: %s}"
-    scene = parameters.load({"scene_file": write(f"objects: [{thing % [1, 0, 0.5]}, {thing % [1, 0, 0.5, 0.2]}]")}).scene
+    scene = parameters.load(
+        {"scene_file": write(f"objects: [{thing % [1, 0, 0.5]}, {thing % [1, 0, 0.5, 0.2]}]")}
+    ).scene
     assert [one.color for one in scene.objects] == [(1, 0, 0.5, 1), (1, 0, 0.5, 0.2)]
 
 

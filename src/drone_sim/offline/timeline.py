@@ -175,7 +175,11 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
     if not isinstance(row, dict):
         raise _WrongKeys(((), f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
     known = ("at", *_KINDS)
-    unknown = [((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}") for key in row if key not in known]
+    unknown = [
+        ((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}")
+        for key in row
+        if key not in known
+    ]
     kinds = [kind for kind in _KINDS if kind in row]
     if len(kinds) != 1:
         held = " and ".join(kinds) or "none"
