@@ -77,7 +77,8 @@ class _Place(NamedTuple):
 
 def _place(model: Any, loc: Location) -> _Place:
     location: List[Key] = []
-    annotation, known = model, ()
+    annotation = model
+    known: Tuple[str, ...] = ()
     for part in loc:
         if part == "[key]":
             break
@@ -168,7 +169,7 @@ def _problem(error: Any, place: _Place) -> Problem:
 
 def _reason(error: Any, place: _Place) -> str:
     kind, message = error["type"], error["msg"].replace("Value error, ", "")
-    if place.is_in_list and kind == "missing" or kind in ("tuple_type", "too_long"):
+    if (place.is_in_list and kind == "missing") or kind in ("tuple_type", "too_long"):
         return _must(place, "must be") or message
     fields = getattr(_bare(place.annotation), "model_fields", None) or {}
     plain = {

@@ -45,9 +45,11 @@ def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
         "6: parameter cameras/9x = '9x': must be a letter and then letters, digits or _",
         "6: parameter cameras/9x = 5: must hold `key: value` lines with object, topic, kind, frame, mount, "
         "every, width, height, horizontal_fov, near, far",
-        "7: parameter cameras/rear/topic = '/a': must be like rear/image: letters, digits and _, a letter first, parted by /",
+        "7: parameter cameras/rear/topic = '/a': must be like rear/image: "
+        "letters, digits and _, a letter first, parted by /",
         "7: parameter cameras/rear/mount = 3: must hold `key: value` lines with parent, position, rpy",
-        "7: parameter cameras/rear: kind, frame, every, width, height, horizontal_fov, near, far are missing; and 1 more",
+        "7: parameter cameras/rear: kind, frame, every, width, height, horizontal_fov, near, far are missing; "
+        "and 1 more",
     ]
 
 

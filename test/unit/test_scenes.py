@@ -230,7 +230,8 @@ README = """
 floor: {size: 20.0}                                # m
 drone: {position: [0, 0, 1], yaw: 0}               # m, rad
 objects:
-  - {name: Crate, shape: box, size: [1, 0.5, 0.3], position: [3, 0, 0.15], rpy: [0, 0, 0.5], color: [0.8, 0.5, 0.2], mass: 2}
+  - {name: Crate, shape: box, size: [1, 0.5, 0.3], position: [3, 0, 0.15], rpy: [0, 0, 0.5], mass: 2,
+     color: [0.8, 0.5, 0.2]}
   - {name: Pillar, shape: cylinder, size: [0.2, 2], position: [3, 2, 1], color: [0.4, 0.6, 0.9, 0.5]}
   - {name: Ball, shape: sphere, size: [0.15], position: [2, -1, 0.15], color: [0.9, 0.2, 0.2], mass: 0.1}
   - {name: Chair, shape: mesh, file: block.obj, size: [0.5, 0.5, 0.5], position: [4, -2, 0.2]}

@@ -137,7 +137,7 @@ LOOP = "while true do end"
     [
         (f"\n{LOOP}", "load", 2),
         *((f"function sysCall_{phase}()\n{LOOP}\nend", phase, 2) for phase in PHASES),
-        (f"function on_twist(m)\n{LOOP}\nend\nsimROS.subscribe('cmd_vel','geometry_msgs/Twist','on_twist')", "on_twist", 2),
+        (f"function f(m)\n{LOOP}\nend\nsimROS.subscribe('cmd_vel','geometry_msgs/Twist','f')", "f", 2),
         (f"\nif sim_call_type==sim_childscriptcall_sensing then\n{LOOP}\nend", "sensing", 3),
         (f"while true do pcall(function() {LOOP} end) end", "load", 1),
         (f"while true do xpcall(function() {LOOP} end, function() {LOOP} end) end", "load", 1),

@@ -153,10 +153,14 @@ def test_a_misspelt_phase_is_found_in_a_helper_too(write, ending):
 
 @ENDINGS
 def test_a_snapshot_holds_the_variables_of_helpers(write, simulate, printed, ending):
-    helper = {"py": "count = [0]\ndef up():\n    count[0] += 1\n    return count[0]\n",
-              "lua": "local count = 0\nreturn {up = function() count = count + 1 return count end}"}[ending]  # fmt: skip
-    user = {"py": "def sysCall_init():\n    import helper\ndef sysCall_sensing():\n    import helper\n    print(helper.up())\n",
-            "lua": "require 'helper'\nfunction sysCall_sensing() print(require('helper').up()) end"}[ending]  # fmt: skip
+    helper = {
+        "py": "count = [0]\ndef up():\n    count[0] += 1\n    return count[0]\n",
+        "lua": "local count = 0\nreturn {up = function() count = count + 1 return count end}",
+    }[ending]
+    user = {
+        "py": "def sysCall_init():\n    import helper\ndef sysCall_sensing():\n    import helper\n    print(helper.up())",
+        "lua": "require 'helper'\nfunction sysCall_sensing() print(require('helper').up()) end",
+    }[ending]
     write(f"helper.{ending}", helper)
     simulation = simulate(write(f"script.{ending}", user))
     simulation.step()
@@ -178,7 +182,7 @@ def test_python_packages_and_names_within(write, simulate, printed):
     write("plain/deep.py", "import lib\nKd = lib.Kp + 1\n")
     path = write(
         "script.py",
-        "import lib, lib.gains as g, plain.deep\nfrom lib.gains import Gain\nfrom plain import deep as d\nimport importlib\n"
+        "import lib, lib.gains as g, plain.deep\nfrom lib.gains import Gain\nfrom plain import deep as d\n"
         "def sysCall_init():\n    print(lib.Kp, g.Kp, plain.deep.Kd, d.Kd, Gain().value)\n",
     )
     simulate(path)
@@ -228,7 +232,7 @@ def test_lua_modules_in_folders_share_the_scripts_globals_and_are_read_once(writ
             "script.lua",
             f"{old}function sysCall_init() print(require('lib.gains').Kp, require('lib.gains').Kp, count) "
             "print(require 'kit', require 'nothing') end",
-        )  # fmt: skip
+        )
     )
     assert printed() == ["read\tlib.gains", "2\t2\t1", "kit\ttrue"]
 

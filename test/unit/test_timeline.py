@@ -149,7 +149,8 @@ def test_every_wrong_key_is_named_with_its_line(tmp_path):
     with pytest.raises(TimelineError) as caught:
         read(tmp_path, text)
     assert str(caught.value).split("; line ") == [
-        f"{tmp_path}/commands.yaml: line 2: entry 1: twist.angular = 3: must be three finite numbers, such as [1, 0, 0]",
+        f"{tmp_path}/commands.yaml: line 2: entry 1: twist.angular = 3: "
+        "must be three finite numbers, such as [1, 0, 0]",
         "2: entry 1: twist.liner: unknown key; known are linear, angular",
         "3: entry 2: at = 'soon': input should be a valid number",
         "4: entry 2: push.duration: missing; it is a number of seconds",

@@ -172,8 +172,9 @@ class _WrongKeys(Exception):
 
 def _entry(row: Any, parameters: Parameters) -> Entry:
     """Return an entry; raises _WrongKeys."""
+    here: Location = ()
     if not isinstance(row, dict):
-        raise _WrongKeys(((), f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
+        raise _WrongKeys((here, f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
     known = ("at", *_KINDS)
     unknown = [
         ((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}")
@@ -183,7 +184,7 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
     kinds = [kind for kind in _KINDS if kind in row]
     if len(kinds) != 1:
         held = " and ".join(kinds) or "none"
-        raise _WrongKeys(*(unknown or [((), f"must hold one of {', '.join(_KINDS)}; it holds {held}")]))
+        raise _WrongKeys(*(unknown or [(here, f"must hold one of {', '.join(_KINDS)}; it holds {held}")]))
     kind = kinds[0]
     times = {key: row[key] for key in row if key == "at"}
     (at, no_time), (action, no_action) = _checked(_Time, times, ()), _checked(_KINDS[kind], row[kind], (kind,))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Dict, Tuple
+from typing import Tuple
 
 from drone_sim.objects import near_names
 from drone_sim.resources import read_bytes

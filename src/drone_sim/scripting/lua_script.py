@@ -13,7 +13,7 @@ import importlib.util
 import logging
 import re
 import weakref
-from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple
+from typing import Any, Callable, Dict, Mapping, Set, Tuple
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import phase_names, script_log

@@ -15,7 +15,7 @@ import sys
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any, Callable, Dict, Mapping, Optional, Sequence
+from typing import Any, Callable, Dict, Mapping, Optional, Sequence, cast
 
 from drone_sim.resources import read_bytes
 
@@ -98,7 +98,7 @@ class Helpers:
             above = ModuleType(self._package)
             above.__path__ = [str(self._folder)]
             sys.modules[self._package] = above
-            sys.meta_path.insert(0, self)  # type: ignore[arg-type]
+            sys.meta_path.insert(0, cast(Any, self))
 
     # ---- what Python's import asks
 
@@ -106,16 +106,13 @@ class Helpers:
         """Return how to load a module below the script's package."""
         if not name.startswith(self._package + ".") or path is None:
             return None
-        last = name.rpartition(".")[2]
+        last, loader = name.rpartition(".")[2], cast(Any, self)
         for folder in map(Path, path):
             within = [str(folder / last)]
             for file, inner in ((folder / last / "__init__.py", within), (folder / f"{last}.py", None)):
                 if file.is_file():
                     return importlib.util.spec_from_file_location(
-                        name,
-                        file,
-                        loader=self,
-                        submodule_search_locations=inner,  # type: ignore[arg-type]
+                        name, file, loader=loader, submodule_search_locations=inner
                     )
             if (folder / last).is_dir():
                 spec = ModuleSpec(name, None, is_package=True)
