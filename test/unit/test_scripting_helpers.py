@@ -158,7 +158,7 @@ def test_a_snapshot_holds_the_variables_of_helpers(write, simulate, printed, end
         "lua": "local count = 0\nreturn {up = function() count = count + 1 return count end}",
     }[ending]
     user = {
-        "py": "def sysCall_init():\n    import helper\ndef sysCall_sensing():\n    import helper\n    print(helper.up())",
+        "py": "def sysCall_sensing():\n    import helper\n    print(helper.up())\nimport helper\n",
         "lua": "require 'helper'\nfunction sysCall_sensing() print(require('helper').up()) end",
     }[ending]
     write(f"helper.{ending}", helper)
@@ -187,6 +187,13 @@ def test_python_packages_and_names_within(write, simulate, printed):
     )
     simulate(path)
     assert printed() == ["2 2 3 3 7"]
+
+
+@pytest.mark.parametrize("first", ["", "from __future__ import annotations\n"])
+def test_dataclasses_work_in_a_script(write, simulate, printed, first):
+    text = "from dataclasses import dataclass\n@dataclass\nclass Gain:\n    value: float = 7\nprint(Gain(8).value)\n"
+    simulate(write("script.py", f"{first}{text}"))
+    assert printed() == ["8"]
 
 
 def test_a_python_helper_finds_what_the_script_finds(write, simulate, printed):

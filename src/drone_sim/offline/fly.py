@@ -12,7 +12,7 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import Any, Callable, ContextManager, Dict, Iterator, NoReturn, Optional, Sequence, TextIO
+from typing import Any, Callable, ContextManager, Dict, Iterator, NoReturn, Optional, Sequence
 
 from tqdm import tqdm
 
@@ -130,7 +130,7 @@ def _check_plot(path: str, steps: int) -> None:
         raise ValueError(f"--plot: {steps} steps; at most {_PLOTTED} are drawn")
 
 
-def _csv(path: Optional[str]) -> ContextManager[Optional[TextIO]]:
+def _csv(path: Optional[str]) -> ContextManager[Any]:
     return writing.replacing(path) if path else contextlib.nullcontext()
 
 

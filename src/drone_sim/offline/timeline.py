@@ -176,7 +176,7 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
     if not isinstance(row, dict):
         raise _WrongKeys((here, f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
     known = ("at", *_KINDS)
-    unknown = [
+    unknown: List[Tuple[Location, str]] = [
         ((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}")
         for key in row
         if key not in known

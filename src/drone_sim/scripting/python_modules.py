@@ -33,7 +33,10 @@ class Helpers:
         self.files = {script}
         self.builtins: Dict[str, Any] = {**vars(builtins), **names, "__import__": self._import}
         self._folder = Path(script).parent
-        self._package = f"_script{next(_numbers)}"
+        self.package = f"_script{next(_numbers)}"
+        above = ModuleType(self.package)
+        above.__path__ = [str(self._folder)]
+        sys.modules[self.package] = above  # dataclasses and the like look up the module of a class
         self._compiled = compiled
         self._is_beside: Dict[str, bool] = {}
 
@@ -41,12 +44,12 @@ class Helpers:
         """Forget the modules; may be called twice."""
         if self in sys.meta_path:
             sys.meta_path.remove(self)
-        for name in [*self.modules(), self._package]:
+        for name in [*self.modules(), self.package]:
             sys.modules.pop(name, None)
 
     def modules(self) -> Dict[str, ModuleType]:
         """Return the modules that were imported, by their names in sys.modules."""
-        return {name: one for name, one in list(sys.modules.items()) if name.startswith(self._package + ".")}
+        return {name: one for name, one in list(sys.modules.items()) if name.startswith(self.package + ".")}
 
     def forget(self, name: str) -> None:
         """Let a module be read anew by the next import."""
@@ -56,8 +59,8 @@ class Helpers:
 
     def shown(self, error: ImportError) -> str:
         """Return what an import that failed says, with near names."""
-        text = str(error).replace(self._package + ".", "")
-        missing = (error.name or "").replace(self._package + ".", "").partition(".")[0]
+        text = str(error).replace(self.package + ".", "")
+        missing = (error.name or "").replace(self.package + ".", "").partition(".")[0]
         beside = [path.stem for path in self._folder.glob("*.py") if str(path) not in self.files]
         near = difflib.get_close_matches(missing, beside) if isinstance(error, ModuleNotFoundError) else []
         return f"{text}; near names are {', '.join(near)}" if near else text
@@ -75,8 +78,9 @@ class Helpers:
         top = name.partition(".")[0]
         if level or not self._found(top):
             return builtins.__import__(name, globals, locals, fromlist, level)
-        self._begin()
-        module = builtins.__import__(f"{self._package}.{name}", globals, locals, fromlist, 0)
+        if self not in sys.meta_path:
+            sys.meta_path.insert(0, cast(Any, self))
+        module = builtins.__import__(f"{self.package}.{name}", globals, locals, fromlist, 0)
         return module if fromlist else getattr(module, top)
 
     def _found(self, top: str) -> bool:
@@ -93,18 +97,11 @@ class Helpers:
             _LOG.warning("%s: %s is not imported from here: Python's own module comes first", self._folder, top)
         return False
 
-    def _begin(self) -> None:
-        if self._package not in sys.modules:
-            above = ModuleType(self._package)
-            above.__path__ = [str(self._folder)]
-            sys.modules[self._package] = above
-            sys.meta_path.insert(0, cast(Any, self))
-
     # ---- what Python's import asks
 
     def find_spec(self, name: str, path: Optional[Sequence[str]], _target: Any = None) -> Optional[ModuleSpec]:
         """Return how to load a module below the script's package."""
-        if not name.startswith(self._package + ".") or path is None:
+        if not name.startswith(self.package + ".") or path is None:
             return None
         last, loader = name.rpartition(".")[2], cast(Any, self)
         for folder in map(Path, path):

@@ -6,7 +6,6 @@ import ast
 import copy
 import inspect
 import traceback
-from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any, Callable, Dict, List, Mapping, Tuple
 
@@ -43,7 +42,7 @@ class PythonScript:
         found = {"self": SimpleNamespace(), "require": self._require, "print": _print, _STOPPED: Stopped, **modules}
         self._helpers = Helpers(path, found, _compiled)
         self._globals: Dict[str, Any] = {
-            "__name__": Path(path).stem,
+            "__name__": self._helpers.package,
             "__file__": path,
             "__builtins__": self._helpers.builtins,
             **found,
@@ -166,7 +165,7 @@ class PythonScript:
 
 
 def _compiled(source: bytes, path: str) -> CodeType:
-    return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec")
+    return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
 
 
 def _copied(*namespaces: Mapping[str, Any]) -> List[Dict[str, Any]]:
