@@ -9,7 +9,7 @@ from pydantic import Field
 from typing_extensions import Annotated, Literal
 
 from drone_sim.frames import Matrix, from_rpy, multiply
-from drone_sim.parameter_types import Angles, Checked, Finite, Label, Name, ParameterError, Point, Within
+from drone_sim.parameter_types import TOPIC, Angles, Checked, Finite, Label, Name, ParameterError, Point, Within
 
 MAX_CAMERAS = 16
 MAX_PIXELS = 4096 * 4096  # of all cameras together
@@ -38,7 +38,7 @@ class CameraParameters(Checked):
     """A vision sensor: where it sits, what it sees."""
 
     object: Name
-    topic: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*$", max_length=128)]
+    topic: Annotated[str, Field(pattern=TOPIC, max_length=128)]
     kind: Literal["color", "depth"]
     frame: Name
     mount: Optional[MountParameters] = None
@@ -60,15 +60,21 @@ def check_together(cameras: Mapping[str, CameraParameters]) -> None:
     for name, camera in cameras.items():
         here = f"parameter cameras/{name}"
         if camera.near >= camera.far:
-            raise ParameterError(f"{here}/near = {camera.near}: must be less than far = {camera.far}")
+            raise ParameterError(
+                f"{here}/near = {camera.near}: must be less than far = {camera.far}", ("cameras", name, "near")
+            )
         if camera.object in objects:
-            raise ParameterError(f"{here}/object = '{camera.object}': is that of cameras/{objects[camera.object]} too")
+            raise ParameterError(
+                f"{here}/object = '{camera.object}': is that of cameras/{objects[camera.object]} too",
+                ("cameras", name, "object"),
+            )
         objects[camera.object] = name
         for topic, what in _topics(camera):
             if topic in topics:
                 raise ParameterError(
                     f"{here}/topic = '{camera.topic}': its {what} would be {topic}, which is {topics[topic]}; "
-                    "a topic such as rear/image has a namespace of its own"
+                    "a topic such as rear/image has a namespace of its own",
+                    ("cameras", name, "topic"),
                 )
         topics.update((topic, f"the {what} of cameras/{name}") for topic, what in _topics(camera))
 

@@ -201,6 +201,12 @@ class Drone:
         modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
         self.script = load.load(path, modules, limit)
         self.script.call("init")
+        self._check_callbacks()
+
+    def _check_callbacks(self) -> None:
+        """Raise ScriptError for a subscription since the last check whose function the script does not have."""
+        for callback in self.bus.new_callbacks():
+            self.script.check(callback)
 
     def close(self) -> None:
         """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
@@ -238,6 +244,7 @@ class Drone:
         if timeout and self._command_age > timeout - step / 2 and self.command != Twist():
             self.receive(Twist())
         self._command_age += step
+        self._check_callbacks()
         self.bus.deliver(self.script.callback)
         self.script.call("actuation")
 

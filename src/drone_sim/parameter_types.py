@@ -28,8 +28,17 @@ MAX_FILE_NAME = 4096  # characters
 _EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$")
 
 
+Key = Union[int, str]
+Location = Tuple[Key, ...]  # the keys and indices on the way to a value
+
+
 class ParameterError(ValueError):
     """A parameter is wrong; the message is one line that names key, value and what is allowed."""
+
+    def __init__(self, message: str, location: Location = ()):
+        """Take where the wrong value stands, if it is one."""
+        super().__init__(message)
+        self.location = location
 
 
 # ---- numbers
@@ -81,6 +90,10 @@ def _none_from_word(value: Any) -> Any:
     return None if isinstance(value, (str, list)) and value in ("none", "null", "", []) else value
 
 
+def _opaque(color: Any) -> Any:
+    return (*color, 1.0) if isinstance(color, (list, tuple)) and len(color) == 3 else color
+
+
 Finite = Annotated[float, AllowInfNan(False)]
 Coordinate = Annotated[Finite, Within(-1e5, 1e5)]  # m
 Angle = Annotated[Finite, Within(-1e3, 1e3)]  # rad
@@ -88,17 +101,32 @@ Length = Annotated[Finite, Within(1e-4, 1e4)]  # m, of a thing
 Mass = Annotated[Finite, Within(1e-6, 1e6, or_zero=True)]  # kg
 Gain = Annotated[Finite, Within(0, 1e4)]
 Velocity = Annotated[Finite, Within(-1e4, 1e4)]  # m/s
-Point = Tuple[Coordinate, Coordinate, Coordinate]
-Angles = Tuple[Angle, Angle, Angle]
+Point = Annotated[Tuple[Coordinate, Coordinate, Coordinate], Field(description="3 numbers, [x, y, z] in m")]
+Angles = Annotated[Tuple[Angle, Angle, Angle], Field(description="3 numbers, [roll, pitch, yaw] in rad")]
 Fraction = Annotated[Finite, Within(0, 1)]
-Color = Tuple[Fraction, Fraction, Fraction, Fraction]
+Color = Annotated[
+    Tuple[Fraction, Fraction, Fraction, Fraction],
+    BeforeValidator(_opaque),
+    Field(description="3 or 4 numbers from 0 to 1, [red, green, blue] or [red, green, blue, opacity]"),
+]
 MarginOrNone = Annotated[Optional[Annotated[Finite, Within(1e-3, 1)]], BeforeValidator(_none_from_word)]  # rad
-Limits = Annotated[Optional[Tuple[Velocity, Velocity]], BeforeValidator(_none_from_word), AfterValidator(_increasing)]
+Limits = Annotated[
+    Optional[Tuple[Velocity, Velocity]],
+    BeforeValidator(_none_from_word),
+    AfterValidator(_increasing),
+    Field(description="2 numbers, [lowest, highest] in m/s, or none"),
+]
 Switch = Annotated[bool, Field(strict=True)]
 
 # ---- words
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=MAX_NAME)]
+NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
+TOPIC = r"^[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*$"
+PATTERNS = {
+    NAME: "must be a letter and then letters, digits or _",
+    TOPIC: "must be like rear/image: letters, digits and _, a letter first, parted by /",
+}
+Name = Annotated[str, Field(pattern=NAME, max_length=MAX_NAME)]
 
 
 def _printable(text: str) -> str:
@@ -173,6 +201,6 @@ def read_yaml(path: Union[str, Path]) -> Dict[str, Any]:
     return values
 
 
-def readable_key(location: Tuple[Union[int, str], ...]) -> str:
+def readable_key(location: Location) -> str:
     """Return the path to a value as a message shows it: cut, and on one line."""
     return "/".join(part if part.isprintable() and len(part) < 80 else shown(part) for part in map(str, location))

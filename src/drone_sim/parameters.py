@@ -5,15 +5,15 @@ No value is defined here: config/drone.yaml holds every default, this module say
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
-from typing import Any, Dict, Literal, Mapping, Optional, Tuple, Union
+from typing import Any, Dict, List, Literal, Mapping, Optional, Tuple
 
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError
 from typing_extensions import Annotated
 
-from drone_sim import scene_parameters
+from drone_sim import scene_parameters, yaml_files
 from drone_sim.camera_parameters import MAX_CAMERAS, CameraParameters, check_together
+from drone_sim.parameter_errors import Problem, line_of, problems, told
 from drone_sim.parameter_types import (
     Angle,
     Checked,
@@ -23,6 +23,7 @@ from drone_sim.parameter_types import (
     Finite,
     Gain,
     Limits,
+    Location,
     MarginOrNone,
     Name,
     ParameterError,
@@ -30,10 +31,9 @@ from drone_sim.parameter_types import (
     Within,
     numeric,
     read_yaml,
-    readable_key,
 )
 from drone_sim.resources import package_path, resolve, shown
-from drone_sim.scene_parameters import SHAPES, SceneParameters
+from drone_sim.scene_parameters import SceneParameters
 
 __all__ = ["CameraParameters", "ParameterError", "Parameters", "load", "read_yaml"]
 
@@ -60,7 +60,9 @@ class DroneParameters(Checked):
 
     name: Name
     urdf: File
-    position: Tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]]
+    position: Annotated[
+        Tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]], Field(description="3 numbers, [x, y, z] in m")
+    ]
     yaw: Angle
 
 
@@ -138,19 +140,27 @@ class Parameters(Checked):
 
     def check_scene(self, content: Dict[str, Any], file: Path) -> None:
         """Raise ParameterError where a scene file with this content could not be loaded."""
-        _checked(self._given, str(file), scene_parameters.from_content(content, file.parent, str(file)))
+        _checked(self._given, str(file), scene_parameters.from_content(content, file.parent))
+
+    def scene_place(self, location: Location) -> str:
+        """Return where a key of the scene stands, for a message: file and line, or just `scene`."""
+        if not self.scene_file:
+            return "scene"
+        return f"{self.scene_file}: line {yaml_files.lines(resolve(self.scene_file)).find(location).line}"
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several keys at once."""
         steps = self.sub_steps
         if steps < 1 or abs(steps * self.sub_step - self.time_step) > 1e-9 * self.time_step:
             raise ParameterError(
-                f"parameter time_step = {self.time_step}: must be a whole multiple of sub_step = {self.sub_step}"
+                f"parameter time_step = {self.time_step}: must be a whole multiple of sub_step = {self.sub_step}",
+                ("time_step",),
             )
         if steps > MAX_SUB_STEPS:
             raise ParameterError(
                 f"parameter sub_step = {self.sub_step}: makes {steps} of a time_step of {self.time_step} s; "
-                f"at most {MAX_SUB_STEPS} are allowed"
+                f"at most {MAX_SUB_STEPS} are allowed",
+                ("sub_step",),
             )
         check_together(self.cameras)
 
@@ -170,10 +180,7 @@ def load(overrides: Optional[Mapping[str, Any]] = None) -> Parameters:
         raise ParameterError(f"parameter config = {shown(config)}: must be the name of a file")
     if config:
         given = _merge(given, _config(config))
-        try:
-            _checked(given, "", {})
-        except ParameterError as error:
-            raise ParameterError(f"{config}: {error}") from None
+        _checked(given, "", {}, config)
     given = _merge(given, overrides)
     return _in_scene(given, given["scene_file"])
 
@@ -189,22 +196,34 @@ def _config(name: str) -> Dict[str, Any]:
 
 
 def _in_scene(given: Dict[str, Any], file: Any) -> Parameters:
-    in_file = isinstance(file, str) and bool(file)
-    return _checked(given, file, scene_parameters.read(file) if in_file else {})
+    if not (isinstance(file, str) and file):
+        return _checked(given, file, {})
+    return _checked(given, file, scene_parameters.read(file), file)
 
 
-def _checked(given: Dict[str, Any], file: Any, scene: Dict[str, Any]) -> Parameters:
-    """Return the parameters with what a scene file says; `file` is its name, '' where there is none."""
-    values = _merge({**given, "scene_file": file}, scene)
+def _checked(given: Dict[str, Any], file: Any, scene: Dict[str, Any], named: str = "") -> Parameters:
+    """Return the parameters with what the scene file says; `file` is its name, '' where there is none.
+
+    What is wrong may stand in the file `named`, which is the scene file or one laid over config/drone.yaml.
+    """
     try:
-        parameters = Parameters.model_validate(values)
+        parameters = Parameters.model_validate(_merge({**given, "scene_file": file}, scene))
     except ValidationError as error:
-        from_scene = scene and error.errors()[0]["loc"][:1] in (("scene",), ("drone",))
-        raise ParameterError(f"{file}: {_one_line(error)}" if from_scene else _one_line(error)) from None
+        raise ParameterError(_told(problems(error, Parameters), named, bool(scene))) from None
     parameters._given = given
     drone = scene.get("drone")
     parameters._drone_in_scene = tuple(drone) if isinstance(drone, dict) else ()
     return parameters
+
+
+def _told(found: List[Problem], file: str, is_scene: bool) -> str:
+    lines = yaml_files.lines(resolve(file)) if file else yaml_files.Lines("")
+    placed = []
+    for problem in found:
+        inner = scene_parameters.problem_in_file(problem) if is_scene else problem
+        line = line_of(lines, inner) if inner is not None else None
+        placed.append((line, problem.text if line is None or inner is None else inner.text))
+    return told(placed, file if not is_scene or any(line for line, _ in placed) else "")
 
 
 def _merge(base: Any, overrides: Any) -> Any:
@@ -214,25 +233,3 @@ def _merge(base: Any, overrides: Any) -> Any:
     for key, value in overrides.items():
         merged[key] = _merge(base[key], value) if key in base else value
     return merged
-
-
-def _one_line(error: ValidationError) -> str:
-    first = error.errors()[0]
-    key = readable_key(first["loc"])
-    if first["type"] == "extra_forbidden":
-        return f"parameter {key}: unknown key{_near(first['loc'])}"
-    message = first["msg"].replace("Value error, ", "")
-    if message.startswith("parameter "):  # of several keys at once: it names them itself
-        return message
-    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-    return f"parameter {key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}{more}"
-
-
-def _near(location: Tuple[Union[int, str], ...]) -> str:
-    model: Any = Parameters
-    for part in location[:-1]:
-        fields = getattr(model, "model_fields", {})
-        model = fields[part].annotation if part in fields else SHAPES.get(str(part))
-    known = list(getattr(model, "model_fields", {}))
-    near = difflib.get_close_matches(str(location[-1])[:80], known, n=3) or known
-    return f"; known are {', '.join(near)}" if near else ""

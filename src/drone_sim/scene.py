@@ -63,9 +63,10 @@ class Scene:
 
     def name_objects(self, objects: ObjectTree) -> None:
         """Let scripts find the objects that have a name. Raises ParameterError for a name that is taken."""
-        for one, body in zip(self._parameters.objects, self._bodies):
+        for index, (one, body) in enumerate(zip(self._parameters.objects, self._bodies)):
             if one.name in objects:
-                raise ParameterError(f"scene: an object named '{one.name}' is there already")
+                place = self._all.scene_place(("objects", index, "name"))
+                raise ParameterError(f"{place}: an object named '{one.name}' is there already")
             if one.name:
                 objects.add(one.name, body=body)
 

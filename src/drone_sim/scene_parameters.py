@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Dict, List, Literal, Tuple, Union
+from typing import Any, Dict, List, Literal, Optional, Tuple, Union
 
 from pydantic import Field
 from typing_extensions import Annotated
 
+from drone_sim.parameter_errors import Problem
 from drone_sim.parameter_types import (
     Angles,
     Checked,
@@ -24,6 +25,7 @@ from drone_sim.parameter_types import (
     Within,
     named_in,
     read_yaml,
+    readable_key,
 )
 from drone_sim.resources import resolve, shown
 
@@ -54,21 +56,21 @@ class BoxParameters(_ObjectParameters):
     """A box; `size` is its full length, width and height."""
 
     shape: Literal["box"]
-    size: Tuple[Length, Length, Length]
+    size: Annotated[Tuple[Length, Length, Length], Field(description="3 numbers, [length, width, height] in m")]
 
 
 class CylinderParameters(_ObjectParameters):
     """A cylinder along its z axis; `size` is radius and length."""
 
     shape: Literal["cylinder"]
-    size: Tuple[Length, Length]
+    size: Annotated[Tuple[Length, Length], Field(description="2 numbers, [radius, length] in m")]
 
 
 class SphereParameters(_ObjectParameters):
     """A sphere; `size` is its radius."""
 
     shape: Literal["sphere"]
-    size: Tuple[Length]
+    size: Annotated[Tuple[Length], Field(description="a list of 1 number, [radius] in m")]
 
 
 class MeshParameters(_ObjectParameters):
@@ -76,7 +78,11 @@ class MeshParameters(_ObjectParameters):
 
     shape: Literal["mesh"]
     file: File
-    size: Tuple[_Scale, _Scale, _Scale] = (1.0, 1.0, 1.0)
+    size: Annotated[Tuple[_Scale, _Scale, _Scale], Field(description="3 numbers, its scale along [x, y, z]")] = (
+        1,
+        1,
+        1,
+    )
     color: Color = (1.0, 1.0, 1.0, 1.0)
 
 
@@ -105,17 +111,9 @@ class SceneParameters(Checked):
         names = set()
         for index, one in enumerate(self.objects):
             if one.name and one.name in names:
-                raise ParameterError(f"parameter scene/objects/{index}/name = '{one.name}': comes twice")
+                location = ("scene", "objects", index, "name")
+                raise ParameterError(f"parameter scene/objects/{index}/name = '{one.name}': comes twice", location)
             names.add(one.name)
-
-
-SHAPES = {
-    "box": BoxParameters,
-    "cylinder": CylinderParameters,
-    "sphere": SphereParameters,
-    "mesh": MeshParameters,
-    "urdf": UrdfParameters,
-}
 
 
 def read(file: str) -> Dict[str, Any]:
@@ -127,18 +125,27 @@ def read(file: str) -> Dict[str, Any]:
         path = resolve(file)
     except FileNotFoundError as error:
         raise ParameterError(f"parameter scene_file = {shown(file)}: {error}") from None
-    return from_content(read_yaml(path), path.parent, file)
+    return from_content(read_yaml(path), path.parent)
 
 
-def from_content(content: Dict[str, Any], folder: Path, file: str) -> Dict[str, Any]:
-    """Return what `read` does, of a scene file's content. Raises ParameterError."""
-    unknown = set(content) - {"floor", "objects", "drone"}
-    if unknown:
-        raise ParameterError(f"{file}: unknown key {min(unknown):.80}; known are drone, floor, objects")
-    scene = {key: content[key] for key in ("floor", "objects") if key in content}
+def from_content(content: Dict[str, Any], folder: Path) -> Dict[str, Any]:
+    """Return what `read` does, of a scene file's content."""
+    scene = {key: value for key, value in content.items() if key != "drone"}  # unknown keys are refused with the rest
     for place in (scene.get("floor"), content.get("drone"), *_listed(scene.get("objects"))):
         _find_files_beside(folder, place)
     return {"scene": scene, "drone": content.get("drone", {})}
+
+
+def problem_in_file(problem: Problem) -> Optional[Problem]:
+    """Return a problem as the scene file has it, where floor and objects stand beside the drone; None for any other."""
+    if problem.location[:1] == ("drone",):
+        return problem
+    if problem.location[:1] != ("scene",):
+        return None
+    location, text = problem.location[1:], problem.text.replace("parameter scene/", "parameter ", 1)
+    if len(location) == 1 and "unknown key" in text:
+        text = f"unknown key {readable_key(location)}; known are drone, floor, objects"
+    return problem._replace(location=location, text=text)
 
 
 def _listed(objects: Any) -> List[Any]:

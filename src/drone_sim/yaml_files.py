@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, ClassVar, Dict, NamedTuple, Union
+from typing import Any, ClassVar, Dict, NamedTuple, Optional, Sequence, Tuple, Union
 
 import yaml
 
@@ -67,6 +67,60 @@ def parse(text: str) -> Any:
         raise YamlError(f"{' '.join(said.split())}{_at(mark)}") from None
     except yaml.YAMLError as error:
         raise YamlError(f"{' '.join(str(error).split()):.200}") from None
+
+
+class Found(NamedTuple):
+    """How far the way to a value leads in a file, and the line (from 1) where it ends."""
+
+    depth: int
+    line: int
+
+
+class Lines:
+    """Where the values of a YAML text stand."""
+
+    def __init__(self, text: str):
+        """Take a text that `parse` reads; of any other nothing is found."""
+        try:
+            self._root = yaml.compose(text, Loader=_Loader)
+        except (yaml.YAMLError, RecursionError):
+            self._root = None
+
+    def find(self, location: Sequence[Union[int, str]]) -> Found:
+        """Return how many of these keys and indices lead to a value, and the line of the last that does."""
+        node, line = self._root, 1
+        for depth, part in enumerate(location):
+            inner = _inner(node, part)
+            if inner is None:
+                return Found(depth, line)
+            node, line = inner
+        return Found(len(location), line)
+
+
+def lines(path: Union[str, Path]) -> Lines:
+    """Return where the values of a YAML file stand, as far as it can be read."""
+    try:
+        return Lines(read_bytes(path, MAX_SIZE).decode("utf-8-sig"))
+    except (OSError, ValueError):
+        return Lines("")
+
+
+def _inner(node: Any, part: Union[int, str]) -> Optional[Tuple[Any, int]]:
+    """Return the node of a key or index, and its line."""
+    if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+        return node.value[part], node.value[part].start_mark.line + 1
+    merged = []
+    for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
+        line = key.start_mark.line + 1
+        if key.value == part:
+            return value, line
+        if key.tag == "tag:yaml.org,2002:merge":
+            merged += [(one, line) for one in (value.value if isinstance(value, yaml.SequenceNode) else [value])]
+    for one, line in merged:
+        inner = _inner(one, part)
+        if inner is not None:
+            return inner[0], line
+    return None
 
 
 def _at(mark: Any) -> str:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -71,6 +72,15 @@ def test_csv_holds_the_flight_to_the_last_bit(tmp_path, commands):
             drone.receive(Twist(Vector3(1, 0, 0.2), Vector3(0, 0, 0.5)))
         simulation.step()
     simulation.close()
+
+
+def test_numbers_are_as_short_as_they_can_be(tmp_path):
+    out = tmp_path / "out.csv"
+    assert main(["--duration", "0.1", "--set", "drone.position=[0.1, 0, 0.8]", "--csv", str(out)]) == 0
+    first, second, _ = out.read_text().splitlines()[1:]
+    assert first == "0,0.1,0,0.8,0,0,0,1" + ",0" * 14
+    for field in second.split(","):
+        assert len(field) <= len(repr(float(field)))
 
 
 def test_header_names_every_column_once():
@@ -174,6 +184,17 @@ def test_settings_are_what_is_flown(tmp_path):
         (["--plot", "out.wrong"], "wrong"),
         (["--sped", "2"], "unrecognized arguments: --sped 2"),
         (["--script", "nowhere.py"], "nowhere.py"),
+        (["--script", "script.txt"], "a child script's name ends in .py or .lua"),
+        (["--plot", "out.txt"], "out.txt: matplotlib does not write .txt; it writes "),
+        (["--plot", "."], ".: is a folder"),
+        (["--csv", "."], ".: is a folder"),
+        (["--csv", "out.png"], "--csv out.png: must end in .csv or .txt"),
+        (["--commands", "climb.py"], "--commands climb.py: must end in .yaml or .yml"),
+        (["--scene", "room.png"], "--scene room.png: must end in .yaml or .yml"),
+        (["--config", "room"], "--config room: must end in .yaml or .yml"),
+        (["--scene", "nowhere.yaml"], "parameter scene_file = 'nowhere.yaml': no such file: nowhere.yaml"),
+        (["--config", "nowhere.yaml"], "parameter config = 'nowhere.yaml': no such file: nowhere.yaml"),
+        (["--csv", "a.txt", "--plot", "./a.txt"], "--csv a.txt: is the file of --plot as well"),
     ],
 )
 def test_a_mistake_ends_with_one_line_and_status_1(tmp_path, monkeypatch, capsys, arguments, says):
@@ -187,6 +208,36 @@ def test_a_mistake_ends_with_one_line_and_status_1(tmp_path, monkeypatch, capsys
     assert len(lines) == 1
     assert lines[0].startswith("fly: ")
     assert says in lines[0]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--scene", "scene.yaml"],
+        ["--script", "no.py"],
+        ["--script", "bad.py"],
+        ["--plot", "out.wrong"],
+        ["--commands", "scene.yaml"],
+    ],
+)
+def test_what_cannot_begin_leaves_the_last_table_alone(tmp_path, monkeypatch, capsys, arguments):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.yaml").write_text("boxes: []\n")
+    (tmp_path / "bad.py").write_text("x = = 1\n")
+    (tmp_path / "flight.csv").write_text("the last flight")
+    assert main([*arguments, "--csv", "flight.csv"]) == 1
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert (tmp_path / "flight.csv").read_text() == "the last flight"
+
+
+def test_scene_and_config_are_flown_as_the_launch_file_does(tmp_path):
+    (tmp_path / "scene.yaml").write_text("drone: {position: [1, 2, 3], yaw: 1}\n")
+    (tmp_path / "config.yaml").write_text("gravity: 0.0\ndrone: {position: [7, 7, 7]}\n")
+    files = ["--scene", str(tmp_path / "scene.yaml"), "--config", str(tmp_path / "config.yaml")]
+    assert main([*files, "--duration", "1", "--csv", str(tmp_path / "out.csv")]) == 0
+    _, rows = read_csv(tmp_path / "out.csv")
+    assert rows[0][1:4] == [1, 2, 3]
+    assert rows[-1][3] > 3.1  # nothing holds it down
 
 
 def test_a_script_error_leaves_the_csv_up_to_there_and_runs_cleanup(tmp_path, script, capsys):
@@ -304,9 +355,15 @@ def test_plot_is_a_picture(tmp_path, commands):
     assert out.read_bytes().startswith(b"\x89PNG")
 
 
-def test_plot_shows_velocities_in_the_track_frame(tmp_path, monkeypatch):
+@pytest.fixture(name="drawn")
+def _drawn(monkeypatch, tmp_path):
     drawn = []
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    return drawn
+
+
+def test_plot_shows_velocities_in_the_track_frame(tmp_path, drawn):
     commands = tmp_path / "forward.yaml"
     commands.write_text("[{at: 0, twist: {linear: [1, 0, 0]}}]")
     turned = ["--set", "drone.yaw=1.5707963267948966"]
@@ -319,3 +376,32 @@ def test_plot_shows_velocities_in_the_track_frame(tmp_path, monkeypatch):
     assert max(pitch.get_ydata()) > 0.1  # nose down to go forward
     assert max(abs(roll.get_ydata())) < 0.01
     assert axes["yaw [rad]"].get_lines()[0].get_ydata()[-1] == pytest.approx(1.5708, abs=1e-3)
+
+
+def test_plot_shows_the_path_from_above_with_a_gap_at_a_pose(tmp_path, drawn):
+    commands = tmp_path / "pose.yaml"
+    commands.write_text("[{at: 0, twist: {linear: [1, 0, 0]}}, {at: 2, pose: {position: [5, 5, 1]}}]")
+    assert main(["--commands", str(commands), "--duration", "3", "--plot", "out.png"]) == 0
+    (path,) = (ax for ax in drawn[0].axes if ax.get_xlabel() == "$x$ [m]")
+    line, start, end = path.get_lines()
+    x, y = line.get_data()
+    gap = np.flatnonzero(np.isnan(x))
+    assert list(gap) == [41]  # 0 s to 2 s, and what came of the step in which it was put there
+    assert max(y[:41]) < 0.1 and min(y[42:]) > 4.9
+    assert (*start.get_data(), *end.get_data()) == (0, 0, x[-1], y[-1])
+    assert path.get_aspect() == 1
+
+
+@pytest.mark.parametrize(
+    "commands, low, high, cut",
+    [
+        ("[]", 4.5, 6, False),  # not down to the 0 before the first step
+        ("[{at: 2, pose: {position: [0, 0, 2], rpy: [0.3, 0, 0]}}]", 1, 8, True),
+    ],
+)
+def test_the_propellers_axis_shows_what_they_do_most_of_the_time(tmp_path, drawn, commands, low, high, cut):
+    (tmp_path / "commands.yaml").write_text(commands)
+    assert main(["--commands", "commands.yaml", "--duration", "17", "--plot", "out.png"]) == 0
+    (ax,) = (ax for ax in drawn[0].axes if ax.get_ylabel() == "propellers [m/s]")
+    assert low < ax.get_ylim()[0] < 5.3 < ax.get_ylim()[1] < high
+    assert any(text.get_text().startswith("goes from") for text in ax.texts) == cut

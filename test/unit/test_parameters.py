@@ -74,6 +74,56 @@ def test_a_mistake_gets_one_line(overrides, message):
     assert "\n" not in str(refused.value) and len(str(refused.value)) < 700
 
 
+def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
+    file = tmp_path / "my.yaml"
+    file.write_text(
+        "gui: 1\n"
+        "control:\n  Kzreff: 3\n  thrust_limits: [1]\n"
+        "cameras:\n  9x: 5\n  rear: {mount: 3, object: Rear, topic: /a}\n  front:\n    every: many\n"
+    )
+    with pytest.raises(parameters.ParameterError) as refused:
+        parameters.load({"config": str(file)})
+    assert str(refused.value).split("; line ") == [
+        f"{file}: line 1: parameter gui = 1: must be true or false",
+        "3: parameter control/Kzreff: unknown key; known are Kzref, Dzref",
+        "4: parameter control/thrust_limits = [1]: must be 2 numbers, [lowest, highest] in m/s, or none",
+        "6: parameter cameras/9x = '9x': must be a letter and then letters, digits or _",
+        "6: parameter cameras/9x = 5: must hold `key: value` lines with object, topic, kind, frame, mount, "
+        "every, width, height, horizontal_fov, near, far",
+        "7: parameter cameras/rear/topic = '/a': must be like rear/image: "
+        "letters, digits and _, a letter first, parted by /",
+        "7: parameter cameras/rear/mount = 3: must hold `key: value` lines with parent, position, rpy",
+        "7: parameter cameras/rear: kind, frame, every, width, height, horizontal_fov, near, far are missing; "
+        "and 1 more",
+    ]
+
+
+@pytest.mark.parametrize(
+    "text, line, words",
+    [
+        ("gravity: -9\ntime_step: 0.012", 2, "parameter time_step = 0.012: must be a whole multiple"),
+        ("cameras:\n  front:\n    near: 200", 3, "parameter cameras/front/near = 200.0: must be less than far"),
+        ("scene:\n  objects:\n  - {shape: cone}", 3, "parameter scene/objects/0/shape = 'cone': must be one of 'box'"),
+        ("scene:\n  boxes: 1", 2, "parameter scene/boxes: unknown key; known are floor, objects"),
+    ],
+)
+def test_a_mistake_in_a_config_file_has_its_line(tmp_path, text, line, words):
+    file = tmp_path / "my.yaml"
+    file.write_text(text)
+    with pytest.raises(parameters.ParameterError) as refused:
+        parameters.load({"config": str(file)})
+    assert str(refused.value).startswith(f"{file}: line {line}: {words}")
+
+
+def test_all_mistakes_of_a_command_line_are_named():
+    with pytest.raises(parameters.ParameterError) as refused:
+        parameters.load({"gravity": "down", "control": {"Kzreff": 3}})
+    said = (
+        "parameter gravity = 'down': input should be a valid number; parameter control/Kzreff: unknown key; known are "
+    )
+    assert str(refused.value).startswith(said)
+
+
 def test_only_the_keys_that_change_are_needed():
     changed = parameters.load({"control": {"Kzref": 4.0}})
     assert changed.control.Kzref == 4.0

@@ -110,18 +110,30 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     [
         ("", "must hold `key: value` lines"),
         ("objects: [", "scene.yaml: while parsing"),
-        ("boxes: []", "unknown key boxes; known are drone, floor, objects"),
+        ("boxes: []", "scene.yaml: line 1: unknown key boxes; known are drone, floor, objects"),
         ("1: 2", "key '1' must be a text (line 1, column 1)"),
-        ("objects: {}", "scene/objects = {}: input should be a valid list"),
-        ("objects: [5]", "scene/objects/0 = 5"),
+        ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
+        (
+            "objects: [5]",
+            "scene.yaml: line 1: parameter objects/0 = 5: must hold `key: value` lines, of which one is `shape`",
+        ),
         ("drone:", "parameter drone = None"),
         ("drone: {position: [0, 0, .nan]}", "drone/position/2 = nan: input should be a finite number"),
-        ("floor: {size: -1}", "scene/floor/size = -1: input should be greater than or equal to 0.01"),
+        (
+            "floor: {size: -1}",
+            "scene.yaml: line 1: parameter floor/size = -1: input should be greater than or equal to 0.01",
+        ),
         ("floor: {texture: no.png}", "no.png': no such file"),
         ("floor: {texture: nonsense.png}", "nonsense.png: cannot be read"),
         ("objects: [{shape: cone, size: [1], position: [0, 0, 0]}]", "'box', 'cylinder', 'sphere', 'mesh', 'urdf'"),
-        ("objects: [{size: [1], position: [0, 0, 0]}]", "discriminator"),
-        ("objects: [{shape: box, size: [1, 1], position: [0, 0, 0]}]", "scene/objects/0/box/size"),
+        (
+            "objects: [{size: [1], position: [0, 0, 0]}]",
+            "parameter objects/0/shape: missing; must be one of 'box', 'cylinder', 'sphere', 'mesh', 'urdf'",
+        ),
+        (
+            "objects: [{shape: box, size: [1, 1], position: [0, 0, 0]}]",
+            "parameter objects/0/size = [1, 1]: must be 3 numbers, [length, width, height] in m",
+        ),
         (
             "objects: [{shape: sphere, size: [-1], position: [0, 0, 0]}]",
             "size/0 = -1: input should be greater than or equal to 0.0001",
@@ -130,7 +142,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: [{shape: sphere, size: [1], position: [0, 0, 0], mass: -1}]", "mass = -1"),
         (
             "objects: [{shape: sphere, size: [1], position: [0, 0, 0], colour: [1, 0, 0, 1]}]",
-            "colour: unknown key; known",
+            "scene.yaml: line 1: parameter objects/0/colour: unknown key; known are color",
         ),
         ("objects: [{shape: box, size: [1, 1, 1], position: [0, 0, 0], texture: nonsense.png}]", "cannot be read"),
         (f"objects: [{BLOCK.replace('block', 'missing')}]", "missing.obj': no such file"),
@@ -139,7 +151,10 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         (f"objects: [{BLOCK.replace('block.obj', 'nonsense.png')}]", "must be one of .obj, .stl, .dae"),
         (f"objects: [{BLOCK.replace('block.obj', 'package://nowhere_at_all/a.obj')}]", "no ROS package nowhere_at_all"),
         ("objects: [{shape: urdf, file: nonsense.urdf, position: [0, 0, 0]}]", "nonsense.urdf: syntax error"),
-        ("objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 0]}]", "named 'Drone' is there already"),
+        (
+            "objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 0]}]",
+            "scene.yaml: line 1: an object named 'Drone' is there already",
+        ),
     ],
 )
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -149,6 +164,87 @@ def test_a_wrong_scene_gets_one_line(write, text, words):
         Simulation(parameters.load({"scene_file": file})).close()
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_every_wrong_key_of_a_scene_is_named_with_its_line(write):
+    file = write(
+        """floor: {size: a}
+boxes: []
+drone:
+  position: [1, 2]
+  yam: 3
+objects:
+  - shape: box
+    size: [1, 1, 1]
+    color: [1, 0]
+    position: [0, 0, 1]
+  - {shape: cone}
+  - {color: red}
+  - {shape: sphere, size: 0.3, colour: [1, 0, 0]}
+"""
+    )
+    shapes = "'box', 'cylinder', 'sphere', 'mesh', 'urdf'"
+    with pytest.raises(ParameterError) as refused:
+        parameters.load({"scene_file": file, "gravity": "down"})
+    first, *others = str(refused.value).split("; line ")
+    assert first == f"{file}: line 1: parameter floor/size = 'a': input should be a valid number"
+    assert others == [
+        "2: unknown key boxes; known are drone, floor, objects",
+        "4: parameter drone/position = [1, 2]: must be 3 numbers, [x, y, z] in m",
+        "5: parameter drone/yam: unknown key; known are yaw",
+        "9: parameter objects/0/color = [1, 0]: must be 3 or 4 numbers from 0 to 1, "
+        "[red, green, blue] or [red, green, blue, opacity]",
+        f"11: parameter objects/1/shape = 'cone': must be one of {shapes}",
+        f"12: parameter objects/2/shape: missing; must be one of {shapes}",
+        "13: parameter objects/3/size = 0.3: must be a list of 1 number, [radius] in m; and 3 more",
+    ]
+
+
+def test_a_wrong_key_behind_a_merge_is_told_where_it_is_merged(write):
+    thing = "&a {shape: box, name: A, size: [1, 1, 1], position: [0, 0, 1]}"
+    file = write(f"objects:\n  - {thing}\n  -\n    <<: *a\n")
+    with pytest.raises(ParameterError) as refused:
+        parameters.load({"scene_file": file})
+    assert str(refused.value) == f"{file}: line 4: parameter objects/1/name = 'A': comes twice"
+
+
+def test_what_is_not_the_scene_files_has_no_line_of_it(write):
+    file = write("drone: {yaw: 1}\nfloor: {size: 3}")
+    with pytest.raises(ParameterError) as refused:
+        parameters.load({"scene_file": file, "drone": {"position": 5}, "floor": 3})
+    assert str(refused.value) == (
+        "parameter drone/position = 5: must be 3 numbers, [x, y, z] in m; "
+        "parameter floor: unknown key; known are " + ", ".join(parameters.Parameters.model_fields)
+    )
+
+
+def test_a_color_of_three_numbers_is_opaque(write):
+    thing = "{shape: box, size: [1, 1, 1], position: [0, 0, 1], color: %s}"
+    scene = parameters.load(
+        {"scene_file": write(f"objects: [{thing % [1, 0, 0.5]}, {thing % [1, 0, 0.5, 0.2]}]")}
+    ).scene
+    assert [one.color for one in scene.objects] == [(1, 0, 0.5, 1), (1, 0, 0.5, 0.2)]
+
+
+README = """
+floor: {size: 20.0}                                # m
+drone: {position: [0, 0, 1], yaw: 0}               # m, rad
+objects:
+  - {name: Crate, shape: box, size: [1, 0.5, 0.3], position: [3, 0, 0.15], rpy: [0, 0, 0.5], mass: 2,
+     color: [0.8, 0.5, 0.2]}
+  - {name: Pillar, shape: cylinder, size: [0.2, 2], position: [3, 2, 1], color: [0.4, 0.6, 0.9, 0.5]}
+  - {name: Ball, shape: sphere, size: [0.15], position: [2, -1, 0.15], color: [0.9, 0.2, 0.2], mass: 0.1}
+  - {name: Chair, shape: mesh, file: block.obj, size: [0.5, 0.5, 0.5], position: [4, -2, 0.2]}
+  - {name: Barrel, shape: urdf, file: parts/barrel.urdf, position: [5, 1, 0.4], mass: 2}
+"""
+
+
+def test_one_entry_of_each_shape_to_copy(write, simulate):
+    simulation = simulate(write(README))
+    for _ in range(10):
+        simulation.step()
+    assert {"Crate", "Pillar", "Ball", "Chair", "Barrel"} <= set(simulation.drone.objects.names)
+    assert simulation.drone.state.position[2] == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize("file", ["no.yaml", "/no/such.yaml", "package://drone_sim/config/scenes/no.yaml", "/tmp"])

@@ -87,7 +87,12 @@ def _fails(tmp_path):
         ("sim.getObjectPosition(nil,-1)", "load", 1, ["wrong kind of value: got (nothing, -1)"]),
         ("local h = 1\nsim.setObjectPosition(h,-1,{0,0,0/0})", "load", 2, ["finite numbers are expected"]),
         ("sim.setScriptSimulationParameter(1,'particleVelocity',{})", "load", 1, ["a number is expected"]),
-        ("function on_twist(m)\n error('x')\nend\nsimROS.subscribe('cmd_vel','T','on_twist')", "on_twist", 2, ["x"]),
+        (
+            "function on_twist(m)\n error('x')\nend\nsimROS.subscribe('cmd_vel','geometry_msgs/Twist','on_twist')",
+            "on_twist",
+            2,
+            ["x"],
+        ),
         ("\nrequire'foo'", "load", 2, ["no module 'foo'"]),
     ],
 )
@@ -114,7 +119,7 @@ def test_lua(fails, source, phase, line, words):
         ("simROS.advertise(3, 'T')", "load", 1, ["simROS.advertise: ", "got (3, 'T', 1, False)"]),
         ("sim.getObjectPosition('Drone')", "load", 1, ["wrong kind of value: got ('Drone', -1)"]),
         ("sim.getObjectPosition(99)", "load", 1, ["no object has the handle 99"]),
-        ("def f(m):\n    undefined\nsimROS.subscribe('cmd_vel', 'T', 'f')", "f", 2, ["NameError"]),
+        ("def f(m):\n    undefined\nsimROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'f')", "f", 2, ["NameError"]),
         ("\nrequire('foo')", "load", 2, ["no module 'foo'"]),
         ("import sys\nsys.exit(1)", "load", 2, ["SystemExit"]),
         ("import no_such_module_", "load", 1, ["ModuleNotFoundError"]),
@@ -132,7 +137,7 @@ LOOP = "while true do end"
     [
         (f"\n{LOOP}", "load", 2),
         *((f"function sysCall_{phase}()\n{LOOP}\nend", phase, 2) for phase in PHASES),
-        (f"function on_twist(m)\n{LOOP}\nend\nsimROS.subscribe('cmd_vel','T','on_twist')", "on_twist", 2),
+        (f"function f(m)\n{LOOP}\nend\nsimROS.subscribe('cmd_vel','geometry_msgs/Twist','f')", "f", 2),
         (f"\nif sim_call_type==sim_childscriptcall_sensing then\n{LOOP}\nend", "sensing", 3),
         (f"while true do pcall(function() {LOOP} end) end", "load", 1),
         (f"while true do xpcall(function() {LOOP} end, function() {LOOP} end) end", "load", 1),
@@ -154,7 +159,7 @@ def test_endless_lua_is_stopped(fails, source, phase, line):
     [
         ("\nwhile True: pass", "load", 2),
         *((f"def sysCall_{phase}():\n    while True: pass", phase, 2) for phase in PHASES),
-        ("def f(m):\n    while True: pass\nsimROS.subscribe('cmd_vel', 'T', f)", "f", 2),
+        ("def f(m):\n    while True: pass\nsimROS.subscribe('cmd_vel', 'geometry_msgs/Twist', f)", "f", 2),
         ("while True:\n  try:\n    while True: pass\n  except: pass", "load", 3),
         ("while True:\n  try:\n    while True: pass\n  except BaseException: pass\n  finally: pass", "load", 3),
         ("import time\nwhile True: time.sleep(0.001)", "load", 2),

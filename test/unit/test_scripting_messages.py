@@ -55,7 +55,7 @@ def test_names_stand_in_the_drones_namespace():
 @pytest.mark.parametrize("queue, kept", [(0, [4]), (1, [4]), (3, [2, 3, 4]), (10, [0, 1, 2, 3, 4])])
 def test_the_last_messages_are_kept(queue, kept):
     bus, heard = MessageBus("drone"), []
-    handle = bus.subscribe("x", "T", "f", queue)
+    handle = bus.subscribe("x", "std_msgs/Int32", "f", queue)
     for message in range(5):
         bus.post("x", message)
     bus.deliver(lambda _, message: heard.append(message))

@@ -135,6 +135,30 @@ def test_a_mistake_is_named_in_one_line(tmp_path, text, says):
     assert "\n" not in message
 
 
+def test_every_wrong_key_is_named_with_its_line(tmp_path):
+    text = """
+- {at: 1, twist: {liner: [1, 0, 0], angular: 3}}
+- at: soon
+  push: {force: [1, 0, 0]}
+- {at: 2, twist: {}}
+- at: 3
+  pose:
+    position: [0, 0, -1]
+- {at: 4, push: {duration: 1}, pusch: 5}
+"""
+    with pytest.raises(TimelineError) as caught:
+        read(tmp_path, text)
+    assert str(caught.value).split("; line ") == [
+        f"{tmp_path}/commands.yaml: line 2: entry 1: twist.angular = 3: "
+        "must be three finite numbers, such as [1, 0, 0]",
+        "2: entry 1: twist.liner: unknown key; known are linear, angular",
+        "3: entry 2: at = 'soon': input should be a valid number",
+        "4: entry 2: push.duration: missing; it is a number of seconds",
+        "8: entry 4: pose.position.z = -1.0: must lie within 0.0 and 1000.0 m",
+        "9: entry 5: pusch: unknown key; known are at, twist, pose, push",
+    ]
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(TimelineError, match=r"nowhere\.yaml"):
         timeline.read(str(tmp_path / "nowhere.yaml"), PARAMETERS)

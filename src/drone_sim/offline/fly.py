@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import logging
 import math
+import os
 import signal
 import sys
 import time
+from pathlib import Path
 from typing import Any, Callable, ContextManager, Dict, Iterator, NoReturn, Optional, Sequence
 
 from tqdm import tqdm
@@ -31,6 +34,9 @@ _WITHOUT_COMMANDS = 10.0  # s
 _PLOTTED = 500_000  # steps
 _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
 _FAILED, _SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
+_YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot")
+_FILES = ("script", "scene", "config", "commands", *_OUTPUTS)
+_ENDINGS = {"scene": _YAML, "config": _YAML, "commands": _YAML, "csv": (".csv", ".txt", "")}
 _EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
 
@@ -75,29 +81,45 @@ def _shown(assignment: str) -> str:
 
 
 def _run(options: argparse.Namespace, guardian: Optional[Guardian]) -> int:
-    parameters = parameters_module.load(settings(options.set))
+    _check_names(options)
+    files = {"config": options.config, "scene_file": options.scene}
+    parameters = parameters_module.load({**settings(options.set), **{key: name for key, name in files.items() if name}})
     timeline = Timeline((), parameters.time_step)
     if options.commands:
         timeline = timeline_module.read(options.commands, parameters)
     steps = first_step(_duration(options, timeline), parameters.time_step)
     if options.plot:
         _check_plot(options.plot, steps)
-    with _csv(options.csv) as file:
-        recording = Recording(file, keep=bool(options.plot))
-        simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
-        began = time.perf_counter()
-        try:
+    if options.csv:
+        writing.check(options.csv)
+    simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
+    began = time.perf_counter()
+    try:
+        with _csv(options.csv) as file:
+            recording = Recording(file, keep=bool(options.plot))
             flown = _status_of(lambda: _fly(simulation, timeline, steps, recording, guardian))
-        finally:
             took = time.perf_counter() - began
-            # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
-            closed = _status_of(simulation.close)
+    finally:
+        # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
+        closed = _status_of(simulation.close)
     if guardian is not None:
         guardian.stand_down()  # no script runs any more, and a plot takes its time
     print(_summary(recording, took), flush=True)
     draw = options.plot and recording.rows
     drawn = _status_of(lambda: _plot(options.plot, recording, timeline)) if draw else 0
     return flown or closed or drawn
+
+
+def _check_names(options: argparse.Namespace) -> None:
+    """Raise ValueError for a file's name that cannot be meant."""
+    for option, endings in _ENDINGS.items():
+        name = getattr(options, option)
+        if name is not None and Path(name).suffix.lower() not in endings:
+            raise ValueError(f"--{option} {_shown(name)}: must end in {' or '.join(filter(None, endings))}")
+    files = {option: os.path.realpath(getattr(options, option)) for option in _FILES if getattr(options, option)}
+    for output, other in itertools.permutations(files, 2):
+        if output in _OUTPUTS and files[output] == files[other]:
+            raise ValueError(f"--{output} {_shown(getattr(options, output))}: is the file of --{other} as well")
 
 
 def _check_plot(path: str, steps: int) -> None:
@@ -188,6 +210,8 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
     parser.add_argument("--script", metavar="FILE", help="child script (default: the tutorial's)")
+    parser.add_argument("--scene", metavar="FILE.yaml", help="floor, objects and the drone's place, as scene:=")
+    parser.add_argument("--config", metavar="FILE.yaml", help="the parameters that change, as config:=")
     parser.add_argument("--commands", metavar="FILE.yaml", help="timeline of twists, poses and pushes")
     parser.add_argument(
         "--duration",
@@ -203,8 +227,8 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="another value for a key of config/drone.yaml, such as control.thrust_limits=null",
     )
-    parser.add_argument("--csv", metavar="OUT", help="write a row per step: state, command, propellers")
-    parser.add_argument("--plot", metavar="OUT.png", help="draw velocities, height, attitude and propellers")
+    parser.add_argument("--csv", metavar="OUT.csv", help="write a row per step: state, command, propellers")
+    parser.add_argument("--plot", metavar="OUT.png", help="draw path, velocities, height, attitude and propellers")
     return parser
 
 

@@ -1,4 +1,4 @@
-"""A flight as a picture: commanded and flown velocities on the left, the drone itself on the right."""
+"""A flight as a picture: commanded and flown velocities, the drone itself, its path from above, and its propellers."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from matplotlib.figure import Figure
 from drone_sim import frames, writing
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import Push, Timeline
-from drone_sim.state import Twist
+from drone_sim.state import Pose, Twist
 
 _BLUE, _ORANGE, _GREEN, _RED = "#1f5fa8", "#d9730d", "#2c8a57", "#a8325e"
 _GREY, _GRID, _SHADE = "#707070", "#e4e4e4", "#f2c9c4"
 _PROPELLERS = (("1 front left", _BLUE), ("2 back left", _ORANGE), ("3 back right", _GREEN), ("4 front right", _RED))
 _VELOCITIES = ("forward $v_x$ [m/s]", "left $v_y$ [m/s]", "up $v_z$ [m/s]", "yaw rate $w_z$ [rad/s]")
+_USUAL = (1, 99)  # percentiles of the propellers' velocities, between which their axis shows everything
+_SMALLEST_PROPELLER_RANGE = 1.0  # m/s
+_SMALLEST_PATH = 1.0  # m
 _SMALLEST_RANGE = 0.05  # of an axis, in its unit: less would blow a ripple up to look like a manoeuvre
 
 
@@ -36,19 +39,26 @@ def save(path: str, recording: Recording, timeline: Timeline) -> None:
     Raises OSError, and ValueError for a format that matplotlib does not have.
     """
     # No pyplot: it would look for a display, and keep every figure.
-    figure = Figure(figsize=(12, 9.5), layout="constrained")
-    axes = figure.subplots(4, 2, sharex=True)
+    figure = Figure(figsize=(16, 9.5), layout="constrained")
+    grid = figure.add_gridspec(4, 3, width_ratios=(1, 1, 1.1))
+    first = figure.add_subplot(grid[0, 0])
+    left = [first, *(figure.add_subplot(grid[row, 0], sharex=first) for row in (1, 2, 3))]
+    middle = [figure.add_subplot(grid[row, 1], sharex=first) for row in range(4)]
+    propellers = figure.add_subplot(grid[2:, 2], sharex=first)
     rows = np.array(recording.rows)
     in_track = np.array([_in_track(recording.matrix(index), row[8:11]) for index, row in enumerate(rows)])
     flown = np.column_stack((in_track[:, :3], rows[:, 13]))
-    _draw_velocities(axes[:, 0], rows[:, 0], rows[:, 14:18], flown)
-    _draw_drone(axes[:, 1], rows, in_track[:, 3:])
-    for ax in axes.flat:
+    _draw_velocities(left, rows[:, 0], rows[:, 14:18], flown)
+    _draw_drone(middle, rows, in_track[:, 3:])
+    _draw_propellers(propellers, rows)
+    for ax in (*left, *middle, propellers):
         _finish(ax)
         _mark(ax, timeline)
-    for ax in axes[-1]:
+        ax.tick_params(labelbottom=ax in (left[-1], middle[-1], propellers))
+    for ax in (left[-1], middle[-1], propellers):
         ax.set_xlabel("simulated time [s]")
         ax.set_xlim(0, max(rows[-1, 0], 1e-3))
+    _draw_path(figure.add_subplot(grid[:2, 2]), rows, timeline)
     with writing.replacing(path, binary=True) as file:
         figure.savefig(file, dpi=120, format=Path(path).suffix[1:] or "png")
 
@@ -71,21 +81,55 @@ def _draw_velocities(axes: Sequence[Axes], times: np.ndarray, commanded: np.ndar
 
 
 def _draw_drone(axes: Sequence[Axes], rows: np.ndarray, angles: np.ndarray) -> None:
-    height, lean, heading, propellers = axes
+    place, height, lean, heading = axes
     times = rows[:, 0]
+    place.plot(times, rows[:, 1], color=_BLUE, label="$x$")
+    place.plot(times, rows[:, 2], color=_ORANGE, label="$y$")
+    place.set_ylabel("place $x$, $y$ [m]")
+    _title(place, "Drone", legend=True)
     height.plot(times, rows[:, 3], color=_BLUE)
     height.set_ylabel("height $z$ [m]")
-    _title(height, "Drone")
     lean.plot(times, angles[:, 0], color=_BLUE, label="pitch (+ nose down)")
     lean.plot(times, angles[:, 1], color=_ORANGE, label="roll (+ to the left)")
     lean.set_ylabel("attitude [rad]")
     _title(lean, legend=True)
     heading.plot(times, np.unwrap(angles[:, 2]), color=_BLUE)
     heading.set_ylabel("yaw [rad]")
+
+
+def _draw_propellers(ax: Axes, rows: np.ndarray) -> None:
     for (name, color), velocities in zip(_PROPELLERS, rows[:, 18:22].T):
-        propellers.step(times, velocities, where="pre", color=color, linewidth=1, label=name)
-    propellers.set_ylabel("propellers [m/s]")
-    _title(propellers, legend=True)
+        ax.step(rows[:, 0], velocities, where="pre", color=color, linewidth=1, label=name)
+    ax.set_ylabel("propellers [m/s]")
+    commanded = rows[1:, 18:22] if len(rows) > 1 else rows[:, 18:22]  # nothing is, at time 0
+    low, high = np.percentile(commanded, _USUAL)
+    margin = max(0.5 * (high - low), _SMALLEST_PROPELLER_RANGE / 2)
+    least, most = float(commanded.min()), float(commanded.max())
+    ax.set_ylim(max(low, least) - margin, min(high, most) + margin)
+    if least < low - margin or most > high + margin:
+        ax.text(0.99, 0.01, f"goes from {least:.1f} to {most:.1f} m/s", transform=ax.transAxes,
+                ha="right", va="bottom", fontsize="small", color=_GREY)  # fmt: skip
+    _title(ax, legend=True)
+
+
+def _draw_path(ax: Axes, rows: np.ndarray, timeline: Timeline) -> None:
+    """Draw the way over ground, seen from above; where a pose puts the drone elsewhere there is a gap."""
+    x, y = rows[:, 1], rows[:, 2]
+    jumps = np.searchsorted(rows[:, 0], [one.at for one in timeline.entries if isinstance(one.action, Pose)], "right")
+    jumps = jumps[jumps < len(rows)]
+    ax.plot(np.insert(x, jumps, np.nan), np.insert(y, jumps, np.nan), color=_BLUE)
+    ax.plot(x[0], y[0], "o", color=_GREEN, label="start")
+    ax.plot(x[-1], y[-1], "s", color=_RED, label="end")
+    half = max(np.ptp(x), np.ptp(y), _SMALLEST_PATH) * 0.55
+    middle_x, middle_y = (x.min() + x.max()) / 2, (y.min() + y.max()) / 2
+    ax.set_xlim(middle_x - half, middle_x + half)
+    ax.set_ylim(middle_y - half, middle_y + half)
+    ax.set_aspect("equal")
+    ax.set_xlabel("$x$ [m]")
+    ax.set_ylabel("$y$ [m]")
+    _title(ax, "Path from above", legend=True)
+    ax.grid(color=_GRID)
+    ax.set_axisbelow(True)
 
 
 def _title(ax: Axes, title: str = "", legend: bool = False) -> None:

@@ -49,8 +49,7 @@ class Recording:
         if not self._keep:
             self.rows.clear()
         self.rows.append(row)
-        # 17 digits bring every float back to the last bit.
-        self._write(f"{value:.17g}" for value in row)
+        self._write(map(_shortest, row))
 
     def matrix(self, index: int) -> Matrix:
         """Return the transform world from base_link of a row."""
@@ -63,3 +62,8 @@ class Recording:
                 self._file.write(",".join(fields) + "\n")  # at once: Ctrl-C leaves no half row
             except OSError as error:
                 raise TableError(error.errno, error.strerror) from None
+
+
+def _shortest(value: float) -> str:
+    """Return the shortest text that a float can be read back from to the last bit."""
+    return repr(float(value)).removesuffix(".0")

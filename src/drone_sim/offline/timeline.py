@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, Iterable, List, NamedTuple, Type, Union
+from typing import Any, Dict, Iterable, List, NamedTuple, Tuple, Type, Union
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from typing_extensions import Annotated  # typing has it from Python 3.9 on
@@ -18,7 +18,8 @@ from typing_extensions import Annotated  # typing has it from Python 3.9 on
 from drone_sim import checks, yaml_files
 from drone_sim.drone import Drone
 from drone_sim.frames import Vector, from_rpy, to_quaternion
-from drone_sim.parameter_types import Finite, Within, numeric, readable_key
+from drone_sim.parameter_errors import told
+from drone_sim.parameter_types import Finite, Location, Within, numeric, readable_key
 from drone_sim.parameters import Parameters
 from drone_sim.resources import shown
 from drone_sim.state import Pose, Twist
@@ -95,12 +96,16 @@ def read(path: str, parameters: Parameters) -> Timeline:
         raise TimelineError(str(error)) from None
     if not isinstance(rows, list):
         raise TimelineError(f"{path}: must be a list of `- {{at: 1.0, twist: ...}}` entries, not {shown(rows)}")
-    entries = []
-    for number, row in enumerate(rows, start=1):
+    entries: List[Entry] = []
+    wrong: List[Tuple[Location, str]] = []
+    for index, row in enumerate(rows):
         try:
             entries.append(_entry(row, parameters))
-        except ValueError as error:
-            raise TimelineError(f"{path}: entry {number}: {error}") from None
+        except _WrongKeys as error:
+            wrong += [((index, *location), f"entry {index + 1}: {text}") for location, text in error.found]
+    if wrong:
+        lines = yaml_files.lines(path)
+        raise TimelineError(told([(lines.find(location).line, text) for location, text in wrong], path))
     return Timeline(entries, parameters.time_step)
 
 
@@ -157,39 +162,58 @@ class _Push(_Model):
 _KINDS: Dict[str, Type[Union[_Twist, _Pose, _Push]]] = {"twist": _Twist, "pose": _Pose, "push": _Push}
 
 
+class _WrongKeys(Exception):
+    """What is wrong with an entry: the keys on the way to each wrong value, and a text."""
+
+    def __init__(self, *found: Tuple[Location, str]):
+        super().__init__()
+        self.found = found
+
+
 def _entry(row: Any, parameters: Parameters) -> Entry:
+    """Return an entry; raises _WrongKeys."""
+    here: Location = ()
     if not isinstance(row, dict):
-        raise ValueError(f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}")
-    for key in row:
-        if key != "at" and key not in _KINDS:
-            raise ValueError(f"{readable_key((key,))}: unknown key; known are at, {', '.join(_KINDS)}")
+        raise _WrongKeys((here, f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
+    known = ("at", *_KINDS)
+    unknown: List[Tuple[Location, str]] = [
+        ((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}")
+        for key in row
+        if key not in known
+    ]
     kinds = [kind for kind in _KINDS if kind in row]
     if len(kinds) != 1:
-        raise ValueError(f"must hold one of {', '.join(_KINDS)}; it holds {' and '.join(kinds) or 'none'}")
+        held = " and ".join(kinds) or "none"
+        raise _WrongKeys(*(unknown or [(here, f"must hold one of {', '.join(_KINDS)}; it holds {held}")]))
     kind = kinds[0]
-    at = _checked(_Time, {key: row[key] for key in row if key == "at"}, "").at
+    times = {key: row[key] for key in row if key == "at"}
+    (at, no_time), (action, no_action) = _checked(_Time, times, ()), _checked(_KINDS[kind], row[kind], (kind,))
+    wrong = [*unknown, *no_time, *no_action]
+    if wrong:
+        raise _WrongKeys(*wrong)
     try:
-        return Entry(at, _checked(_KINDS[kind], row[kind], f"{kind}.").checked(parameters))
+        return Entry(at.at, action.checked(parameters))
     except checks.Refused as refused:
-        raise ValueError(f"{kind}.{refused}") from None
+        key = str(refused).partition(".")[0].partition(" ")[0]
+        raise _WrongKeys(((kind, key), f"{kind}.{refused}")) from None
 
 
-def _checked(model: Type[Any], values: Any, prefix: str) -> Any:
+def _checked(model: Type[Any], values: Any, above: Location) -> Tuple[Any, List[Tuple[Location, str]]]:
+    """Return a model of the values, or None and what is wrong with them."""
     try:
-        return model.model_validate(values)
+        return model.model_validate(values), []
     except ValidationError as error:
-        raise ValueError(_one_line(error, model, prefix)) from None
+        return None, [((*above, *one["loc"]), _one_line(one, model, above)) for one in error.errors()]
 
 
-def _one_line(error: ValidationError, model: Type[BaseModel], prefix: str) -> str:
-    first = error.errors()[0]
-    key = (prefix + readable_key(first["loc"]).replace("/", ".")).rstrip(".")
+def _one_line(error: Any, model: Type[BaseModel], above: Location) -> str:
+    key = readable_key((*above, *error["loc"])).replace("/", ".")
     known = ", ".join(model.model_fields)
-    if first["type"] == "extra_forbidden":
+    if error["type"] == "extra_forbidden":
         return f"{key}: unknown key; known are {known}"
-    if first["type"] == "missing":
+    if error["type"] == "missing":
         return f"{key}: missing; it is a number of seconds"
-    if first["type"] == "model_type":
-        return f"{key} = {shown(first['input'])}: must be a mapping of {known}"
-    message = first["msg"].replace("Value error, ", "")
-    return f"{key} = {shown(first['input'])}: {message[0].lower()}{message[1:]}"
+    if error["type"] == "model_type":
+        return f"{key} = {shown(error['input'])}: must be a mapping of {known}"
+    message = error["msg"].replace("Value error, ", "")
+    return f"{key} = {shown(error['input'])}: {message[0].lower()}{message[1:]}"

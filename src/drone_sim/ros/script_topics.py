@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
+import importlib
 from collections.abc import Mapping
 from typing import Any, Callable, Collection, Type
 
 import genpy
 import roslib.message
+import rospkg
 import rospy
 from sensor_msgs.msg import Image as ImageMessage
 
@@ -82,8 +85,18 @@ def _message_class(kind: str) -> Type[genpy.Message]:
     except (ImportError, ValueError):
         found = None
     if found is None:
-        raise ValueError(f"message type '{kind}' is not installed")
+        raise ValueError(f"message type '{kind}' is not installed{_near_types(kind)}")
     return found
+
+
+def _near_types(kind: str) -> str:
+    package, _, name = kind.partition("/")
+    try:
+        known = [one for one in dir(importlib.import_module(f"{package}.msg")) if one[0] != "_"]
+        near = [f"{package}/{one}" for one in difflib.get_close_matches(name, known)]
+    except (ImportError, ValueError):
+        near = [f"{one}/{name}" for one in difflib.get_close_matches(package, rospkg.RosPack().list())]
+    return f"; near names are {', '.join(near)}" if near else ""
 
 
 def _fill(message: genpy.Message, given: Any, path: str) -> genpy.Message:

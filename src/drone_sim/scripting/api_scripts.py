@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
+import logging
 import math
-from typing import Any, Dict, Optional, Tuple
+from typing import Any, Dict, Iterable, Optional, Tuple
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import object_paths
@@ -15,11 +17,14 @@ from drone_sim.scripting.script_values import refuse_if_too_large
 
 __all__ = ["LOG", "Scripts"]
 
+_LOG = logging.getLogger(__name__)  # not the script's own words
 Handle = int
 Name = str
 
 _VERSION = 40600  # the CoppeliaSim whose API this is nearest to
 _MOST = 1000  # parameters of one script
+_NEAR = 0.8  # of difflib's ratio
+_LONGEST = 80  # characters of a name that is looked at
 _SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
 
 
@@ -32,6 +37,7 @@ class Scripts:
         self._names = list(host.script_parameters)
         self._parameters: Dict[int, Parameters] = dict(enumerate(host.script_parameters.values()))
         self._own = self._names.index(host.own_script)
+        self._read = [set(parameters) for parameters in self._parameters.values()]  # names that something reads
         self._clock = surroundings.clock
         self._time_step = surroundings.time_step
 
@@ -87,17 +93,41 @@ class Scripts:
     def setScriptSimulationParameter(self, script: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of a script: `particleVelocity` (m/s) drives a propeller.
 
-        With sim.handle_tree it is set in this script and those below.
+        With sim.handle_tree it is set in this script and those below. A name that a propeller does not have is
+        refused where it comes near to one that it has; of any other the log says once that nothing reads it.
         """
         if script == _TREE:
+            self._check_name(self._parameters, name)
             for parameters in self._parameters.values():
                 _set(parameters, name, value)
             return
         parameters = self._parameters.get(script) or self._parameters[self._index(script)]
-        if type(value) is float and name in parameters and math.isfinite(value):  # four times a step, so at once
+        if name not in parameters:
+            self._check_name([self._index(script)], name)
+        elif type(value) is float and math.isfinite(value):  # four times a step, so at once
             parameters[name] = value
-        else:
-            _set(parameters, name, value)
+            return
+        _set(parameters, name, value)
+
+    def _check_name(self, scripts: Iterable[int], name: Any) -> None:
+        """Raise ValueError for a misspelt parameter of a propeller; say of one that nothing reads that it is so."""
+        of_propellers = set().union(*(names for number, names in enumerate(self._read) if number != self._own))
+        if list(scripts) == [self._own]:
+            if name in of_propellers:
+                _LOG.warning(
+                    "'%s' is a parameter of the propellers; in the script of %s nothing reads it",
+                    name,
+                    self._names[self._own],
+                )
+            return
+        if name in of_propellers or name in self._read[self._own]:
+            return
+        plain = {known.lower(): known for known in sorted(of_propellers)}
+        near = difflib.get_close_matches(str(name)[:_LONGEST].replace("_", "").lower(), plain, cutoff=_NEAR)
+        if near:
+            known = ", ".join(plain[one] for one in near)
+            raise ValueError(f"a propeller has no script parameter '{name}'; near names are {known}")
+        _LOG.warning("nothing reads '%.80s' of a propeller; particleVelocity drives it", name)
 
     def _index(self, script: int) -> int:
         if script == _SELF:

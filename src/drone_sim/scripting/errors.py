@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+from typing import Any, Iterable
+
 LONGEST_MESSAGE = 600  # characters
 
 
@@ -22,3 +25,9 @@ class ScriptError(Exception):
 
 class UnknownName(AttributeError):
     """A script asked for a function or constant that the API does not have."""
+
+
+def no_function(callback: Any, known: Iterable[str]) -> str:
+    """Return the message on a callback that a script does not have, with the near ones of the functions that it has."""
+    near = difflib.get_close_matches(str(callback), list(known))
+    return f"the script has no function '{callback}' to call back{'; near names are ' if near else ''}{', '.join(near)}"

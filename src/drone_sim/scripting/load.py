@@ -10,12 +10,12 @@ from drone_sim.resources import resolve
 from drone_sim.scripting.calls import Api
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.messages import Callback
+from drone_sim.scripting.python_modules import LARGEST
 from drone_sim.scripting.python_script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
 
 _BUILT_IN = Path(__file__).resolve().parents[1] / "child_scripts"
 DEFAULT = "tutorial"
-_LARGEST = 1024 * 1024  # bytes
 
 
 class Script(Protocol):
@@ -26,6 +26,9 @@ class Script(Protocol):
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message. Raises ScriptError."""
+
+    def check(self, callback: Callback) -> None:
+        """Raise ScriptError where the script has no such function to call back."""
 
     def remember(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now."""
@@ -41,6 +44,9 @@ class NoScript:
         """Do nothing."""
 
     def callback(self, _callback: Callback, _message: Any) -> None:
+        """Do nothing."""
+
+    def check(self, _callback: Callback) -> None:
         """Do nothing."""
 
     def remember(self) -> Callable[[], None]:
@@ -92,7 +98,7 @@ def _read(path: str) -> bytes:
     if file.exists() and not file.is_file():
         raise ScriptError("load", path, 0, "is not a file")
     with file.open("rb") as opened:
-        source = opened.read(_LARGEST + 1)
-    if len(source) > _LARGEST:
-        raise ScriptError("load", path, 0, f"is too large: a script has at most {_LARGEST} bytes")
+        source = opened.read(LARGEST + 1)
+    if len(source) > LARGEST:
+        raise ScriptError("load", path, 0, f"is too large: a script has at most {LARGEST} bytes")
     return source

@@ -27,7 +27,8 @@ local function callback_number(f)
 end
 
 local function fail(message)
-  error(name_of_script .. ':' .. line_in_script() .. ': ' .. message, 0)
+  local line, name = place_in_script()
+  error(name .. ':' .. line .. ': ' .. message, 0)
 end
 
 -- What Python gave: how to read it, and values.

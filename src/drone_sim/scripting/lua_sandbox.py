@@ -7,6 +7,7 @@ Finalizers run with hooks switched off, and so do the handlers of Lua's own xpca
 """
 
 from drone_sim.scripting.lua_crossing import CROSSING
+from drone_sim.scripting.lua_functions import FUNCTIONS
 from drone_sim.scripting.lua_matrices import MATRICES
 from drone_sim.scripting.lua_snapshots import SNAPSHOTS
 
@@ -16,7 +17,7 @@ local bridge, source = ...
 local pcall, error, type, tostring, select, next, pairs = pcall, error, type, tostring, select, next, pairs
 local rawget, rawset, rawlen, setmetatable = rawget, rawset, rawlen, setmetatable
 local unpack = table.unpack or unpack
-local concat, byte, sub = table.concat, string.byte, string.sub
+local concat, byte, sub, match = table.concat, string.byte, string.sub, string.match
 local load, loadstring, setfenv = load, loadstring, setfenv
 local collectgarbage, memory = collectgarbage, collectgarbage
 local getinfo, sethook = debug.getinfo, debug.sethook
@@ -26,7 +27,7 @@ local create, resume, close = coroutine.create, coroutine.resume, coroutine.clos
 local exceeded, log = bridge.exceeded, bridge.log
 local newer = _VERSION ~= 'Lua 5.1'
 debug = nil -- or lupa looks up its traceback in every call
-local name_of_script = sub(source, 2) -- source is '=name'
+local sources = {[source] = sub(source, 2)} -- of the script and what it requires: '=name' -> 'name'
 rawlen = rawlen or function(t) return #t end -- which knows no __len in 5.1
 
 local function pack(...)
@@ -44,19 +45,20 @@ local SMALL = 4 * 1024 -- KiB
 local hooks = 0
 local SOFT = bridge.memory / 1024 -- KiB that the script may use
 local TIME, MEMORY, MISSING = 1, 2, 3 -- why it was stopped, or not called
-local running, stopped, stopped_at = false, false, 0
+local running, stopped, stopped_at, stopped_in = false, false, 0, ''
 
-local function line_in_script()
+local function place_in_script()
   for level = 3, 250 do
     local info = getinfo(level, 'Sl')
-    if not info then return 0 end
-    if info.source == source and info.currentline > 0 then return info.currentline end
+    if not info then break end
+    if sources[info.source] and info.currentline > 0 then return info.currentline, sources[info.source] end
   end
-  return 0
+  return 0, sources[source]
 end
 
 local function stop(why)
-  stopped, stopped_at = why, line_in_script()
+  stopped = why
+  stopped_at, stopped_in = place_in_script()
   error('stopped', 0)
 end
 
@@ -111,14 +113,14 @@ local function phases()
   return found
 end
 
--- Run f; return which phases there are, and then nothing; or true and what f returned; or the number of the limit and
--- the line; or false and a message, which may begin with the line.
+-- Run f; return which phases there are, and then nothing; or true and what f returned; or the number of the limit,
+-- the line and the name of the file; or false and a message, which may begin with the line.
 local function run(f, ...)
   running, stopped = true, false
   local ok, value = pcall(f, ...)
   running = false
   if memory('count') > SOFT then pcall(check_memory) end
-  if stopped then return phases(), stopped, stopped_at end
+  if stopped then return phases(), stopped, stopped_at, stopped_in end
   if ok and value == nil then return phases() end
   if ok then return phases(), true, value end
   if type(value) == 'userdata' then error(value, 0) end
@@ -168,7 +170,7 @@ for _, name in pairs{'_VERSION', 'assert', 'collectgarbage', 'error', 'getmetata
 end
 env._G = env
 env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.difftime}
-local modules = {math = math, string = string, table = table, coroutine = coroutine, os = env.os, utf8 = utf8}
+for _, name in pairs{'math', 'string', 'table', 'coroutine', 'os', 'utf8'} do modules[name] = env[name] end
 string.dump = nil
 
 function env.print(...)
@@ -243,11 +245,7 @@ function env.load(text, name, mode, ...)
 end
 env.loadstring = env.load
 
-function env.require(name)
-  local module = modules[name]
-  if module == nil then error("no module '" .. tostring(name) .. "'", 2) end
-  return module
-end
+env.require = require
 
 ---- what Lua 5.1 and newer call differently
 
@@ -290,8 +288,8 @@ math.randomseed(1) -- the same flight every time
 
 return {
   phase = phase, called_back = called_back, open = open, remember = remember, recall = recall, define = define,
-  list = list, modules = modules, globals = env,
+  list = list, modules = modules, globals = env, has = has, functions = functions,
 }
 """
 
-PRELUDE = _LIMITS + MATRICES + CROSSING + _PHASES + SNAPSHOTS + _GLOBALS
+PRELUDE = _LIMITS + MATRICES + CROSSING + _PHASES + FUNCTIONS + SNAPSHOTS + _GLOBALS

@@ -13,14 +13,14 @@ import importlib.util
 import logging
 import re
 import weakref
-from pathlib import Path
-from typing import Any, Callable, Mapping, Set, Tuple, Union
+from typing import Any, Callable, List, Mapping, Set, Tuple, Union
 
 from drone_sim.objects import near_names
-from drone_sim.scripting import script_log
+from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.calls import Api, Function, contents, explain
-from drone_sim.scripting.constants import PHASES
-from drone_sim.scripting.errors import LONGEST_MESSAGE, ScriptError
+from drone_sim.scripting.constants import CONSTANTS, PHASES
+from drone_sim.scripting.errors import LONGEST_MESSAGE, ScriptError, no_function
+from drone_sim.scripting.lua_modules import LuaModules
 from drone_sim.scripting.lua_sandbox import PRELUDE
 from drone_sim.scripting.lua_source import LuaSource
 from drone_sim.scripting.lua_thread import MOST_LEFT, LeftBehind, LuaThread, SameThread, left_behind
@@ -38,7 +38,6 @@ _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", "lua51")
 _FLAT = {"simROS": "simExtRosInterface_"}
 
 _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
-_NAME_LENGTH = 50  # Lua cuts longer chunk names
 _NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
 _EVERY_STEP = ("actuation", "sensing")
 _TIME, _OVER_MEMORY, _MISSING = 1, 2, 3  # why Lua stopped a script, or called nothing (lua_sandbox.py)
@@ -55,8 +54,9 @@ class LuaScript:
         self._limit = limit
         self._end = ""  # why nothing can be called any more
         self._phases = 0
-        self._name = Path(path).name[:_NAME_LENGTH]
+        self._helpers = LuaModules(path)
         text = LuaSource(source)
+        self._check_call_types(text)
         if text.loops_in_c and left_behind() >= MOST_LEFT:
             raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
         self._thread: Door = LuaThread(limit) if text.loops_in_c else SameThread(limit)
@@ -65,7 +65,10 @@ class LuaScript:
             sandbox = self._thread.run(self._build, dialect, modules)
             self._phase, self._called_back = sandbox[b"phase"], sandbox[b"called_back"]
             self._remember, self._recall = sandbox[b"remember"], sandbox[b"recall"]
+            self._has, self._functions = sandbox[b"has"], sandbox[b"functions"]
             self._run("load", sandbox[b"open"], text.text, text.per_phase)
+            if not text.per_phase:
+                self._check_names()
         except BaseException:
             self._thread.close()
             raise
@@ -93,14 +96,44 @@ class LuaScript:
             "longest_message": 4 * LONGEST_MESSAGE,
             "longest_line": 4 * script_log.LONGEST,
             "phases": _phase_functions,
+            "module": _reader(self._thread, self._helpers),
         }
         table = runtime.table_from({key.encode(): value for key, value in bridge.items()})
-        sandbox = runtime.execute(PRELUDE.encode(), table, f"={self._name}".encode())
+        sandbox = runtime.execute(PRELUDE.encode(), table, f"={self._helpers.chunk}".encode())
         self._define(sandbox, modules)
         _LOG.debug("%s runs in %s", self._path, dialect)
         return sandbox
 
     # ---- the script
+
+    def _check_call_types(self, text: LuaSource) -> None:
+        """Raise ScriptError for a phase that does not exist: Lua would compare sim_call_type with nil."""
+        known = [name for name in CONSTANTS if name.startswith("childscriptcall_")]
+        for name in text.call_types:
+            if name not in known:
+                line = text.line(name)
+                raise self._error("load", f"there is no sim_{name}; {near_names(name, known)}", line)
+
+    def _check_names(self) -> None:
+        """Raise ScriptError for a function that was meant to be a phase, but would not be called as one."""
+        places = self._named_functions()
+        for name, meant in phase_names.misspelt(places):
+            raise ScriptError("load", *places[name], phase_names.never_called(name, meant))
+        phase_names.warn(self._path, places)
+
+    def _named_functions(self) -> Dict[str, Tuple[str, int]]:
+        """Return file and line of the script's global functions, by name."""
+        words = self._run("load", self._functions).decode("utf-8", "replace").split("\n")
+        return {
+            name: (self._helpers.path(chunk), int(line))
+            for name, line, chunk in zip(words[::3], words[1::3], words[2::3])
+        }
+
+    def check(self, callback: Callback) -> None:
+        """Raise ScriptError where there is no function to call back."""
+        name = callback.encode() if isinstance(callback, str) else callback
+        if not self._run(str(callback), self._has, name):
+            raise self._error(str(callback), no_function(callback, self._named_functions()))
 
     def call(self, phase: str) -> None:
         """Run a phase; raises ScriptError."""
@@ -128,7 +161,7 @@ class LuaScript:
         self._finalizer()
         self._end = self._end or "the script is closed"
         self._phases = 0
-        self._phase = self._called_back = self._remember = self._recall = None
+        self._phase = self._called_back = self._remember = self._recall = self._has = self._functions = None
 
     def _run(self, phase: str, function: Any, *arguments: Any, near: bool = False) -> Any:
         """Call a function in Lua's thread (`near`: see there); return what it returns."""
@@ -150,29 +183,28 @@ class LuaScript:
         self._phases, how, *rest = outcome
         if how is True:
             return rest[0]
-        raise self._failure(phase, how, *rest)
+        raise self._failure(phase, how, rest)
 
-    def _failure(self, phase: str, how: Any, found: Any = None) -> ScriptError:
-        """Return the error that Lua tells of: `found` is a message, or the line where the script was stopped."""
+    def _failure(self, phase: str, how: Any, found: List[Any]) -> ScriptError:
+        """Return the error that Lua tells of: `found` holds a message, or line and file where the script was stopped."""
         if how is False:
-            return self._error_with_line(phase, found)
+            return self._error_with_line(phase, found[0])
         if how == _TIME:
-            return self._error(phase, str(self._limit), found)
+            return self._error(phase, str(self._limit), *found)
         if how == _OVER_MEMORY:
             self._end = _TOO_MUCH
-            return self._error(phase, self._end, found)
-        return self._error(phase, f"the script has no function '{phase}' to call back")
+            return self._error(phase, self._end, *found)
+        return self._error(phase, no_function(phase, ()))
 
-    def _error(self, phase: str, message: str, line: int = 0) -> ScriptError:
-        return ScriptError(phase, self._path, int(line), message)
+    def _error(self, phase: str, message: str, line: int = 0, chunk: bytes = b"") -> ScriptError:
+        return ScriptError(phase, self._helpers.path(chunk.decode("utf-8", "replace")), int(line), message)
 
     def _error_with_line(self, phase: str, message: bytes) -> ScriptError:
         text = message.decode("utf-8", "replace")
         if text == "not enough memory":
             return self._error(phase, _TOO_MUCH)
-        match = re.match(rf"{re.escape(self._name)}:(\d+): (.*)$", text, re.DOTALL)
-        found, text = (int(match.group(1)), match.group(2)) if match else (0, text)
-        return self._error(phase, text + self._hint(text), found)
+        path, line, text = self._helpers.placed(text)
+        return ScriptError(phase, path, line, text + self._hint(text))
 
     def _hint(self, text: str) -> str:
         """Return what a name that is nil may have been meant to be."""
@@ -245,6 +277,10 @@ def _log(thread: Door) -> Callable[[bytes], None]:
             script_log.say(line)
 
     return log
+
+
+def _reader(thread: LuaThread, modules: LuaModules) -> Callable[[bytes], Tuple[bool, bytes, bytes]]:
+    return lambda name: (False, b"stopped", b"") if thread.closed else modules.read(name)
 
 
 def _phase_functions() -> Tuple[bytes, ...]:

@@ -39,6 +39,7 @@ local function take_snapshot()
   end
 
   visit(env)
+  visit(loaded)
   visit(getmeta(''))
   for _, f in next, callbacks do visit(f) end
   if chunk then visit(chunk) end

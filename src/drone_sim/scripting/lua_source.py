@@ -13,13 +13,17 @@ _LOOP_IN_C = (
     *("date", "utf8"),
 )
 _LOOPS_IN_C = re.compile(rb"\b(?:" + "|".join(_LOOP_IN_C).encode() + rb")\b")
+_REQUIRE = re.compile(rb"\brequire\b")  # a helper may name what it likes; these cannot
+_REQUIRE_OWN = re.compile(rb"\brequire[ \t]{0,9}\(?[ \t]{0,9}['\"](?:sim|simROS|math|string|table|coroutine|os)['\"]")
+_CALL_TYPE = re.compile(rb"\bsim[._](childscriptcall_\w{0,60})")
 _FLAT_CALL = re.compile(rb"(?<![.:\w])sim[A-Z]\w{0,200}[ \t\r\n]{0,200}\(")
 
 
 class LuaSource:
     """A script's text; `per_phase` if it looks at sim_call_type, `flat` if it calls V-REP 3.x's functions.
 
-    `loops_in_c` if it names a function of Lua's that may not come back.
+    `loops_in_c` if it names a function of Lua's that may not come back, or requires a file.
+    `call_types` are the constants that it compares sim_call_type with, without `sim_`.
     """
 
     def __init__(self, text: bytes):
@@ -27,8 +31,14 @@ class LuaSource:
         self.text = b"--" + text if text.startswith(b"#") else text
         bare = _without_comments(self.text)
         self.per_phase = _PER_PHASE.search(bare) is not None
+        self.call_types = sorted({name.decode() for name in _CALL_TYPE.findall(bare)})
         self.flat = _FLAT_CALL.search(bare) is not None
-        self.loops_in_c = _LOOPS_IN_C.search(bare) is not None
+        helpers = len(_REQUIRE.findall(bare)) > len(_REQUIRE_OWN.findall(bare))
+        self.loops_in_c = helpers or _LOOPS_IN_C.search(bare) is not None
+
+    def line(self, word: str) -> int:
+        """Return the first line with a word in it."""
+        return self.text.count(b"\n", 0, self.text.find(word.encode())) + 1
 
 
 def _without_comments(text: bytes) -> bytes:

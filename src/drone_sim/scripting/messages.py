@@ -8,9 +8,10 @@ where there is one: that is the seam to ROS.
 from __future__ import annotations
 
 import copy
+import re
 import threading
 from collections import deque
-from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Protocol, Tuple, Union
+from typing import Any, Callable, Deque, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple, Union
 
 import numpy as np
 
@@ -25,6 +26,9 @@ Callback = Union[str, Callable[[Any], None]]
 _KEPT = 32  # published messages
 _MOST = 200  # subscriptions and publishers
 _LONGEST_QUEUE = 1000  # messages
+_OWN_TOPICS = {"cmd_vel": "geometry_msgs/Twist"}
+_NONE: List[Callback] = []
+_TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
 
 
 class Sender(Protocol):
@@ -102,12 +106,14 @@ class MessageBus:
     `own_topics` are never asked of it: the drone itself posts them.
     """
 
-    def __init__(self, namespace: str, own_topics: Tuple[str, ...] = ("cmd_vel",)):
-        """Take the drone's namespace, such as 'drone', and the topics that the drone posts itself."""
+    def __init__(self, namespace: str, own_topics: Optional[Mapping[str, str]] = None):
+        """Take the drone's namespace, such as 'drone', and topics that the drone posts itself, with their types."""
         self.backend: Optional[Backend] = None
         self.published: Deque[Published] = deque(maxlen=_KEPT)
         self._namespace = namespace
-        self._own_topics = {self._resolve(topic) for topic in own_topics}
+        own = _OWN_TOPICS if own_topics is None else own_topics
+        self._own_topics = {self._resolve(topic): kind for topic, kind in own.items()}
+        self._new_callbacks: List[Callback] = []
         self._lock = threading.Lock()
         self._next_handle = 0
         self._subscriptions: Dict[int, _Subscription] = {}
@@ -143,10 +149,12 @@ class MessageBus:
             return self.backend.subscribe(resolved, kind, messages.append)
 
         self._refuse_if_too_many()
+        self._check_type(resolved, kind)
         subscription = _Subscription(resolved, callback, messages, begin, begin())
         with self._lock:
             handle = self._new_handle()
             self._subscriptions[handle] = subscription
+        self._new_callbacks.append(callback)
         return handle
 
     def shutdownSubscriber(self, handle: Handle) -> None:
@@ -164,6 +172,7 @@ class MessageBus:
         def begin() -> Optional[Sender]:
             return self.backend.advertise(resolved, kind, kept, bool(latch)) if self.backend else None
 
+        self._check_type(resolved, kind)
         return self._add_publisher(resolved, kind, begin)
 
     def publish(self, handle: Handle, message: Any) -> None:
@@ -218,6 +227,13 @@ class MessageBus:
                 if subscription.topic == resolved:
                     subscription.messages.append(message)
 
+    def new_callbacks(self) -> List[Callback]:
+        """Return what was subscribed with since the last call."""
+        if not self._new_callbacks:
+            return _NONE
+        new, self._new_callbacks = self._new_callbacks, []
+        return new
+
     def deliver(self, call: Callable[[Callback, Any], None]) -> None:
         """Hand every waiting message to `call(callback, message)`, oldest first."""
         waiting: List[Tuple[Callback, Any]] = []
@@ -229,6 +245,7 @@ class MessageBus:
 
     def close(self) -> None:
         """End every subscription and stop advertising: the script that made them is gone."""
+        self._new_callbacks = []
         with self._lock:
             subscriptions, self._subscriptions = self._subscriptions, {}
             publishers, self._publishers = self._publishers, {}
@@ -268,6 +285,14 @@ class MessageBus:
             handle = self._new_handle()
             self._publishers[handle] = publisher
         return handle
+
+    def _check_type(self, topic: str, kind: str) -> None:
+        """Raise ValueError for a type that the topic does not have, or that is none."""
+        own = self._own_topics.get(topic)
+        if own is not None and kind != own:
+            raise ValueError(f"messages on {topic} are of the type {own}, not '{kind}'")
+        if not _TYPE.fullmatch(kind):
+            raise ValueError(f"'{kind:.80}' is no message type; one is, for example, geometry_msgs/Twist")
 
     def _refuse_if_too_many(self) -> None:
         if len(self._subscriptions) + len(self._publishers) >= _MOST:

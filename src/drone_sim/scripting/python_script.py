@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import ast
 import copy
+import inspect
 import traceback
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, Callable, Dict, Mapping, Tuple
+from types import CodeType, SimpleNamespace
+from typing import Any, Callable, Dict, List, Mapping, Tuple
 
 from drone_sim.objects import near_names
-from drone_sim.scripting import script_log
+from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.calls import Api, mistake
-from drone_sim.scripting.constants import PHASES
-from drone_sim.scripting.errors import ScriptError, UnknownName
+from drone_sim.scripting.errors import ScriptError, UnknownName, no_function
 from drone_sim.scripting.messages import Callback
+from drone_sim.scripting.phase_names import FUNCTIONS
 from drone_sim.scripting.process import process_kept
+from drone_sim.scripting.python_modules import Helpers
 from drone_sim.scripting.script_log import say, shown
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
 
@@ -23,14 +24,14 @@ __all__ = ["PythonScript", "ScriptError"]
 
 _STOPPED = "__stopped__"  # Stopped, among a script's globals
 _RARE = ("init", "cleanup")
-_FUNCTIONS = {phase: f"sysCall_{phase}" for phase in PHASES}
+_NOT_COPIED = ("__builtins__", "__loader__", "__spec__")
 
 
 class PythonScript:
     """A file that defines sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup as it needs them.
 
     It finds `sim`, `simROS`, `require` and `self` (an empty object to keep variables in), as
-    CoppeliaSim's Python scripts do. What it prints goes to the log.
+    CoppeliaSim's Python scripts do; so do the modules beside it that it imports. What it prints goes to the log.
     """
 
     def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
@@ -38,25 +39,41 @@ class PythonScript:
         self._path = path
         self._limit = limit
         self._modules = modules
+        found = {"self": SimpleNamespace(), "require": self._require, "print": _print, _STOPPED: Stopped, **modules}
+        self._helpers = Helpers(path, found, _compiled)
         self._globals: Dict[str, Any] = {
-            "__name__": Path(path).stem,
+            "__name__": self._helpers.package,
             "__file__": path,
-            "self": SimpleNamespace(),
-            "require": self._require,
-            "print": _print,
-            _STOPPED: Stopped,
-            **modules,
+            "__builtins__": self._helpers.builtins,
+            **found,
         }
-        with process_kept():
-            self._run("load", self._load, source)
+        try:
+            with process_kept():
+                self._run("load", lambda: exec(_compiled(source, path), self._globals))
+            self._check_names()
+        except ScriptError:
+            self.close()
+            raise
 
-    def _load(self, source: bytes) -> None:
-        code = compile(_let_stopped_pass(ast.parse(source, self._path)), self._path, "exec")
-        exec(code, self._globals)
+    def _check_names(self) -> None:
+        """Raise ScriptError for a function that was meant to be a phase, but would not be called as one."""
+        functions = {name: one for name, one in self._globals.items() if callable(one) and not name.startswith("__")}
+        for name, meant in phase_names.misspelt(functions):
+            raise self._error_at(functions[name], phase_names.never_called(name, meant))
+        for name in FUNCTIONS.values():
+            one = functions.get(name)
+            if inspect.isgeneratorfunction(one) or inspect.iscoroutinefunction(one) or inspect.isasyncgenfunction(one):
+                raise self._error_at(one, f"{name} would not run: it has a `yield` or is `async`")
+        phase_names.warn(self._path, functions)
+
+    def _error_at(self, function: Any, message: str) -> ScriptError:
+        code = getattr(function, "__code__", None)
+        path, line = (code.co_filename, code.co_firstlineno) if inspect.iscode(code) else (self._path, 0)
+        return ScriptError("load", path, line, message)
 
     def call(self, phase: str) -> None:
         """Call `sysCall_<phase>` if the script has it; raises ScriptError."""
-        function = self._globals.get(_FUNCTIONS[phase])
+        function = self._globals.get(FUNCTIONS[phase])
         if function is None:
             return
         if phase in _RARE:
@@ -70,29 +87,38 @@ class PythonScript:
         if callable(callback):
             self._run(getattr(callback, "__name__", "callback"), callback, message)
             return
-        function = self._globals.get(callback)
-        if not callable(function):
-            raise ScriptError(str(callback), self._path, 0, f"the script has no function '{callback}' to call back")
-        self._run(callback, function, message)
+        self.check(callback)
+        self._run(callback, self._globals[callback], message)
+
+    def check(self, callback: Callback) -> None:
+        """Raise ScriptError where there is no function to call back."""
+        if not callable(callback) and not callable(self._globals.get(callback)):
+            known = [name for name, one in self._globals.items() if inspect.isfunction(one)]
+            raise ScriptError(str(callback), self._path, 0, no_function(callback, known))
 
     def remember(self) -> Callable[[], None]:
         """Return a function that gives `self` and the global variables the values that they have now.
 
-        Values that cannot be copied (open files, modules, API objects) stay as they are.
+        So it does for those of the modules beside the script. Values that cannot be copied (open files, modules, API
+        objects) stay as they are.
         """
-        kept = _copied(self._globals)
+        modules = self._helpers.modules()
+        kept = _copied(self._globals, *map(vars, modules.values()))
 
         def recall() -> None:
-            fresh = _copied(kept)
-            for name in set(self._globals) - set(fresh) - {"__builtins__"}:
-                del self._globals[name]
-            self._globals.update(fresh)
+            for name in set(self._helpers.modules()) - set(modules):
+                self._helpers.forget(name)
+            for variables, fresh in zip((self._globals, *map(vars, modules.values())), _copied(*kept)):
+                for name in set(variables) - set(fresh) - set(_NOT_COPIED):
+                    del variables[name]
+                variables.update(fresh)
 
         return recall
 
     def close(self) -> None:
         """Forget the script; it cannot be called after that."""
         self._globals.clear()
+        self._helpers.close()
 
     def _run(self, phase: str, function: Any, *arguments: Any) -> None:
         failed = None
@@ -111,36 +137,42 @@ class PythonScript:
 
     def _error(self, phase: str, error: BaseException) -> ScriptError:
         if self._limit.struck:
-            return ScriptError(phase, self._path, self._line(error), str(self._limit))
+            return ScriptError(phase, *self._place(error), str(self._limit))
         kind = "an exception"
         try:
             kind = type(error).__name__
-            line, message = self._limit.run(self._told, error)
+            (path, line), message = self._limit.run(self._told, error)
         except BaseException:
-            line, message = 0, f"{kind}, which cannot be shown"
-        return ScriptError(phase, self._path, line, message)
+            path, line, message = self._path, 0, f"{kind}, which cannot be shown"
+        return ScriptError(phase, path, line, message)
 
-    def _told(self, error: BaseException) -> Tuple[int, str]:
-        """Return line and message of an exception; whatever the script made of it may raise, or not return."""
-        if isinstance(error, SyntaxError) and error.filename == self._path:
-            return error.lineno or 0, f"SyntaxError: {error.msg}"
-        line = self._line(error)
+    def _told(self, error: BaseException) -> Tuple[Tuple[str, int], str]:
+        """Return place and message of an exception; whatever the script made of it may raise, or not return."""
+        if isinstance(error, SyntaxError) and error.filename in self._helpers.files:
+            return (str(error.filename), error.lineno or 0), f"SyntaxError: {error.msg}"
+        place = self._place(error)
         if isinstance(error, UnknownName):
-            return line, str(error)
-        name, text = type(error).__name__, shown(error)
-        return line, mistake(error, self._modules.values()) or (f"{name}: {text}" if text else name)
+            return place, str(error)
+        name = type(error).__name__
+        text = self._helpers.shown(error) if isinstance(error, ImportError) else shown(error)
+        return place, mistake(error, self._modules.values()) or (f"{name}: {text}" if text else name)
 
-    def _line(self, error: BaseException) -> int:
-        found = 0
-        for frame, line in traceback.walk_tb(error.__traceback__):
-            if frame.f_code.co_filename == self._path:
-                found = line
-        return found
+    def _place(self, error: BaseException) -> Tuple[str, int]:
+        """Return file and line, in the script or a module beside it, where an exception was raised."""
+        frames = ((frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__))
+        return ([(self._path, 0)] + [place for place in frames if place[0] in self._helpers.files])[-1]
 
 
-def _copied(variables: Mapping[str, Any]) -> Dict[str, Any]:
+def _compiled(source: bytes, path: str) -> CodeType:
+    return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
+
+
+def _copied(*namespaces: Mapping[str, Any]) -> List[Dict[str, Any]]:
     memo: Dict[int, Any] = {}  # one for all: what is shared stays shared
-    return {name: _copy(value, memo) for name, value in variables.items() if name != "__builtins__"}
+    return [
+        {name: _copy(value, memo) for name, value in variables.items() if name not in _NOT_COPIED}
+        for variables in namespaces
+    ]
 
 
 def _copy(value: Any, memo: Dict[int, Any]) -> Any:

@@ -1,0 +1,198 @@
+"""A name that is nearly right is told at load, before the drone falls for it."""
+
+import pytest
+
+from drone_sim import parameters
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.simulation import Simulation
+
+PARAMETERS = parameters.load()
+
+
+@pytest.fixture(name="load")
+def _load(tmp_path):
+    """Give a function that loads a script and ends it; it returns what that raised, and the script's path."""
+
+    def load(ending, source):
+        path = tmp_path / f"script.{ending}"
+        path.write_text(source, encoding="utf-8")
+        try:
+            Simulation(PARAMETERS, script=str(path)).close()
+        except ScriptError as error:
+            return str(error), path
+        return "", path
+
+    return load
+
+
+def define(ending, name, body=""):
+    return f"def {name}():\n    {body or 'pass'}\n" if ending == "py" else f"function {name}()\n    {body}\nend\n"
+
+
+ENDINGS = pytest.mark.parametrize("ending", ["py", "lua"])
+
+
+@ENDINGS
+@pytest.mark.parametrize(
+    "name, meant",
+    [
+        ("sysCall_actuate", "sysCall_actuation"),
+        ("sysCall_Init", "sysCall_init"),
+        ("syscall_sensing", "sysCall_sensing"),
+        ("sysCall_actution", "sysCall_actuation"),
+        ("sysCallCleanup", "sysCall_cleanup"),
+        ("sysCal_init", "sysCall_init"),
+        ("sys_actuation", "sysCall_actuation"),
+        ("ysCall_init", "sysCall_init"),
+        ("SYSCALL_CLEANUP", "sysCall_cleanup"),
+        ("sysCall_begin", "sysCall_init"),
+    ],
+)
+def test_a_misspelt_phase_is_refused_with_its_line(load, ending, name, meant):
+    others = "".join(define(ending, one) for one in ("sysCall_init", "sysCall_cleanup") if one != meant)
+    said, path = load(ending, f"{others}\n{define(ending, name)}")
+    assert said == f"[load] {path}:{others.count(chr(10)) + 2}: {name} would never be called; near names are {meant}"
+
+
+@ENDINGS
+@pytest.mark.parametrize(
+    "name", ["sensing", "init", "set_actuation", "scale_actuation", "call_init", "system", "Sysiphus"]
+)
+def test_a_name_of_the_scripts_own_is_its_own(load, caplog, ending, name):
+    assert load(ending, define(ending, "sysCall_actuation") + define(ending, name))[0] == ""
+    assert not caplog.records
+
+
+@ENDINGS
+def test_what_coppeliasim_calls_and_nobody_here_is_said_once(load, caplog, ending):
+    said, path = load(ending, "".join(define(ending, f"sysCall_{name}") for name in ("init", "thread", "joint")))
+    assert said == ""
+    phases = "sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup are"
+    assert [record.getMessage() for record in caplog.records] == [
+        f"{path}: sysCall_{name} is not called here; {phases}" for name in ("joint", "thread")
+    ]
+
+
+@ENDINGS
+def test_an_old_version_beside_the_phase_is_left_alone_but_told(load, caplog, ending):
+    said, _ = load(ending, define(ending, "sysCall_actuation") + define(ending, "sysCall_actuation_old"))
+    assert said == ""
+    assert [record.getMessage().partition(": ")[2] for record in caplog.records] == [
+        "sysCall_actuation_old is not called; sysCall_actuation is"
+    ]
+
+
+@ENDINGS
+@pytest.mark.parametrize("name, more", [("", ""), ("actuation", "; actuation would have to be sysCall_actuation")])
+def test_a_script_without_phases_says_so(load, caplog, ending, name, more):
+    said, path = load(ending, define(ending, name) if name else "")
+    assert said == ""
+    (record,) = caplog.records
+    listed = "sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup"
+    assert record.getMessage() == f"{path}: has none of {listed}: nothing flies the drone{more}"
+
+
+@pytest.mark.parametrize("source", ["def sysCall_actuation():\n    yield", "async def sysCall_actuation():\n    pass"])
+def test_a_phase_that_python_would_not_run_is_refused(load, source):
+    said, path = load("py", source)
+    assert said == f"[load] {path}:1: sysCall_actuation would not run: it has a `yield` or is `async`"
+
+
+@pytest.mark.parametrize("word", ["actuaton", "init", "Sensing"])
+def test_a_misspelt_call_type_is_refused(load, word):
+    said, path = load("lua", f"-- sim_childscriptcall_nonsense\nif sim_call_type==sim_childscriptcall_{word} then\nend")
+    assert said.startswith(f"[load] {path}:2: there is no sim_childscriptcall_{word}; near names are childscriptcall_")
+
+
+# ---- parameters of the propellers
+
+SET = "sim.setScriptSimulationParameter({}, '{}', 5.0)"
+PROPELLER = "sim.getScriptHandle('Quadricopter_propeller_respondable1')"
+
+
+@ENDINGS
+@pytest.mark.parametrize("handle", [PROPELLER, "sim.handle_tree"])
+@pytest.mark.parametrize(
+    "name", ["particleVelocty", "particlevelocity", "particle_velocity", "ParticleVelocity", "particleSpeedVelocity"]
+)
+def test_a_misspelt_parameter_of_a_propeller_is_refused(load, ending, handle, name):
+    said, path = load(ending, define(ending, "sysCall_init", SET.format(handle, name)))
+    assert said.startswith(
+        f"[init] {path}:2: sim.setScriptSimulationParameter: a propeller has no script parameter '{name}'"
+    )
+    assert "near names are particleVelocity" in said
+
+
+@ENDINGS
+@pytest.mark.parametrize(
+    "handle, name, told",
+    [
+        (PROPELLER, "velocity", "nothing reads 'velocity' of a propeller; particleVelocity drives it"),
+        (
+            "sim.handle_self",
+            "particleVelocity",
+            "'particleVelocity' is a parameter of the propellers; in the script of Drone",
+        ),
+        ("sim.handle_self", "Kzreff", ""),
+        ("sim.handle_self", "mine", ""),
+        (PROPELLER, "particlesAreVisible", ""),
+        ("sim.handle_tree", "particlesAreVisible", ""),
+        (PROPELLER, "particleVelocity", ""),
+    ],
+)
+def test_any_other_parameter_is_the_scripts_own_and_told_once_if_a_propeller_gets_it(
+    load, caplog, ending, handle, name, told
+):
+    call = SET.format(handle, name)
+    source = define(ending, "sysCall_init", call) + define(ending, "sysCall_cleanup", call)
+    assert load(ending, source)[0] == ""
+    records = [record.getMessage() for record in caplog.records]
+    assert len(records) == bool(told)
+    assert not told or told in records[0]
+
+
+# ---- subscriptions
+
+
+@ENDINGS
+def test_a_callback_may_be_defined_later_in_the_file(load, ending):
+    subscribe = define(ending, "sysCall_init", "simROS.subscribe('/x', 'std_msgs/Int32', 'on_x')")
+    assert load(ending, subscribe + ("def on_x(m):\n    pass" if ending == "py" else "function on_x(m) end"))[0] == ""
+
+
+@ENDINGS
+def test_a_callback_that_is_not_there_is_told_after_init_with_near_names(load, ending):
+    subscribe = define(ending, "sysCall_init", "simROS.subscribe('/x', 'std_msgs/Int32', 'on_twst')")
+    said, path = load(ending, subscribe + define(ending, "on_twist"))
+    assert said == f"[on_twst] {path}: the script has no function 'on_twst' to call back; near names are on_twist"
+
+
+@ENDINGS
+def test_a_callback_that_is_subscribed_in_flight_is_checked_in_the_next_step(tmp_path, ending):
+    path = tmp_path / f"script.{ending}"
+    path.write_text(define(ending, "sysCall_sensing", "simROS.subscribe('/x', 'std_msgs/Int32', 'on_twst')"))
+    simulation = Simulation(PARAMETERS, script=str(path))
+    simulation.step()
+    with pytest.raises(ScriptError, match="no function 'on_twst'"):
+        simulation.step()
+    simulation.close()
+
+
+@ENDINGS
+@pytest.mark.parametrize(
+    "topic, kind, words",
+    [
+        (
+            "cmd_vel",
+            "geometry_msgs/Twst",
+            "messages on /drone/cmd_vel are of the type geometry_msgs/Twist, not 'geometry_msgs/Twst'",
+        ),
+        ("/drone/cmd_vel", "std_msgs/Float32", "messages on /drone/cmd_vel are of the type geometry_msgs/Twist"),
+        ("/x", "Twist", "'Twist' is no message type; one is, for example, geometry_msgs/Twist"),
+        ("/x", "geometry_msgs.msg.Twist", "is no message type"),
+    ],
+)
+def test_a_wrong_message_type_is_refused(load, ending, topic, kind, words):
+    source = define(ending, "on_x") + f"simROS.subscribe('{topic}', '{kind}', 'on_x')"
+    said, path = load(ending, source)
+    assert said.startswith(f"[load] {path}:{source.count(chr(10)) + 1}: simROS.subscribe: ") and words in said
