@@ -256,7 +256,8 @@ class _Built:
                 raise ParameterError("the scene as it begins: a position or a velocity is not finite")
             overlaps = world.overlaps()
             if overlaps > MAX_OVERLAPS:
-                raise ParameterError(f"scene/objects: {overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may")
+                said = f"{overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may"
+                raise ParameterError(f"scene/objects: {said}")
         except BaseException:
             world.close()
             raise

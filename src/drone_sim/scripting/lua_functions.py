@@ -10,7 +10,6 @@ local function load_module(name)
   if type(name) ~= 'string' then error("no module '" .. tostring(name) .. "'", 3) end
   local found, text, chunk_name = bridge.module(name)
   if not found then error(text, 3) end
-  check_memory()
   if byte(text) == 27 then error('precompiled code: ' .. chunk_name, 3) end
   local f, message = compile(text, '=' .. chunk_name)
   if not f then error(message, 0) end

@@ -19,12 +19,11 @@ local rawget, rawset, rawlen, setmetatable = rawget, rawset, rawlen, setmetatabl
 local unpack = table.unpack or unpack
 local concat, byte, sub, match = table.concat, string.byte, string.sub, string.match
 local load, loadstring, setfenv = load, loadstring, setfenv
-local collectgarbage, memory = collectgarbage, collectgarbage
 local getinfo, sethook = debug.getinfo, debug.sethook
 local getupvalue, setupvalue = debug.getupvalue, debug.setupvalue
 local getmeta, setmeta = debug.getmetatable, debug.setmetatable
 local create, resume, close = coroutine.create, coroutine.resume, coroutine.close
-local exceeded, log = bridge.exceeded, bridge.log
+local look, log = bridge.look, bridge.log
 local newer = _VERSION ~= 'Lua 5.1'
 debug = nil -- or lupa looks up its traceback in every call
 local sources = {[source] = sub(source, 2)} -- of the script and what it requires: '=name' -> 'name'
@@ -36,15 +35,10 @@ end
 
 ---- errors, and the limits of time and memory
 
--- In the simulation's own thread what takes long in C (comparing or joining strings of 100 MB, say) may take so only
--- a few times between two hooks; but the clock, for which Python is called, is looked at as seldom as in a thread.
-local direct = bridge.direct
-local INSTRUCTIONS = direct and 100 or 1000 -- between two hooks: 1000 are some 10 us
-local HOOKS = direct and 50 or 10 -- between two looks at the clock, while the memory is small
-local SMALL = 4 * 1024 -- KiB
-local hooks = 0
-local SOFT = bridge.memory / 1024 -- KiB that the script may use
-local TIME, MEMORY, MISSING = 1, 2, 3 -- why it was stopped, or not called
+-- In the simulation's own thread what takes long in C (comparing or joining strings of 100 MB, say) may take so only a
+-- few times between two looks at the clock and the memory; 1000 instructions are some 10 us.
+local INSTRUCTIONS = bridge.direct and 200 or 2000
+local MISSING = 3 -- beside the reasons for which `look` stops a script (lua_script.py)
 local running, stopped, stopped_at, stopped_in = false, false, 0, ''
 
 local function place_in_script()
@@ -62,20 +56,11 @@ local function stop(why)
   error('stopped', 0)
 end
 
-local function check_memory()
-  if memory('count') <= SOFT then return end
-  collectgarbage()
-  if memory('count') > SOFT then stop(MEMORY) end
-end
-
 local function hook()
   if not running then return end
   if stopped then error('stopped', 0) end
-  check_memory()
-  hooks = hooks + 1
-  if hooks < HOOKS and memory('count') < SMALL then return end
-  hooks = 0
-  if exceeded() then stop(TIME) end
+  local why = look()
+  if why > 0 then stop(why) end
 end
 sethook(hook, '', INSTRUCTIONS)
 
@@ -119,7 +104,6 @@ local function run(f, ...)
   running, stopped = true, false
   local ok, value = pcall(f, ...)
   running = false
-  if memory('count') > SOFT then pcall(check_memory) end
   if stopped then return phases(), stopped, stopped_at, stopped_in end
   if ok and value == nil then return phases() end
   if ok then return phases(), true, value end
@@ -138,7 +122,7 @@ end
 local function called_back(name, message)
   local f = callbacks[name]
   if f == nil then f = rawget(env, name) end
-  if type(f) ~= 'function' then return phases(), MISSING end
+  if type(f) ~= 'function' then return phases(), MISSING, 0 end
   return run(f, message)
 end
 
@@ -177,7 +161,6 @@ function env.print(...)
   local words = {}
   for i = 1, select('#', ...) do words[i] = tostring((select(i, ...))) end
   local line = sub(concat(words, '\t'), 1, bridge.longest_line)
-  check_memory()
   log(line)
 end
 
@@ -273,7 +256,7 @@ function string.rep(text, count, separator)
   if text == '' and (separator or '') == '' then return '' end -- which would be joined one by one
   return rep(text, count, separator)
 end
-if direct then -- see lua_source.py
+if bridge.direct then -- see lua_source.py
   for _, name in pairs{'find', 'match', 'gmatch', 'gfind', 'gsub'} do string[name] = nil end
   table.sort, table.move = nil, nil
   env.os.date, env.load, env.loadstring, env.collectgarbage, env.utf8, modules.utf8 = nil, nil, nil, nil, nil, nil

@@ -13,7 +13,7 @@ import importlib.util
 import logging
 import re
 import weakref
-from typing import Any, Callable, List, Mapping, Set, Tuple, Union
+from typing import Any, Callable, Dict, Mapping, Sequence, Set, Tuple, Union
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import phase_names, script_log
@@ -24,7 +24,7 @@ from drone_sim.scripting.lua_modules import LuaModules
 from drone_sim.scripting.lua_sandbox import PRELUDE
 from drone_sim.scripting.lua_source import LuaSource
 from drone_sim.scripting.lua_thread import MOST_LEFT, LeftBehind, LuaThread, SameThread, left_behind
-from drone_sim.scripting.lua_values import AS_STREAM, FAILED, Values
+from drone_sim.scripting.lua_values import AS_STREAM, FAILED, TOO_MUCH, Values
 from drone_sim.scripting.messages import Callback
 from drone_sim.scripting.time_limit import TimeLimit
 
@@ -41,8 +41,8 @@ _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
 _EVERY_STEP = ("actuation", "sensing")
 _TIME, _OVER_MEMORY, _MISSING = 1, 2, 3  # why Lua stopped a script, or called nothing (lua_sandbox.py)
-_AS_STREAM, _STOPPED = (AS_STREAM,), (FAILED, b"stopped")
-_TOO_MUCH = f"not enough memory: the script uses more than {_MEMORY // _MIB} MiB"
+_AS_STREAM, _TOO_MUCH, _STOPPED = (AS_STREAM,), (TOO_MUCH,), (FAILED, b"stopped")
+_ABOUT_MEMORY = f"not enough memory: the script uses more than {_MEMORY // _MIB} MiB"
 
 
 class LuaScript:
@@ -84,14 +84,13 @@ class LuaScript:
             unpack_returned_tuples=True,
             max_memory=_CAP,
         )
-        self._values = values = Values(runtime)
+        self._values = values = Values(runtime, _MEMORY)
         # What Lua holds of Python must not lead back to this object, or neither is ever freed.
         self._finalizer = weakref.finalize(self, _free, self._thread, values)
         bridge = {
             **values.bridge(),
-            "exceeded": _hook(self._thread, self._limit),
+            "look": _look(self._thread, self._limit, values),
             "log": _log(self._thread),
-            "memory": _MEMORY,
             "direct": isinstance(self._thread, SameThread),
             "longest_message": 4 * LONGEST_MESSAGE,
             "longest_line": 4 * script_log.LONGEST,
@@ -146,7 +145,8 @@ class LuaScript:
     def callback(self, callback: Callback, message: Any) -> None:
         """Call the script's function of that name with a message; raises ScriptError."""
         name = callback if isinstance(callback, str) else "callback"
-        self._run(name, self._call_back, callback.encode() if isinstance(callback, str) else callback, message, near=True)
+        called = callback.encode() if isinstance(callback, str) else callback
+        self._run(name, self._call_back, called, message, near=True)
 
     def _call_back(self, callback: Any, message: Any) -> Any:
         return self._called_back(callback, self._values.to_lua(message))
@@ -177,22 +177,23 @@ class LuaScript:
             raise self._error(phase, str(self._limit) if late else str(error) or type(error).__name__) from None
         finally:
             script_log.end_call()
-        if not isinstance(outcome, tuple):
-            self._phases = outcome
-            return None
-        self._phases, how, *rest = outcome
+            if not self._end and self._values.used() > _MEMORY and self._values.too_much():
+                self._end = _ABOUT_MEMORY  # entered once more, lupa itself might find no room
+        self._phases, how, *found = outcome if isinstance(outcome, tuple) else (outcome, True, None)
         if how is True:
-            return rest[0]
-        raise self._failure(phase, how, rest)
+            if not self._end:
+                return found[0]
+            how, found = _OVER_MEMORY, []
+        raise self._failure(phase, how, found)
 
-    def _failure(self, phase: str, how: Any, found: List[Any]) -> ScriptError:
-        """Return the error that Lua tells of: `found` holds a message, or line and file where the script was stopped."""
+    def _failure(self, phase: str, how: Any, found: Sequence[Any]) -> ScriptError:
+        """Return the error that Lua tells of: `found` holds a message, or line and file where it was stopped."""
         if how is False:
             return self._error_with_line(phase, found[0])
         if how == _TIME:
             return self._error(phase, str(self._limit), *found)
         if how == _OVER_MEMORY:
-            self._end = _TOO_MUCH
+            self._end = _ABOUT_MEMORY
             return self._error(phase, self._end, *found)
         return self._error(phase, no_function(phase, ()))
 
@@ -202,7 +203,7 @@ class LuaScript:
     def _error_with_line(self, phase: str, message: bytes) -> ScriptError:
         text = message.decode("utf-8", "replace")
         if text == "not enough memory":
-            return self._error(phase, _TOO_MUCH)
+            return self._error(phase, _ABOUT_MEMORY)
         path, line, text = self._helpers.placed(text)
         return ScriptError(phase, path, line, text + self._hint(text))
 
@@ -253,6 +254,8 @@ def _lua_function(name: str, function: Function, values: Values, thread: Door) -
     def call(how: int, *given: Any) -> Tuple[Any, ...]:
         if thread.closed:
             return _STOPPED
+        if values.used() > _MEMORY and values.too_much():  # or there may be no room for the answer
+            return _TOO_MUCH
         arguments: Any = given
         try:
             if how:
@@ -267,8 +270,15 @@ def _lua_function(name: str, function: Function, values: Values, thread: Door) -
     return call
 
 
-def _hook(thread: Door, limit: TimeLimit) -> Callable[[], bool]:
-    return lambda: thread.closed or limit.exceeded()
+def _look(thread: Door, limit: TimeLimit, values: Values) -> Callable[[], int]:
+    """Return what Lua's hook asks whether the script is to be stopped, and for what."""
+
+    def look() -> int:
+        if values.used() > _MEMORY and values.too_much():
+            return _OVER_MEMORY
+        return _TIME if thread.closed or limit.exceeded() else 0
+
+    return look
 
 
 def _log(thread: Door) -> Callable[[bytes], None]:

@@ -16,7 +16,7 @@ _ALL_NUMBERS = _NUMBERS.issuperset
 _LARGEST = 2**63  # whole numbers beyond are floats in Lua
 
 # How the values of an answer to Lua are read there (lua_crossing.py).
-FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM = range(5)
+FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM, TOO_MUCH = range(6)
 
 
 # What functions of the API return, most often, and the answer that it is.
@@ -39,14 +39,24 @@ _OPEN_LIST, _OPEN_FIELDS, _CLOSE = _Mark(), _Mark(), _Mark()
 class Values:
     """Converts for one Lua state. `close` lets go of it: Python cannot see a cycle that leads through Lua."""
 
-    def __init__(self, runtime: Any):
-        """Take lupa's runtime."""
+    def __init__(self, runtime: Any, memory: int):
+        """Take lupa's runtime, and how much memory (bytes) the script may use."""
         self._runtime = runtime
+        self._memory = memory
+        self.used: Callable[[], int] = runtime.get_memory_used  # Lua's own count leaves out 5.5's long strings
         self._stream: List[Any] = []
 
     def close(self) -> None:
         """Let go of the Lua state."""
         self._runtime = None
+        self.used = int
+
+    def too_much(self) -> bool:
+        """Tell whether the script uses more memory than it may, without what it does not need any more."""
+        if self.used() <= self._memory:
+            return False
+        self._runtime.gccollect()
+        return self.used() > self._memory
 
     def bridge(self) -> Dict[str, Any]:
         """Return what the Lua side needs for handing values over."""
