@@ -112,7 +112,9 @@ class LuaScript:
     def callback(self, callback: Callback, message: Any) -> None:
         """Call the script's function of that name with a message; raises ScriptError."""
         name = callback if isinstance(callback, str) else "callback"
-        self._run(name, self._call_back, callback.encode() if isinstance(callback, str) else callback, message, near=True)
+        self._run(
+            name, self._call_back, callback.encode() if isinstance(callback, str) else callback, message, near=True
+        )
 
     def _call_back(self, callback: Any, message: Any) -> Any:
         return self._called_back(callback, self._values.to_lua(message))
