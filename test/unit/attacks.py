@@ -1,0 +1,120 @@
+"""Flies scripts that attack the process, each in a process of its own: forked from one that has imported everything.
+
+Run as a program, it reads a request in each line of its input and answers with a line: of JSON, both.
+"""
+
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+SOURCE = Path(__file__).resolve().parents[2] / "src"
+HANGS = 100  # s, on a busy machine; most take less than one
+
+
+class Attacker:
+    """A process that flies scripts."""
+
+    def __init__(self):
+        self._process = subprocess.Popen(
+            [sys.executable, __file__],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={"PYTHONPATH": str(SOURCE), "PATH": "/usr/bin:/bin"},
+        )
+
+    def fly(self, path, limit, where="main"):
+        """Return what was said in the first flight and in the one after it, and how much was logged."""
+        print(json.dumps([str(path), limit, where]), file=self._process.stdin, flush=True)
+        status, text = json.loads(self._process.stdout.readline())
+        assert status == 0, f"the process ended with {status}"
+        return json.loads(text)
+
+    def close(self):
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def flight(path, limit):
+    """Fly a script for three steps with a command and a snapshot in each; return what was said."""
+    from drone_sim import parameters
+    from drone_sim.scripting.errors import ScriptError
+    from drone_sim.simulation import Simulation
+    from drone_sim.state import Twist
+
+    said = []
+    simulation = None
+    try:
+        simulation = Simulation(parameters.load({"script_time_limit": limit}), script=path)
+        simulation.drone.receive(Twist())
+        for _ in range(3):
+            simulation.step()
+            simulation.restore(simulation.snapshot())
+    except ScriptError as error:
+        said.append(str(error))
+    try:
+        if simulation is not None:
+            simulation.close()
+    except ScriptError as error:
+        said.append(str(error))
+    return said
+
+
+def _attack(path, limit, where, answer):
+    lines = []
+    handler = logging.Handler()
+    handler.emit = lambda record: lines.append(record.getMessage())
+    logging.getLogger("drone_sim.script").addHandler(handler)
+
+    def attack():
+        found = {"first": flight(path, limit)}
+        Path(path).write_text("", encoding="utf-8")
+        found.update(second=flight(path, 20), lines=len(lines), bytes=sum(map(len, lines)))
+        os.write(answer, json.dumps(found).encode())
+
+    if where == "main":
+        attack()
+    else:
+        thread = threading.Thread(target=attack)
+        thread.start()
+        thread.join()
+
+
+def _serve():
+    import drone_sim.scripting.lua_script
+    import drone_sim.simulation  # noqa: F401 -- imported for those who are forked
+
+    for line in sys.stdin:
+        read, write = os.pipe()
+        child = os.fork()
+        if not child:
+            os.dup2(os.open(os.devnull, os.O_RDWR), 0)
+            os.dup2(2, 1)
+            _attack(*json.loads(line), write)
+            sys.exit(0)
+        os.close(write)
+        status = _wait(child)
+        print(json.dumps([status, os.read(read, 60000).decode()]), flush=True)
+        os.close(read)
+
+
+def _wait(child):
+    end = time.monotonic() + HANGS
+    while time.monotonic() < end:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if ended:
+            return status
+        time.sleep(0.01)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return "a hang"
+
+
+if __name__ == "__main__":
+    _serve()

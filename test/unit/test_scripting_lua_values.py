@@ -1,0 +1,120 @@
+"""Values on their way between Lua and Python, in each form that they take."""
+
+import random
+
+import pytest
+
+from drone_sim import frames, parameters
+from drone_sim.scripting import lua_script
+from drone_sim.scripting.calls import Api
+from drone_sim.scripting.lua_script import LuaScript
+from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.simulation import Simulation
+
+PROLOGUE = {
+    "5.1": b"local _ = function() simGetSimulationTime() end ",
+    "newest": b"",
+    "in a thread": b"local _ = string.find ",
+}
+
+
+@pytest.fixture(name="call", params=PROLOGUE)
+def _call(request):
+    scripts = []
+
+    def call(arguments, give=lambda *values: None, then=""):
+        """Call test.f(arguments) in Lua; return what it was called with."""
+        given = []
+
+        def f(*values):
+            given.append(values)
+            return give(*values)
+
+        source = PROLOGUE[request.param] + f"local r = {{test.f({arguments})}} {then}".encode()
+        scripts.append(LuaScript("script.lua", source, {"test": Api("test", {"f": f}, {})}, TimeLimit(20)))
+        return given[0]
+
+    yield call
+    for script in scripts:
+        script.close()
+
+
+@pytest.mark.parametrize(
+    "arguments, expected",
+    [
+        ("", ()),
+        ("nil, nil", ()),
+        ("1, nil, true", (1, None, True)),
+        ("1.5, 'a', false", (1.5, "a", False)),
+        ("'\\255', nil", (b"\xff",)),
+        ("{1, 2.5}", ([1, 2.5],)),
+        ("1, {1, 2}", (1, [1, 2])),
+        ("1, {1, 2}, 3", (1, [1, 2], 3)),
+        ("{1, 2}, 'a', 3", ([1, 2], "a", 3)),
+        ("1, 2, {1, 2}", (1, 2, [1, 2])),
+        ("{1, 2}, {1, 2, 3}", ([1, 2], [1, 2, 3])),
+        ("1, {1, 2, 3}, {4, 5}", (1, [1, 2, 3], [4, 5])),
+        ("{1, 2, 3}, {1, 2, 3}, {4, 5}", ([1, 2, 3], [1, 2, 3], [4, 5])),
+        ("{1, 'a'}, {1, {2}, 3}", ([1, "a"], [1, [2], 3])),
+        ("1, {true}", (1, [True])),
+        ("{}, {a = {b = {1}}}", ([], {"a": {"b": [1]}})),
+        ("1, 2, 3, nil, 5", (1, 2, 3, None, 5)),
+        ("{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13}", (list(range(1, 14)),)),
+        ("('x'):rep(5000)", ("x" * 5000,)),
+    ],
+)
+def test_arguments(call, arguments, expected):
+    assert call(arguments) == expected
+
+
+@pytest.mark.parametrize("count", [199, 200, 201, 400, 100_000])
+def test_long_lists(call, count):
+    (values,) = call(
+        f"(function() local t = {{}} for i = 1, {count} do t[i] = i end return t end)()",
+        lambda values: values,
+        f"assert(#r[1] == {count} and r[1][{count}] == {count})",
+    )
+    assert values == list(range(1, count + 1))
+
+
+@pytest.mark.parametrize(
+    "result, check",
+    [
+        (None, "#r == 0"),
+        ((1, "a", None, True), "r[1] == 1 and r[2] == 'a' and r[4]"),
+        ([1.5, "x", [2]], "r[1][1] == 1.5 and r[1][2] == 'x' and r[1][3][1] == 2"),
+        ({"a": {"b": [1]}}, "r[1].a.b[1] == 1"),
+        (b"\xff\x00", "#r[1] == 2"),
+        (10**30, "r[1] == 1e30"),
+    ],
+)
+def test_results(call, result, check):
+    call("", lambda: result, f"assert({check})")
+
+
+@pytest.mark.parametrize("result, words", [({None: 1}, "cannot be a key"), ({float("nan"): 1}, "cannot be a key"),
+                                           (b"x" * 2**27, "too many"), ([0] * 2**21, "too many")])  # fmt: skip
+def test_what_lua_cannot_take_is_an_error(call, result, words):
+    with pytest.raises(lua_script.ScriptError, match=words):
+        call("", lambda: result)
+
+
+@pytest.mark.parametrize("prologue", PROLOGUE.values())
+def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue):
+    dice = random.Random(1)
+    m = [dice.uniform(-2, 2) for _ in range(12)]
+    v = [dice.uniform(-2, 2) for _ in range(3)]
+    lua = "{{{}}}".format
+    source = prologue.decode() + (
+        f"local m, v = {lua(', '.join(map(repr, m)))}, {lua(', '.join(map(repr, v)))}\n"
+        "sim.setScriptSimulationParameter(sim.handle_self, 'product', sim.multiplyVector(m, v))\n"
+        "sim.setScriptSimulationParameter(sim.handle_self, 'inverse', sim.getMatrixInverse(m))\n"
+        "assert(not pcall(sim.multiplyVector, m, {1, 2, 0/0}) and not pcall(sim.getMatrixInverse, {}))\n"
+        "assert(sim.multiplyVector({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, {1, 2, 3})[3] == 3)"
+    )
+    path = tmp_path / "script.lua"
+    path.write_text(source, encoding="utf-8")
+    simulation = Simulation(parameters.load(), script=str(path))
+    found = simulation.drone.script_parameters["Drone"]
+    assert found["product"] == list(frames.transform(m, v)) and found["inverse"] == list(frames.invert(m))
+    simulation.close()

@@ -1,0 +1,143 @@
+"""A snapshot is whole: messages that wait, topics, drawings and a script's variables belong to it."""
+
+import struct
+
+import pytest
+
+from drone_sim import parameters
+from drone_sim.scripting.drawings import Drawings
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.messages import MessageBus
+from drone_sim.simulation import Simulation
+from drone_sim.state import Twist, Vector3
+
+LUA = """
+local count, point = 0, setmetatable({}, {__index = {step = 1}})
+function sysCall_init()
+    said = simROS.advertise('said', 'x/Y')
+    heard = simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'on_twist', 8)
+    path = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 100)
+end
+function on_twist(m)
+    count = count + getmetatable(point).__index.step
+    simROS.publish(said, {count = count, x = m.linear.x})
+    if m.linear.x == 3 then
+        simROS.shutdownSubscriber(heard)
+        simROS.shutdownPublisher(said)
+        said = simROS.advertise('other', 'x/Y')
+        getmetatable(point).__index.step = 5
+        sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 100)
+    end
+    sim.addDrawingObjectItem(path, {count, 0, 0})
+    sim.setObjectPosition(sim.getObject('/target'), {count, 0, 1})
+end
+"""
+
+
+def flight(simulation, steps=4):
+    path = []
+    for _ in range(steps):
+        simulation.step()
+        path.append(struct.pack("3d", *simulation.drone.state.position))
+    drawn = {handle: list(one.items) for handle, one in simulation.drone.drawings.objects.items()}
+    return path, list(simulation.drone.bus.published), drawn
+
+
+def test_commands_on_their_way_are_delivered_again(tmp_path):
+    path = tmp_path / "script.lua"
+    path.write_text(LUA, encoding="utf-8")
+    simulation = Simulation(parameters.load(), script=str(path), drawings=Drawings())
+    flights = []
+    for x in (1, 2):
+        simulation.drone.receive(Twist(Vector3(x)))
+        simulation.step()
+    simulation.drone.receive(Twist(Vector3(3)))
+    snapshot = simulation.snapshot()
+    for _ in range(3):
+        simulation.drone.bus.published.clear()
+        flights.append(flight(simulation))
+        simulation.restore(snapshot)
+    assert flights[0] == flights[1] == flights[2]
+    assert [one.message for one in flights[0][1]] == [{"count": 3, "x": 3}]
+    assert flights[0][2] == {1: [(1, 0, 0), (2, 0, 0), (3, 0, 0)], 2: []}
+    simulation.close()
+
+
+@pytest.mark.parametrize("script", ["", "target"])
+def test_flights_go_on_to_the_bit(script):
+    simulation = Simulation(parameters.load(), script=script, drawings=Drawings())
+    simulation.step()
+    simulation.drone.receive(Twist(Vector3(1, 0.5, 0.2), Vector3(0, 0, 0.3)))
+    snapshot = simulation.snapshot()
+    first = flight(simulation, 50)
+    simulation.drone.receive(Twist(Vector3(-1)))
+    simulation.restore(snapshot)
+    assert flight(simulation, 50) == first
+    simulation.close()
+
+
+class Counted:
+    """A backend that says what is subscribed and advertised at the moment."""
+
+    def __init__(self):
+        self.topics = set()
+
+    def subscribe(self, topic, kind, take):
+        self.topics.add(topic)
+        return lambda: self.topics.discard(topic)
+
+    def advertise(self, topic, kind, queue, latch):
+        self.topics.add(topic)
+        return Counted.Sender(self, topic)
+
+    class Sender:
+        def __init__(self, backend, topic):
+            self._backend, self._topic = backend, topic
+
+        def publish(self, message):
+            assert self._topic in self._backend.topics
+
+        def shutdown(self):
+            self._backend.topics.discard(self._topic)
+
+
+def test_topics_come_back_under_their_handles():
+    bus = MessageBus("drone")
+    bus.backend = Counted()
+    heard, said = bus.subscribe("/in", "T", "f", 4), bus.advertise("/out", "T")
+    bus.post("/in", {"data": [1]})
+    recall = bus.remember()
+    bus.shutdownSubscriber(heard)
+    bus.shutdownPublisher(said)
+    assert (bus.subscribe("/more", "T", "g"), bus.advertise("/else", "T")) == (3, 4)
+    for _ in range(2):
+        recall()
+        assert bus.backend.topics == {"/in", "/out"}
+        bus.publish(said, {})
+        found = []
+        bus.deliver(lambda callback, message, found=found: found.append((callback, message["data"].pop())))
+        assert found == [("f", 1)], "what a callback does to a message, it does to its own"
+    assert bus.advertise("/new", "T") == 3
+
+
+def test_a_stopped_script_has_no_snapshots(tmp_path):
+    path = tmp_path / "script.lua"
+    path.write_text("function sysCall_sensing() string.find(('x'):rep(1e5), '.-.-.-.-.-y') end", encoding="utf-8")
+    simulation = Simulation(parameters.load({"script_time_limit": 0.2}), script=str(path))
+    snapshot = simulation.snapshot()
+    for attempt in (simulation.step, simulation.step, simulation.snapshot, lambda: simulation.restore(snapshot)):
+        with pytest.raises(ScriptError, match="stopped after"):
+            attempt()
+    simulation.close()
+
+
+def test_the_time_between_calls_is_not_the_scripts(tmp_path):
+    """A script without phases, and a snapshot after a pause, have no old deadline over them."""
+    path = tmp_path / "script.lua"
+    path.write_text("x = {} for i = 1, 20000 do x[i] = {i} end", encoding="utf-8")
+    simulation = Simulation(parameters.load({"script_time_limit": 5}), script=str(path))
+    simulation.drone.script._limit._deadline = 0.0  # as after a long pause
+    for _ in range(5):
+        simulation.step()
+    simulation.restore(simulation.snapshot())
+    simulation.close()
