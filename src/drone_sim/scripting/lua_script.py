@@ -289,7 +289,7 @@ def _log(thread: Door) -> Callable[[bytes], None]:
     return log
 
 
-def _reader(thread: LuaThread, modules: LuaModules) -> Callable[[bytes], Tuple[bool, bytes, bytes]]:
+def _reader(thread: Door, modules: LuaModules) -> Callable[[bytes], Tuple[bool, bytes, bytes]]:
     return lambda name: (False, b"stopped", b"") if thread.closed else modules.read(name)
 
 
