@@ -16,3 +16,8 @@ def _shared_renderer():
 def _renderer(shared_renderer):
     shared_renderer.set_visuals(())
     return shared_renderer
+
+
+def pytest_make_parametrize_id(val):
+    """Name a long value by its length: pytest would make it a part of the test's name, over and over."""
+    return f"{len(val)} long" if isinstance(val, (str, bytes)) and len(val) > 200 else None
