@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 from typing import (
     Any,
     Dict,
@@ -26,6 +27,7 @@ from drone_sim.resources import shown
 from drone_sim.yaml_files import Lines
 
 MOST = 8  # problems that are told
+LONG = 900  # characters after which no other is
 
 
 class Problem(NamedTuple):
@@ -54,8 +56,10 @@ def told(placed: Sequence[Tuple[Optional[int], str]], file: str = "") -> str:
     inside = sorted(((line, text) for line, text in placed if line is not None), key=lambda one: one[0])
     words = [f"line {line}: {text}" for line, text in inside]
     words += [text for line, text in placed if line is None]
-    more = f"; and {len(words) - MOST} more" if len(words) > MOST else ""
-    return (f"{file}: " if file else "") + "; ".join(words[:MOST]) + more
+    lengths = itertools.accumulate(map(len, words), initial=0)  # of all that comes before
+    first = [word for word, before in zip(words, lengths) if before < LONG][:MOST]
+    more = f"; and {len(words) - len(first)} more" if len(first) < len(words) else ""
+    return (f"{file}: " if file else "") + "; ".join(first) + more
 
 
 def line_of(lines: Lines, problem: Problem) -> Optional[int]:

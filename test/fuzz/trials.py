@@ -26,7 +26,7 @@ from drone_sim.state import Twist, Vector3
 from drone_sim.urdf import UrdfError
 
 REFUSALS = (ParameterError, ScriptError, UrdfError, TimelineError, checks.Refused)
-LONGEST = 600  # characters of a refusal, without the folder that the case lies in
+LONGEST = 1200  # characters of a refusal, without the folder that the case lies in
 _SCRIPT_LIMIT = 0.2  # s
 _SMALL = {"width": 32, "height": 24}  # px: what a picture shows does not matter here
 

@@ -40,9 +40,9 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"a\nb": 1}, "parameter 'a\\nb': unknown key"),
         ({"control": {"Kzref": 1e300}}, "control/Kzref = 1e+300: input should be less than or equal to 10000"),
         ({"real_time_factor": 1e-9}, "real_time_factor = 1e-09: must be 0, or from 0.001 to 1000"),
-        ({"gui": 1}, "gui = 1: input should be a valid boolean"),
+        ({"gui": 1}, "gui = 1: must be true or false"),
         ({"samples": False}, "samples = False"),
-        ({"drone": {"position": [1, 2]}}, "drone/position/2"),
+        ({"drone": {"position": [1, 2]}}, "drone/position = [1, 2]: must be 3 numbers"),
         ({"drone": {"position": [1, 2, 3, 4]}}, "drone/position = [1, 2, 3, 4]"),
         ({"drone": {"name": "a" * 100}}, "string should have at most 64 characters"),
         ({"drone": {"urdf": "x" * 300}}, "no such file"),
@@ -52,7 +52,7 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"cameras": {"front": {"width": 640.5}}}, "cameras/front/width = 640.5: input should be a valid integer"),
         ({"cameras": {"front": {"topic": "odom"}}}, "'odom': its image would be odom, which is the drone's own"),
         ({"cameras": {"front": {"topic": "markers/update"}}}, "markers/update, which is the drone's own"),
-        ({"cameras": {"front": {"topic": "a//b"}}}, "should match pattern"),
+        ({"cameras": {"front": {"topic": "a//b"}}}, "must be like rear/image"),
         ({"cameras": {"track": {"topic": "camera_info"}}}, "which is the camera_info of cameras/front"),
         ({"cameras": {"track": {"topic": "front/compressed"}}}, "which is the compressed of cameras/front"),
         ({"cameras": {"track": {"topic": "track"}}}, "'track': its camera_info would be camera_info, which is the"),
@@ -71,7 +71,7 @@ def test_a_mistake_gets_one_line(overrides, message):
     with pytest.raises(parameters.ParameterError) as refused:
         parameters.load(overrides)
     assert message in str(refused.value)
-    assert "\n" not in str(refused.value) and len(str(refused.value)) < 700
+    assert "\n" not in str(refused.value) and len(str(refused.value)) < 1200
 
 
 def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
@@ -170,9 +170,9 @@ def test_a_config_file_lies_between_the_defaults_and_what_is_given(tmp_path):
 @pytest.mark.parametrize(
     "text, words",
     [
-        ("gravity: 1:30", "config.yaml: parameter gravity = '1:30'"),
+        ("gravity: 1:30", "config.yaml: line 1: parameter gravity = '1:30'"),
         ("gravity: 1\ngravity: 2", "config.yaml: key 'gravity' comes twice (line 2, column 1)"),
-        ("gravty: 1", "config.yaml: parameter gravty: unknown key; known are gravity"),
+        ("gravty: 1", "config.yaml: line 1: parameter gravty: unknown key; known are gravity"),
         ("config: other.yaml", "config.yaml: a config file names no other `config`"),
         ("- 1", "config.yaml: must hold `key: value` lines"),
     ],

@@ -35,7 +35,10 @@ IN_LUA = [
     # loops in C: the thread is left behind
     ("string.find(('x'):rep(250000), '.-.-.-.-.-y')", STOPPED),
     ("function sysCall_sensing() string.find(('x'):rep(250000), '.-.-.-.-.-y') end", STOPPED),
-    ("simROS.subscribe('cmd_vel', 'T', function() string.find(('x'):rep(250000), '.-.-.-.-.-y') end)", STOPPED),
+    (
+        "simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', function() string.find(('x'):rep(2e5), '.-.-.-.-.-y') end)",
+        STOPPED,
+    ),
     ("table.move({}, 1, 2^53, 2, {})", ""),
     ("table.insert(setmetatable({}, {__len = function() return 2^52 end}), 1, 1)", ""),
     ("string.find(('a'):rep(2e7), ('a'):rep(1e7) .. 'b', 1, true)", ""),
@@ -80,7 +83,10 @@ IN_LUA = [
     # values
     ("local t = {} t[1] = t sim.setScriptSimulationParameter(sim.handle_self, 'x', t)", "nested too deeply"),
     ("local t = {} t.x = t sim.setScriptSimulationParameter(sim.handle_self, 'x', t)", "nested too deeply"),
-    ("local t = {} for _ = 1, 1e5 do t = {t} end simROS.publish(simROS.advertise('x', 'T'), t)", "nested too deeply"),
+    (
+        "local t = {} for _ = 1, 1e5 do t = {t} end simROS.publish(simROS.advertise('x', 'std_msgs/String'), t)",
+        "nested too deeply",
+    ),
     ("sim.setScriptSimulationParameter(sim.handle_self, 'x', {[{}] = 1})", "a table cannot be a key"),
     ("local t = {} for _ = 1, 15 do t = {t, t, t, t, t, t, t, t, t, t} end sim.getObject(t)", ""),
     ("local t = {} for i = 1, 53 do t[2^i] = 1 end sim.getObject(t)", ""),
@@ -90,8 +96,8 @@ IN_LUA = [
     ("sim.setFloatSignal(('x'):rep(1000), 1)", "at most 200 characters"),
     ("sim.setInt32Signal('x', 1e300)", "a whole number within +-2147483647"),
     ("for i = 1, 1e5 do sim.setScriptSimulationParameter(0, 'x' .. i, 1) end", "at most 1000 parameters"),
-    ("for i = 1, 1e5 do simROS.subscribe('x', 'T', 'f') end", "at most 200 subscriptions and publishers"),
-    ("for i = 1, 1e5 do simROS.advertise('x', 'T') end", "at most 200 subscriptions and publishers"),
+    ("for i = 1, 1e5 do simROS.subscribe('x', 'std_msgs/String', 'f') end", "at most 200 subscriptions and publishers"),
+    ("for i = 1, 1e5 do simROS.advertise('x', 'std_msgs/String') end", "at most 200 subscriptions and publishers"),
     ("sim.setObjectPosition(0, {1, 2, coroutine.create(print)})", "a thread cannot be handed over"),
     # log and errors
     ("while true do print(('x'):rep(1e5)) end", STOPPED),
@@ -148,8 +154,11 @@ IN_PYTHON = [
     ("import sys\nsys.stdout = sys.stderr = None\nprint(1)", ""),
     ("import threading\nthreading.Thread(target=lambda: [0 for _ in iter(int, 1)], daemon=True).start()", ""),
     ("while True: print('x' * 10 ** 4)", STOPPED),
-    ("x = []\nx.append(x)\nsimROS.publish(simROS.advertise('a', 'T'), {'a': x})", "nested too deeply"),
-    ("x = []\nfor _ in range(15): x = [x] * 10\nsimROS.publish(simROS.advertise('a', 'T'), {'a': x})", "too"),
+    ("x = []\nx.append(x)\nsimROS.publish(simROS.advertise('a', 'std_msgs/String'), {'a': x})", "nested too deeply"),
+    (
+        "x = []\nfor _ in range(15): x = [x] * 10\nsimROS.publish(simROS.advertise('a', 'std_msgs/String'), {'a': x})",
+        "too",
+    ),
     ("x = []\nfor _ in range(15): x = [x] * 10\nsim.getObjectPosition(x)", "wrong kind of value: got ([[[...]"),
     ("x = []\nx.append(x)\nsim.setScriptSimulationParameter(0, 'x', x)", "nested too deeply"),
     ("class E:\n    def __repr__(self): raise ValueError\nsim.getObjectPosition(E())", "got (a E, -1)"),

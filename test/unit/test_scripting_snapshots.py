@@ -104,12 +104,12 @@ class Counted:
 def test_topics_come_back_under_their_handles():
     bus = MessageBus("drone")
     bus.backend = Counted()
-    heard, said = bus.subscribe("/in", "T", "f", 4), bus.advertise("/out", "T")
+    heard, said = bus.subscribe("/in", "std_msgs/String", "f", 4), bus.advertise("/out", "std_msgs/String")
     bus.post("/in", {"data": [1]})
     recall = bus.remember()
     bus.shutdownSubscriber(heard)
     bus.shutdownPublisher(said)
-    assert (bus.subscribe("/more", "T", "g"), bus.advertise("/else", "T")) == (3, 4)
+    assert (bus.subscribe("/more", "std_msgs/String", "g"), bus.advertise("/else", "std_msgs/String")) == (3, 4)
     for _ in range(2):
         recall()
         assert bus.backend.topics == {"/in", "/out"}
@@ -117,7 +117,7 @@ def test_topics_come_back_under_their_handles():
         found = []
         bus.deliver(lambda callback, message, found=found: found.append((callback, message["data"].pop())))
         assert found == [("f", 1)], "what a callback does to a message, it does to its own"
-    assert bus.advertise("/new", "T") == 3
+    assert bus.advertise("/new", "std_msgs/String") == 3
 
 
 def test_a_stopped_script_has_no_snapshots(tmp_path):

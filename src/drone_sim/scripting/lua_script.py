@@ -173,8 +173,10 @@ class LuaScript:
             self._end = str(self._limit)
             raise self._error(phase, self._end) from None
         except Exception as error:  # lupa's own, or a message that cannot be handed over
-            late = str(error) == "stopped"  # by a hook just behind the script's end
-            raise self._error(phase, str(self._limit) if late else str(error) or type(error).__name__) from None
+            said = str(error) or type(error).__name__
+            if said == "stopped":  # by a hook just before the script's beginning, or behind its end
+                said = _ABOUT_MEMORY if self._values.used() > _MEMORY else str(self._limit)
+            raise self._error(phase, said) from None
         finally:
             script_log.end_call()
             if not self._end and self._values.used() > _MEMORY and self._values.too_much():
