@@ -153,12 +153,25 @@ open(path, "w").write("\\n".join(map(repr, delays)))
 """
 
 
+# What one keeps of a flight: its camera, and all that is small.
+RECORDED = (
+    "/drone/front",
+    "/drone/camera_info",
+    "/drone/odom",
+    "/drone/propellers",
+    "/drone/command",
+    "/tf",
+    "/tf_static",
+)
+
+
 def latencies(seconds: float = 20.0) -> List[Row]:
     """At real time with the camera on: command to the loop's inbox, stamp of an image to its subscriber, jitter."""
     import rospy
     from geometry_msgs.msg import Twist
     from sensor_msgs.msg import Image
 
+    rospy.set_param("/use_sim_time", False)  # which a launch file before may have left
     came: List[float] = []
     ages: List[float] = []
 
@@ -211,7 +224,7 @@ def _recorded(argument: str, folder: str, seconds: float) -> "re.Match[str]":
 
     with launched(argument) as lines:
         recorder = subprocess.Popen(
-            ["rosbag", "record", "-a", "-q", "-O", f"{folder}/all.bag"], stdout=subprocess.DEVNULL
+            ["rosbag", "record", "-q", "-O", f"{folder}/flight.bag", *RECORDED], stdout=subprocess.DEVNULL
         )
         subscriber = _listen("/drone/front", Image)
         time.sleep(seconds)
