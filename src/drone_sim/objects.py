@@ -62,38 +62,36 @@ class SceneObject:
         """Tell whether that is its alias or one of its names."""
         return name == self.alias or name in self.names
 
-    @property
     def matrix(self) -> Matrix:
-        """World from this frame."""
+        """Return the transform world from this frame."""
         if self.body is not None:
             return self.body.matrix
         if self.parent is None:
             return self.local
         # Scripts ask for the same few frames several times a step: the same two tuples, the same product.
-        above, local = self.parent.matrix, self.local
+        above, local = self.parent.matrix(), self.local
         if above is not self._above or local is not self._below:
             self._above, self._below, self._product = above, local, frames.multiply(above, local)
         return self._product
 
-    @matrix.setter
-    def matrix(self, matrix: Matrix) -> None:
+    def put(self, matrix: Matrix) -> None:
+        """Put it at a transform in the world; what carries it goes there, at rest."""
         if self.body is not None:
             self.body.move(Pose(frames.position(matrix), frames.to_quaternion(matrix)))
         elif self.parent is None:
             self.local = matrix
         else:
-            self.local = frames.multiply(frames.invert(self.parent.matrix), matrix)
+            self.local = frames.multiply(frames.invert(self.parent.matrix()), matrix)
 
-    @property
     def velocity(self) -> tuple[Vector, Vector]:
-        """Linear (m/s) and angular (rad/s) velocity in the world; zero where no body carries it."""
+        """Return linear (m/s) and angular (rad/s) velocity in the world; zero where no body carries it."""
         carrier = self
         while carrier.body is None:
             if carrier.parent is None:
                 return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
             carrier = carrier.parent
         (x, y, z), _, linear, angular = carrier.body.state
-        m, (wx, wy, wz) = self.matrix, angular
+        m, (wx, wy, wz) = self.matrix(), angular
         x, y, z = m[3] - x, m[7] - y, m[11] - z  # from the body's frame to this one
         return (linear[0] + wy * z - wz * y, linear[1] + wz * x - wx * z, linear[2] + wx * y - wy * x), angular
 
@@ -186,17 +184,17 @@ class ObjectTree:
         """Return the transform of an object relative to another, to its PARENT, or to the WORLD."""
         moved = self[handle]
         if relative_to == WORLD:
-            return moved.matrix
+            return moved.matrix()
         reference = moved.parent if relative_to == PARENT else self[relative_to]
-        return moved.matrix if reference is None else frames.relative(reference.matrix, moved.matrix)
+        return moved.matrix() if reference is None else frames.relative(reference.matrix(), moved.matrix())
 
     def set_matrix(self, handle: int, relative_to: int, matrix: Matrix) -> None:
         """Put an object at a transform relative to another, to its PARENT, or to the WORLD."""
         moved = self[handle]
         if relative_to != WORLD:
             reference = moved.parent if relative_to == PARENT else self[relative_to]
-            matrix = matrix if reference is None else frames.multiply(reference.matrix, matrix)
-        moved.matrix = matrix
+            matrix = matrix if reference is None else frames.multiply(reference.matrix(), matrix)
+        moved.put(matrix)
 
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Hang an object on another (WORLD for none): it stays where it is, or keeps its local transform.
@@ -210,10 +208,10 @@ class ObjectTree:
             if ancestor is moved:
                 raise ValueError(f"'{moved.name}' cannot be its own ancestor")
             ancestor = ancestor.parent
-        matrix = moved.matrix
+        matrix = moved.matrix()
         moved.parent = new
         if keep_in_place and moved.body is None:
-            moved.matrix = matrix
+            moved.put(matrix)
 
 
 def near_names(name: str, known: Iterable[str]) -> str:

@@ -52,7 +52,7 @@ class Wrench:
         """Start with no force at all."""
         self.force: Vector = (0.0, 0.0, 0.0)
         self._torque: Vector = (0.0, 0.0, 0.0)  # what does not depend on R: the torques, and every l x a
-        self._levers: List[Tuple[Vector, Vector]] = []  # (2 l, a)
+        self._levers: List[Tuple[float, ...]] = []  # 2 l and a, in one
 
     def add(self, force: Vector, torque: Vector, point: Vector) -> None:
         """Add a force (N, world) at a point (m, inertial frame of the body), and a torque (N m, world)."""
@@ -70,14 +70,14 @@ class Wrench:
             ty + torque[1] + lz * ax - lx * az,
             tz + torque[2] + lx * ay - ly * ax,
         )
-        self._levers.append(((2.0 * lx, 2.0 * ly, 2.0 * lz), axis))
+        self._levers.append((2.0 * lx, 2.0 * ly, 2.0 * lz, ax, ay, az))
 
     def torque_under(self, orientation: Quaternion) -> Vector:
         """Return the torque about the centre of mass (N m, world) while the body has this orientation."""
         # Written out, without a loop but the one over directions: this runs in every sub-step.
         x, y, z, w = orientation
         sum_x, sum_y, sum_z = self._torque
-        for (lx, ly, lz), (ax, ay, az) in self._levers:
+        for lx, ly, lz, ax, ay, az in self._levers:
             tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
             ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
             sum_x += uy * az - uz * ay
@@ -102,18 +102,19 @@ class Propellers:
         self._law = ParticleLaw(parameters, time_step)
         self._time_step = time_step
         self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
-        self._by_axis: Dict[Vector, List[Tuple[int, Vector, float]]] = {}
+        by_axis: Dict[Vector, List[Tuple[int, float, float, float, float]]] = {}
         for number, (axis, point, rotation) in enumerate(zip(axes, points, rotations)):
-            self._by_axis.setdefault(axis, []).append((number, point, rotation * parameters.torque_per_velocity))
+            by_axis.setdefault(axis, []).append((number, *point, rotation * parameters.torque_per_velocity))
+        self._by_axis = list(by_axis.items())
 
     def blow(self, velocities: Sequence[float], body: Matrix, wrench: Wrench) -> None:
         """Emit a step's particles at these velocities (m/s), within limits, from a body there; add to its wrench."""
         if min(velocities) < self._slowest or max(velocities) > self._fastest:
             velocities = [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
         newtons, air, time_step = self._law.emit(), self.air, self._time_step
-        for axis, members in self._by_axis.items():
+        for axis, members in self._by_axis:
             force = torque = x = y = z = 0.0
-            for number, (px, py, pz), newton_metres in members:
+            for number, px, py, pz, newton_metres in members:
                 velocity = velocities[number]
                 thrust = newtons * velocity
                 force += thrust

@@ -52,9 +52,7 @@ class Scene:
         scene_files.check(parameters.scene)
         self._world = world
         floor = parameters.scene.floor
-        world.add_floor(floor.size, floor.texture)
-        if not floor.edge:
-            world.add_ground(floor.size)
+        world.add_floor(floor.size, floor.texture, ground=not floor.edge)
         try:
             self._numbers = [world.add_shape(_shape(one)) for one in parameters.scene.objects]
         except ValueError as error:

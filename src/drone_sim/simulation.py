@@ -115,7 +115,7 @@ class Simulation:
     def _begin(self) -> None:
         """Be at time 0 of a new run, in the initial scene."""
         floor = self.parameters.scene.floor
-        self._edge = floor.size / 2 if floor.edge else math.inf  # m, of what the drone can stand on
+        self._edge = floor.size / 2 if floor.edge else None  # m, of what the drone can stand on
         self.steps = 0
         self._runs += 1
         if self._drawings is not None:
@@ -205,9 +205,9 @@ class Simulation:
         if not -_NOWHERE < x + y + z + vx + vy + vz + wx + wy + wz < _NOWHERE:
             where = f"position {x:g} {y:g} {z:g} m, velocity {vx:g} {vy:g} {vz:g} m/s"
             raise Diverged(f"the simulation has diverged at t = {self.time:.2f} s: {where}; `start` begins anew")
-        if max(abs(x), abs(y)) > self._edge:
+        if self._edge is not None and max(abs(x), abs(y)) > self._edge:
             LOG.warning("the drone is past the edge of the floor, at %.2f %.2f m: nothing carries it there", x, y)
-            self._edge = math.inf  # said once
+            self._edge = None  # said once
 
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the script's variables included, until the next start or stop."""

@@ -86,7 +86,7 @@ def test_a_carried_object_moves_with_its_body(position, velocity, rate, arm):
     objects.add("body", body=Turning(position, velocity, rate))
     objects.add("frame", "body", frames.from_euler(arm, (0.1, 0.2, 0.3)))
     objects.add("tip", "frame")
-    linear, angular = objects[objects.handle("tip")].velocity
+    linear, angular = objects[objects.handle("tip")].velocity()
     x, y, _ = arm
     assert angular == (0, 0, rate)
     expected = (velocity[0] - rate * y, velocity[1] + rate * x, velocity[2])

@@ -170,5 +170,6 @@ def test_what_has_not_changed_is_not_drawn_again(simulation):
     assert front.look() is again
     objects = simulation.drone.objects
     camera = objects[objects.handle("FrontVision")]
-    camera.matrix = (*camera.matrix[:3], camera.matrix[3] + 0.5, *camera.matrix[4:])  # a script moves the camera
+    here = camera.matrix()
+    camera.put((*here[:3], here[3] + 0.5, *here[4:]))  # a script moves the camera
     assert not np.array_equal(front.look(), again)

@@ -95,7 +95,7 @@ class DroneInput:
 def move_target(simulation: Simulation, pose: Pose) -> None:
     """Put the green sphere, DronePosition, there."""
     objects = simulation.drone.objects
-    objects[objects.handle(TARGET)].matrix = pose.matrix
+    objects[objects.handle(TARGET)].put(pose.matrix)
 
 
 def _check_frame(frame: str) -> None:

@@ -126,7 +126,7 @@ class Objects:
 
     def getObjectVelocity(self, handle: Handle) -> Tuple[List[float], List[float]]:
         """Return the linear and the angular velocity of an object, in the world frame."""
-        linear, angular = self._objects[handle].velocity
+        linear, angular = self._objects[handle].velocity()
         return list(linear), list(angular)
 
     def getVelocity(self, handle: Handle) -> Tuple[List[float], List[float]]:
@@ -146,7 +146,7 @@ class Objects:
     def addForce(self, handle: Handle, position: ThreeNumbers, force: ThreeNumbers) -> None:
         """Let a force (N) act in the next step at a position (m); both in the frame of the body."""
         shape = self._objects[handle]
-        x, y, z = frames.rotate(shape.matrix, _vector(force))
+        x, y, z = frames.rotate(shape.matrix(), _vector(force))
         self._host.add_force(shape.name, (x, y, z), (0.0, 0.0, 0.0), _vector(position))
 
     def setJointPosition(self, handle: Handle, position: Number) -> None:

@@ -17,6 +17,8 @@ import sys
 import threading
 import time
 import weakref
+from threading import get_ident
+from time import monotonic
 from types import FrameType
 from typing import Any, Callable, Iterator, Optional
 
@@ -59,30 +61,30 @@ class TimeLimit:
     def start(self) -> None:
         """Begin to count."""
         self._expired = False
-        self._deadline = time.monotonic() + self.seconds
+        self._deadline = monotonic() + self.seconds
 
     def exceeded(self) -> bool:
         """Tell whether the time since `start` is used up."""
-        return self._expired or (self.seconds > 0 and time.monotonic() > self._deadline)
+        return self._expired or (self.seconds > 0 and monotonic() > self._deadline)
 
     def left(self) -> float:
         """Return how many seconds are left, negative where none are; infinite without a limit."""
-        return self._deadline - time.monotonic() if self.seconds > 0 or self._expired else math.inf
+        return self._deadline - monotonic() if self.seconds > 0 or self._expired else math.inf
 
     def expire(self) -> None:
         """Let the time be used up now."""
         self._expired = True
-        self._deadline = time.monotonic()
+        self._deadline = monotonic()
 
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
         """Do not count what happens inside: it is the simulator's time, not the script's."""
-        began, armed = time.monotonic(), self._armed
+        began, armed = monotonic(), self._armed
         self._armed = False
         try:
             yield
         finally:
-            self._deadline += time.monotonic() - began
+            self._deadline += monotonic() - began
             self._armed = armed
 
     def carry_with(self, carry: Callable[[Callable[[], Any]], Any]) -> None:
@@ -98,9 +100,9 @@ class TimeLimit:
 
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a Python function; raises Stopped where it does not return in time."""
-        self._deadline = time.monotonic() + self.seconds
+        self._deadline = monotonic() + self.seconds
         self.struck, self._traced_by = False, None
-        self._thread = threading.get_ident()
+        self._thread = get_ident()
         if self._thread != _MAIN:
             _watch(self)
         elif self.seconds:
@@ -141,7 +143,7 @@ class TimeLimit:
             self._fired = True
             if self._armed and self.exceeded():
                 self.struck = True
-                self._deadline = time.monotonic() + _AGAIN
+                self._deadline = monotonic() + _AGAIN
                 _raise_in_thread(self._thread, Stopped)
             else:
                 self._fired = False
@@ -184,7 +186,7 @@ class _Timer:
         if not self._is_ready:
             atexit.register(signal.setitimer, signal.ITIMER_REAL, 0)  # nobody catches it while Python ends
             self._is_ready = True
-        self.next = time.monotonic() + seconds
+        self.next = monotonic() + seconds
         signal.setitimer(signal.ITIMER_REAL, min(seconds, _LONGEST))
 
 

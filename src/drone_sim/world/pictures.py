@@ -26,19 +26,15 @@ class Pictures:
         """Start with an empty world. `origin` returns the mesh file that one of PyBullet's was made from."""
         self._client = client
         self._origin = origin
-        self._floor = self._ground = -1
+        self._floor = -1
         self._textures: Dict[int, str] = {}
         self._parts: Dict[int, List[_Part]] = {}
         self._standing: Dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
 
     def set_floor(self, body: int, texture: str) -> None:
-        """Say which body receives the shadows, and its texture."""
+        """Say which body is the floor, which receives the shadows, and its texture; its second visual is the ground."""
         self._floor = body
         self.set_texture(body, texture)
-
-    def set_ground(self, body: int) -> None:
-        """Say which body is the ground around the floor."""
-        self._ground = body
 
     def set_texture(self, body: int, texture: str) -> None:
         """Say which image covers a body: PyBullet does not tell."""
@@ -118,7 +114,8 @@ class Pictures:
         _, link, kind, dimensions, file, position, orientation, rgba = row[:8]
         shape, size = _shape_and_size(kind, dimensions)
         source = self._origin(file.decode()) if shape == "mesh" else ""
-        texture = self._textures.get(key[0], "")
+        floor, ground = key == (self._floor, 0), key == (self._floor, 1)
+        texture = "" if ground else self._textures.get(key[0], "")
         visual = Visual(
             key=key,
             shape=shape,
@@ -127,8 +124,8 @@ class Pictures:
             file=source,
             texture=texture,
             edition=tuple(identity_of(one) if one else None for one in (source, texture)),
-            floor=key[0] == self._floor,
-            ground=key[0] == self._ground,
+            floor=floor,
+            ground=ground,
         )
         return _Part(visual, link, from_quaternion(position, orientation))
 

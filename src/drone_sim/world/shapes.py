@@ -69,10 +69,10 @@ def _checked_urdf(path: str) -> Xml.Element:
         raise ValueError(f"urdf {path}: {error}") from None
 
 
-def dress(client: int, body: int, path: str) -> None:
-    """Cover a body with the image at `path`."""
+def dress(client: int, body: int, visual: int, path: str) -> None:
+    """Cover a visual shape of a body (-1: all of its root link's) with the image at `path`."""
     image = pybullet.loadTexture(path, physicsClientId=client)
-    pybullet.changeVisualShape(body, -1, textureUniqueId=image, physicsClientId=client)
+    pybullet.changeVisualShape(body, -1, visual, textureUniqueId=image, physicsClientId=client)
 
 
 def _geometry(shape: Shape, files: OwnFiles) -> Tuple[Dict[str, Any], Dict[str, Any]]:
@@ -93,40 +93,34 @@ def _geometry(shape: Shape, files: OwnFiles) -> Tuple[Dict[str, Any], Dict[str, 
     return {**both, "fileName": files.mesh(shape.file, hull=True)}, seen
 
 
-def create_floor(client: int, files: OwnFiles, size: float) -> int:
-    """Add a square floor with its top at z = 0, `size` metres a side; return its body id."""
-    solid = pybullet.createCollisionShape(
-        pybullet.GEOM_BOX,
-        halfExtents=[size / 2, size / 2, _FLOOR_THICKNESS / 2],
-        collisionFramePosition=[0, 0, -_FLOOR_THICKNESS / 2],
-        physicsClientId=client,
-    )
-    seen = pybullet.createVisualShape(
-        pybullet.GEOM_MESH, fileName=files.write(_floor_mesh(size), ".obj"), physicsClientId=client
-    )
-    return int(pybullet.createMultiBody(0, solid, seen, physicsClientId=client))
+def create_floor(client: int, files: OwnFiles, size: float, ground: bool) -> int:
+    """Add a square floor with its top at z = 0, `size` metres a side; return its body id.
 
-
-def create_ground(client: int, files: OwnFiles, hole: float) -> int:
-    """Add bare ground around a floor of `hole` metres a side, its top at z = 0, too; return its body id."""
-    reach, half, depth = _GROUND_REACH, hole / 2, _FLOOR_THICKNESS / 2
-    wide = (reach - half) / 2
-    sides = [(reach, wide, 0.0, half + wide), (reach, wide, 0.0, -half - wide)]
-    sides += [(wide, half, half + wide, 0.0), (wide, half, -half - wide, 0.0)]
+    With `ground`, bare ground surrounds it at the same height. It is of the same body, as its second visual shape:
+    every body costs a step some 4 % of its time, whether anything comes near it or not.
+    """
+    half, depth = size / 2, _FLOOR_THICKNESS / 2
+    boxes = [(half, half, 0.0, 0.0)]  # half lengths in x and y, and centre
+    seen = [(_floor_mesh(size), (1.0, 1.0, 1.0, 1.0), 0.0)]
+    if ground:
+        reach, wide = _GROUND_REACH, (_GROUND_REACH - half) / 2
+        boxes += [(reach, wide, 0.0, half + wide), (reach, wide, 0.0, -half - wide)]
+        boxes += [(wide, half, half + wide, 0.0), (wide, half, -half - wide, 0.0)]
+        seen.append((_floor_mesh(2 * reach), (*GROUND, 1.0), -_BELOW))
     solid = pybullet.createCollisionShapeArray(
-        shapeTypes=[pybullet.GEOM_BOX] * len(sides),
-        halfExtents=[[x, y, depth] for x, y, _, _ in sides],
-        collisionFramePositions=[[x, y, -depth] for _, _, x, y in sides],
+        shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
+        halfExtents=[[x, y, depth] for x, y, _, _ in boxes],
+        collisionFramePositions=[[x, y, -depth] for _, _, x, y in boxes],
         physicsClientId=client,
     )
-    seen = pybullet.createVisualShape(
-        pybullet.GEOM_MESH,
-        fileName=files.write(_floor_mesh(2 * reach), ".obj"),
-        rgbaColor=(*GROUND, 1),
-        visualFramePosition=[0, 0, -_BELOW],
+    visual = pybullet.createVisualShapeArray(
+        shapeTypes=[pybullet.GEOM_MESH] * len(seen),
+        fileNames=[files.write(mesh, ".obj") for mesh, _, _ in seen],
+        rgbaColors=[color for _, color, _ in seen],
+        visualFramePositions=[[0, 0, z] for _, _, z in seen],
         physicsClientId=client,
     )
-    return int(pybullet.createMultiBody(0, solid, seen, physicsClientId=client))
+    return int(pybullet.createMultiBody(0, solid, visual, physicsClientId=client))
 
 
 def _floor_mesh(size: float) -> bytes:

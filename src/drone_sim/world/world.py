@@ -58,7 +58,8 @@ class World:
         self._beginning: Dict[int, Tuple[Vector, Quaternion, List[float]]] = {}
         self._files.clear()
         self._pictures = Pictures(self._client, self._files.origin)
-        self._undressed: Dict[int, str] = {}  # bodies whose texture PyBullet has not been given
+        # Bodies whose texture PyBullet has not been given, and for which visual shape it is (-1: all).
+        self._undressed: Dict[int, Tuple[str, int]] = {}
 
     def close(self) -> None:
         """Free the world; may be called twice."""
@@ -69,19 +70,15 @@ class World:
 
     # ---- building
 
-    def add_floor(self, size: float, texture: str) -> int:
-        """Add a square floor with its top at z = 0, `size` metres a side; return its body id."""
-        body = shapes.create_floor(self._client, self._files, size)
-        self._cover(body, texture)
+    def add_floor(self, size: float, texture: str, ground: bool = False) -> int:
+        """Add a square floor with its top at z = 0, `size` metres a side, and bare ground around it if asked for.
+
+        Returns its body id.
+        """
+        body = shapes.create_floor(self._client, self._files, size, ground)
+        self._cover(body, texture, visual=0)
         self._set_material(body)
         self._pictures.set_floor(body, texture)
-        return body
-
-    def add_ground(self, hole: float) -> int:
-        """Add bare ground around a floor of `hole` metres a side; return its body id."""
-        body = shapes.create_ground(self._client, self._files, hole)
-        self._set_material(body)
-        self._pictures.set_ground(body)
         return body
 
     def add_shape(self, shape: shapes.Shape) -> int:
@@ -104,17 +101,17 @@ class World:
         self.set_pose(number, pose)  # again, for PyBullet reads a URDF's pose in single precision
         return number
 
-    def _cover(self, body: int, texture: str) -> None:
+    def _cover(self, body: int, texture: str, visual: int = -1) -> None:
         if texture:
-            self._undressed[body] = texture
+            self._undressed[body] = (texture, visual)
         if self._gui:
             self._dress()
 
     def _dress(self) -> None:
         """Give PyBullet the textures, which only its window and its own renderer show."""
         while self._undressed:
-            body, texture = self._undressed.popitem()
-            shapes.dress(self._client, body, self._files.texture(texture))
+            body, (texture, visual) = self._undressed.popitem()
+            shapes.dress(self._client, body, visual, self._files.texture(texture))
 
     def remove(self, body: int) -> None:
         """Take a body out of the world."""
