@@ -29,6 +29,7 @@ from drone_sim.parameter_types import (
     ParameterError,
     Switch,
     Within,
+    named_in,
     numeric,
     read_yaml,
 )
@@ -168,8 +169,8 @@ class Parameters(Checked):
 def load(overrides: Optional[Mapping[str, Any]] = None) -> Parameters:
     """Return config/drone.yaml with a file and `overrides` (nested mappings of the same shape) laid over it.
 
-    The file is named by the overrides' key `config`; '' is none. What it names is relative to where the process
-    runs, as in `overrides`. Raises ParameterError.
+    The file is named by the overrides' key `config`; '' is none. The files that it names are relative to it, those
+    in `overrides` to where the process runs. Raises ParameterError.
     """
     overrides = {} if overrides is None else overrides
     if not isinstance(overrides, Mapping):
@@ -186,12 +187,18 @@ def load(overrides: Optional[Mapping[str, Any]] = None) -> Parameters:
 
 
 def _config(name: str) -> Dict[str, Any]:
+    """Return what a file says. Raises ParameterError."""
     try:
-        values = read_yaml(resolve(name))
+        path = resolve(name)
     except FileNotFoundError as error:
         raise ParameterError(f"parameter config = {shown(name)}: {error}") from None
+    values = read_yaml(path)
     if "config" in values:
         raise ParameterError(f"{name}: a config file names no other `config`")
+    scene_parameters.find_files_beside(path.parent, values)
+    for key in ("script", "scene_file"):
+        if isinstance(values.get(key), str) and Path(values[key]).suffix:  # tutorial and target have none
+            values[key] = named_in(path.parent, values[key])
     return values
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Dict, List, Literal, Optional, Tuple, Union
+from typing import Any, Dict, List, Literal, Mapping, Optional, Tuple, Union
 
 from pydantic import Field
 from typing_extensions import Annotated
@@ -131,9 +131,17 @@ def read(file: str) -> Dict[str, Any]:
 def from_content(content: Dict[str, Any], folder: Path) -> Dict[str, Any]:
     """Return what `read` does, of a scene file's content."""
     scene = {key: value for key, value in content.items() if key != "drone"}  # unknown keys are refused with the rest
-    for place in (scene.get("floor"), content.get("drone"), *_listed(scene.get("objects"))):
-        _find_files_beside(folder, place)
-    return {"scene": scene, "drone": content.get("drone", {})}
+    found = {"scene": scene, "drone": content.get("drone", {})}
+    find_files_beside(folder, found)
+    return found
+
+
+def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
+    """Let the file names among `scene` and `drone` lead to files in a folder."""
+    scene = values.get("scene")
+    places = [scene.get("floor"), *_listed(scene.get("objects"))] if isinstance(scene, dict) else []
+    for place in (values.get("drone"), *places):
+        _find_beside(folder, place)
 
 
 def problem_in_file(problem: Problem) -> Optional[Problem]:
@@ -152,7 +160,7 @@ def _listed(objects: Any) -> List[Any]:
     return objects if isinstance(objects, list) else []  # what is no list is refused with the other values
 
 
-def _find_files_beside(folder: Path, place: Any) -> None:
+def _find_beside(folder: Path, place: Any) -> None:
     for key in ("file", "texture", "urdf"):
         name = place.get(key) if isinstance(place, dict) else None
         if isinstance(name, str) and name and not hasattr(name, "given"):  # an alias is the same mapping once more

@@ -3,6 +3,7 @@
 import pytest
 
 from drone_sim import parameters
+from drone_sim.resources import package_path
 from drone_sim.simulation import Simulation
 
 BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
@@ -165,6 +166,19 @@ def test_a_config_file_lies_between_the_defaults_and_what_is_given(tmp_path):
     loaded = parameters.load({"config": str(config), "control": {"Kzref": 4}})
     assert (loaded.gravity, loaded.control.Kzref, loaded.control.Dzref, loaded.time_step) == (-1.0, 4.0, 2.0, 0.05)
     assert loaded.in_scene("").gravity == -1.0
+
+
+def test_the_files_that_a_config_file_names_lie_beside_it(tmp_path):
+    (tmp_path / "own.urdf").write_text((package_path() / "urdf" / "drone.urdf").read_text())
+    (tmp_path / "room.yaml").write_text("floor: {size: 7}")
+    config = tmp_path / "config.yaml"
+    config.write_text("drone: {urdf: own.urdf}\nscene_file: room.yaml\nscript: own.py\n")
+    loaded = parameters.load({"config": str(config)})
+    assert loaded.drone.urdf == str(tmp_path / "own.urdf")
+    assert loaded.scene.floor.size == 7
+    assert loaded.script == str(tmp_path / "own.py")
+    config.write_text("script: target\n")
+    assert parameters.load({"config": str(config)}).script == "target"
 
 
 @pytest.mark.parametrize(
