@@ -76,7 +76,7 @@ def check_together(cameras: Mapping[str, CameraParameters]) -> None:
                     "a topic such as rear/image has a namespace of its own",
                     ("cameras", name, "topic"),
                 )
-        topics.update((topic, f"the {what} of cameras/{name}") for topic, what in _topics(camera))
+            topics[topic] = f"the {what} of cameras/{name}"
 
 
 def _topics(camera: CameraParameters) -> Iterator[Tuple[str, str]]:

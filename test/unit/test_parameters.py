@@ -55,6 +55,7 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"cameras": {"front": {"topic": "markers/update"}}}, "markers/update, which is the drone's own"),
         ({"cameras": {"front": {"topic": "a//b"}}}, "must be like rear/image"),
         ({"cameras": {"track": {"topic": "camera_info"}}}, "which is the camera_info of cameras/front"),
+        ({"cameras": {"track": {"topic": "rear/camera_info"}}}, "which is the image of cameras/track"),
         ({"cameras": {"track": {"topic": "front/compressed"}}}, "which is the compressed of cameras/front"),
         ({"cameras": {"track": {"topic": "track"}}}, "'track': its camera_info would be camera_info, which is the"),
         ({"cameras": {"track": {"object": "FrontVision"}}}, "object = 'FrontVision': is that of cameras/front too"),
