@@ -67,11 +67,15 @@ def read_bytes(path: Union[str, Path], limit: int) -> bytes:
 
     Raises OSError and, in one line without the file's name, ValueError.
     """
-    # A FIFO without a writer would hold up a plain open().
-    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+    # A FIFO without a writer would hold up a plain open(), and os.fdopen keeps a folder open that it refuses.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise ValueError("must be a regular file")
-        content = file.read(limit + 1) or b""
+        with os.fdopen(descriptor, "rb", closefd=False) as file:
+            content = file.read(limit + 1)
+    finally:
+        os.close(descriptor)
     if len(content) > limit:
         raise ValueError(f"larger than {limit / MEBIBYTE:g} MiB, the most that is read of such a file")
     return content

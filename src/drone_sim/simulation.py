@@ -16,6 +16,7 @@ from typing import Callable, Dict, NamedTuple, Optional
 
 import numpy as np
 
+from drone_sim import memory
 from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.camera.vision import Camera, Vision
 from drone_sim.drone import Drone
@@ -139,6 +140,7 @@ class Simulation:
         self.stop()
         parameters = self.parameters.in_scene(self.parameters.scene_file if scene_file is None else scene_file)
         self._build(parameters)
+        memory.give_back()
         self._run()
 
     def _run(self) -> None:

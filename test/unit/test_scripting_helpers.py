@@ -255,7 +255,7 @@ def test_lua_modules_in_folders_share_the_scripts_globals_and_are_read_once(writ
         ("helpr", "no module 'helpr': no file helpr.lua beside the script; near names are helper"),
         ("linked", "leads out of the script's folder"),
         ("pipe", "must be a regular file"),
-        ("folder", "Is a directory"),
+        ("folder", "must be a regular file"),
         ("large", "larger than 1 MiB"),
         ("compiled", "precompiled"),
         ("circle", "requires itself"),

@@ -85,3 +85,13 @@ def test_only_regular_files_in_utf_8_are_read(tmp_path, monkeypatch, name):
         assert "\n" not in str(refused.value) and len(str(refused.value)) < 900
     if name == "latin.yaml":
         assert "line 2: must be text in UTF-8" in str(refused.value)
+
+
+def test_what_is_no_file_is_not_kept_open(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    (tmp_path / "large.yaml").write_text(" " * (2**20 + 1))
+    before = len(os.listdir("/proc/self/fd"))
+    for name in ("", "pipe.yaml", "large.yaml"):
+        with pytest.raises(yaml_files.YamlError):
+            yaml_files.read(tmp_path / name)
+    assert len(os.listdir("/proc/self/fd")) == before
