@@ -46,6 +46,7 @@ class Drone:
         self.body = urdf.read(own.urdf)
         self.bus = MessageBus(own.name)
         self._parameters = parameters
+        self._timeout, self._time_step = parameters.cmd_vel_timeout, parameters.time_step  # asked for in every step
         self._world = world
         self._start = Pose(own.position, frames.to_quaternion(frames.from_rpy((0, 0, 0), (0, 0, own.yaw))))
         self._id = world.add_rigid_body(self.body, self._start)
@@ -66,8 +67,8 @@ class Drone:
         self._world.set_pose(self._id, self._start)
         self.refresh()
         rotations = [rotation for _, rotation in PROPELLERS]
-        law, step = self._parameters.propellers, self._parameters.time_step
-        self._propellers = Propellers(law, self._axes, self._points, rotations, step)
+        law = self._parameters.propellers
+        self._propellers = Propellers(law, self._axes, self._points, rotations, self._time_step)
         self.command = Twist()
         self._command_age = 0.0
         self._pushes: List[_Push] = []
@@ -197,7 +198,7 @@ class Drone:
         self.close()
         limit = TimeLimit(self._parameters.script_time_limit)
         sensors = {self._parameters.cameras[name].object: take for name, take in (pictures or {}).items()}
-        surroundings = Surroundings(clock, self._parameters.time_step, sensors, limit.outside)
+        surroundings = Surroundings(clock, self._time_step, sensors, limit.outside)
         modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
         self.script = load.load(path, modules, limit)
         self.script.call("init")
@@ -225,7 +226,7 @@ class Drone:
 
         It lasts `duration` seconds of simulated time, rounded to whole steps, one at least. Pushes add up.
         """
-        self._pushes.append(_Push(force, torque, max(1, round(duration / self._parameters.time_step))))
+        self._pushes.append(_Push(force, torque, max(1, round(duration / self._time_step))))
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m, world).
@@ -240,10 +241,10 @@ class Drone:
 
     def actuation(self) -> None:
         """Hand waiting messages to the script, then let it command the propellers."""
-        timeout, step = self._parameters.cmd_vel_timeout, self._parameters.time_step
-        if timeout and self._command_age > timeout - step / 2 and self.command != Twist():
+        timeout = self._timeout
+        if timeout and self._command_age > timeout - self._time_step / 2 and self.command != Twist():
             self.receive(Twist())
-        self._command_age += step
+        self._command_age += self._time_step
         self._check_callbacks()
         self.bus.deliver(self.script.callback)
         self.script.call("actuation")

@@ -182,7 +182,10 @@ class ObjectTree:
 
     def matrix(self, handle: int, relative_to: int = WORLD) -> Matrix:
         """Return the transform of an object relative to another, to its PARENT, or to the WORLD."""
-        moved = self[handle]
+        try:
+            moved = self._objects[handle]
+        except (KeyError, TypeError):
+            moved = self[handle]  # which says what is wrong; this runs a dozen times a step
         if relative_to == WORLD:
             return moved.matrix()
         reference = moved.parent if relative_to == PARENT else self[relative_to]

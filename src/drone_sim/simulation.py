@@ -10,7 +10,6 @@ For example:
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Callable, Dict, NamedTuple, Optional
 
@@ -191,14 +190,15 @@ class Simulation:
 
     def step(self) -> None:
         """Run one simulation step: actuation, dynamics, vision, sensing. Raises ScriptError and Diverged."""
-        self.drone.actuation()
-        self.world.advance(self.drone.wrenches(), self._sub_steps)
-        self.drone.refresh()
+        drone = self.drone
+        drone.actuation()
+        self.world.advance(drone.wrenches(), self._sub_steps)
+        drone.refresh()
         self.steps += 1
         self._check_state()
         for camera in self.cameras.values():
-            camera.image = self._look(camera) if self.steps % camera.every == 0 and camera.watched() else None
-        self.drone.script.call("sensing")
+            camera.image = self._look(camera) if camera.watched() and self.steps % camera.every == 0 else None
+        drone.script.call("sensing")
 
     def _check_state(self) -> None:
         """Raise Diverged where the drone is nowhere any more."""

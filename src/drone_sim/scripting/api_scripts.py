@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import logging
-import math
+from math import isfinite
 from typing import Any, Dict, Iterable, Optional, Tuple
 
 from drone_sim.objects import near_names
@@ -96,18 +96,15 @@ class Scripts:
         With sim.handle_tree it is set in this script and those below. A name that a propeller does not have is
         refused where it comes near to one that it has; of any other the log says once that nothing reads it.
         """
-        if script == _TREE:
-            self._check_name(self._parameters, name)
-            for parameters in self._parameters.values():
-                _set(parameters, name, value)
+        known = self._parameters.get(script)
+        if known and name in known and type(value) is float and isfinite(value):  # four times a step, so at once
+            known[name] = value
             return
-        parameters = self._parameters.get(script) or self._parameters[self._index(script)]
-        if name not in parameters:
-            self._check_name([self._index(script)], name)
-        elif type(value) is float and math.isfinite(value):  # four times a step, so at once
-            parameters[name] = value
-            return
-        _set(parameters, name, value)
+        scripts = [*self._parameters] if script == _TREE else [self._index(script)]
+        if script == _TREE or name not in self._parameters[scripts[0]]:
+            self._check_name(scripts, name)
+        for one in scripts:
+            _set(self._parameters[one], name, value)
 
     def _check_name(self, scripts: Iterable[int], name: Any) -> None:
         """Raise ValueError for a misspelt parameter of a propeller; say of one that nothing reads that it is so."""
@@ -166,7 +163,7 @@ def _stored(value: Any, before: Any) -> Any:
     if isinstance(value, str):
         value = _from_text(value)
     if type(value) is float or type(value) is int:
-        if not math.isfinite(value):
+        if not isfinite(value):
             raise WrongValue("a finite number is expected")
     elif type(before) is float or type(before) is int:
         raise WrongValue("a number is expected")

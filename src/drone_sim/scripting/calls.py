@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 import itertools
-import math
 import sys
 import traceback
+from math import isfinite
 from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Sequence, Tuple
 
 from drone_sim.objects import near_names
@@ -134,7 +134,7 @@ def numbers(values: Sequence[float], count: int) -> Tuple[float, ...]:
             total = sum(values)
         except TypeError:
             total = None
-        if type(total) is float and math.isfinite(total):
+        if type(total) is float and isfinite(total):
             return tuple(values)
     expected = f"{count} numbers are expected" if count != 1 else "a number is expected"
     try:
@@ -143,6 +143,6 @@ def numbers(values: Sequence[float], count: int) -> Tuple[float, ...]:
         raise WrongValue(expected) from None
     if len(found) != count:
         raise WrongValue(f"{expected}, not {len(found)}")
-    if not math.isfinite(sum(found)):
+    if not isfinite(sum(found)):
         raise WrongValue("finite numbers are expected")
     return found

@@ -24,7 +24,7 @@ from drone_sim.scripting.time_limit import Stopped, TimeLimit
 __all__ = ["PythonScript", "ScriptError"]
 
 _STOPPED = "__stopped__"  # Stopped, among a script's globals
-_RARE = ("init", "cleanup")
+_RARE = frozenset(("init", "cleanup"))
 _NOT_COPIED = ("__builtins__", "__loader__", "__spec__")
 
 

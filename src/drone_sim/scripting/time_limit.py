@@ -101,7 +101,7 @@ class TimeLimit:
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a Python function; raises Stopped where it does not return in time."""
         self._deadline = monotonic() + self.seconds
-        self.struck, self._traced_by = False, None
+        self.struck = False
         self._thread = get_ident()
         if self._thread != _MAIN:
             _watch(self)

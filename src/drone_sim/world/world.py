@@ -143,8 +143,11 @@ class World:
         )
         info = pybullet.getDynamicsInfo(number, -1, self._client)
         inertial = Pose(info[3], info[4])
+        backwards = inverse(inertial)
+        if backwards.orientation == _NO_TURN:
+            backwards = Pose(backwards.position, _NO_TURN)  # the very same one: `state` looks in every step
         self.changes = next(_changes)
-        self._inertial_frames[number] = (inertial, inverse(inertial))
+        self._inertial_frames[number] = (inertial, backwards)
 
     # ---- dynamics
 
@@ -157,7 +160,7 @@ class World:
         centre, turn = self._centres[body] = pybullet.getBasePositionAndOrientation(body, self._client)
         (vx, vy, vz), angular = pybullet.getBaseVelocity(body, self._client)
         inertial, backwards = self._inertial_frames[body]
-        orientation = turn if backwards.orientation == _NO_TURN else multiply_quaternions(turn, backwards.orientation)
+        orientation = turn if backwards.orientation is _NO_TURN else multiply_quaternions(turn, backwards.orientation)
         arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
         sx, sy, sz = cross(angular, arm)
         position = (centre[0] - arm[0], centre[1] - arm[1], centre[2] - arm[2])
@@ -204,7 +207,7 @@ class World:
         loads = [(body, wrench.force, wrench.torque_under) for body, wrench in wrenches.items()]
         for _ in range(sub_steps):
             for body, force, torque_under in loads:
-                centre, orientation = known.get(body) or where(body, client)
+                centre, orientation = (known and known.get(body)) or where(body, client)
                 push(body, -1, force, centre, in_world, client)
                 turn(body, -1, torque_under(orientation), in_world, client)
             step(client)
