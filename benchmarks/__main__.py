@@ -5,28 +5,29 @@ import json
 import platform
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Callable, Dict, List
+from typing import Any
 
 from benchmarks import loop, node, plot, render
 from benchmarks.cores import one_core
 from drone_sim import writing
 from drone_sim.camera.renderer import Renderer
 
-Row = Dict[str, Any]
+Row = dict[str, Any]
 README = Path(__file__).parents[1] / "README.md"
 RESULTS = Path(__file__).parent / "results.json"
 
 
-def _in_a_folder(measure: Callable[[Path], List[Row]]) -> Callable[[], List[Row]]:
-    def measured() -> List[Row]:
+def _in_a_folder(measure: Callable[[Path], list[Row]]) -> Callable[[], list[Row]]:
+    def measured() -> list[Row]:
         with tempfile.TemporaryDirectory() as folder, one_core():
             return measure(Path(folder))
 
     return measured
 
 
-BENCHMARKS: Dict[str, Callable[[], List[Row]]] = {
+BENCHMARKS: dict[str, Callable[[], list[Row]]] = {
     "render": _in_a_folder(render.compare),
     "growth": _in_a_folder(render.growth),
     "loop": loop.compare,
@@ -43,7 +44,7 @@ def machine() -> str:
     return f"{(names or [platform.machine()])[0]}, {len(names)} cores; OpenGL by {drawn_by}"
 
 
-def table(rows: List[Row]) -> str:
+def table(rows: list[Row]) -> str:
     """Lay rows out in columns; a number gets three digits."""
     keys = [key for key in dict.fromkeys(key for row in rows for key in row) if key != "renderer"]
     cells = [keys] + [[_text(row.get(key, "")) for key in keys] for row in rows]
@@ -57,7 +58,7 @@ def _text(value: Any) -> str:
     return f"{value:.3g}" if value < 1000 else str(round(value))
 
 
-def _fill_readme(results: Dict[str, Any]) -> None:
+def _fill_readme(results: dict[str, Any]) -> None:
     begin, end = "<!-- benchmarks: begin -->\n", "<!-- benchmarks: end -->"
     tables = [f"{name}\n{table(results[name])}" for name in BENCHMARKS if name in results]
     block = "```text\n" + "\n\n".join([f"on {results['machine']}", *tables]) + "\n```\n"

@@ -2,7 +2,8 @@
 
 import statistics
 import time
-from typing import Any, Callable, Dict, List
+from collections.abc import Callable
+from typing import Any
 
 import pybullet
 from tqdm import tqdm
@@ -14,18 +15,18 @@ from drone_sim.simulation import Simulation
 from drone_sim.state import Pose
 from drone_sim.world import World
 
-Row = Dict[str, Any]
+Row = dict[str, Any]
 STEP = 0.05  # s
 SUB_STEPS = 10
 
 
-def race(steps: Dict[str, Callable[[], Any]], rounds: int, seconds: float) -> List[Row]:
+def race(steps: dict[str, Callable[[], Any]], rounds: int, seconds: float) -> list[Row]:
     """Time each `step` (50 ms of simulated time) by turns: the machine's own ups and downs hit all alike.
 
     The factor is from the median time; `of_bare` is the median, over the rounds, of the share of the first one.
     """
-    times: Dict[str, List[float]] = {name: [] for name in steps}
-    shares: Dict[str, List[float]] = {name: [] for name in steps}
+    times: dict[str, list[float]] = {name: [] for name in steps}
+    shares: dict[str, list[float]] = {name: [] for name in steps}
     for _ in tqdm(range(rounds), desc="  rounds", leave=False):
         medians = {name: _times(step, seconds) for name, step in steps.items()}
         first = statistics.median(next(iter(medians.values())))
@@ -35,7 +36,7 @@ def race(steps: Dict[str, Callable[[], Any]], rounds: int, seconds: float) -> Li
     return [_row(name, sorted(times[name]), statistics.median(shares[name])) for name in steps]
 
 
-def _times(step: Callable[[], Any], seconds: float) -> List[float]:
+def _times(step: Callable[[], Any], seconds: float) -> list[float]:
     times = []
     end = time.perf_counter() + seconds
     while time.perf_counter() < end:
@@ -45,7 +46,7 @@ def _times(step: Callable[[], Any], seconds: float) -> List[float]:
     return times
 
 
-def _row(name: str, times: List[float], share: float) -> Row:
+def _row(name: str, times: list[float], share: float) -> Row:
     median, low, high = (times[int(len(times) * part)] for part in (0.5, 0.1, 0.9))
     spread = {"p10": STEP / high, "p90": STEP / low, "step_us": 1e6 * median}
     return {"name": name, "factor": STEP / median, **spread, "of_bare": share}
@@ -81,7 +82,7 @@ def ours(*cameras: str) -> Callable[[], None]:
     return simulation.step
 
 
-def compare(rounds: int = 10, seconds: float = 0.4) -> List[Row]:
+def compare(rounds: int = 10, seconds: float = 0.4) -> list[Row]:
     """Return the rows, measured on one core."""
     with one_core():
         steps = {

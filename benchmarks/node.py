@@ -14,12 +14,14 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, Callable, ContextManager, Dict, Iterator, List
+from typing import Any
 
 import numpy as np
 
-Row = Dict[str, Any]
+Row = dict[str, Any]
 CORE = "0"  # the node's; listeners have the others
 
 
@@ -40,19 +42,19 @@ def master() -> Iterator[None]:
         process.wait()
 
 
-def node(*arguments: str, program: str = "") -> ContextManager[List[str]]:
+def node(*arguments: str, program: str = "") -> AbstractContextManager[list[str]]:
     """Run the simulator, or a python program, on one core until the block ends; yield its lines of output."""
     what = [sys.executable, "-c", program] if program else ["rosrun", "drone_sim", "simulator"]
     return _running("taskset", "-c", CORE, *what, *arguments)
 
 
-def launched(*arguments: str) -> ContextManager[List[str]]:
+def launched(*arguments: str) -> AbstractContextManager[list[str]]:
     """Run all of the launch file until the block ends; yield its lines of output."""
     return _running("roslaunch", "drone_sim", "drone.launch", *arguments)
 
 
 @contextlib.contextmanager
-def _running(*command: str) -> Iterator[List[str]]:
+def _running(*command: str) -> Iterator[list[str]]:
     process = subprocess.Popen(
         command,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
@@ -60,7 +62,7 @@ def _running(*command: str) -> Iterator[List[str]]:
         stderr=subprocess.STDOUT,
         text=True,
     )
-    lines: List[str] = []
+    lines: list[str] = []
     flying = threading.Event()
 
     def read() -> None:
@@ -82,18 +84,18 @@ def _running(*command: str) -> Iterator[List[str]]:
         reader.join()
 
 
-def real_time_factors(rounds: int = 3, seconds: float = 6.0) -> List[Row]:
+def real_time_factors(rounds: int = 3, seconds: float = 6.0) -> list[Row]:
     """As fast as it can, by turns: the bare node, and the launch file in real and in simulated time.
 
     Heard by nobody, and with the front camera and odometry heard by another process. Medians, lowest and highest.
     """
     free = "real_time_factor:=0"
-    running: Dict[str, Callable[[], ContextManager[List[str]]]] = {
+    running: dict[str, Callable[[], AbstractContextManager[list[str]]]] = {
         "bare node": lambda: node(f"_{free}"),
         "drone.launch": lambda: launched("rviz:=false", free),
         "drone.launch, use_sim_time": lambda: launched("rviz:=false", free, "use_sim_time:=true"),
     }
-    factors: Dict[str, List[float]] = {}
+    factors: dict[str, list[float]] = {}
     for _ in range(rounds):
         for name, run in running.items():
             for heard in (False, True):
@@ -107,7 +109,7 @@ def real_time_factors(rounds: int = 3, seconds: float = 6.0) -> List[Row]:
     ]
 
 
-def _factor(run: Callable[[], ContextManager[List[str]]], heard: bool, seconds: float) -> float:
+def _factor(run: Callable[[], AbstractContextManager[list[str]]], heard: bool, seconds: float) -> float:
     from nav_msgs.msg import Odometry
     from sensor_msgs.msg import Image
 
@@ -121,7 +123,7 @@ def _factor(run: Callable[[], ContextManager[List[str]]], heard: bool, seconds: 
     return float(_flew(lines).group(2))
 
 
-def _flew(lines: List[str]) -> "re.Match[str]":
+def _flew(lines: list[str]) -> "re.Match[str]":
     """Return what the node says at its end: seconds flown, factor, late steps, by how many ms."""
     said = r"flew ([\d.]+) s at ([\d.]+) times real time, (\d+) late steps, by (\d+) ms"
     flew = re.search(said, "".join(lines))
@@ -165,15 +167,15 @@ RECORDED = (
 )
 
 
-def latencies(seconds: float = 20.0) -> List[Row]:
+def latencies(seconds: float = 20.0) -> list[Row]:
     """At real time with the camera on: command to the loop's inbox, stamp of an image to its subscriber, jitter."""
     import rospy
     from geometry_msgs.msg import Twist
     from sensor_msgs.msg import Image
 
     rospy.set_param("/use_sim_time", False)  # which a launch file before may have left
-    came: List[float] = []
-    ages: List[float] = []
+    came: list[float] = []
+    ages: list[float] = []
 
     def image(message: Any) -> None:
         now = time.time()
@@ -204,7 +206,7 @@ def latencies(seconds: float = 20.0) -> List[Row]:
     ]
 
 
-def late_steps(seconds: float = 60.0) -> List[Row]:
+def late_steps(seconds: float = 60.0) -> list[Row]:
     """At real time, the launch file with the front camera heard and a bag of everything; with rviz if it is there."""
     rows = []
     for rviz in (False, True):
@@ -262,7 +264,7 @@ def _spread(name: str, seconds: Any) -> Row:
     return {"name": name, "median_ms": float(median), "p95_ms": float(high), "samples": len(seconds)}
 
 
-def measure() -> List[Row]:
+def measure() -> list[Row]:
     """Return all rows."""
     import rospy
 

@@ -1,7 +1,7 @@
 """The results of a benchmark run as one picture."""
 
 from pathlib import Path
-from typing import Any, Dict
+from typing import Any
 
 import matplotlib
 
@@ -12,7 +12,7 @@ from matplotlib import pyplot
 from drone_sim import writing
 
 
-def draw(results: Dict[str, Any], file: str) -> None:
+def draw(results: dict[str, Any], file: str) -> None:
     """Draw what there is: frame times, real-time factors, growth."""
     figure, (left, middle, right) = pyplot.subplots(1, 3, figsize=(15, 4.5), constrained_layout=True)
     _bars(left, results.get("render", []), "median_ms", "frame, 640 x 480 [ms]")

@@ -7,8 +7,9 @@ import importlib.util
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Tuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,8 +20,8 @@ from drone_sim.camera.intrinsics import Intrinsics
 from drone_sim.camera.renderer import Renderer
 from drone_sim.visual import Visual
 
-Row = Dict[str, Any]
-Scene = Tuple[List[Visual], np.ndarray]
+Row = dict[str, Any]
+Scene = tuple[list[Visual], np.ndarray]
 
 CAMERA = Intrinsics(640, 480, np.radians(60.0), 0.02, 100.0)
 AHEAD = np.array([[0.0, 0.0, 1.0, 0.2], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.8], [0.0, 0.0, 0.0, 1.0]])
@@ -36,7 +37,7 @@ def measure(name: str, draw: Callable[[], Any], seconds: float = 2.0, **facts: A
     """Time `draw` until `seconds` are over, at least five times after two for warming up."""
     amounts = ", ".join(f"{key} {value}" for key, value in facts.items() if key != "renderer")
     print(f"  {amounts or name}", file=sys.stderr, flush=True)
-    times: List[float] = []
+    times: list[float] = []
     for _ in range(2):
         draw()
     end = time.perf_counter() + seconds
@@ -58,7 +59,7 @@ def pose(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:
 
 def build(folder: Path, things: int = 10, triangles: int = 0) -> Scene:
     """A textured floor of 10 x 10 m, a quadrotor at 0.8 m, boxes and cylinders, perhaps a ball of triangles."""
-    parts: List[Tuple[str, Tuple[float, ...], Tuple[float, ...], np.ndarray, str]] = [
+    parts: list[tuple[str, tuple[float, ...], tuple[float, ...], np.ndarray, str]] = [
         ("mesh", (1.0, 1.0, 1.0), WHITE, np.eye(4), _floor(folder)),
         ("box", (0.1, 0.1, 0.05), DARK, pose(0, 0, 0.8), ""),
         ("sphere", (0.04,), COLOURS[0], pose(0.05, 0, 0.8), ""),
@@ -105,7 +106,7 @@ def populate(client: int, scene: Scene) -> None:
     """The same things as PyBullet bodies that only look."""
     kinds = {"box": pybullet.GEOM_BOX, "sphere": pybullet.GEOM_SPHERE, "cylinder": pybullet.GEOM_CYLINDER}
     for visual, matrix in zip(*scene):
-        form: Dict[str, Any] = {"shapeType": kinds.get(visual.shape, pybullet.GEOM_MESH), "rgbaColor": visual.rgba}
+        form: dict[str, Any] = {"shapeType": kinds.get(visual.shape, pybullet.GEOM_MESH), "rgbaColor": visual.rgba}
         if visual.shape == "mesh":
             form["fileName"] = visual.file
         elif visual.shape == "box":
@@ -127,7 +128,7 @@ def bullet_draw(client: int, **options: int) -> Callable[[], Any]:
     return lambda: pybullet.getCameraImage(*size, view, projection, physicsClientId=client, **options)
 
 
-def compare(folder: Path, seconds: float = 2.0) -> List[Row]:
+def compare(folder: Path, seconds: float = 2.0) -> list[Row]:
     """Ours beside TinyRenderer and PyBullet's EGL plugin."""
     scene = build(folder)
     rows = [
@@ -178,7 +179,7 @@ def ours(
         renderer.close()
 
 
-def growth(folder: Path, seconds: float = 1.0) -> List[Row]:
+def growth(folder: Path, seconds: float = 1.0) -> list[Row]:
     """Our frame time against picture size, number of bodies and number of triangles."""
     scene, rows = build(folder), []
     for width, height in ((160, 120), (320, 240), (640, 480), (1280, 720), (1920, 1080)):

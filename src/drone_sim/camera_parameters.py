@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Dict, Iterator, Mapping, Optional, Tuple
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal
 
 from pydantic import Field
-from typing_extensions import Annotated, Literal
 
 from drone_sim.frames import Matrix, from_rpy, multiply
 from drone_sim.parameter_types import TOPIC, Angles, Checked, Finite, Label, Name, ParameterError, Point, Within
@@ -41,7 +41,7 @@ class CameraParameters(Checked):
     topic: Annotated[str, Field(pattern=TOPIC, max_length=128)]
     kind: Literal["color", "depth"]
     frame: Name
-    mount: Optional[MountParameters] = None
+    mount: MountParameters | None = None
     every: Annotated[int, Within(1, 1_000_000)]
     width: Annotated[int, Within(1, 4096)]
     height: Annotated[int, Within(1, 4096)]
@@ -56,7 +56,7 @@ def check_together(cameras: Mapping[str, CameraParameters]) -> None:
     if pixels > MAX_PIXELS:
         raise ParameterError(f"parameter cameras: {pixels} pixels in all; at most {MAX_PIXELS} are allowed")
     topics = {topic: "the drone's own" for topic in RESERVED_TOPICS}
-    objects: Dict[str, str] = {}
+    objects: dict[str, str] = {}
     for name, camera in cameras.items():
         here = f"parameter cameras/{name}"
         if camera.near >= camera.far:
@@ -79,7 +79,7 @@ def check_together(cameras: Mapping[str, CameraParameters]) -> None:
             topics[topic] = f"the {what} of cameras/{name}"
 
 
-def _topics(camera: CameraParameters) -> Iterator[Tuple[str, str]]:
+def _topics(camera: CameraParameters) -> Iterator[tuple[str, str]]:
     """Yield what a camera publishes, and what it is."""
     yield camera.topic, "image"
     folder, slash, _ = camera.topic.rpartition("/")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Sequence, Tuple
+from collections.abc import Sequence
 
 from drone_sim.frames import Vector
 from drone_sim.parameters import Parameters
@@ -21,7 +21,7 @@ def twist(linear: Sequence[float], angular: Sequence[float], parameters: Paramet
     return Twist(Vector3(*linear), Vector3(*angular))
 
 
-def push(force: Sequence[float], torque: Sequence[float], parameters: Parameters) -> Tuple[Vector, Vector, float]:
+def push(force: Sequence[float], torque: Sequence[float], parameters: Parameters) -> tuple[Vector, Vector, float]:
     """Return force (N), torque (N m) and how long a push lasts (s); raises Refused beyond the limits."""
     limits = parameters.push
     _check_within("force", force, limits.force_limit, "N")

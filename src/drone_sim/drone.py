@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class Drone:
         shapes = [(respondable(number), link) for number, link in enumerate(self._links, start=1)]
         self._shapes = {name: frames.multiply(inertial_from_root, link) for name, link in [(DRONE, IDENTITY), *shapes]}
         self.script: load.Script = load.NoScript()
-        self.drawings: Optional[Drawings] = None
+        self.drawings: Drawings | None = None
         self.jumps = 0  # how often it was put somewhere else
         self.reset()
 
@@ -71,9 +72,9 @@ class Drone:
         self._propellers = Propellers(law, self._axes, self._points, rotations, self._time_step)
         self.command = Twist()
         self._command_age = 0.0
-        self._pushes: List[_Push] = []
+        self._pushes: list[_Push] = []
         self._added = Wrench()
-        self._joint_angles: Dict[str, float] = {}
+        self._joint_angles: dict[str, float] = {}
         cameras = self._parameters.cameras
         self.objects = drone_objects.scene_objects(self, self.body.links, self._links, cameras)
         self.signals = Signals()
@@ -81,7 +82,7 @@ class Drone:
         self.script_parameters = self._script_parameters()
         self._commanded = [self.script_parameters[respondable(number)] for number in (1, 2, 3, 4)]
 
-    def _script_parameters(self) -> Dict[str, Dict[str, Any]]:
+    def _script_parameters(self) -> dict[str, dict[str, Any]]:
         """Return what V-REP's scripts have as simulation parameters, and the gains of control."""
         law = self._parameters.propellers
         seen = {"particlesAreVisible": True, "simulateParticles": True, "fakeShadow": True}
@@ -114,13 +115,13 @@ class Drone:
         return self.objects.matrix(self.objects.handle("Track_base"))
 
     @property
-    def particle_velocities(self) -> Tuple[float, ...]:
+    def particle_velocities(self) -> tuple[float, ...]:
         """What the script commands: m/s, propellers 1 to 4."""
         (first, second, third, fourth), key = self._commanded, _PARTICLE_VELOCITY
         return first[key], second[key], third[key], fourth[key]
 
     @property
-    def blade_angles(self) -> Dict[str, float]:
+    def blade_angles(self) -> dict[str, float]:
         """Angle (rad) of each propeller's blades, by joint of the URDF.
 
         They turn against the torque that they leave, unless the script turns them.
@@ -130,7 +131,7 @@ class Drone:
             for number, (place, _) in enumerate(PROPELLERS, start=1)
         }
 
-    def turn_joint(self, name: str, angle: Optional[float] = None) -> float:
+    def turn_joint(self, name: str, angle: float | None = None) -> float:
         """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError."""
         names = [joint(number) for number in (1, 2, 3, 4)]
         if name not in names:
@@ -189,7 +190,7 @@ class Drone:
     # ---- script
 
     def load_script(
-        self, path: str, clock: Callable[[], float], pictures: Optional[Mapping[str, Callable[[], np.ndarray]]] = None
+        self, path: str, clock: Callable[[], float], pictures: Mapping[str, Callable[[], np.ndarray]] | None = None
     ) -> None:
         """Load a child script ('' for the tutorial's) and call its init. Raises ScriptError.
 
@@ -249,7 +250,7 @@ class Drone:
         self.bus.deliver(self.script.callback)
         self.script.call("actuation")
 
-    def wrenches(self) -> Dict[int, Wrench]:
+    def wrenches(self) -> dict[int, Wrench]:
         """Emit a step's particles, use up a step of the pushes; return the step's wrench on each body, by its id."""
         wrench, self._added = self._added, Wrench()
         self._propellers.blow(self.particle_velocities, self.matrix, wrench)

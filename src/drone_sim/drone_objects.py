@@ -17,7 +17,7 @@ Cameras and vision sensors look along their z axis, with y up and x to the left,
 from __future__ import annotations
 
 import math
-from typing import Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from drone_sim import frames
 from drone_sim.frames import Matrix

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from collections import OrderedDict
-from typing import Any, Callable, Dict, Generic, Iterable, NamedTuple, Optional, Tuple, TypeVar
+from collections.abc import Callable, Iterable
+from typing import Any, Generic, NamedTuple, TypeVar
 
 T = TypeVar("T")
-Identity = Optional[Tuple[int, int, int]]  # modification time (ns), size (bytes), inode
+Identity = tuple[int, int, int] | None  # modification time (ns), size (bytes), inode
 
 
 class Reading(NamedTuple):
@@ -25,7 +26,7 @@ class FileCache(Generic[T]):
         """Take what reads a file."""
         self._read = read
         self._limit = limit
-        self._kept: OrderedDict[str, Tuple[Reading, Dict[str, Identity]]] = OrderedDict()
+        self._kept: OrderedDict[str, tuple[Reading, dict[str, Identity]]] = OrderedDict()
 
     def get(self, path: str) -> T:
         """Return what is in a file now. Raises what `read` raises."""

@@ -7,12 +7,12 @@ step handles a dozen of them and one numpy call costs more than all the arithmet
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import asin, atan2, copysign, cos, sin, sqrt
-from typing import Sequence, Tuple
 
-Vector = Tuple[float, float, float]
-Quaternion = Tuple[float, float, float, float]
-Matrix = Tuple[float, ...]
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Matrix = tuple[float, ...]
 
 IDENTITY: Matrix = (1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 

@@ -12,8 +12,8 @@ import os
 import select
 import signal
 import time
+from collections.abc import Callable
 from types import FrameType
-from typing import Callable, Optional
 
 PATIENCE = 2.5  # s, for the orderly end
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -61,7 +61,7 @@ class Guardian:
         self._handle(signal.SIG_DFL)
         self._tell(_NOTICED)
 
-    def _on_signal(self, number: int, _frame: Optional[FrameType]) -> None:
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self.asked = self.asked or number
         self._call()
 
@@ -110,7 +110,7 @@ def _be_the_guardian(read: int, write: int, process: int, name: str) -> None:
 
 def _outlasts_its_time(pipe: int) -> bool:
     """Wait for a signal's number, then for the end of the process; return whether it has not come in time."""
-    deadline: Optional[float] = None
+    deadline: float | None = None
     while True:
         left = None if deadline is None else max(0.0, deadline - time.monotonic())
         if not select.select([pipe], [], [], left)[0]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
@@ -31,7 +32,7 @@ _MOST = {
     },
 }
 _HULL = 256  # corners that a hull may have
-_Colour = Tuple[float, float, float, float]
+_Colour = tuple[float, float, float, float]
 
 
 class Part(NamedTuple):
@@ -43,9 +44,9 @@ class Part(NamedTuple):
 
     vertices: np.ndarray
     faces: np.ndarray
-    uv: Optional[np.ndarray]
+    uv: np.ndarray | None
     rgba: _Colour
-    texture: Optional[np.ndarray]
+    texture: np.ndarray | None
 
     @property
     def nbytes(self) -> int:
@@ -53,7 +54,7 @@ class Part(NamedTuple):
         return sum(one.nbytes for one in (self.vertices, self.faces, self.uv, self.texture) if one is not None)
 
 
-def read(path: str) -> Tuple[Part, ...]:
+def read(path: str) -> tuple[Part, ...]:
     """Return a mesh file's parts, placed as the file says. Raises ValueError, in one line that names the file."""
     return _CACHE.get(path)
 
@@ -102,7 +103,7 @@ class _Beside(Resolver):
     def __init__(self, folder: Path):
         """Take the mesh's folder."""
         self._folder = folder
-        self.files: List[str] = []
+        self.files: list[str] = []
         self.problem = ""
 
     def get(self, key: str) -> bytes:
@@ -130,7 +131,7 @@ class _Beside(Resolver):
         """Return the resolver of a folder below."""
         raise NotImplementedError
 
-    def keys(self) -> List[str]:
+    def keys(self) -> list[str]:
         """Return nothing: files are asked for by name."""
         return []
 
@@ -215,7 +216,7 @@ def _part(mesh: trimesh.Trimesh) -> Part:
     return Part(vertices, faces, uv, rgba, None if uv is None else texture)
 
 
-def _check(parts: Tuple[Part, ...]) -> None:
+def _check(parts: tuple[Part, ...]) -> None:
     count = sum(len(part.faces) for part in parts)
     if not count:
         raise ValueError("holds no triangles")
@@ -225,7 +226,7 @@ def _check(parts: Tuple[Part, ...]) -> None:
         raise ValueError(f"a vertex is more than {MAX_COORDINATE:g} m from the origin")
 
 
-def _material(part: Any) -> Tuple[Optional[np.ndarray], _Colour, Optional[np.ndarray]]:
+def _material(part: Any) -> tuple[np.ndarray | None, _Colour, np.ndarray | None]:
     """Vertex uv (n, 2) or None, base colour and texture of a trimesh part, as far as it has them."""
     kind = getattr(part.visual, "kind", None)
     if kind in ("vertex", "face"):
@@ -248,7 +249,7 @@ def _base_colour(material: Any) -> _Colour:
     if factor is None:
         return WHITE
     red, green, blue, alpha = _colour(factor)
-    own: Dict[str, Any] = getattr(material, "kwargs", None) or {}
+    own: dict[str, Any] = getattr(material, "kwargs", None) or {}
     opacity = own.get("d")  # MTL's dissolve; trimesh leaves it unread
     return (red, green, blue, min(1.0, max(0.0, float(opacity[0]))) if opacity else alpha)
 
@@ -260,4 +261,4 @@ def _colour(values: Any) -> _Colour:
     return (red, green, blue, alpha)
 
 
-_CACHE: FileCache[Tuple[Part, ...]] = FileCache(_read, 256 * MEBIBYTE)
+_CACHE: FileCache[tuple[Part, ...]] = FileCache(_read, 256 * MEBIBYTE)

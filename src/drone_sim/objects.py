@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from typing import Callable, Dict, Iterable, Iterator, Optional, Protocol, Sequence, Tuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Protocol
 
 from drone_sim import frames
 from drone_sim.frames import IDENTITY, Matrix, Vector
@@ -34,11 +35,11 @@ class SceneObject:
 
     def __init__(
         self,
-        names: Tuple[str, ...],
+        names: tuple[str, ...],
         alias: str,
-        parent: Optional[SceneObject],
+        parent: SceneObject | None,
         local: Matrix = IDENTITY,
-        body: Optional[Body] = None,
+        body: Body | None = None,
     ):
         """Stand at `local` in the parent's frame (the world's if None), or wherever `body` is.
 
@@ -49,8 +50,8 @@ class SceneObject:
         self.parent = parent
         self.local = local
         self.body = body
-        self._above: Optional[Matrix] = None
-        self._below: Optional[Matrix] = None
+        self._above: Matrix | None = None
+        self._below: Matrix | None = None
         self._product = IDENTITY
 
     @property
@@ -101,15 +102,15 @@ class ObjectTree:
 
     def __init__(self) -> None:
         """Start empty."""
-        self._objects: Dict[int, SceneObject] = {}
-        self._handles: Dict[str, int] = {}
+        self._objects: dict[int, SceneObject] = {}
+        self._handles: dict[str, int] = {}
 
     def add(
         self,
         name: str,
-        parent: Optional[str] = None,
+        parent: str | None = None,
         local: Matrix = IDENTITY,
-        body: Optional[Body] = None,
+        body: Body | None = None,
         *,
         alias: str = "",
         also: Sequence[str] = (),
@@ -135,14 +136,14 @@ class ObjectTree:
         """Every name that an object has."""
         return self._handles.keys()
 
-    def children(self, parent: Optional[SceneObject]) -> Iterator[Tuple[int, SceneObject]]:
+    def children(self, parent: SceneObject | None) -> Iterator[tuple[int, SceneObject]]:
         """Yield handle and object of what hangs on an object (on nothing, for None), in the order of handles."""
         return ((handle, child) for handle, child in self._objects.items() if child.parent is parent)
 
     def path(self, handle: int) -> str:
         """Return the 4.x path of an object from the root, such as /Quadcopter/propeller[0]/joint."""
         parts = []
-        here: Optional[SceneObject] = self[handle]
+        here: SceneObject | None = self[handle]
         while here is not None:
             twins = [child for _, child in self.children(here.parent) if child.alias == here.alias]
             parts.append(f"{here.alias}[{twins.index(here)}]" if len(twins) > 1 else here.alias)
@@ -157,7 +158,7 @@ class ObjectTree:
         """Tell whether an object has that name."""
         return name in self._handles
 
-    def handle_of(self, sought: Optional[SceneObject]) -> int:
+    def handle_of(self, sought: SceneObject | None) -> int:
         """Return the handle of an object, WORLD for None."""
         return WORLD if sought is None else self._handles[sought.name]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Callable
+from collections.abc import Callable
 
 _SLICE = 0.1  # s; a long sleep is cut so that a shutdown is noticed
 

@@ -4,29 +4,18 @@ from __future__ import annotations
 
 import difflib
 import itertools
-from typing import (
-    Any,
-    Dict,
-    List,
-    Literal,
-    NamedTuple,
-    Optional,
-    Sequence,
-    Tuple,
-    Type,
-    Union,
-    get_args,
-    get_origin,
-)
+from collections.abc import Sequence
+from types import UnionType
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
-from typing_extensions import Annotated
 
 from drone_sim.parameter_types import PATTERNS, Key, Location, ParameterError, readable_key
 from drone_sim.resources import shown
 from drone_sim.yaml_files import Lines
 
 MOST = 8  # problems that are told
+_UNIONS = (Union, UnionType)  # Union[A, B] and A | B
 LONG = 900  # characters after which no other is
 
 
@@ -38,10 +27,10 @@ class Problem(NamedTuple):
     is_missing: bool = False
 
 
-def problems(error: ValidationError, model: Type[BaseModel]) -> List[Problem]:
+def problems(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
     """Return what is wrong; the keys that one mapping lacks are one problem."""
-    found: Dict[Problem, None] = {}  # a list that is too short is reported once for each number that it lacks
-    missing: Dict[Location, List[_Place]] = {}
+    found: dict[Problem, None] = {}  # a list that is too short is reported once for each number that it lacks
+    missing: dict[Location, list[_Place]] = {}
     for one in error.errors():
         place = _place(model, one["loc"])
         if one["type"] == "missing" and not place.is_in_list:
@@ -51,7 +40,7 @@ def problems(error: ValidationError, model: Type[BaseModel]) -> List[Problem]:
     return [*found, *map(_missing, missing.values())]
 
 
-def told(placed: Sequence[Tuple[Optional[int], str]], file: str = "") -> str:
+def told(placed: Sequence[tuple[int | None, str]], file: str = "") -> str:
     """Return problems in one line: those with a line of a file by it, then the others."""
     inside = sorted(((line, text) for line, text in placed if line is not None), key=lambda one: one[0])
     words = [f"line {line}: {text}" for line, text in inside]
@@ -62,7 +51,7 @@ def told(placed: Sequence[Tuple[Optional[int], str]], file: str = "") -> str:
     return (f"{file}: " if file else "") + "; ".join(first) + more
 
 
-def line_of(lines: Lines, problem: Problem) -> Optional[int]:
+def line_of(lines: Lines, problem: Problem) -> int | None:
     """Return the line of a wrong key, that of the mapping for a missing one; None for what the file does not have."""
     sought = problem.location[:-1] if problem.is_missing else problem.location
     depth, line = lines.find(sought)
@@ -76,13 +65,13 @@ class _Place(NamedTuple):
     location: Location  # without pydantic's own additions
     annotation: Any  # of the value that stands there, or of the list that it stands in
     is_in_list: bool
-    known: Tuple[str, ...]  # the keys beside it
+    known: tuple[str, ...]  # the keys beside it
 
 
 def _place(model: Any, loc: Location) -> _Place:
-    location: List[Key] = []
+    location: list[Key] = []
     annotation = model
-    known: Tuple[str, ...] = ()
+    known: tuple[str, ...] = ()
     for part in loc:
         if part == "[key]":
             break
@@ -97,7 +86,7 @@ def _place(model: Any, loc: Location) -> _Place:
     return _Place(tuple(location), annotation, False, known)
 
 
-def _inside(annotation: Any, part: Key) -> Tuple[Any, Tuple[str, ...]]:
+def _inside(annotation: Any, part: Key) -> tuple[Any, tuple[str, ...]]:
     bare = _bare(annotation)
     fields = getattr(bare, "model_fields", {})
     if part in fields:
@@ -110,16 +99,16 @@ def _bare(annotation: Any) -> Any:
     """Return a type without what is annotated, and without None."""
     while True:
         arguments = [one for one in get_args(annotation) if one is not type(None)]
-        if get_origin(annotation) is Annotated or (get_origin(annotation) is Union and len(arguments) == 1):
+        if get_origin(annotation) is Annotated or (get_origin(annotation) in _UNIONS and len(arguments) == 1):
             annotation = arguments[0]
         else:
             return annotation
 
 
-def _tagged(annotation: Any) -> Dict[str, Any]:
+def _tagged(annotation: Any) -> dict[str, Any]:
     """Return the models of a union by the word that chooses one of them."""
     bare = _bare(annotation)
-    if get_origin(bare) is not Union:
+    if get_origin(bare) not in _UNIONS:
         return {}
     return {get_args(one.model_fields["shape"].annotation)[0]: one for one in get_args(bare)}
 
@@ -144,7 +133,7 @@ def _description(annotation: Any) -> str:
 # ---- what
 
 
-def _missing(places: List[_Place]) -> Problem:
+def _missing(places: list[_Place]) -> Problem:
     *above, _ = location = places[0].location
     if len(places) == 1:
         return Problem(location, f"parameter {readable_key(location)}: missing{_must(places[0], '; it must be')}", True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, Optional, Tuple, Union
+from typing import Annotated, Any
 
 from annotated_types import Ge, GroupedMetadata, Le
 from pydantic import (
@@ -18,7 +19,6 @@ from pydantic import (
     PlainSerializer,
     PlainValidator,
 )
-from typing_extensions import Annotated
 
 from drone_sim import yaml_files
 from drone_sim.resources import resolve, shown
@@ -28,8 +28,8 @@ MAX_FILE_NAME = 4096  # characters
 _EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$")
 
 
-Key = Union[int, str]
-Location = Tuple[Key, ...]  # the keys and indices on the way to a value
+Key = int | str
+Location = tuple[Key, ...]  # the keys and indices on the way to a value
 
 
 class ParameterError(ValueError):
@@ -79,7 +79,7 @@ class Within(GroupedMetadata):
         return value
 
 
-def _increasing(pair: Optional[Tuple[float, float]]) -> Optional[Tuple[float, float]]:
+def _increasing(pair: tuple[float, float] | None) -> tuple[float, float] | None:
     if pair is not None and not pair[0] < pair[1]:
         raise ValueError("must be [lowest, highest] with lowest < highest")
     return pair
@@ -101,17 +101,17 @@ Length = Annotated[Finite, Within(1e-4, 1e4)]  # m, of a thing
 Mass = Annotated[Finite, Within(1e-6, 1e6, or_zero=True)]  # kg
 Gain = Annotated[Finite, Within(0, 1e4)]
 Velocity = Annotated[Finite, Within(-1e4, 1e4)]  # m/s
-Point = Annotated[Tuple[Coordinate, Coordinate, Coordinate], Field(description="3 numbers, [x, y, z] in m")]
-Angles = Annotated[Tuple[Angle, Angle, Angle], Field(description="3 numbers, [roll, pitch, yaw] in rad")]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(description="3 numbers, [x, y, z] in m")]
+Angles = Annotated[tuple[Angle, Angle, Angle], Field(description="3 numbers, [roll, pitch, yaw] in rad")]
 Fraction = Annotated[Finite, Within(0, 1)]
 Color = Annotated[
-    Tuple[Fraction, Fraction, Fraction, Fraction],
+    tuple[Fraction, Fraction, Fraction, Fraction],
     BeforeValidator(_opaque),
     Field(description="3 or 4 numbers from 0 to 1, [red, green, blue] or [red, green, blue, opacity]"),
 ]
-MarginOrNone = Annotated[Optional[Annotated[Finite, Within(1e-3, 1)]], BeforeValidator(_none_from_word)]  # rad
+MarginOrNone = Annotated[Annotated[Finite, Within(0.001, 1)] | None, BeforeValidator(_none_from_word)]  # rad
 Limits = Annotated[
-    Optional[Tuple[Velocity, Velocity]],
+    tuple[Velocity, Velocity] | None,
     BeforeValidator(_none_from_word),
     AfterValidator(_increasing),
     Field(description="2 numbers, [lowest, highest] in m/s, or none"),
@@ -190,7 +190,7 @@ class Checked(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def read_yaml(path: Union[str, Path]) -> Dict[str, Any]:
+def read_yaml(path: str | Path) -> dict[str, Any]:
     """Return the mapping in a YAML file; raises ParameterError, in one line, where there is none."""
     try:
         values = yaml_files.read(path)

@@ -5,11 +5,11 @@ No value is defined here: config/drone.yaml holds every default, this module say
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Dict, List, Literal, Mapping, Optional, Tuple
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError
-from typing_extensions import Annotated
 
 from drone_sim import scene_parameters, yaml_files
 from drone_sim.camera_parameters import MAX_CAMERAS, CameraParameters, check_together
@@ -62,7 +62,7 @@ class DroneParameters(Checked):
     name: Name
     urdf: File
     position: Annotated[
-        Tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]], Field(description="3 numbers, [x, y, z] in m")
+        tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]], Field(description="3 numbers, [x, y, z] in m")
     ]
     yaw: Angle
 
@@ -117,13 +117,13 @@ class Parameters(Checked):
     propellers: PropellerParameters
     control: ControlParameters
     samples: Annotated[Literal[0, 2, 4, 8], BeforeValidator(numeric)]
-    cameras: Annotated[Dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
-    _given: Dict[str, Any] = PrivateAttr(default_factory=dict)  # what stands without the scene file
+    cameras: Annotated[dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
+    _given: dict[str, Any] = PrivateAttr(default_factory=dict)  # what stands without the scene file
 
-    _drone_in_scene: Tuple[str, ...] = PrivateAttr(default=())
+    _drone_in_scene: tuple[str, ...] = PrivateAttr(default=())
 
     @property
-    def drone_in_scene(self) -> Tuple[str, ...]:
+    def drone_in_scene(self) -> tuple[str, ...]:
         """The keys of `drone` that the scene file gives."""
         return self._drone_in_scene
 
@@ -139,7 +139,7 @@ class Parameters(Checked):
         """
         return _in_scene(self._given, file)
 
-    def check_scene(self, content: Dict[str, Any], file: Path) -> None:
+    def check_scene(self, content: dict[str, Any], file: Path) -> None:
         """Raise ParameterError where a scene file with this content could not be loaded."""
         _checked(self._given, str(file), scene_parameters.from_content(content, file.parent))
 
@@ -166,7 +166,7 @@ class Parameters(Checked):
         check_together(self.cameras)
 
 
-def load(overrides: Optional[Mapping[str, Any]] = None) -> Parameters:
+def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
     """Return config/drone.yaml with a file and `overrides` (nested mappings of the same shape) laid over it.
 
     The file is named by the overrides' key `config`; '' is none. The files that it names are relative to it, those
@@ -186,7 +186,7 @@ def load(overrides: Optional[Mapping[str, Any]] = None) -> Parameters:
     return _in_scene(given, given["scene_file"])
 
 
-def _config(name: str) -> Dict[str, Any]:
+def _config(name: str) -> dict[str, Any]:
     """Return what a file says. Raises ParameterError."""
     try:
         path = resolve(name)
@@ -202,13 +202,13 @@ def _config(name: str) -> Dict[str, Any]:
     return values
 
 
-def _in_scene(given: Dict[str, Any], file: Any) -> Parameters:
+def _in_scene(given: dict[str, Any], file: Any) -> Parameters:
     if not (isinstance(file, str) and file):
         return _checked(given, file, {})
     return _checked(given, file, scene_parameters.read(file), file)
 
 
-def _checked(given: Dict[str, Any], file: Any, scene: Dict[str, Any], named: str = "") -> Parameters:
+def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str = "") -> Parameters:
     """Return the parameters with what the scene file says; `file` is its name, '' where there is none.
 
     What is wrong may stand in the file `named`, which is the scene file or one laid over config/drone.yaml.
@@ -223,7 +223,7 @@ def _checked(given: Dict[str, Any], file: Any, scene: Dict[str, Any], named: str
     return parameters
 
 
-def _told(found: List[Problem], file: str, is_scene: bool) -> str:
+def _told(found: list[Problem], file: str, is_scene: bool) -> str:
     lines = yaml_files.lines(resolve(file)) if file else yaml_files.Lines("")
     placed = []
     for problem in found:

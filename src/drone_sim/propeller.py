@@ -13,7 +13,7 @@ V-REP 3.x keeps the carry (21, 22, 21, ... particles at dt = 0.05 s), CoppeliaSi
 from __future__ import annotations
 
 import math
-from typing import Callable, Dict, List, Sequence, Tuple
+from collections.abc import Callable, Sequence
 
 from drone_sim.frames import Matrix, Quaternion, Vector, rotate
 from drone_sim.parameters import PropellerParameters
@@ -52,7 +52,7 @@ class Wrench:
         """Start with no force at all."""
         self.force: Vector = (0.0, 0.0, 0.0)
         self._torque: Vector = (0.0, 0.0, 0.0)  # what does not depend on R: the torques, and every l x a
-        self._levers: List[Tuple[float, ...]] = []  # 2 l and a, in one
+        self._levers: list[tuple[float, ...]] = []  # 2 l and a, in one
 
     def add(self, force: Vector, torque: Vector, point: Vector) -> None:
         """Add a force (N, world) at a point (m, inertial frame of the body), and a torque (N m, world)."""
@@ -102,7 +102,7 @@ class Propellers:
         self._law = ParticleLaw(parameters, time_step)
         self._time_step = time_step
         self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
-        by_axis: Dict[Vector, List[Tuple[int, float, float, float, float]]] = {}
+        by_axis: dict[Vector, list[tuple[int, float, float, float, float]]] = {}
         for number, (axis, point, rotation) in enumerate(zip(axes, points, rotations)):
             by_axis.setdefault(axis, []).append((number, *point, rotation * parameters.torque_per_velocity))
         self._by_axis = list(by_axis.items())

@@ -6,7 +6,7 @@ import os
 import reprlib
 import stat
 from pathlib import Path
-from typing import Any, Union
+from typing import Any
 
 _HERE = Path(__file__).resolve()
 MEBIBYTE = 2**20
@@ -62,7 +62,7 @@ def resolve(name: str) -> Path:
     raise FileNotFoundError(f"no such file{named}{odd}")
 
 
-def read_bytes(path: Union[str, Path], limit: int) -> bytes:
+def read_bytes(path: str | Path, limit: int) -> bytes:
     """Return what a file holds. It must be a regular one, not larger than `limit` bytes.
 
     Raises OSError and, in one line without the file's name, ValueError.

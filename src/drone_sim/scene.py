@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Dict, List, Tuple
+from typing import Any
 
 import numpy as np
 import yaml
@@ -68,7 +68,7 @@ class Scene:
             if one.name:
                 objects.add(one.name, body=body)
 
-    def visuals(self) -> Tuple[List[Visual], np.ndarray]:
+    def visuals(self) -> tuple[list[Visual], np.ndarray]:
         """Return how the objects look, floor and drone aside, and the poses world from visual, (N, 4, 4)."""
         return self._world.visuals(self._numbers), self._world.visual_poses(self._numbers)
 
@@ -79,7 +79,7 @@ class Scene:
         floor, and OSError; what was in the file is then still there.
         """
         x, y, z = frames.position(drone)
-        content: Dict[str, Any] = {
+        content: dict[str, Any] = {
             "floor": self._plain(self._parameters.floor, path.parent),
             "drone": {**self._named(path.parent), "position": [x, y, z], "yaw": frames.to_rpy(drone)[2]},
             "objects": self._objects(path.parent),
@@ -92,12 +92,12 @@ class Scene:
         path.parent.mkdir(parents=True, exist_ok=True)
         writing.write(path, text)
 
-    def _named(self, folder: Path) -> Dict[str, Any]:
+    def _named(self, folder: Path) -> dict[str, Any]:
         """Return what the last scene file said of the drone, place aside."""
         own = {key: getattr(self._all.drone, key) for key in self._all.drone_in_scene if key in ("name", "urdf")}
         return {key: _file_name(value, folder) for key, value in own.items()}
 
-    def _objects(self, folder: Path) -> List[Dict[str, Any]]:
+    def _objects(self, folder: Path) -> list[dict[str, Any]]:
         saved = []
         for one, body in zip(self._parameters.objects, self._bodies):
             values = self._plain(one, folder)
@@ -106,7 +106,7 @@ class Scene:
             saved.append(values)
         return saved
 
-    def _plain(self, values: Checked, folder: Path) -> Dict[str, Any]:
+    def _plain(self, values: Checked, folder: Path) -> dict[str, Any]:
         """Return them as YAML has them, their files named as a scene file in `folder` can name them."""
         plain = values.model_dump(mode="json", exclude_defaults=True)
         for key in ("file", "texture"):

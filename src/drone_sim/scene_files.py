@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Iterator, Sequence, Tuple
+from collections.abc import Iterator, Sequence
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -45,7 +45,7 @@ def _check_meshes(scene: SceneParameters) -> None:
             raise ValueError(f"mesh {path}: reaches {reach:g} m from its origin; at most {MAX_REACH:g} m are allowed")
 
 
-def _meshes(scene: SceneParameters) -> Iterator[Tuple[str, Sequence[float]]]:
+def _meshes(scene: SceneParameters) -> Iterator[tuple[str, Sequence[float]]]:
     """Yield path and scale of each mesh that stands in the scene."""
     for one in scene.objects:
         if isinstance(one, MeshParameters):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Dict, List, Literal, Mapping, Optional, Tuple, Union
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
-from typing_extensions import Annotated
 
 from drone_sim.parameter_errors import Problem
 from drone_sim.parameter_types import (
@@ -56,21 +56,21 @@ class BoxParameters(_ObjectParameters):
     """A box; `size` is its full length, width and height."""
 
     shape: Literal["box"]
-    size: Annotated[Tuple[Length, Length, Length], Field(description="3 numbers, [length, width, height] in m")]
+    size: Annotated[tuple[Length, Length, Length], Field(description="3 numbers, [length, width, height] in m")]
 
 
 class CylinderParameters(_ObjectParameters):
     """A cylinder along its z axis; `size` is radius and length."""
 
     shape: Literal["cylinder"]
-    size: Annotated[Tuple[Length, Length], Field(description="2 numbers, [radius, length] in m")]
+    size: Annotated[tuple[Length, Length], Field(description="2 numbers, [radius, length] in m")]
 
 
 class SphereParameters(_ObjectParameters):
     """A sphere; `size` is its radius."""
 
     shape: Literal["sphere"]
-    size: Annotated[Tuple[Length], Field(description="a list of 1 number, [radius] in m")]
+    size: Annotated[tuple[Length], Field(description="a list of 1 number, [radius] in m")]
 
 
 class MeshParameters(_ObjectParameters):
@@ -78,7 +78,7 @@ class MeshParameters(_ObjectParameters):
 
     shape: Literal["mesh"]
     file: File
-    size: Annotated[Tuple[_Scale, _Scale, _Scale], Field(description="3 numbers, its scale along [x, y, z]")] = (
+    size: Annotated[tuple[_Scale, _Scale, _Scale], Field(description="3 numbers, its scale along [x, y, z]")] = (
         1,
         1,
         1,
@@ -91,11 +91,11 @@ class UrdfParameters(_ObjectParameters):
 
     shape: Literal["urdf"]
     file: File
-    size: Tuple[()] = ()
+    size: tuple[()] = ()
 
 
 ObjectParameters = Annotated[
-    Union[BoxParameters, CylinderParameters, SphereParameters, MeshParameters, UrdfParameters],
+    BoxParameters | CylinderParameters | SphereParameters | MeshParameters | UrdfParameters,
     Field(discriminator="shape"),
 ]
 
@@ -104,7 +104,7 @@ class SceneParameters(Checked):
     """The world without the drone."""
 
     floor: FloorParameters
-    objects: Annotated[List[ObjectParameters], Field(max_length=MAX_OBJECTS)]
+    objects: Annotated[list[ObjectParameters], Field(max_length=MAX_OBJECTS)]
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several objects at once."""
@@ -116,7 +116,7 @@ class SceneParameters(Checked):
             names.add(one.name)
 
 
-def read(file: str) -> Dict[str, Any]:
+def read(file: str) -> dict[str, Any]:
     """Return a scene file's floor, objects and drone as they stand among the parameters.
 
     Its own files (mesh, urdf, texture) are relative to it. Raises ParameterError.
@@ -128,7 +128,7 @@ def read(file: str) -> Dict[str, Any]:
     return from_content(read_yaml(path), path.parent)
 
 
-def from_content(content: Dict[str, Any], folder: Path) -> Dict[str, Any]:
+def from_content(content: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return what `read` does, of a scene file's content."""
     scene = {key: value for key, value in content.items() if key != "drone"}  # unknown keys are refused with the rest
     found = {"scene": scene, "drone": content.get("drone", {})}
@@ -144,7 +144,7 @@ def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
         _find_beside(folder, place)
 
 
-def problem_in_file(problem: Problem) -> Optional[Problem]:
+def problem_in_file(problem: Problem) -> Problem | None:
     """Return a problem as the scene file has it, where floor and objects stand beside the drone; None for any other."""
     if problem.location[:1] == ("drone",):
         return problem
@@ -156,7 +156,7 @@ def problem_in_file(problem: Problem) -> Optional[Problem]:
     return problem._replace(location=location, text=text)
 
 
-def _listed(objects: Any) -> List[Any]:
+def _listed(objects: Any) -> list[Any]:
     return objects if isinstance(objects, list) else []  # what is no list is refused with the other values
 
 

@@ -10,8 +10,9 @@ For example:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Callable, Dict, NamedTuple, Optional
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,8 +59,8 @@ class Simulation:
         *,
         script: str = "",
         gui: bool = False,
-        backend: Optional[Backend] = None,
-        drawings: Optional[Drawings] = None,
+        backend: Backend | None = None,
+        drawings: Drawings | None = None,
         started: bool = True,
     ):
         """Build the scene and, if `started`, run the init of the child script ('' is the tutorial's).
@@ -80,7 +81,7 @@ class Simulation:
         self._take(_Built(parameters, World(parameters.sub_step, parameters.gravity, gui)))
         try:
             self.vision = Vision(self.world, parameters.samples)
-            self.cameras: Dict[str, Camera] = {name: self._camera(one) for name, one in parameters.cameras.items()}
+            self.cameras: dict[str, Camera] = {name: self._camera(one) for name, one in parameters.cameras.items()}
             if started:
                 self._run()
         except BaseException:
@@ -130,7 +131,7 @@ class Simulation:
 
     # ---- start and stop
 
-    def start(self, scene_file: Optional[str] = None) -> None:
+    def start(self, scene_file: str | None = None) -> None:
         """Read scene and script from disk, and run the script's init; another scene file may take the last one's place.
 
         Where scene or drone cannot be read, the last ones stay, stopped. Raises ParameterError, UrdfError,

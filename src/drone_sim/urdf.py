@@ -10,8 +10,9 @@ merged here, by the parallel axis theorem:
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import NamedTuple
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -40,8 +41,8 @@ class RigidBody:
     mass: float
     centre_of_mass: np.ndarray  # (3,)
     inertia: np.ndarray  # (3, 3), about the centre of mass, root link's axes
-    links: Dict[str, Matrix]  # root from link, joints at zero
-    blades: Tuple[Blades, ...]
+    links: dict[str, Matrix]  # root from link, joints at zero
+    blades: tuple[Blades, ...]
     xml: str  # the same body as a URDF of one link
 
 
@@ -81,7 +82,7 @@ def _merge(robot: Xml.Element) -> RigidBody:
     )
 
 
-def _pose(link: str, joints: Dict[str, Xml.Element]) -> Matrix:
+def _pose(link: str, joints: dict[str, Xml.Element]) -> Matrix:
     pose = IDENTITY
     while link in joints:
         joint = joints[link]
@@ -95,11 +96,11 @@ def _end(joint: Xml.Element, end: str) -> str:
     return "" if element is None else element.attrib["link"]
 
 
-def _numbers(text: str) -> Tuple[float, ...]:
+def _numbers(text: str) -> tuple[float, ...]:
     return tuple(map(float, text.split()))
 
 
-def _origin(element: Optional[Xml.Element]) -> Matrix:
+def _origin(element: Xml.Element | None) -> Matrix:
     origin = None if element is None else element.find("origin")
     if origin is None:
         return IDENTITY
@@ -125,8 +126,8 @@ def _steiner(d: np.ndarray) -> np.ndarray:
 
 
 def _blades(
-    visuals: Sequence[Tuple[str, Xml.Element]], joints: Dict[str, Xml.Element], poses: Dict[str, Matrix]
-) -> List[Blades]:
+    visuals: Sequence[tuple[str, Xml.Element]], joints: dict[str, Xml.Element], poses: dict[str, Matrix]
+) -> list[Blades]:
     return [
         Blades(index, joints[link].attrib["name"], poses[link], _origin(visual))
         for index, (link, visual) in enumerate(visuals)
@@ -137,8 +138,8 @@ def _blades(
 def _one_link(
     robot: Xml.Element,
     root: str,
-    poses: Dict[str, Matrix],
-    inertial: Tuple[float, np.ndarray, np.ndarray],
+    poses: dict[str, Matrix],
+    inertial: tuple[float, np.ndarray, np.ndarray],
 ) -> str:
     merged = Xml.Element("robot", name=robot.get("name", "drone"))
     link = Xml.SubElement(merged, "link", name=root)

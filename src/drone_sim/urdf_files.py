@@ -6,8 +6,9 @@ PyBullet trusts its input: two roots, an empty name or a circle of joints crash 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence
+from typing import NamedTuple
 from xml.etree import ElementTree as Xml
 
 from drone_sim.mesh_files import KINDS
@@ -46,7 +47,7 @@ class _Numbers(NamedTuple):
 
 
 _Attributes = Mapping[str, _Numbers]
-_Colors = Mapping[Optional[str], Optional[Xml.Element]]
+_Colors = Mapping[str | None, Xml.Element | None]
 _LENGTH = _Numbers(1, 1e-6, 1e4)
 _MOMENT = _Numbers(1, 1e-12, 1e9, or_zero=True, default="0")
 _PRODUCT = _Numbers(1, -1e9, 1e9, default="0")
@@ -55,7 +56,7 @@ _INERTIA: _Attributes = {
     **{name: _MOMENT for name in ("ixx", "iyy", "izz")},
     **{name: _PRODUCT for name in ("ixy", "ixz", "iyz")},
 }
-_SHAPES: Dict[str, _Attributes] = {
+_SHAPES: dict[str, _Attributes] = {
     "box": {"size": _LENGTH._replace(many=3)},
     "cylinder": {"radius": _LENGTH, "length": _LENGTH},
     "capsule": {"radius": _LENGTH, "length": _LENGTH},
@@ -63,7 +64,7 @@ _SHAPES: Dict[str, _Attributes] = {
     "plane": {"normal": _Numbers(3, -1, 1)},
     "mesh": {"scale": _Numbers(3, -1e6, 1e6, default="1 1 1")},
 }
-_JOINT: Dict[str, _Attributes] = {
+_JOINT: dict[str, _Attributes] = {
     "axis": {"xyz": _Numbers(3, -1e4, 1e4, default="1 0 0")},
     "dynamics": {name: _Numbers(1, 0, 1e6, default="0") for name in ("damping", "friction")},
     "limit": {
@@ -71,14 +72,14 @@ _JOINT: Dict[str, _Attributes] = {
         **{name: _Numbers(1, 0, 1e6, default="0") for name in ("effort", "velocity")},
     },
 }
-_CONTACT: Dict[str, _Attributes] = {
+_CONTACT: dict[str, _Attributes] = {
     name: {"value": _Numbers(1, 0, 1e6)}
     for name in ("lateral_friction", "rolling_friction", "spinning_friction", "restitution", "stiffness", "damping")
 }
 
 
 class _Builder(Xml.TreeBuilder):
-    def doctype(self, *_: Optional[str]) -> None:
+    def doctype(self, *_: str | None) -> None:
         """Refuse it, for it may name entities that grow without end."""
         raise ValueError("must have no DOCTYPE")
 
@@ -134,7 +135,7 @@ def _check_tree(links: Sequence[Xml.Element], joints: Sequence[Xml.Element], kin
     _names(joints)
     if not names:
         raise ValueError("must have at least one link")
-    parents: Dict[str, str] = {}
+    parents: dict[str, str] = {}
     for joint in joints:
         kind = joint.get("type")
         if kind not in kinds:
@@ -158,8 +159,8 @@ def _check_way_to_the_root(name: str, parents: Mapping[str, str]) -> None:
             raise ValueError(f"link {name}: its joints form a circle")
 
 
-def _names(elements: Sequence[Xml.Element]) -> List[str]:
-    names: Dict[str, None] = {}
+def _names(elements: Sequence[Xml.Element]) -> list[str]:
+    names: dict[str, None] = {}
     for element in elements:
         name = element.get("name", "")
         if not name or len(name) > MAX_NAME or not name.isprintable():
@@ -183,7 +184,7 @@ def _end(joint: Xml.Element, end: str, links: Sequence[str]) -> str:
 # ---- elements
 
 
-def _add(element: Optional[Xml.Element], attributes: _Attributes, parent: Xml.Element, tag: str) -> None:
+def _add(element: Xml.Element | None, attributes: _Attributes, parent: Xml.Element, tag: str) -> None:
     """Add a copy of an element with these attributes alone."""
     if element is None:
         return
@@ -229,7 +230,7 @@ def _add_link(link: Xml.Element, robot: Xml.Element, folder: Path, colors: _Colo
                 _within(kind, _add_material, material, copied[-1], colors)
 
 
-def _check_mass(element: Optional[Xml.Element]) -> float:
+def _check_mass(element: Xml.Element | None) -> float:
     mass = 0.0 if element is None else float(_Numbers(1, -math.inf, math.inf).check(element.get("value", "")))
     if mass < 0:
         raise ValueError(f"mass {mass} kg: must not be negative")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Hashable, Tuple
 
 GROUND = (0.47, 0.50, 0.44)  # colour of the bare ground around the floor
 SHAPES = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
@@ -27,8 +27,8 @@ class Visual:
 
     key: Hashable
     shape: str
-    size: Tuple[float, ...]
-    rgba: Tuple[float, float, float, float]
+    size: tuple[float, ...]
+    rgba: tuple[float, float, float, float]
     file: str = ""
     texture: str = ""
     edition: Hashable = None

@@ -6,12 +6,13 @@ import contextlib
 import os
 import secrets
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, Any, Iterator, Union
+from typing import IO, Any
 
 
 @contextlib.contextmanager
-def replacing(path: Union[str, Path], binary: bool = False) -> Iterator[IO[Any]]:
+def replacing(path: str | Path, binary: bool = False) -> Iterator[IO[Any]]:
     """Give a file to write, which takes the place of `path` at the end; on an OSError the old one stays.
 
     It is a temporary file in the same folder until then. Another exception (a flight that fails) keeps what was
@@ -44,13 +45,13 @@ def replacing(path: Union[str, Path], binary: bool = False) -> Iterator[IO[Any]]
             raise
 
 
-def write(path: Union[str, Path], content: str) -> None:
+def write(path: str | Path, content: str) -> None:
     """Write a text file whole or not at all. Raises OSError, in one line that names the file."""
     with replacing(path) as file:
         file.write(content)
 
 
-def check(path: Union[str, Path]) -> None:
+def check(path: str | Path) -> None:
     """Raise OSError, in one line, where `path` cannot become a file."""
     with _named(path):
         if os.path.isdir(path):
@@ -62,7 +63,7 @@ def check(path: Union[str, Path]) -> None:
             raise PermissionError(0, "must not be written to")
 
 
-def _is_special(path: Union[str, Path]) -> bool:
+def _is_special(path: str | Path) -> bool:
     # /dev/stdout may lead to a regular file, to which somebody else writes, too.
     named = os.path.abspath(path).startswith(("/dev/", "/proc/"))
     return named or (os.path.exists(path) and not os.path.isfile(path))
@@ -82,7 +83,7 @@ def _finish(file: IO[Any], temporary: str, target: str) -> None:
 
 
 @contextlib.contextmanager
-def _named(path: Union[str, Path]) -> Iterator[None]:
+def _named(path: str | Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:

@@ -7,8 +7,9 @@ those of YAML 1.2: `1e3` is one, `1:30` is none (YAML 1.1 takes it for 90), `010
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Dict, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, ClassVar, NamedTuple
 
 import yaml
 
@@ -29,7 +30,7 @@ class YamlError(ValueError):
     """A YAML text is refused; one line that says where and why."""
 
 
-def read(path: Union[str, Path]) -> Any:
+def read(path: str | Path) -> Any:
     """Return what a YAML file holds; raises YamlError, which names the file."""
     try:
         content = read_bytes(path, MAX_SIZE)
@@ -86,7 +87,7 @@ class Lines:
         except (yaml.YAMLError, RecursionError):
             self._root = None
 
-    def find(self, location: Sequence[Union[int, str]]) -> Found:
+    def find(self, location: Sequence[int | str]) -> Found:
         """Return how many of these keys and indices lead to a value, and the line of the last that does."""
         node, line = self._root, 1
         for depth, part in enumerate(location):
@@ -97,7 +98,7 @@ class Lines:
         return Found(len(location), line)
 
 
-def lines(path: Union[str, Path]) -> Lines:
+def lines(path: str | Path) -> Lines:
     """Return where the values of a YAML file stand, as far as it can be read."""
     try:
         return Lines(read_bytes(path, MAX_SIZE).decode("utf-8-sig"))
@@ -105,7 +106,7 @@ def lines(path: Union[str, Path]) -> Lines:
         return Lines("")
 
 
-def _inner(node: Any, part: Union[int, str]) -> Optional[Tuple[Any, int]]:
+def _inner(node: Any, part: int | str) -> tuple[Any, int] | None:
     """Return the node of a key or index, and its line."""
     if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
         return node.value[part], node.value[part].start_mark.line + 1
@@ -206,7 +207,7 @@ class _Size(NamedTuple):
     depth: int
 
 
-def _measure(node: Any, known: Dict[int, _Size], depth: int) -> _Size:
+def _measure(node: Any, known: dict[int, _Size], depth: int) -> _Size:
     """Return how much a node stands for once its aliases are followed; raises where that is too much."""
     size = known.get(id(node))
     if size is None:

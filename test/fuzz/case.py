@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, NamedTuple
+from typing import Any, NamedTuple
 
 
 class Case(NamedTuple):
     """Files, by name, and what to do with them; `data` is of plain Python types, and its meaning is the kind's."""
 
     kind: str
-    files: Dict[str, bytes]
+    files: dict[str, bytes]
     data: Any = None
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Dict, List, Tuple
+from collections.abc import Callable
+from typing import Any
 
 import rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, WrenchStamped
@@ -13,7 +14,7 @@ from drone_sim.ros.inputs import DroneInput
 from drone_sim.ros.markers import Handles
 from drone_sim.simulation import Simulation
 
-_CALLBACKS: Dict[str, Callable[[Any], None]] = {}
+_CALLBACKS: dict[str, Callable[[Any], None]] = {}
 _KINDS = {
     "cmd_vel": Twist,
     "set_pose": PoseStamped,
@@ -39,7 +40,7 @@ rospy.Subscriber = rospy.Publisher = rospy.Timer = _Deaf
 rospy.rostime.set_rostime_initialized(True)
 
 
-def send(simulation: Simulation, messages: List[Tuple[str, Dict[str, Any]]]) -> None:
+def send(simulation: Simulation, messages: list[tuple[str, dict[str, Any]]]) -> None:
     """Call what the node has subscribed, and do what that left to be done."""
     inbox = Inbox()
     Handles(simulation, DroneInput(simulation, inbox), inbox)
@@ -50,7 +51,7 @@ def send(simulation: Simulation, messages: List[Tuple[str, Dict[str, Any]]]) -> 
     inbox.empty()
 
 
-def _fill(message: Any, fields: Dict[str, Any]) -> None:
+def _fill(message: Any, fields: dict[str, Any]) -> None:
     if "frame" in fields:
         message.header.frame_id = fields["frame"]
     if "event" in fields:

@@ -9,7 +9,7 @@ import tempfile
 import time
 from multiprocessing import Pipe
 from pathlib import Path
-from typing import Any, Optional
+from typing import Any
 
 from case import Answer, Case
 
@@ -26,7 +26,7 @@ class Trier:
 
     def __init__(self) -> None:
         """Begin without a worker: the first case starts it."""
-        self._process: Optional[subprocess.Popen[bytes]] = None
+        self._process: subprocess.Popen[bytes] | None = None
         self._connection: Any = None
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as this
         self._resident = self._last = 0

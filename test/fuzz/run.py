@@ -21,7 +21,7 @@ import warnings
 import zlib
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any, Dict, List, NamedTuple
+from typing import Any, NamedTuple
 
 import hypothesis
 from case import Case
@@ -48,7 +48,7 @@ class Result(NamedTuple):
     kind: str
     taken: int
     refused: int
-    found: Dict[str, Found]
+    found: dict[str, Found]
     slowest: float
 
 
@@ -69,10 +69,10 @@ class _Kind:
         self.trier = trier
         self.taken = self.refused = 0
         self.slowest = 0.0
-        self.found: Dict[str, Found] = {}
+        self.found: dict[str, Found] = {}
         self._new = ""  # the fault that is being made smaller
         self._until = 0.0
-        self._known: Dict[bytes, str] = {}  # hypothesis asks again for what it tried
+        self._known: dict[bytes, str] = {}  # hypothesis asks again for what it tried
 
     def run(self, count: int, seed: int) -> Result:
         """Try `count` cases; the seed and the kind's name say which."""
@@ -154,7 +154,7 @@ def _run_alone(name: str, count: int, seed: int) -> Result:
         trier.close()
 
 
-def keep(result: Result, out: Path, seed: int) -> List[str]:
+def keep(result: Result, out: Path, seed: int) -> list[str]:
     """Write each fault's case into a folder; return a line on each."""
     lines = []
     for name, found in sorted(result.found.items(), key=lambda item: -item[1].count):
@@ -171,7 +171,7 @@ def keep(result: Result, out: Path, seed: int) -> List[str]:
     return lines
 
 
-def _again(folders: List[str]) -> int:
+def _again(folders: list[str]) -> int:
     """Try what earlier runs have found."""
     trier, status = Trier(), 0
     for folder in folders:
@@ -205,7 +205,7 @@ def main() -> int:
     began, lines = time.monotonic(), []
     count = -(-options.cases // len(options.kinds))
     with ProcessPoolExecutor(options.jobs) as executor:
-        futures: List[Any] = [executor.submit(_run_alone, kind, count, options.seed) for kind in options.kinds]
+        futures: list[Any] = [executor.submit(_run_alone, kind, count, options.seed) for kind in options.kinds]
         for future in futures:
             one: Result = future.result()
             faults = sum(found.count for found in one.found.values())

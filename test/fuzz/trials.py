@@ -9,8 +9,9 @@ import contextlib
 import io
 import logging
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Callable, Dict, List
+from typing import Any
 
 from case import Case
 
@@ -31,7 +32,7 @@ _SCRIPT_LIMIT = 0.2  # s
 _SMALL = {"width": 32, "height": 24}  # px: what a picture shows does not matter here
 
 
-_RENDERERS: Dict[int, Renderer] = {}
+_RENDERERS: dict[int, Renderer] = {}
 
 
 def _renderer(samples: int = 0) -> Renderer:
@@ -91,7 +92,7 @@ def _fly_a_little(simulation: Simulation, steps: int = 3) -> None:
         raise Fault(f"the drone is at {state.position}")
 
 
-def _simulate(given: Dict[str, Any], folder: Path) -> None:
+def _simulate(given: dict[str, Any], folder: Path) -> None:
     simulation = Simulation(parameters.load(given))
     try:
         _fly_a_little(simulation)
@@ -115,8 +116,8 @@ def _parameters(case: Case, folder: Path) -> None:
     _simulate(_with_small_pictures(case.data), folder)
 
 
-def _with_small_pictures(given: Dict[str, Any]) -> Dict[str, Any]:
-    small: Dict[str, Any] = {"cameras": {name: dict(_SMALL) for name in ("front", "depth", "track", "floor")}}
+def _with_small_pictures(given: dict[str, Any]) -> dict[str, Any]:
+    small: dict[str, Any] = {"cameras": {name: dict(_SMALL) for name in ("front", "depth", "track", "floor")}}
     return dict(parameters._merge(small, given))
 
 
@@ -126,7 +127,7 @@ def _scene(case: Case, folder: Path) -> None:
 
 def _mesh(case: Case, folder: Path) -> None:
     (name,) = set(case.files) - {"one.mtl", "one.png"}
-    one: Dict[str, Any] = {
+    one: dict[str, Any] = {
         "shape": "mesh",
         "file": str(folder / name),
         "position": [2, 0, 1],
@@ -144,7 +145,7 @@ def _mesh(case: Case, folder: Path) -> None:
 
 def _urdf(case: Case, folder: Path) -> None:
     file = str(folder / "robot.urdf")
-    given: Dict[str, Any] = {"drone": {"urdf": file}}
+    given: dict[str, Any] = {"drone": {"urdf": file}}
     if case.data != "drone":
         mass = 1.0 if case.data == "heavy object" else 0.0
         given = {"scene": {"objects": [{"shape": "urdf", "file": file, "position": [2, 0, 1], "mass": mass}]}}
@@ -161,7 +162,7 @@ def _script(case: Case, folder: Path) -> str:
         parameters.load({"script_time_limit": _SCRIPT_LIMIT, "cameras": {"front": dict(_SMALL)}}), started=False
     )
     simulation.script = str(folder / name)
-    said: List[str] = []
+    said: list[str] = []
 
     def attempt(action: Callable[[], None]) -> None:
         try:
@@ -193,7 +194,7 @@ def _fly(case: Case, folder: Path) -> str:
     return _status(["--commands", str(folder / "flight.yaml"), *case.data], folder)
 
 
-def _status(arguments: List[str], folder: Path) -> str:
+def _status(arguments: list[str], folder: Path) -> str:
     errors = io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()):
         try:
@@ -231,13 +232,13 @@ def _messages(case: Case, folder: Path) -> str:
 class _Log(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
-        self.lines: List[str] = []
+        self.lines: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
         self.lines.append(record.getMessage())
 
 
-_TRIALS: Dict[str, Callable[[Case, Path], Any]] = {
+_TRIALS: dict[str, Callable[[Case, Path], Any]] = {
     "parameters": _parameters,
     "assignments": _assignments,
     "scene": _scene,

@@ -17,7 +17,7 @@ import time
 import traceback
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, List
+from typing import Any
 
 from case import Answer
 
@@ -35,7 +35,7 @@ def _where(error: BaseException) -> str:
     return f"{Path(last.filename).name}:{last.name}" if last else "?"
 
 
-def _try(case: Any, background: List[str]) -> Answer:
+def _try(case: Any, background: list[str]) -> Answer:
     from trials import Fault, run
 
     folder = Path(tempfile.mkdtemp(prefix="fuzz"))
@@ -77,7 +77,7 @@ def main() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     faulthandler.enable()
-    background: List[str] = []
+    background: list[str] = []
     threading.excepthook = lambda hook: background.append(f"{hook.exc_type.__name__}: {_said(hook.exc_value)}")
     connection = Connection(int(sys.argv[1]))
     while True:

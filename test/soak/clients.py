@@ -12,8 +12,9 @@ import random
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Tuple
+from typing import Any
 
 import rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, WrenchStamped
@@ -25,7 +26,7 @@ from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerU
 HUNG = 10.0  # s that a service may take
 PACKAGE = Path(__file__).resolve().parents[2]
 
-SCRIPTS: Dict[str, str] = {
+SCRIPTS: dict[str, str] = {
     "broken.py": "def sysCall_init(:\n",
     "broken.lua": "function sysCall_init(\n",
     "raises.py": "def sysCall_actuation():\n    1 / 0\n",
@@ -49,7 +50,7 @@ GOOD_SCRIPTS = (
     *sorted((PACKAGE / "src" / "drone_sim" / "child_scripts").glob("t*.py")),
     *sorted((PACKAGE / "test" / "unit" / "scripts").glob("*.lua")),
 )
-SCENES: Dict[str, str] = {
+SCENES: dict[str, str] = {
     "bad_key.yaml": "object: []\n",
     "bad_yaml.yaml": "objects: [{\n",
     "bad_size.yaml": "objects: [{shape: box, size: [1, -1, 1], position: [0, 0, 1]}]\n",
@@ -75,9 +76,9 @@ class Diary:
         self._file.write(json.dumps([what, round(seconds, 3), well, said]) + "\n")
 
 
-def within(seconds: float, action: Callable[[], Any]) -> Tuple[bool, Any]:
+def within(seconds: float, action: Callable[[], Any]) -> tuple[bool, Any]:
     """Return whether the action came to its end in that time, and its result or what it raised."""
-    result: List[Any] = []
+    result: list[Any] = []
 
     def run() -> None:
         try:
@@ -147,7 +148,7 @@ def _scene(dice: random.Random, folder: Path, saving: bool) -> str:
 
 def send_commands(dice: random.Random, _folder: Path, _diary: Diary) -> None:
     """Publish commands, good ones and nonsense, far more often than there are steps."""
-    kinds: Dict[str, Any] = {"cmd_vel": Twist, "set_pose": PoseStamped, "target_pose": PoseStamped}
+    kinds: dict[str, Any] = {"cmd_vel": Twist, "set_pose": PoseStamped, "target_pose": PoseStamped}
     kinds.update({"initialpose": PoseWithCovarianceStamped, "push": WrenchStamped})
     kinds["markers/feedback"] = InteractiveMarkerFeedback
     publishers = {topic: rospy.Publisher(f"/drone/{topic}", kind, queue_size=10) for topic, kind in kinds.items()}
@@ -186,7 +187,7 @@ def _fill(message: Any, dice: random.Random) -> None:
     pose.orientation.w = 1.0
 
 
-TOPICS: Tuple[Tuple[str, Any], ...] = (
+TOPICS: tuple[tuple[str, Any], ...] = (
     ("front", Image),
     ("front/compressed", CompressedImage),
     ("camera_info", CameraInfo),
@@ -202,7 +203,7 @@ TOPICS: Tuple[Tuple[str, Any], ...] = (
 
 def look(dice: random.Random, _folder: Path, _diary: Diary) -> None:
     """Subscribe and unsubscribe."""
-    subscribers: Dict[str, rospy.Subscriber] = {}
+    subscribers: dict[str, rospy.Subscriber] = {}
     while True:
         topic, kind = dice.choice(TOPICS)
         if topic in subscribers:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from typing import Any, Dict, List, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class Sample(NamedTuple):
     descriptors: int
 
 
-def slope(samples: List[Sample]) -> float:
+def slope(samples: list[Sample]) -> float:
     """Return by how many MB a minute the memory grew: the median of the slopes between any two (Theil and Sen)."""
     at, memory = np.array([[s.at, s.memory] for s in samples]).T
     first, second = np.triu_indices(len(at), 1)
@@ -33,13 +33,13 @@ def slope(samples: List[Sample]) -> float:
     return float(np.median(slopes) * 60.0) if len(slopes) else 0.0
 
 
-def settled(samples: List[Sample]) -> List[Sample]:
+def settled(samples: list[Sample]) -> list[Sample]:
     """Return the samples after the warm-up: a third of the run, at most two minutes."""
     warm = samples[0].at + min(120.0, (samples[-1].at - samples[0].at) / 3)
     return [sample for sample in samples if sample.at >= warm]
 
 
-def growth(samples: List[Sample]) -> List[str]:
+def growth(samples: list[Sample]) -> list[str]:
     """Name what grew after the warm-up, if that was long enough ago."""
     rest = settled(samples)
     if rest[-1].at - rest[0].at < JUDGED:
@@ -57,7 +57,7 @@ def growth(samples: List[Sample]) -> List[str]:
     return found
 
 
-def late_steps(lines: List[str]) -> int:
+def late_steps(lines: list[str]) -> int:
     """Return how many late steps the node has counted."""
     counts = [
         int(n) for line in lines for n in re.findall(r"\((\d+) so far\)|(\d+) late steps", line)[0:1] for n in n if n
@@ -65,9 +65,9 @@ def late_steps(lines: List[str]) -> int:
     return max(counts, default=0)
 
 
-def answers(diary: List[Any]) -> Dict[str, Counter]:
+def answers(diary: list[Any]) -> dict[str, Counter]:
     """Count what the services said, with numbers and names left out."""
-    said: Dict[str, Counter] = {}
+    said: dict[str, Counter] = {}
     for what, _, well, text in diary:
         if what != "odom":
             key = "well" if well else _TIDY.sub("_", text)[:110]
@@ -75,7 +75,7 @@ def answers(diary: List[Any]) -> Dict[str, Counter]:
     return said
 
 
-def faults(lines: List[str], diary: List[Any], samples: List[Sample]) -> List[str]:
+def faults(lines: list[str], diary: list[Any], samples: list[Sample]) -> list[str]:
     """Name what went wrong."""
     found = [
         f"{what}: {text} after {seconds:.1f} s"
@@ -86,7 +86,7 @@ def faults(lines: List[str], diary: List[Any], samples: List[Sample]) -> List[st
     return [*found[:10], *growth(samples)]
 
 
-def report(samples: List[Sample], lines: List[str], diary: List[Any], began: float) -> str:
+def report(samples: list[Sample], lines: list[str], diary: list[Any], began: float) -> str:
     """Return the line of now."""
     now, calls = samples[-1], [entry for entry in diary if entry[0] != "odom"]
     odometry = [int(text) for what, _, well, text in diary if what == "odom" and well][-10:]

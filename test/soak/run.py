@@ -22,8 +22,9 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Iterator, List, Optional
+from typing import Any
 from xmlrpc.client import ServerProxy
 
 import clients
@@ -38,7 +39,7 @@ ENDS = 5.0  # s that the node may take to end: 3, and what roslaunch takes to te
 class Launch:
     """roslaunch with a master of its own, and what it prints."""
 
-    def __init__(self, folder: Path, arguments: List[str]):
+    def __init__(self, folder: Path, arguments: list[str]):
         """Launch; `folder` is the home of all that the node writes."""
         with socket.socket() as probe:
             probe.bind(("localhost", 0))
@@ -46,7 +47,7 @@ class Launch:
         os.environ.update(ROS_MASTER_URI=f"http://localhost:{port}", HOME=str(folder), ROS_HOME=str(folder / "ros"))
         os.environ.update(PYTHONUNBUFFERED="1")
         command = ["roslaunch", "-p", str(port), "drone_sim", "drone.launch", "rviz:=false", *arguments]
-        self.lines: List[str] = []
+        self.lines: list[str] = []
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -74,7 +75,7 @@ class Launch:
             return "State:\tZ" not in status.read_text()
         return False
 
-    def sample(self) -> Optional[Sample]:
+    def sample(self) -> Sample | None:
         """Look at the node's process; None where there is none."""
         folder = Path(f"/proc/{self.pid}")
         try:
@@ -148,7 +149,7 @@ class Crowd:
             self._stopped = not self._stopped
             self._sleeper.send_signal(signal.SIGSTOP if self._stopped else signal.SIGCONT)
 
-    def dead(self) -> List[str]:
+    def dead(self) -> list[str]:
         """Name the clients that ended by themselves, which is the harness's own fault."""
         return [f"{one.args}" for one in self._processes if one.poll() is not None]
 
@@ -164,9 +165,9 @@ class Crowd:
         for one in self._processes:
             one.wait()
 
-    def diary(self) -> List[Any]:
+    def diary(self) -> list[Any]:
         """Return all that they have noted."""
-        noted: List[Any] = []
+        noted: list[Any] = []
         for path in sorted(self._folder.glob("*.jsonl")):
             for line in path.read_text(encoding="utf-8").splitlines():
                 with contextlib.suppress(ValueError):  # cut off, where the client was ended
@@ -191,10 +192,10 @@ def home(keep: bool) -> Iterator[Path]:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def soak(launch: Launch, crowd: Crowd, minutes: float) -> List[Sample]:
+def soak(launch: Launch, crowd: Crowd, minutes: float) -> list[Sample]:
     """Let the crowd at the node for so long, and say every 10 s how it is."""
     began = time.monotonic()
-    samples: List[Sample] = []
+    samples: list[Sample] = []
     due = began + EVERY
     while time.monotonic() < began + 60 * minutes:
         time.sleep(1.0)
@@ -209,7 +210,7 @@ def soak(launch: Launch, crowd: Crowd, minutes: float) -> List[Sample]:
     return samples
 
 
-def afterwards(folder: Path) -> List[str]:
+def afterwards(folder: Path) -> list[str]:
     """Start the tutorial's script in the empty scene, and see that it answers: the node must be what it was."""
     program = (
         "import rospy, sys, clients; from pathlib import Path; from nav_msgs.msg import Odometry\n"
@@ -236,7 +237,7 @@ def afterwards(folder: Path) -> List[str]:
     return [] if done.returncode == 0 else [f"it does not fly afterwards: {done.stderr[-300:]}"]
 
 
-def finish(launch: Launch, crowd: Crowd, folder: Path, samples: List[Sample]) -> List[str]:
+def finish(launch: Launch, crowd: Crowd, folder: Path, samples: list[Sample]) -> list[str]:
     """See that the node still flies, end it, say what the services answered; return what went wrong."""
     survived = launch.alive()
     found = afterwards(folder) if survived else ["the node died; it said last:", *launch.lines[-3:]]

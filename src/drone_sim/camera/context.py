@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Dict
+from typing import Any
 
 import moderngl
 
@@ -26,7 +26,7 @@ def create(device_index: int) -> moderngl.Context:
     reasons = []
     for index in range(device_index, device_index + DEVICES):
         try:
-            settings: Dict[str, Any] = {"backend": "egl", "libgl": LIBEGL, "libegl": LIBEGL, "device_index": index}
+            settings: dict[str, Any] = {"backend": "egl", "libgl": LIBEGL, "libegl": LIBEGL, "device_index": index}
             return moderngl.create_context(require=REQUIRED, standalone=True, **settings)
         except Exception as error:  # moderngl raises bare Exceptions
             reasons.append(" ".join(str(error).split()))

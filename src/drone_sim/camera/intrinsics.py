@@ -8,8 +8,8 @@ centres, as in OpenCV and image_geometry: the top left pixel's centre is (0, 0),
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Sequence, Tuple
 
 import numpy as np
 
@@ -58,16 +58,16 @@ class Intrinsics:
         return (self.height - 1) / 2.0
 
     @property
-    def K(self) -> Tuple[float, ...]:
+    def K(self) -> tuple[float, ...]:
         """Camera matrix, 3 x 3 row-major, as in sensor_msgs/CameraInfo."""
         return (self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
 
     @property
-    def P(self) -> Tuple[float, ...]:
+    def P(self) -> tuple[float, ...]:
         """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo."""
         return (self.fx, 0.0, self.cx, 0.0, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
 
-    def pixel(self, point_optical: Sequence[float]) -> Tuple[float, float]:
+    def pixel(self, point_optical: Sequence[float]) -> tuple[float, float]:
         """Pixel (u, v) of a point (x, y, z) in the optical frame, in metres; z must be positive."""
         x, y, z = point_optical
         if not z > 0.0:

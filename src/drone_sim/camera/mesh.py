@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Iterator, Optional, Tuple
 
 import numpy as np
 import trimesh
@@ -31,9 +31,9 @@ class Mesh:
     vertices: np.ndarray
     normals: np.ndarray
     faces: np.ndarray
-    uv: Optional[np.ndarray] = None
-    rgba: Tuple[float, float, float, float] = WHITE
-    texture: Optional[np.ndarray] = None
+    uv: np.ndarray | None = None
+    rgba: tuple[float, float, float, float] = WHITE
+    texture: np.ndarray | None = None
     closed: bool = False
 
     @property
@@ -44,7 +44,7 @@ class Mesh:
         )
 
 
-def load(visual: Visual) -> Tuple[Mesh, ...]:
+def load(visual: Visual) -> tuple[Mesh, ...]:
     """The visual's meshes, one per material; its own rgba is not applied.
 
     A texture shows on boxes (once per face), planes (once per metre) and meshes that bring uv coordinates;
@@ -82,7 +82,7 @@ def _triangles(mesh: trimesh.Trimesh) -> np.ndarray:
     return np.asarray(mesh.vertices, dtype=np.float64)[np.asarray(mesh.faces)]
 
 
-def _box(size: Tuple[float, ...]) -> Tuple[np.ndarray, np.ndarray]:
+def _box(size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Corners (12, 3, 3) and uv (12, 3, 2); each side shows the picture upright (z up) from outside."""
     corners = _triangles(trimesh.creation.box(extents=(1.0, 1.0, 1.0)))
     normals = _areas(corners)
@@ -95,7 +95,7 @@ def _box(size: Tuple[float, ...]) -> Tuple[np.ndarray, np.ndarray]:
     return corners * np.asarray(size), np.stack([right, up], axis=2) + 0.5
 
 
-def _plane() -> Tuple[np.ndarray, np.ndarray]:
+def _plane() -> tuple[np.ndarray, np.ndarray]:
     square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * PLANE_HALF_SIZE
     corners = square[np.array([[0, 1, 2], [0, 2, 3]])]
     return corners, corners[:, :, :2]
@@ -103,9 +103,9 @@ def _plane() -> Tuple[np.ndarray, np.ndarray]:
 
 def _assemble(
     corners: np.ndarray,
-    uv: Optional[np.ndarray],
-    rgba: Tuple[float, float, float, float],
-    texture: Optional[np.ndarray],
+    uv: np.ndarray | None,
+    rgba: tuple[float, float, float, float],
+    texture: np.ndarray | None,
 ) -> Mesh:
     """Index the corners (m, 3, 3) of loose triangles, with normals, merging those that are alike."""
     normals = crease_normals(corners).reshape(-1, 3)

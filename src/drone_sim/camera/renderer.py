@@ -9,7 +9,8 @@ are shadows on these alone, in the plane of the first floor, and transparent thi
 from __future__ import annotations
 
 import threading
-from typing import Any, Dict, Optional, Sequence, Tuple
+from collections.abc import Sequence
+from typing import Any
 
 import cv2
 import moderngl
@@ -29,7 +30,7 @@ TO_SUN = (-0.34, 0.30, 0.89)  # world frame, about 27 degrees from the vertical
 class _Target:
     """What is drawn into, for one picture size."""
 
-    def __init__(self, gl: moderngl.Context, size: Tuple[int, int], samples: int) -> None:
+    def __init__(self, gl: moderngl.Context, size: tuple[int, int], samples: int) -> None:
         self.framebuffer = gl.framebuffer(
             [gl.renderbuffer(size, 4, samples=samples)], gl.depth_renderbuffer(size, samples=samples)
         )
@@ -48,7 +49,7 @@ class Renderer:
     def __init__(self, *, samples: int = 0, device_index: int = 0) -> None:
         """Make the context and the shaders; there is nothing to draw yet."""
         self._thread = threading.get_ident()
-        self._gl: Optional[moderngl.Context] = context.create(device_index)
+        self._gl: moderngl.Context | None = context.create(device_index)
         with self._gl as gl:
             if samples not in (0, 2, 4, 8) or samples > gl.max_samples:
                 raise ValueError(f"samples {samples}: 0, 2, 4 or 8 are possible, at most {gl.max_samples} here")
@@ -62,8 +63,8 @@ class Renderer:
                 self._programs["sky"],
                 [(gl.buffer(sky.dome()), "3f 3f", "direction", "tint")],
             )
-            self._targets: Dict[Tuple[int, int], _Target] = {}
-            self._data_targets: Dict[Tuple[int, int], moderngl.Framebuffer] = {}
+            self._targets: dict[tuple[int, int], _Target] = {}
+            self._data_targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
 
     def set_visuals(self, visuals: Sequence[Visual]) -> None:
         """Draw these from now on; only meshes not known yet are read, those no longer used are freed.
@@ -74,7 +75,7 @@ class Renderer:
             self._scene.update(visuals)
 
     def render(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: Optional[np.ndarray] = None
+        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
     ) -> np.ndarray:
         """Picture (height, width, 3) uint8 RGB, top row first, written into `out` where given.
 
@@ -97,7 +98,7 @@ class Renderer:
         return cv2.cvtColor(target.rgba, cv2.COLOR_RGBA2RGB, dst=out)
 
     def render_depth(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: Optional[np.ndarray] = None
+        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
     ) -> np.ndarray:
         """Depth (height, width) float32, metres along the optical z; NaN where nothing is within `far`.
 
@@ -108,7 +109,7 @@ class Renderer:
         return out
 
     def render_labels(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: Optional[np.ndarray] = None
+        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
     ) -> np.ndarray:
         """Index of the visual seen at each pixel, (height, width) int32, -1 for none. As for `render`."""
         labels = self._data(intrinsics, camera_pose, poses, None, depth=False)
@@ -164,7 +165,7 @@ class Renderer:
             _draw(gl, scene.glass_from_far(camera_pose[:3, 2], poses), "surface")
 
     def _data(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: Optional[np.ndarray], depth: bool
+        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None, depth: bool
     ) -> np.ndarray:
         """Depth or label of every pixel, float32, -1 where nothing is."""
         size = (intrinsics.width, intrinsics.height)
@@ -196,7 +197,7 @@ def _draw(gl: moderngl.Context, batches: Sequence[Batch], role: str) -> None:
 
 
 def _programs(gl: moderngl.Context) -> Programs:
-    def surface(*names: str) -> Tuple[str, ...]:
+    def surface(*names: str) -> tuple[str, ...]:
         start = "\n".join(["#version 330 core", *(f"#define {name}" for name in names)])
         plain = (shaders.SURFACE_VERTEX, shaders.SURFACE_FRAGMENT)
         return tuple(source.replace("#version 330 core", start) for source in plain)
@@ -219,7 +220,7 @@ def _programs(gl: moderngl.Context) -> Programs:
     return programs
 
 
-def _output(out: Optional[np.ndarray], shape: Tuple[int, ...], dtype: type) -> np.ndarray:
+def _output(out: np.ndarray | None, shape: tuple[int, ...], dtype: type) -> np.ndarray:
     if out is None:
         return np.empty(shape, dtype=dtype)
     if out.shape != shape or out.dtype != dtype or not out.flags.c_contiguous:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -17,7 +18,7 @@ MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
 FIXED_LAYOUT = (("paint", "4f", 16), ("label", "1f", 4))
 ANISOTROPY = 8.0
 
-Programs = Dict[str, Any]  # moderngl.Program by role
+Programs = dict[str, Any]  # moderngl.Program by role
 
 
 @dataclass
@@ -26,8 +27,8 @@ class Part:
 
     vertices: moderngl.Buffer
     indices: moderngl.Buffer
-    texture: Optional[moderngl.Texture]
-    rgba: Tuple[float, ...]
+    texture: moderngl.Texture | None
+    rgba: tuple[float, ...]
     transparent: bool
     closed: bool
     top: float
@@ -45,12 +46,12 @@ class Batch:
     """Instances of one part that are drawn by one call."""
 
     part: Part
-    members: List[int]  # indices into the visuals
+    members: list[int]  # indices into the visuals
     floor: bool = False
     transparent: bool = False
     ground: bool = False
     first: int = 0  # record
-    arrays: Dict[str, moderngl.VertexArray] = field(default_factory=dict)
+    arrays: dict[str, moderngl.VertexArray] = field(default_factory=dict)
 
     def draw(self, role: str) -> None:
         """Draw with the program of this role: surface, shadow or data."""
@@ -67,16 +68,16 @@ class Scene:
         self._context = context
         self._programs = programs
         self._software = software
-        self._parts: Dict[Visual, Tuple[Part, ...]] = {}
-        self._buffers: List[moderngl.Buffer] = []
+        self._parts: dict[Visual, tuple[Part, ...]] = {}
+        self._buffers: list[moderngl.Buffer] = []
         self._members = np.zeros(0, dtype=np.intp)
         self._scales = np.zeros((0, 1, 3))
-        self.visuals: Tuple[Visual, ...] = ()
-        self.batches: List[Batch] = []
-        self.solids: List[Batch] = []
-        self.floors: List[Batch] = []
+        self.visuals: tuple[Visual, ...] = ()
+        self.batches: list[Batch] = []
+        self.solids: list[Batch] = []
+        self.floors: list[Batch] = []
         self.has_ground = False  # which the picture is cleared to; it has a depth, too
-        self.glass: List[Batch] = []
+        self.glass: list[Batch] = []
 
     def update(self, visuals: Sequence[Visual]) -> None:
         """Follow the list; on ValueError (an unreadable mesh) the scene stays as it was."""
@@ -115,14 +116,14 @@ class Scene:
         rows[:, :, :3] *= self._scales
         self._buffers[0].write(rows.astype(np.float32))
 
-    def floor_height(self, poses: np.ndarray) -> Optional[float]:
+    def floor_height(self, poses: np.ndarray) -> float | None:
         """World z of the top of the first floor, metres, or None without a floor."""
         if not self.floors:
             return None
         floor = self.floors[0]
         return float(poses[floor.members[0], 2, 3] + floor.part.top * self._scales[floor.first, 0, 2])
 
-    def glass_from_far(self, axis: np.ndarray, poses: np.ndarray) -> List[Batch]:
+    def glass_from_far(self, axis: np.ndarray, poses: np.ndarray) -> list[Batch]:
         """The transparent batches, the farthest along `axis` (3,) first."""
 
         def depth(batch: Batch) -> float:
@@ -173,10 +174,10 @@ class Scene:
             texture.anisotropy = min(ANISOTROPY, self._context.max_anisotropy)
         return texture
 
-    def _sort(self, visuals: Sequence[Visual], forms: Sequence[Visual]) -> List[Batch]:
+    def _sort(self, visuals: Sequence[Visual], forms: Sequence[Visual]) -> list[Batch]:
         """Solid instances of a part share a batch; transparent ones are drawn singly, in the order of depth."""
-        solids: Dict[int, Batch] = {}
-        singles: List[Batch] = []
+        solids: dict[int, Batch] = {}
+        singles: list[Batch] = []
         for index, (visual, form) in enumerate(zip(visuals, forms)):
             for part in self._parts[form]:
                 if visual.ground:
@@ -210,7 +211,7 @@ class Scene:
             for role, name in (("surface", surface), ("shadow", "shadow"), ("data", "data")):
                 batch.arrays[role] = self._array(batch, self._programs[name])
 
-    def _paint(self, batch: Batch, index: int) -> Tuple[float, ...]:
+    def _paint(self, batch: Batch, index: int) -> tuple[float, ...]:
         red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.part.rgba)
         return (red, green, blue, SHADE if batch.floor else alpha if batch.transparent else 1.0)
 
@@ -232,7 +233,7 @@ class Scene:
         return array
 
 
-def _shared(visual: Visual) -> Tuple[Visual, Tuple[float, ...]]:
+def _shared(visual: Visual) -> tuple[Visual, tuple[float, ...]]:
     """The geometry to upload, one for all that share it, and the scale that makes it this visual's."""
     form = Visual(None, visual.shape, (), mesh.WHITE, texture=visual.texture, edition=visual.edition)
     if visual.shape == "box":

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from typing import Callable, List, Optional, Protocol, Tuple
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
@@ -23,7 +24,7 @@ class Scene(Protocol):
     def changes(self) -> int:
         """Return another number than before whenever a picture of it may look different."""
 
-    def visuals(self) -> List[Visual]:
+    def visuals(self) -> list[Visual]:
         """Return everything that can be drawn."""
 
     def visual_poses(self) -> np.ndarray:
@@ -31,7 +32,7 @@ class Scene(Protocol):
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
-    ) -> Tuple[np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return RGB (height, width, 3) and depth (height, width), drawn without OpenGL."""
 
 
@@ -45,7 +46,7 @@ class Vision:
         """
         self._scene = scene
         self._samples = samples
-        self._renderer: Optional[Renderer] = None
+        self._renderer: Renderer | None = None
         self._fallback = False
 
     def look_at(self, scene: Scene) -> None:
@@ -101,10 +102,10 @@ class Camera:
         self.intrinsics = intrinsics
         self.every = 1  # steps between two pictures
         self.watched: Callable[[], bool] = lambda: False
-        self.image: Optional[np.ndarray] = None  # what those who look are shown; None while nobody does
+        self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
         self.pose = pose
         self._vision = vision
-        self._last: Optional[Tuple[int, Matrix, np.ndarray]] = None  # the scene's changes, the pose, the picture
+        self._last: tuple[int, Matrix, np.ndarray] | None = None  # the scene's changes, the pose, the picture
 
     def take(self) -> np.ndarray:
         """Return a picture of the scene as it stands; shape and type as Vision.picture says."""

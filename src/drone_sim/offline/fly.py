@@ -11,8 +11,10 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, Callable, ContextManager, Dict, Iterator, NoReturn, Optional, Sequence
+from typing import Any, NoReturn
 
 from tqdm import tqdm
 
@@ -40,7 +42,7 @@ _ENDINGS = {"scene": _YAML, "config": _YAML, "commands": _YAML, "csv": (".csv", 
 _EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
 
-def main(arguments: Optional[Sequence[str]] = None, guardian: Optional[Guardian] = None) -> int:
+def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
     """Fly; return 0, or 1 after a line on stderr for a wrong input or script, or 130 after Ctrl-C.
 
     With a guardian the flight ends between two steps when a signal comes; without one, signals are the caller's.
@@ -52,12 +54,12 @@ def main(arguments: Optional[Sequence[str]] = None, guardian: Optional[Guardian]
         return _status_of(lambda: _run(options, guardian))
 
 
-def settings(assignments: Sequence[str]) -> Dict[str, Any]:
+def settings(assignments: Sequence[str]) -> dict[str, Any]:
     """Return `a.b=VALUE` assignments as the nested mapping that parameters.load takes; VALUE is YAML.
 
     Of several for one key the last one counts. Raises ParameterError.
     """
-    nested: Dict[str, Any] = {}
+    nested: dict[str, Any] = {}
     for assignment in assignments:
         key, equals, text = assignment.partition("=")
         *parents, last = key.split(".")
@@ -80,7 +82,7 @@ def _shown(assignment: str) -> str:
     return assignment if assignment.isprintable() and len(assignment) < 200 else shown(assignment)
 
 
-def _run(options: argparse.Namespace, guardian: Optional[Guardian]) -> int:
+def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     _check_names(options)
     files = {"config": options.config, "scene_file": options.scene}
     parameters = parameters_module.load({**settings(options.set), **{key: name for key, name in files.items() if name}})
@@ -130,7 +132,7 @@ def _check_plot(path: str, steps: int) -> None:
         raise ValueError(f"--plot: {steps} steps; at most {_PLOTTED} are drawn")
 
 
-def _csv(path: Optional[str]) -> ContextManager[Any]:
+def _csv(path: str | None) -> AbstractContextManager[Any]:
     return writing.replacing(path) if path else contextlib.nullcontext()
 
 
@@ -152,7 +154,7 @@ def _duration(options: argparse.Namespace, timeline: Timeline) -> float:
 
 
 def _fly(
-    simulation: Simulation, timeline: Timeline, steps: int, recording: Recording, guardian: Optional[Guardian]
+    simulation: Simulation, timeline: Timeline, steps: int, recording: Recording, guardian: Guardian | None
 ) -> int:
     recording.add(simulation)
     # disable=None: no bar where stderr is not a terminal.
@@ -185,7 +187,7 @@ def _summary(recording: Recording, took: float) -> str:
     )
 
 
-def _status_of(action: Callable[[], Optional[int]]) -> int:
+def _status_of(action: Callable[[], int | None]) -> int:
     """Return the action's exit status, 0 for None; where it fails as users may expect, after one line."""
     try:
         return action() or 0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -63,7 +63,7 @@ def save(path: str, recording: Recording, timeline: Timeline) -> None:
         figure.savefig(file, dpi=120, format=Path(path).suffix[1:] or "png")
 
 
-def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> Tuple[float, ...]:
+def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> tuple[float, ...]:
     """Return velocity (m/s) and pitch, roll (rad) in the track frame, as the tutorial has them, and the yaw."""
     yaw = frames.to_euler(matrix)[2]
     track_from_world = frames.from_euler((0.0, 0.0, 0.0), (0.0, 0.0, -yaw))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Iterable, List, Optional, TextIO, Tuple
+from collections.abc import Iterable
+from typing import TextIO
 
 from drone_sim.frames import Matrix, from_quaternion
 from drone_sim.simulation import Simulation
@@ -30,12 +31,12 @@ class Recording:
     base_link in the world frame, the command is in the track frame, propellers are particle velocities.
     """
 
-    def __init__(self, file: Optional[TextIO] = None, keep: bool = True):
+    def __init__(self, file: TextIO | None = None, keep: bool = True):
         """Take the CSV file, if there is to be one, and write its header. Raises TableError.
 
         Without `keep`, `rows` holds the last one alone: a long flight must not fill the memory.
         """
-        self.rows: List[Tuple[float, ...]] = []
+        self.rows: list[tuple[float, ...]] = []
         self._file = file
         self._keep = keep
         self._write(COLUMNS)

@@ -10,10 +10,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, Iterable, List, NamedTuple, Tuple, Type, Union
+from collections.abc import Iterable
+from typing import (
+    Annotated,  # typing has it from Python 3.9 on
+    Any,
+    NamedTuple,
+)
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
-from typing_extensions import Annotated  # typing has it from Python 3.9 on
 
 from drone_sim import checks, yaml_files
 from drone_sim.drone import Drone
@@ -45,7 +49,7 @@ class Entry(NamedTuple):
     """What happens to the drone at `at` seconds of simulated time."""
 
     at: float
-    action: Union[Twist, Pose, Push]
+    action: Twist | Pose | Push
 
     @property
     def end(self) -> float:
@@ -68,7 +72,7 @@ class Timeline:
     def __init__(self, entries: Iterable[Entry], time_step: float):
         """Sort the entries by time, those of one time in the order given; `time_step` in seconds."""
         self.entries = sorted(entries, key=lambda entry: entry.at)
-        self._due: Dict[int, List[Entry]] = {}
+        self._due: dict[int, list[Entry]] = {}
         for entry in self.entries:
             self._due.setdefault(first_step(entry.at, time_step), []).append(entry)
 
@@ -96,8 +100,8 @@ def read(path: str, parameters: Parameters) -> Timeline:
         raise TimelineError(str(error)) from None
     if not isinstance(rows, list):
         raise TimelineError(f"{path}: must be a list of `- {{at: 1.0, twist: ...}}` entries, not {shown(rows)}")
-    entries: List[Entry] = []
-    wrong: List[Tuple[Location, str]] = []
+    entries: list[Entry] = []
+    wrong: list[tuple[Location, str]] = []
     for index, row in enumerate(rows):
         try:
             entries.append(_entry(row, parameters))
@@ -159,13 +163,13 @@ class _Push(_Model):
         return Push(force, torque, self.duration)
 
 
-_KINDS: Dict[str, Type[Union[_Twist, _Pose, _Push]]] = {"twist": _Twist, "pose": _Pose, "push": _Push}
+_KINDS: dict[str, type[_Twist | _Pose | _Push]] = {"twist": _Twist, "pose": _Pose, "push": _Push}
 
 
 class _WrongKeys(Exception):
     """What is wrong with an entry: the keys on the way to each wrong value, and a text."""
 
-    def __init__(self, *found: Tuple[Location, str]):
+    def __init__(self, *found: tuple[Location, str]):
         super().__init__()
         self.found = found
 
@@ -176,7 +180,7 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
     if not isinstance(row, dict):
         raise _WrongKeys((here, f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
     known = ("at", *_KINDS)
-    unknown: List[Tuple[Location, str]] = [
+    unknown: list[tuple[Location, str]] = [
         ((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}")
         for key in row
         if key not in known
@@ -198,7 +202,7 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
         raise _WrongKeys(((kind, key), f"{kind}.{refused}")) from None
 
 
-def _checked(model: Type[Any], values: Any, above: Location) -> Tuple[Any, List[Tuple[Location, str]]]:
+def _checked(model: type[Any], values: Any, above: Location) -> tuple[Any, list[tuple[Location, str]]]:
     """Return a model of the values, or None and what is wrong with them."""
     try:
         return model.model_validate(values), []
@@ -206,7 +210,7 @@ def _checked(model: Type[Any], values: Any, above: Location) -> Tuple[Any, List[
         return None, [((*above, *one["loc"]), _one_line(one, model, above)) for one in error.errors()]
 
 
-def _one_line(error: Any, model: Type[BaseModel], above: Location) -> str:
+def _one_line(error: Any, model: type[BaseModel], above: Location) -> str:
     key = readable_key((*above, *error["loc"])).replace("/", ".")
     known = ", ".join(model.model_fields)
     if error["type"] == "extra_forbidden":

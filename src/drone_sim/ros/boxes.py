@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import List, Sequence, Tuple
+from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import Point
@@ -17,7 +17,7 @@ _FROM_BELOW, _FROM_ABOVE, _FROM_SUN = np.array([(0.42, 0.41, 0.40), (0.52, 0.54,
 _SIDES = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))  # normals
 
 
-def _corners() -> List[Point]:
+def _corners() -> list[Point]:
     """Return the triangles of a box of 1 m, two for each of _SIDES."""
     points = []
     for normal in np.array(_SIDES, dtype=float):
@@ -39,7 +39,7 @@ def paint(marker: Marker, matrix: frames.Matrix, rgba: Sequence[float]) -> None:
         marker.colors += [ColorRGBA(red, green, blue, rgba[3])] * 6
 
 
-def light(normal: Tuple[float, float, float]) -> np.ndarray:
+def light(normal: tuple[float, float, float]) -> np.ndarray:
     """Return what a surface with this normal (world) gets of red, green and blue: as in the cameras' shaders."""
     share = 0.5 + 0.5 * normal[2]
     ambient = (1 - share) * _FROM_BELOW + share * _FROM_ABOVE

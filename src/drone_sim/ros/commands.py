@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Callable, NamedTuple, Optional
+from collections.abc import Callable
+from typing import NamedTuple
 
 from drone_sim.ros import keys
 
@@ -21,7 +22,7 @@ class Command(NamedTuple):
     vz: float = 0.0
     wz: float = 0.0
 
-    def after(self, key: str) -> Optional[Command]:
+    def after(self, key: str) -> Command | None:
         """Return the command after a key press, or None for a key that commands nothing."""
         if key == " ":
             return Command()
@@ -62,7 +63,7 @@ class CommandInForce:
     def forget(self) -> None:
         """Know nothing: the simulator has gone, or another one has come."""
         with self._lock:
-            self.heard: Optional[Command] = None
+            self.heard: Command | None = None
             self.sent = Command()
             self._awaited = False
             self._others = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from types import SimpleNamespace
-from typing import Any, Deque, Dict, NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -14,7 +14,7 @@ from dynamic_reconfigure.server import Server
 from sensor_msgs.msg import CompressedImage
 
 
-def _parameter(name: str, kind: str, default: Any, lowest: Any, highest: Any, description: str) -> Dict[str, Any]:
+def _parameter(name: str, kind: str, default: Any, lowest: Any, highest: Any, description: str) -> dict[str, Any]:
     return {
         **{"name": name, "type": kind, "ctype": kind, "cconsttype": f"const {kind}", "default": default},
         **{"min": lowest, "max": highest, "level": 0, "description": description, "edit_method": ""},
@@ -64,13 +64,13 @@ class CompressedPublisher:
         """Advertise, and open the dynamic_reconfigure server at `<base>/compressed`."""
         topic = rospy.resolve_name(f"{base}/compressed")
         self._publisher = rospy.Publisher(topic, CompressedImage, queue_size=1)
-        self._settings: Dict[str, Any] = {}
+        self._settings: dict[str, Any] = {}
         self._server = Server(_plugin_parameters(), self._keep, topic)
-        self._waiting: Deque[_Picture] = deque(maxlen=1)
+        self._waiting: deque[_Picture] = deque(maxlen=1)
         self._came = threading.Event()
         threading.Thread(target=self._work, name=f"{topic} encoder", daemon=True).start()
 
-    def _keep(self, settings: Dict[str, Any], _level: int) -> Dict[str, Any]:
+    def _keep(self, settings: dict[str, Any], _level: int) -> dict[str, Any]:
         if settings["format"] not in ("jpeg", "png"):
             rospy.logwarn(f"compressed/format = '{settings['format']}': must be jpeg or png; jpeg is used")
             settings["format"] = "jpeg"
@@ -99,7 +99,7 @@ class CompressedPublisher:
                     return
 
 
-def _encoded(picture: _Picture, settings: Dict[str, Any]) -> CompressedImage:
+def _encoded(picture: _Picture, settings: dict[str, Any]) -> CompressedImage:
     message = CompressedImage()
     message.header.stamp, message.header.frame_id = picture.stamp, picture.frame
     message.format = f"rgb8; {settings['format']} compressed bgr8"

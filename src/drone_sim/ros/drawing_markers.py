@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import List, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import rospy
@@ -61,14 +61,14 @@ def _marker(handle: int, drawn: DrawingObject) -> Marker:
     return marker
 
 
-def _points(drawn: DrawingObject, item: Item) -> List[Sequence[float]]:
+def _points(drawn: DrawingObject, item: Item) -> list[Sequence[float]]:
     if drawn.kind in _CORNERS:
         return _polygon(item, drawn.size / 2, _CORNERS[drawn.kind])
-    points: List[Sequence[float]] = [item[first : first + 3] for first in range(0, len(item), 3)]
+    points: list[Sequence[float]] = [item[first : first + 3] for first in range(0, len(item), 3)]
     return points[:1] if drawn.kind == "cubepoints" else points
 
 
-def _polygon(item: Item, radius: float, corners: int) -> List[Sequence[float]]:
+def _polygon(item: Item, radius: float, corners: int) -> list[Sequence[float]]:
     """Return the triangles of a regular polygon about a point, across a normal."""
     middle, normal = np.array(item[:3]), _unit(np.array(item[3:]))
     aside = radius * _unit(np.cross(normal, [1.0, 0.0, 0.0] if abs(normal[0]) < 0.9 else [0.0, 1.0, 0.0]))
@@ -76,7 +76,7 @@ def _polygon(item: Item, radius: float, corners: int) -> List[Sequence[float]]:
     angles = 2 * np.pi * np.arange(corners) / corners
     rim = (middle + np.outer(np.cos(angles), aside) + np.outer(np.sin(angles), up)).tolist()
     centre = middle.tolist()
-    triangles: List[Sequence[float]] = []
+    triangles: list[Sequence[float]] = []
     for one, other in zip(rim, [*rim[1:], rim[0]]):
         triangles += [centre, one, other]
     return triangles

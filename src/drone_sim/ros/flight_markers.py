@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Sequence, Tuple
+from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import Point
@@ -40,7 +40,7 @@ class HeightMarkers:
         """Advertise in the drone's namespace."""
         self._simulation = simulation
         self._topic = MarkerTopic(f"{simulation.drone.name}/view/height", EYES)
-        self._shown: Optional[State] = None
+        self._shown: State | None = None
 
     def update(self) -> None:
         """Publish where the drone has moved, if anybody listens."""
@@ -58,7 +58,7 @@ class CommandMarkers:
         """Advertise in the drone's namespace."""
         self._simulation = simulation
         self._topic = MarkerTopic(f"{simulation.drone.name}/view/command", EYES)
-        self._shown: Optional[Tuple[Twist, frames.Matrix, State]] = None
+        self._shown: tuple[Twist, frames.Matrix, State] | None = None
 
     def update(self) -> None:
         """Publish command and place where they have changed, if anybody listens."""
@@ -80,7 +80,7 @@ class StateText:
         self._topic = MarkerTopic(f"{simulation.drone.name}/view/state", EYES)
         self._words = Throttle(WORDS)
         self._text = ""
-        self._shown: Optional[Tuple[str, State]] = None
+        self._shown: tuple[str, State] | None = None
 
     def update(self) -> None:
         """Publish text and place where they have changed, if anybody listens."""
@@ -110,7 +110,7 @@ def _shadow(state: State) -> Marker:
     radius = _SHADOW[0] + _SHADOW[1] * height
     angles = [2 * math.pi * number / _RIM for number in range(_RIM)]
     rim = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
-    points: List[Sequence[float]] = []
+    points: list[Sequence[float]] = []
     for one, other in zip(rim, [*rim[1:], rim[0]]):
         points += [(0.0, 0.0, 0.0), one, other]
     marker = shape(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), points)
@@ -123,7 +123,7 @@ def _shadow(state: State) -> Marker:
 
 def _plumb_line(height: float) -> Marker:
     """Return it as seen from the drone."""
-    points: List[Vector] = [(0.0, 0.0, 0.0), (0.0, 0.0, -height)]
+    points: list[Vector] = [(0.0, 0.0, 0.0), (0.0, 0.0, -height)]
     for number in range(1, min(_TICKS, math.ceil(height / _TICK))):
         half, z = (0.05 if number % 2 else 0.1), number * _TICK - height
         points += [(-half, 0.0, z), (half, 0.0, z), (0.0, -half, z), (0.0, half, z)]
@@ -132,7 +132,7 @@ def _plumb_line(height: float) -> Marker:
     return marker
 
 
-def _arrow(command: Twist, base: frames.Matrix) -> Optional[Marker]:
+def _arrow(command: Twist, base: frames.Matrix) -> Marker | None:
     """Return it as seen from the drone; a command counts in `base`, Track_base."""
     speed = math.hypot(*command.linear)
     if not speed:
@@ -147,7 +147,7 @@ def _arrow(command: Twist, base: frames.Matrix) -> Optional[Marker]:
     return _flat(np.array([ahead * _AWAY, ahead * (_AWAY + neck)]), np.array([aside, aside]), ahead * (_AWAY + reach))
 
 
-def _turn(command: Twist, base: frames.Matrix) -> Optional[Marker]:
+def _turn(command: Twist, base: frames.Matrix) -> Marker | None:
     """Return an arc from the front, as far as the turn that is commanded goes."""
     turn = max(-3.0, min(3.0, _SECONDS * command.angular[2]))
     if not turn:
@@ -164,7 +164,7 @@ def _flat(middle: np.ndarray, aside: np.ndarray, tip: np.ndarray) -> Marker:
     rviz's own arrows are dark when they are seen from behind.
     """
     left, right = middle + _HALF * aside, middle - _HALF * aside
-    points: List[Sequence[float]] = []
+    points: list[Sequence[float]] = []
     for one, other, next_one, next_other in zip(*(side.tolist() for side in (left, right, left[1:], right[1:]))):
         points += [one, other, next_other, one, next_other, next_one]
     points += np.array([middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]).tolist()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Callable, Dict, Set, Tuple
+from collections.abc import Callable
 
 PATIENCE = 1.0  # s; while a handle is held, rviz says so every 0.25 s
 
@@ -19,7 +19,7 @@ class Held:
         """Begin with none; take a monotonic clock."""
         self._clock = clock
         self._lock = threading.Lock()
-        self._heard: Dict[Tuple[str, str], float] = {}  # by handle and client, s
+        self._heard: dict[tuple[str, str], float] = {}  # by handle and client, s
 
     def take(self, name: str, client: str) -> None:
         """Say that a client has taken a handle."""
@@ -37,7 +37,7 @@ class Held:
         with self._lock:
             self._heard.pop((name, client), None)
 
-    def names(self) -> Set[str]:
+    def names(self) -> set[str]:
         """Return the handles that are held."""
         with self._lock:
             since = self._clock() - PATIENCE

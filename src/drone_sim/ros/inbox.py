@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from queue import SimpleQueue
-from typing import Callable, List
 
 _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
 
@@ -28,8 +28,8 @@ class Inbox:
 
         Raises TimeoutError where the answer does not come in time; a job that has not begun by then never will.
         """
-        answer: List[str] = []
-        failure: List[Exception] = []
+        answer: list[str] = []
+        failure: list[Exception] = []
         done = threading.Event()
         begun = threading.Lock()  # taken by what comes first: the job, or the end of patience
 

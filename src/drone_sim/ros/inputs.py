@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from collections.abc import Sequence
 
 import rospy
 from geometry_msgs.msg import Pose as PoseMessage

@@ -13,7 +13,7 @@ import signal
 import sys
 import termios
 import time
-from typing import Any, List
+from typing import Any
 
 import rospy
 
@@ -75,7 +75,7 @@ class Screen:
         self._teleop.said = ""
         termios.tcflush(self._terminal, termios.TCIFLUSH)
 
-    def _read(self) -> List[str]:
+    def _read(self) -> list[str]:
         """Wait a little for keys, and return them. Raises OSError when there will be none any more."""
         if not select.select([self._terminal], [], [], _PERIOD)[0]:
             return self._decoder.feed(b"")
@@ -101,7 +101,7 @@ class Screen:
         self._write(len(HELP) + 1 if room else 0, lines[:height], width, curses.A_NORMAL)
         self._screen.refresh()
 
-    def _write(self, first: int, lines: List[str], width: int, look: int) -> None:
+    def _write(self, first: int, lines: list[str], width: int, look: int) -> None:
         for row, line in enumerate(lines, start=first):
             self._screen.addnstr(row, 0, line, width - 1, look)  # curses cannot fill the last corner
 

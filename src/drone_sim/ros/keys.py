@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from typing import Callable, List
+from collections.abc import Callable
 
 UP, DOWN, LEFT, RIGHT, BACKSPACE, ESCAPE, UNKNOWN = "up", "down", "left", "right", "backspace", "escape", "unknown"
 PATIENCE = 0.5  # s, for what may follow an ESC; a slow line sends a sequence in pieces
@@ -31,7 +31,7 @@ class KeyDecoder:
         self._bytes = b""
         self._came = self._clock()
 
-    def feed(self, data: bytes) -> List[str]:
+    def feed(self, data: bytes) -> list[str]:
         """Return the keys that are complete with `data`, which may be empty; call it at least now and then.
 
         An ESC after which nothing comes for PATIENCE is the key itself; any other beginning of a sequence is dropped.

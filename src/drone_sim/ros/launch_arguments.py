@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from pathlib import Path
-from typing import List, Sequence
 
 from drone_sim.objects import near_names
 from drone_sim.parameters import ParameterError
@@ -43,7 +43,7 @@ def check(command: Sequence[str], folder: Path) -> None:
             raise ParameterError(f"{argument}: drone.launch has no argument {name}; {near_names(name, known)}")
 
 
-def _arguments(command: Sequence[str]) -> List[str]:
+def _arguments(command: Sequence[str]) -> list[str]:
     """Return what follows `roslaunch`; nothing for another program."""
     for number, word in enumerate(command[:2]):  # python may come first
         if Path(word).name == "roslaunch":

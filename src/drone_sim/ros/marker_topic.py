@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Optional, Sequence
+from collections.abc import Sequence
 
 import rospy
 from geometry_msgs.msg import Point, Quaternion, Vector3
@@ -37,7 +37,7 @@ class MarkerTopic:
         """Tell whether it is time for another message; it counts as sent then."""
         return self.watched and self._throttle.passes()
 
-    def show(self, markers: Sequence[Optional[Marker]]) -> None:
+    def show(self, markers: Sequence[Marker | None]) -> None:
         """Publish; None takes away what may be shown in that place."""
         message = MarkerArray([marker or Marker(action=Marker.DELETE) for marker in markers])
         for number, marker in enumerate(message.markers):

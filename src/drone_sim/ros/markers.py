@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Set
+from typing import Any
 
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
@@ -37,7 +37,7 @@ class Handles:
         self._throttle = Throttle(_PERIOD)
         self._server = _Server(f"{simulation.drone.name}/markers")
         self._looks = {TARGET: _ball(), _DRONE: _ring()}
-        self._shown: Set[str] = set()
+        self._shown: set[str] = set()
         self._show({_DRONE})
         self._server.applyChanges()
 
@@ -54,7 +54,7 @@ class Handles:
             self._server.setPose(name, _pose(level))
         self._server.applyChanges()
 
-    def _show(self, wanted: Set[str]) -> None:
+    def _show(self, wanted: set[str]) -> None:
         """Show these handles: the sphere once a script has taken it off the drone, which it would only hide."""
         for name in wanted - self._shown:
             self._server.insert(_handle(name, self._looks[name]), self._on_feedback)

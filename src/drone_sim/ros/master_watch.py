@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from typing import Any, Dict, Optional
+from typing import Any
 
 import rosgraph
 import rospy
@@ -28,7 +28,7 @@ class MasterWatch(threading.Thread):
         super().__init__(name="master watch", daemon=True)
         self._done = threading.Event()
         self._master = rosgraph.Master(rospy.get_name())
-        self._parameters: Dict[str, Any] = {}
+        self._parameters: dict[str, Any] = {}
         self._pid = self._ask()
 
     def run(self) -> None:
@@ -46,7 +46,7 @@ class MasterWatch(threading.Thread):
                 rospy.logwarn("a new ROS master is there: registered again, with the parameters as they were")
             lost = pid is None
 
-    def _ask(self) -> Optional[int]:
+    def _ask(self) -> int | None:
         """Return the master's process number, None where it does not answer; remember what it knows of this node."""
         try:
             pid = self._master.getPid()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import rospy
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, TwistStamped, Vector3

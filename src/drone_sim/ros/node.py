@@ -13,7 +13,7 @@ import gc
 import logging
 import sys
 import time
-from typing import Callable
+from collections.abc import Callable
 
 import rospy
 

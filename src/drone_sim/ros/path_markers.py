@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Tuple
 
 from visualization_msgs.msg import Marker
 
@@ -29,9 +28,9 @@ class PathMarkers:
         self._simulation = simulation
         self._topic = MarkerTopic(f"{simulation.drone.name}/view/path", _PERIOD)
         self._run = -1
-        self._jumps: Optional[int] = None  # None where nobody has looked for a while
-        self._lines: List[List[Vector]] = []
-        self._shown: Tuple[int, List[int], Optional[Vector]] = (-1, [], None)
+        self._jumps: int | None = None  # None where nobody has looked for a while
+        self._lines: list[list[Vector]] = []
+        self._shown: tuple[int, list[int], Vector | None] = (-1, [], None)
 
     def update(self) -> None:
         """Follow the drone, and publish what is new, if anybody listens."""
@@ -68,5 +67,5 @@ class PathMarkers:
                 del self._lines[0]
 
 
-def _line(points: List[Vector]) -> Marker:
+def _line(points: list[Vector]) -> Marker:
     return shape(Marker.LINE_STRIP, _ORANGE, (_WIDTH, 0, 0), points)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Tuple, Union
 
 import cv2
 import numpy as np
@@ -17,10 +16,10 @@ _HALF = 3.0  # m, at which depth is shown half as bright as right in front
 _DEPTHS = ("32FC1", "16UC1")
 _MILLIMETRES = 1e-3  # ROS's unit of depth in 16UC1
 
-Size = Tuple[int, int]
+Size = tuple[int, int]
 
 
-def decode(message: Union[Image, CompressedImage]) -> np.ndarray:
+def decode(message: Image | CompressedImage) -> np.ndarray:
     """Return a message's picture, BGR (height, width, 3); depth is the darker the farther, and black where it is none.
 
     Raises ValueError, in one line, for one that cannot be shown.
@@ -56,7 +55,7 @@ def blank(text: str) -> np.ndarray:
     return picture
 
 
-def tile(pictures: List[Tuple[str, np.ndarray]], largest: Optional[Size] = None) -> np.ndarray:
+def tile(pictures: list[tuple[str, np.ndarray]], largest: Size | None = None) -> np.ndarray:
     """Return named pictures (BGR) side by side and below each other, no larger than `largest` (width, height)."""
     columns = math.ceil(math.sqrt(len(pictures)))
     width = max(picture.shape[1] for _, picture in pictures)
@@ -79,7 +78,7 @@ def _cell(name: str, picture: np.ndarray, width: int, height: int) -> np.ndarray
     return cell
 
 
-def _shrunk(picture: np.ndarray, largest: Optional[Size]) -> np.ndarray:
+def _shrunk(picture: np.ndarray, largest: Size | None) -> np.ndarray:
     factor = min(largest[0] / picture.shape[1], largest[1] / picture.shape[0]) if largest else 1.0
     if factor >= 1:
         return picture

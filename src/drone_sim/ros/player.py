@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Callable, Optional
+from collections.abc import Callable
 
 import rospy
 from std_msgs.msg import String
@@ -42,7 +42,7 @@ class Player:
         """Whether the next step is due when the clock says so."""
         return self.simulation.running and not self.paused
 
-    def start(self, scene_file: Optional[str] = None) -> str:
+    def start(self, scene_file: str | None = None) -> str:
         """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
         self.paused = False
         self.attempt(lambda: self.simulation.start(scene_file))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Hashable
 from dataclasses import replace
 from pathlib import Path
-from typing import Dict, Hashable, List, Optional, Tuple
 
 import cv2
 import numpy as np
@@ -23,8 +23,8 @@ class RvizMeshes:
 
     def __init__(self) -> None:
         """Begin without a folder; the first file makes it."""
-        self._folder: Optional[tempfile.TemporaryDirectory] = None
-        self._written: Dict[Hashable, str] = {}
+        self._folder: tempfile.TemporaryDirectory | None = None
+        self._written: dict[Hashable, str] = {}
 
     def resource(self, visual: Visual, glow: float) -> str:
         """Return the URL of a visual's mesh, laid with its texture as the cameras lay it, tinted with its rgba.
@@ -61,7 +61,7 @@ class RvizMeshes:
         return f"file://{stem}.obj"
 
 
-def _age(file: str) -> Tuple[int, int]:
+def _age(file: str) -> tuple[int, int]:
     """Return what changes when a file is written anew."""
     if not file:
         return (0, 0)
@@ -75,7 +75,7 @@ def _write_image(path: Path, image: np.ndarray) -> None:
         raise OSError(f"{path}: cannot be written")
 
 
-def _material(number: int, part: Mesh, tint: Tuple[float, ...], glow: float, image: str) -> List[str]:
+def _material(number: int, part: Mesh, tint: tuple[float, ...], glow: float, image: str) -> list[str]:
     red, green, blue, alpha = np.multiply(tint, part.rgba)
     if part.transparent:
         alpha = min(alpha, _SEEN_THROUGH)
@@ -85,7 +85,7 @@ def _material(number: int, part: Mesh, tint: Tuple[float, ...], glow: float, ima
     return [*lines, f"map_Kd {image}"] if image else lines
 
 
-def _triangles(part: Mesh, first: int) -> List[str]:
+def _triangles(part: Mesh, first: int) -> list[str]:
     """Return the lines of a part whose vertices count from `first`."""
     uv = np.zeros((len(part.vertices), 2)) if part.uv is None else part.uv
     lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in part.vertices.tolist()]

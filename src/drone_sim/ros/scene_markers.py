@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import List, Optional, Sequence, Tuple
+from collections.abc import Sequence
 
 import numpy as np
 import rospy
@@ -35,7 +35,7 @@ class SceneMarkers:
         self._simulation = simulation
         self._files = files
         self._throttle = Throttle(_PERIOD)
-        self._shown: Optional[Tuple[List[Visual], np.ndarray]] = None
+        self._shown: tuple[list[Visual], np.ndarray] | None = None
         name = f"{simulation.drone.name}/scene"
         self._publisher = rospy.Publisher(name, MarkerArray, queue_size=1, latch=True)
 

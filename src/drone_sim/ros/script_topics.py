@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import difflib
 import importlib
-from collections.abc import Mapping
-from typing import Any, Callable, Collection, Type
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
 
 import genpy
 import roslib.message
@@ -42,7 +42,7 @@ class RosBackend:
 
 
 class _Sender:
-    def __init__(self, publisher: rospy.Publisher, made: Type[genpy.Message], stamp: Callable[[], rospy.Time]):
+    def __init__(self, publisher: rospy.Publisher, made: type[genpy.Message], stamp: Callable[[], rospy.Time]):
         self._publisher = publisher
         self._made = made
         self._stamp = stamp
@@ -79,7 +79,7 @@ class _Silence:
         pass
 
 
-def _message_class(kind: str) -> Type[genpy.Message]:
+def _message_class(kind: str) -> type[genpy.Message]:
     try:
         found = roslib.message.get_message_class(kind)
     except (ImportError, ValueError):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Callable, Optional
 
 import rospy
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
@@ -29,7 +29,7 @@ class Services:
         """Advertise."""
         self._player = player
         self._inbox = inbox
-        self._snapshot: Optional[Snapshot] = None
+        self._snapshot: Snapshot | None = None
         for name in ("start", "stop", "restart", "step", "save_scene", "load_scene", "snapshot", "restore"):
             rospy.Service(f"~{name}", Trigger, self._trigger(getattr(self, name)))
         rospy.Service("~pause", SetBool, self._on_pause)

@@ -7,7 +7,8 @@ import os
 import socket
 import sys
 import xmlrpc.client
-from typing import Any, Callable, Dict
+from collections.abc import Callable
+from typing import Any
 from urllib.parse import urlsplit
 
 import rosgraph
@@ -85,7 +86,7 @@ def reported(name: str, action: Callable[[], Any]) -> int:
 
 def read_parameters() -> Parameters:
     """Return the node's private parameters. Raises ParameterError, and ScriptError for a script that is not there."""
-    given: Dict[str, Any] = rospy.get_param("~", {})
+    given: dict[str, Any] = rospy.get_param("~", {})
     if not isinstance(given, dict):
         name = rospy.get_name()
         raise ParameterError(f"parameter {name} = {str(given)[:80]}: must hold parameters, such as {name}/script")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import List, Optional, Sequence
+import itertools
+from collections.abc import Sequence
 
 import numpy as np
 import rospy
@@ -39,7 +40,7 @@ class Surroundings:
         """Advertise in the drone's namespace."""
         self._simulation = simulation
         self._files = files
-        self._shown: Optional[Scene] = None
+        self._shown: Scene | None = None
         self._topic = MarkerTopic(f"{simulation.drone.name}/view/surroundings", WORDS)
 
     def update(self) -> None:
@@ -78,8 +79,8 @@ def _ground(half: float) -> Marker:
     for beyond, colour in _GROUND:
         radius = half + beyond
         rings.append([(radius * np.cos(a), radius * np.sin(a), _BELOW, *colour) for a in angles])
-    corners: List[Sequence[float]] = []
-    for near, far in zip(rings, rings[1:]):
+    corners: list[Sequence[float]] = []
+    for near, far in itertools.pairwise(rings):
         for low, right, high, left in zip(near, far, far[1:], near[1:]):
             corners += [low, right, high, low, high, left]
     marker = shape(Marker.TRIANGLE_LIST, _OPAQUE, (1, 1, 1))

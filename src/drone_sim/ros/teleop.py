@@ -6,7 +6,7 @@ import contextlib
 import math
 import threading
 import time
-from typing import Any, List, Optional, Type
+from typing import Any
 
 import rospy
 from geometry_msgs.msg import Twist, TwistStamped
@@ -35,7 +35,7 @@ class Teleop:
         self.said = ""  # one line for the user
         self.farewell = ""  # the last one
         self._in_force = CommandInForce()
-        self._odometry: Optional[Odometry] = None
+        self._odometry: Odometry | None = None
         self._heard = -math.inf  # when something came from the simulator
         self._told = ""  # the simulator's state
         self._calling = ""
@@ -99,7 +99,7 @@ class Teleop:
                 self._publisher.publish(_message(Command()))
             time.sleep(_FAREWELL)
 
-    def _call(self, name: str, kind: Type[Any], *request: Any) -> None:
+    def _call(self, name: str, kind: type[Any], *request: Any) -> None:
         """Call a service of the simulator in a thread of its own, for the keys must go on."""
         if self._calling:
             self.said = f"{self._calling}: no answer yet"
@@ -120,7 +120,7 @@ class Teleop:
 
     # ---- the read-out
 
-    def lines(self) -> List[str]:
+    def lines(self) -> list[str]:
         """Return the read-out: state, command in force, what the drone does, and what there is to say."""
         state = self._state()
         return [f"state    {state}", f"command  {self._told_command()}", *_motion(self._odometry), self.said]
@@ -149,7 +149,7 @@ def _message(command: Command) -> Twist:
     return twist
 
 
-def _motion(odometry: Optional[Odometry]) -> List[str]:
+def _motion(odometry: Odometry | None) -> list[str]:
     """Return velocity in the track frame, and pose; both are exact."""
     if odometry is None:
         return ["drone    no odometry", ""]

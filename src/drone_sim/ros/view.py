@@ -11,7 +11,7 @@ import threading
 import time
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -40,13 +40,13 @@ class Topic:
         """Begin without a publisher."""
         self.name = name
         self.why = "waiting for a publisher"
-        self.shown: Optional[np.ndarray] = None
+        self.shown: np.ndarray | None = None
         self._message: Any = None
-        self._subscriber: Optional[rospy.Subscriber] = None
+        self._subscriber: rospy.Subscriber | None = None
         self._said = False
         self._since = time.monotonic()
 
-    def look_for(self, published: Dict[str, str]) -> None:
+    def look_for(self, published: dict[str, str]) -> None:
         """Subscribe if somebody publishes; say, once, that nobody does or that it is no image."""
         kind = published.get(self.name)
         if self._subscriber is None and kind in _KINDS:
@@ -99,7 +99,7 @@ class Topic:
         return f"{self.name}   no picture for {silent:.0f} s" if old else self.name
 
     @property
-    def picture(self) -> Tuple[str, np.ndarray]:
+    def picture(self) -> tuple[str, np.ndarray]:
         """The caption, and what there is to see."""
         return self.caption, pictures.blank(self.why.partition(";")[0]) if self.shown is None else self.shown
 
@@ -107,7 +107,7 @@ class Topic:
 class Viewer:
     """Follows topics until somebody ends it; the thread that calls `run` owns the window."""
 
-    def __init__(self, topics: List[str]):
+    def __init__(self, topics: list[str]):
         """Begin to listen."""
         self.topics = [Topic(rospy.resolve_name(topic)) for topic in topics]
         self.ended = threading.Event()
@@ -149,7 +149,7 @@ class Viewer:
         label = tkinter.Label(window, borderwidth=0)
         label.pack()
         largest = int(_SHARE * window.winfo_screenwidth()), int(_SHARE * window.winfo_screenheight())
-        told: List[Tuple[str, str]] = []
+        told: list[tuple[str, str]] = []
         while not self._over():
             news = self._wait()
             if news or told != [(topic.why, topic.caption) for topic in self.topics]:

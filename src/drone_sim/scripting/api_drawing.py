@@ -6,7 +6,8 @@ log says once for each function.
 
 from __future__ import annotations
 
-from typing import Any, Dict, Optional, Sequence, Set
+from collections.abc import Sequence
+from typing import Any
 
 from drone_sim.objects import WORLD
 from drone_sim.scripting.calls import Function, numbers
@@ -44,9 +45,9 @@ class Drawing:
         """Take the drone, and whether its drawings are shown."""
         self._host = host
         self._drawings = host.drawings
-        self._said: Set[str] = set()
+        self._said: set[str] = set()
 
-    def functions(self) -> Dict[str, Function]:
+    def functions(self) -> dict[str, Function]:
         """Return every function, by name."""
         makers = {name: self._ignored(name, makes=True) for name in _MAKERS}
         others = {name: self._ignored(name, makes=False) for name in _OTHERS}
@@ -60,7 +61,7 @@ class Drawing:
         duplicateTolerance: Number = 0.0,
         parent: Handle = WORLD,
         maxItemCount: int = 1,
-        color: Optional[ThreeNumbers] = None,
+        color: ThreeNumbers | None = None,
         *_shine: Any,
     ) -> int:
         """Make a drawing object that holds up to `maxItemCount` items; return its handle.
@@ -81,7 +82,7 @@ class Drawing:
             self._drawings.make(self._host.drawings_made, int(objectType), extent, tolerance, int(maxItemCount), rgb)
         return self._host.drawings_made
 
-    def addDrawingObjectItem(self, handle: Handle, item: Optional[Numbers] = None) -> None:
+    def addDrawingObjectItem(self, handle: Handle, item: Numbers | None = None) -> None:
         """Draw one more item, its points one after the other (m, world); without an item, remove all of them."""
         values = None if item is None else numbers(item, len(item))
         if self._drawings is None:
@@ -95,7 +96,7 @@ class Drawing:
             self._drawings.remove(handle)
 
     def _ignored(self, name: str, makes: bool) -> Function:
-        def call(*_arguments: Any) -> Optional[int]:
+        def call(*_arguments: Any) -> int | None:
             if makes:
                 self._host.drawings_made += 1
             self._say(name, "there is nothing to draw on; accepted and ignored")

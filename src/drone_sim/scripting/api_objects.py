@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, List, Mapping, Optional, Sequence, Tuple
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from drone_sim import frames
 from drone_sim.objects import WORLD
@@ -30,7 +31,7 @@ class Objects:
 
     # ---- names
 
-    def getObject(self, path: Name, options: Optional[Mapping[str, Any]] = None) -> int:
+    def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
         """Return the handle of an object by path or name; -1 for none with the option noError."""
         try:
             return object_paths.find(self._objects, path, self._host.own_script)
@@ -39,7 +40,7 @@ class Objects:
                 return -1
             raise
 
-    def getObjectHandle(self, path: Name, options: Optional[Mapping[str, Any]] = None) -> int:
+    def getObjectHandle(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
         """Return the handle of an object by name (3.x) or path."""
         return self.getObject(path, options)
 
@@ -51,7 +52,7 @@ class Objects:
         """Return the 4.x alias of an object; its path from the root where options is 1 or more."""
         return self._objects.path(handle) if options > 0 else self._objects[handle].alias
 
-    def getNameSuffix(self, name: Optional[Name] = None) -> int:
+    def getNameSuffix(self, name: Name | None = None) -> int:
         """Return the number of the model's copy in a name such as 'Quadricopter#0'; -1 for the first."""
         digits = (name or "").rpartition("#")[2]
         return int(digits) if "#" in (name or "") and digits.isdigit() else -1
@@ -71,7 +72,7 @@ class Objects:
 
     # ---- where they are
 
-    def getObjectPosition(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
+    def getObjectPosition(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the position of an object."""
         m = self._objects.matrix(handle, relativeTo)
         return [m[3], m[7], m[11]]
@@ -83,7 +84,7 @@ class Objects:
         x, y, z = place
         self._objects.set_matrix(handle, frame, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
 
-    def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
+    def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the Euler angles of an object."""
         return list(frames.to_euler(self._objects.matrix(handle, relativeTo)))
 
@@ -93,7 +94,7 @@ class Objects:
         m = self._objects.matrix(handle, frame)
         self._objects.set_matrix(handle, frame, frames.from_euler((m[3], m[7], m[11]), turn))
 
-    def getObjectQuaternion(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
+    def getObjectQuaternion(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the quaternion (x, y, z, w) of an object."""
         return list(frames.to_quaternion(self._objects.matrix(handle, relativeTo)))
 
@@ -103,7 +104,7 @@ class Objects:
         m = self._objects.matrix(handle, frame)
         self._objects.set_matrix(handle, frame, frames.from_quaternion((m[3], m[7], m[11]), _unit(turn)))
 
-    def getObjectPose(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
+    def getObjectPose(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return position and quaternion of an object, 7 numbers."""
         m = self._objects.matrix(handle, relativeTo)
         return [*frames.position(m), *frames.to_quaternion(m)]
@@ -113,7 +114,7 @@ class Objects:
         frame, place = _frame_and_values(relativeTo, pose, 7)
         self._objects.set_matrix(handle, frame, frames.from_quaternion(place[:3], _unit(place[3:])))
 
-    def getObjectMatrix(self, handle: Handle, relativeTo: Handle = WORLD) -> List[float]:
+    def getObjectMatrix(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the 12 numbers of an object's transform."""
         return list(self._objects.matrix(handle, relativeTo))
 
@@ -124,12 +125,12 @@ class Objects:
 
     # ---- how they move
 
-    def getObjectVelocity(self, handle: Handle) -> Tuple[List[float], List[float]]:
+    def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
         """Return the linear and the angular velocity of an object, in the world frame."""
         linear, angular = self._objects[handle].velocity()
         return list(linear), list(angular)
 
-    def getVelocity(self, handle: Handle) -> Tuple[List[float], List[float]]:
+    def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
         """Return the linear and the angular velocity of an object, in the world frame."""
         return self.getObjectVelocity(handle)
 
@@ -159,33 +160,33 @@ class Objects:
 
     # ---- matrices
 
-    def multiplyVector(self, matrix: TwelveNumbers, vector: ThreeNumbers) -> List[float]:
+    def multiplyVector(self, matrix: TwelveNumbers, vector: ThreeNumbers) -> list[float]:
         """Return matrix · vector."""
         m, v = numbers(matrix, 12), numbers(vector, 3)
         return list(frames.transform(m, v))
 
-    def multiplyMatrices(self, first: TwelveNumbers, second: TwelveNumbers) -> List[float]:
+    def multiplyMatrices(self, first: TwelveNumbers, second: TwelveNumbers) -> list[float]:
         """Return first · second."""
         return list(frames.multiply(numbers(first, 12), numbers(second, 12)))
 
-    def buildMatrix(self, position: ThreeNumbers, angles: ThreeNumbers) -> List[float]:
+    def buildMatrix(self, position: ThreeNumbers, angles: ThreeNumbers) -> list[float]:
         """Return the transform of a position and Euler angles."""
         return list(frames.from_euler(numbers(position, 3), numbers(angles, 3)))
 
-    def getEulerAnglesFromMatrix(self, matrix: TwelveNumbers) -> List[float]:
+    def getEulerAnglesFromMatrix(self, matrix: TwelveNumbers) -> list[float]:
         """Return the Euler angles of a transform."""
         return list(frames.to_euler(numbers(matrix, 12)))
 
-    def getMatrixInverse(self, matrix: TwelveNumbers) -> List[float]:
+    def getMatrixInverse(self, matrix: TwelveNumbers) -> list[float]:
         """Return the inverse of a transform."""
         return list(frames.invert(numbers(matrix, 12)))
 
-    def getInvertedMatrix(self, matrix: TwelveNumbers) -> List[float]:
+    def getInvertedMatrix(self, matrix: TwelveNumbers) -> list[float]:
         """Return the inverse of a transform (3.x)."""
         return list(frames.invert(numbers(matrix, 12)))
 
 
-def _frame_and_values(first: Any, second: Any, count: int) -> Tuple[int, Tuple[float, ...]]:
+def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[float, ...]]:
     """Tell a handle and values apart, which come in either order, or the values alone."""
     if isinstance(first, (int, float)):
         return int(first), numbers(second, count)
@@ -201,7 +202,7 @@ def _vector(values: Sequence[float]) -> frames.Vector:
     return x, y, z
 
 
-def _unit(quaternion: Sequence[float]) -> Tuple[float, ...]:
+def _unit(quaternion: Sequence[float]) -> tuple[float, ...]:
     length = sum(value * value for value in quaternion) ** 0.5
     if length == 0:
         raise WrongValue("a quaternion that is not zero is expected")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import difflib
 import logging
+from collections.abc import Iterable
 from math import isfinite
-from typing import Any, Dict, Iterable, Optional, Tuple
+from typing import Any
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import object_paths
@@ -35,7 +36,7 @@ class Scripts:
         """Take the drone whose scripts they are, and the clock."""
         self._host = host
         self._names = list(host.script_parameters)
-        self._parameters: Dict[int, Parameters] = dict(enumerate(host.script_parameters.values()))
+        self._parameters: dict[int, Parameters] = dict(enumerate(host.script_parameters.values()))
         self._own = self._names.index(host.own_script)
         self._read = [set(parameters) for parameters in self._parameters.values()]  # names that something reads
         self._clock = surroundings.clock
@@ -63,7 +64,7 @@ class Scripts:
 
     # ---- scripts
 
-    def getScriptHandle(self, name: Optional[Name] = None) -> int:
+    def getScriptHandle(self, name: Name | None = None) -> int:
         """Return the handle of the script that is attached to an object; of this one without a name."""
         if name is None:
             return self._own
@@ -171,7 +172,7 @@ def _stored(value: Any, before: Any) -> Any:
 
 
 def _from_text(text: str) -> Any:
-    words: Dict[str, Tuple[Any]] = {"true": (True,), "false": (False,)}
+    words: dict[str, tuple[Any]] = {"true": (True,), "false": (False,)}
     if text in words:
         return words[text][0]
     try:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from typing import Any, Callable, Dict, Optional, Type
+from collections.abc import Callable
+from typing import Any
 
 from drone_sim.scripting.calls import WrongValue
 from drone_sim.scripting.script_values import MOST_BYTES
@@ -22,7 +23,7 @@ class Signals:
 
     def __init__(self) -> None:
         """Start with none."""
-        self._values: Dict[Type[Any], Dict[str, Any]] = {float: {}, int: {}, str: {}}
+        self._values: dict[type[Any], dict[str, Any]] = {float: {}, int: {}, str: {}}
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings the present signals back."""
@@ -37,11 +38,11 @@ class Signals:
         """Set a number."""
         self._set(float, name, float(value))
 
-    def getFloatSignal(self, name: Name) -> Optional[float]:
+    def getFloatSignal(self, name: Name) -> float | None:
         """Return a number, or nothing where it is not set."""
         return self._values[float].get(name)
 
-    def clearFloatSignal(self, name: Optional[Name] = None) -> None:
+    def clearFloatSignal(self, name: Name | None = None) -> None:
         """Forget a number, or all of them."""
         self._clear(float, name)
 
@@ -51,11 +52,11 @@ class Signals:
             raise WrongValue(f"a whole number within +-{_LARGEST} is expected")
         self._set(int, name, int(value))
 
-    def getInt32Signal(self, name: Name) -> Optional[int]:
+    def getInt32Signal(self, name: Name) -> int | None:
         """Return a whole number, or nothing where it is not set."""
         return self._values[int].get(name)
 
-    def clearInt32Signal(self, name: Optional[Name] = None) -> None:
+    def clearInt32Signal(self, name: Name | None = None) -> None:
         """Forget a whole number, or all of them."""
         self._clear(int, name)
 
@@ -71,15 +72,15 @@ class Signals:
             raise ValueError(f"string signals may hold {MOST_BYTES} bytes together, not {size}")
         self._set(str, name, value)
 
-    def getStringSignal(self, name: Name) -> Optional[str]:
+    def getStringSignal(self, name: Name) -> str | None:
         """Return a string, or nothing where it is not set."""
         return self._values[str].get(name)
 
-    def clearStringSignal(self, name: Optional[Name] = None) -> None:
+    def clearStringSignal(self, name: Name | None = None) -> None:
         """Forget a string, or all of them."""
         self._clear(str, name)
 
-    def _set(self, kind: Type[Any], name: str, value: Any) -> None:
+    def _set(self, kind: type[Any], name: str, value: Any) -> None:
         if not isinstance(name, str):
             raise WrongValue("the name of a signal is a string")
         if len(name) > _LONGEST_NAME:
@@ -89,7 +90,7 @@ class Signals:
             raise ValueError(f"{_MOST} signals of a kind are there already: clear some")
         values[name] = value
 
-    def _clear(self, kind: Type[Any], name: Optional[str]) -> None:
+    def _clear(self, kind: type[Any], name: str | None) -> None:
         if name is None:
             self._values[kind].clear()
         else:

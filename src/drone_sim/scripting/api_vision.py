@@ -7,7 +7,7 @@ step, or as of now where nobody has looked since.
 
 from __future__ import annotations
 
-from typing import Any, List, Tuple
+from typing import Any
 
 import numpy as np
 
@@ -26,23 +26,23 @@ class VisionSensors:
         self._pictures = surroundings.pictures
         self._outside = surroundings.outside
 
-    def getVisionSensorCharImage(self, handle: Handle, *_options: Any) -> Tuple[bytes, int, int]:
+    def getVisionSensorCharImage(self, handle: Handle, *_options: Any) -> tuple[bytes, int, int]:
         """Return image, width and height."""
         picture = self._picture(handle)
         height, width = picture.shape[:2]
         return b"".join(picture[::-1]), width, height  # row by row: `tobytes` takes forty times as long
 
-    def getVisionSensorImg(self, handle: Handle, *_options: Any) -> Tuple[bytes, List[int]]:
+    def getVisionSensorImg(self, handle: Handle, *_options: Any) -> tuple[bytes, list[int]]:
         """Return image and [width, height]."""
         image, width, height = self.getVisionSensorCharImage(handle)
         return image, [width, height]
 
-    def getVisionSensorResolution(self, handle: Handle) -> List[int]:
+    def getVisionSensorResolution(self, handle: Handle) -> list[int]:
         """Return [width, height]."""
         height, width = self._picture(handle).shape[:2]
         return [width, height]
 
-    def getVisionSensorRes(self, handle: Handle) -> List[int]:
+    def getVisionSensorRes(self, handle: Handle) -> list[int]:
         """Return [width, height]."""
         return self.getVisionSensorResolution(handle)
 

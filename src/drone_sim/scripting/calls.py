@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import inspect
 import itertools
-import sys
 import traceback
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
-from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Sequence, Tuple
+from typing import Any
 
 from drone_sim.objects import near_names
 from drone_sim.scripting.errors import UnknownName
@@ -17,7 +17,6 @@ _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, Overfl
 _SHOWN = 60  # characters of a value
 _MOST = 13  # values
 _LONGEST = 1000  # characters of an error's message
-_NAME_IN_ERRORS = "__qualname__" if sys.version_info >= (3, 10) else "__name__"  # of a call with wrong arguments
 
 
 class Api:
@@ -36,13 +35,13 @@ class Api:
         raise UnknownName(f"{own} has no '{name}'; {near_names(name, [*functions, *constants])}")
 
 
-def contents(api: Api) -> Tuple[str, Dict[str, Function], Dict[str, Any]]:
+def contents(api: Api) -> tuple[str, dict[str, Function], dict[str, Any]]:
     """Return name, functions and constants of an API."""
     name, functions, constants = api.__dict__["_api"]
     return name, functions, constants
 
 
-def public_functions(parts: Iterable[object]) -> Dict[str, Function]:
+def public_functions(parts: Iterable[object]) -> dict[str, Function]:
     """Return the public methods of some objects, by name."""
     return {
         name: getattr(part, name)
@@ -52,7 +51,7 @@ def public_functions(parts: Iterable[object]) -> Dict[str, Function]:
     }
 
 
-def mistake(error: BaseException, apis: Iterable[Api]) -> Optional[str]:
+def mistake(error: BaseException, apis: Iterable[Api]) -> str | None:
     """Return one line on an error that a call of an API raised in a Python script; None for any other error.
 
     Looked up afterwards, in the traceback: a guard around every function would cost every call.
@@ -68,7 +67,7 @@ def mistake(error: BaseException, apis: Iterable[Api]) -> Optional[str]:
             given = [frame.f_locals[one.name] for one in parameters if one.kind is not one.VAR_POSITIONAL]
             return explain(name, function, given, error)
     for name, function in functions:
-        if str(error).startswith(f"{getattr(function, _NAME_IN_ERRORS)}() "):  # never got inside
+        if str(error).startswith(f"{function.__qualname__}() "):  # never got inside
             return f"{name}: wrong number of values, expected ({_expected(inspect.signature(function))})"
     return None
 
@@ -127,7 +126,7 @@ class WrongValue(TypeError):
     """A value is of the wrong kind; the message says what is expected instead."""
 
 
-def numbers(values: Sequence[float], count: int) -> Tuple[float, ...]:
+def numbers(values: Sequence[float], count: int) -> tuple[float, ...]:
     """Return `count` finite numbers; raises WrongValue."""
     if type(values) is list and len(values) == count:  # most often what another call returned
         try:

@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from typing import Dict
-
 from drone_sim.objects import PARENT, WORLD
 
 PHASES = ("init", "actuation", "sensing", "cleanup")
@@ -86,5 +84,5 @@ _OTHERS = {
     "verbosity_scriptinfos": 440,
 }
 
-CONSTANTS: Dict[str, int] = {**_HANDLES, **_DRAWING, **_PARTICLES, **_CALL_TYPES, **_OTHERS}
-CALL_TYPES: Dict[str, int] = dict(zip(PHASES, _CALL_TYPES.values()))  # of sim_call_type, by phase
+CONSTANTS: dict[str, int] = {**_HANDLES, **_DRAWING, **_PARTICLES, **_CALL_TYPES, **_OTHERS}
+CALL_TYPES: dict[str, int] = dict(zip(PHASES, _CALL_TYPES.values()))  # of sim_call_type, by phase

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-from typing import Set
 
 
 class Cores:
@@ -21,7 +20,7 @@ class Cores:
         self._shared = -1  # the core that the other thread is kept on
         self._are_shared = False
         try:
-            self._all: Set[int] = os.sched_getaffinity(0)
+            self._all: set[int] = os.sched_getaffinity(0)
             self._here = ctypes.CDLL(None).sched_getcpu
         except (AttributeError, OSError):  # not Linux
             self._all = set()
@@ -48,7 +47,7 @@ class Cores:
         self._allow(self._other, self._all)
 
     @staticmethod
-    def _allow(thread: int, cores: Set[int]) -> bool:
+    def _allow(thread: int, cores: set[int]) -> bool:
         with contextlib.suppress(OSError, ValueError):
             os.sched_setaffinity(thread, cores)
             return True

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Callable, Deque, Dict, Optional, Tuple
 
 from drone_sim.scripting.constants import CONSTANTS
 
@@ -30,7 +30,7 @@ _KINDS = {CONSTANTS[f"drawing_{kind}"]: kind for kind in _NUMBERS}
 _CYCLIC = CONSTANTS["drawing_cyclic"]
 _SEEN_THROUGH = {CONSTANTS["drawing_50percenttransparency"]: 0.5, CONSTANTS["drawing_25percenttransparency"]: 0.75}
 
-Item = Tuple[float, ...]
+Item = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class DrawingObject:
 
     kind: str
     size: float
-    rgba: Tuple[float, float, float, float]
-    items: Deque[Item]
+    rgba: tuple[float, float, float, float]
+    items: deque[Item]
     cyclic: bool
     tolerance: float
 
@@ -50,7 +50,7 @@ class Drawings:
 
     def __init__(self) -> None:
         """Start with none."""
-        self.objects: Dict[int, DrawingObject] = {}
+        self.objects: dict[int, DrawingObject] = {}
         self.changes = 0
 
     def make(self, handle: int, kind: int, size: float, tolerance: float, most: int, color: Item) -> None:
@@ -61,13 +61,13 @@ class Drawings:
             raise ValueError(f"no drawing object has the type {kind}; known are sim.drawing_{', '.join(_NUMBERS)}")
         alpha = math.prod(part for flag, part in _SEEN_THROUGH.items() if kind & flag)
         rgba = (color[0], color[1], color[2], alpha)
-        items: Deque[Item] = deque(maxlen=min(max(1, most), MOST))
+        items: deque[Item] = deque(maxlen=min(max(1, most), MOST))
         self.objects[handle] = DrawingObject(
             _KINDS[kind & _KIND], size, rgba, items, bool(kind & _CYCLIC), max(0.0, tolerance)
         )
         self.changes += 1
 
-    def add(self, handle: int, item: Optional[Item]) -> None:
+    def add(self, handle: int, item: Item | None) -> None:
         """Add an item, unless the object is full and not cyclic, or has one so near; None removes all items.
 
         Raises ValueError for a handle that there is not, and for too few numbers.
@@ -116,5 +116,5 @@ class Drawings:
         return drawn.tolerance > 0 and any(math.dist(one[:3], item[:3]) < drawn.tolerance for one in drawn.items)
 
 
-def _copied(objects: Dict[int, DrawingObject]) -> Dict[int, DrawingObject]:
+def _copied(objects: dict[int, DrawingObject]) -> dict[int, DrawingObject]:
     return {handle: replace(drawn, items=drawn.items.copy()) for handle, drawn in objects.items()}

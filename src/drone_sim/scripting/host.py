@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Callable, Dict, Mapping, Optional, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from drone_sim.objects import ObjectTree
 from drone_sim.scripting.api_signals import Signals
 from drone_sim.scripting.drawings import Drawings
 
-Parameters = Dict[str, Any]
+Parameters = dict[str, Any]
 
 
 def _call(function: Callable[[], Any]) -> Any:
@@ -39,7 +40,7 @@ class Host(Protocol):
         """Name of the object that this script is attached to."""
 
     @property
-    def drawings(self) -> Optional[Drawings]:
+    def drawings(self) -> Drawings | None:
         """Where to draw, if anywhere."""
 
     drawings_made: int  # the last handle that was given away
@@ -47,7 +48,7 @@ class Host(Protocol):
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m)."""
 
-    def turn_joint(self, joint: str, angle: Optional[float]) -> float:
+    def turn_joint(self, joint: str, angle: float | None) -> float:
         """Turn a joint to an angle (rad), unless None; return the angle. Raises ValueError for what is none."""
 
 

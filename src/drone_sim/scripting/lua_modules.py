@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Tuple
 
 from drone_sim.objects import near_names
 from drone_sim.resources import read_bytes
@@ -29,7 +28,7 @@ class LuaModules:
         """Return the file behind a chunk's name, the script's for any other name."""
         return self._paths.get(chunk, self._paths[self.chunk])
 
-    def placed(self, text: str) -> Tuple[str, int, str]:
+    def placed(self, text: str) -> tuple[str, int, str]:
         """Return file, line (0: not known) and the rest of a message of Lua's."""
         for chunk, path in self._paths.items():
             match = re.match(rf"{re.escape(chunk)}:(\d+): (.*)$", text, re.DOTALL)
@@ -37,7 +36,7 @@ class LuaModules:
                 return path, int(match.group(1)), match.group(2)
         return self._paths[self.chunk], 0, text
 
-    def read(self, name: bytes) -> Tuple[bool, bytes, bytes]:
+    def read(self, name: bytes) -> tuple[bool, bytes, bytes]:
         """Return true, text and chunk name of a module; or false and a message."""
         try:
             text, chunk = self._read(name.decode("utf-8"))
@@ -46,7 +45,7 @@ class LuaModules:
             return False, f"no module '{name.decode('utf-8', 'replace')[:80]}': {said}".encode("utf-8", "replace"), b""
         return True, text, chunk.encode("utf-8", "replace")
 
-    def _read(self, name: str) -> Tuple[bytes, str]:
+    def _read(self, name: str) -> tuple[bytes, str]:
         if len(name) > _LONGEST or not _NAME.fullmatch(name):
             raise ValueError("a module's name is made of letters, digits, _ and -; dots stand for folders")
         inner = name.replace(".", "/")

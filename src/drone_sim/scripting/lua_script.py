@@ -13,7 +13,8 @@ import importlib.util
 import logging
 import re
 import weakref
-from typing import Any, Callable, Dict, Mapping, Sequence, Set, Tuple, Union
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import phase_names, script_log
@@ -28,7 +29,7 @@ from drone_sim.scripting.lua_values import AS_STREAM, FAILED, TOO_MUCH, Values
 from drone_sim.scripting.messages import Callback
 from drone_sim.scripting.time_limit import TimeLimit
 
-Door = Union[LuaThread, SameThread]
+Door = LuaThread | SameThread
 
 _LOG = logging.getLogger(__name__)
 _MIB = 1024 * 1024
@@ -120,7 +121,7 @@ class LuaScript:
             raise ScriptError("load", *places[name], phase_names.never_called(name, meant))
         phase_names.warn(self._path, places)
 
-    def _named_functions(self) -> Dict[str, Tuple[str, int]]:
+    def _named_functions(self) -> dict[str, tuple[str, int]]:
         """Return file and line of the script's global functions, by name."""
         words = self._run("load", self._functions).decode("utf-8", "replace").split("\n")
         return {
@@ -221,7 +222,7 @@ class LuaScript:
     # ---- the API
 
     def _define(self, sandbox: Any, modules: Mapping[str, Api]) -> None:
-        self._known: Set[str] = set()
+        self._known: set[str] = set()
         script_globals = sandbox[b"globals"]
 
         def add(place: Any, name: str, shown: str, function: Function) -> None:
@@ -253,7 +254,7 @@ def _lua_function(name: str, function: Function, values: Values, thread: Door) -
     """Return a function that answers Lua's calls; one of a script that was left behind does nothing."""
     readers, answer = values.readers(), values.answer_of(function)
 
-    def call(how: int, *given: Any) -> Tuple[Any, ...]:
+    def call(how: int, *given: Any) -> tuple[Any, ...]:
         if thread.closed:
             return _STOPPED
         if values.used() > _MEMORY and values.too_much():  # or there may be no room for the answer
@@ -291,11 +292,11 @@ def _log(thread: Door) -> Callable[[bytes], None]:
     return log
 
 
-def _reader(thread: Door, modules: LuaModules) -> Callable[[bytes], Tuple[bool, bytes, bytes]]:
+def _reader(thread: Door, modules: LuaModules) -> Callable[[bytes], tuple[bool, bytes, bytes]]:
     return lambda name: (False, b"stopped", b"") if thread.closed else modules.read(name)
 
 
-def _phase_functions() -> Tuple[bytes, ...]:
+def _phase_functions() -> tuple[bytes, ...]:
     return tuple(f"sysCall_{phase}".encode() for phase in PHASES)
 
 

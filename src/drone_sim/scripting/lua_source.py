@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import List
 
 _COMMENT = re.compile(rb"--(?:\[(=*)\[)?")
 _PER_PHASE = re.compile(rb"\bsim_call_type\b")
@@ -42,7 +41,7 @@ class LuaSource:
 
 
 def _without_comments(text: bytes) -> bytes:
-    kept: List[bytes] = []
+    kept: list[bytes] = []
     here = 0
     while True:
         comment = _COMMENT.search(text, here)

@@ -12,8 +12,9 @@ import os
 import sys
 import threading
 import time
+from collections.abc import Callable
 from types import CodeType
-from typing import Any, Callable, List, Optional, Tuple
+from typing import Any
 
 from drone_sim.scripting.cores import Cores
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
@@ -25,7 +26,7 @@ _OUTSTAY = 5.0  # s that such a function may go on
 _NICE = 19  # the priority of what is left behind: it gets the time that nobody else wants
 MOST_LEFT = 8  # threads of a process that may hang at once
 
-_left: List[threading.Thread] = []
+_left: list[threading.Thread] = []
 
 
 class LeftBehind(Stopped):
@@ -44,7 +45,7 @@ class SameThread:
     def __init__(self, limit: TimeLimit):
         """Take the limit, which the hook looks at."""
         self.closed = False
-        self.api_code: Optional[CodeType] = None
+        self.api_code: CodeType | None = None
         self._limit = limit
 
     def run(self, function: Callable[..., Any], *arguments: Any, near: bool = False) -> Any:
@@ -66,16 +67,16 @@ class LuaThread:
     def __init__(self, limit: TimeLimit):
         """Start the thread; it ends with `close`."""
         self.closed = False  # once it is, no function of the API does anything
-        self.api_code: Optional[CodeType] = None  # of the function that answers Lua's calls
+        self.api_code: CodeType | None = None  # of the function that answers Lua's calls
         self._limit = limit
         self._seconds = min(limit.seconds or threading.TIMEOUT_MAX, threading.TIMEOUT_MAX)
         limit.carry_with(self._carry)
         self._go, self._done = threading.Lock(), threading.Lock()
         self._go.acquire()
         self._done.acquire()
-        self._job: Optional[Tuple[Callable[..., Any], Tuple[Any, ...]]] = None
-        self._errand: Optional[Callable[[], Any]] = None
-        self._outcome: Tuple[Any, Optional[BaseException]] = (None, None)
+        self._job: tuple[Callable[..., Any], tuple[Any, ...]] | None = None
+        self._errand: Callable[[], Any] | None = None
+        self._outcome: tuple[Any, BaseException | None] = (None, None)
         self._thread = threading.Thread(target=self._work, name="Lua script", daemon=True)
         self._thread.start()
         self._cores = Cores(self._thread.native_id or 0)

@@ -6,8 +6,9 @@ becomes several values; a message object becomes a table of its fields.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any
 
 from drone_sim.scripting.script_values import DEEPEST, MOST_BYTES, MOST_VALUES, refuse_if_too_large
 
@@ -20,12 +21,12 @@ FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM, TOO_MUCH = range(6)
 
 
 # What functions of the API return, most often, and the answer that it is.
-_ANSWERS: Dict[Any, Callable[[Any], Tuple[Any, ...]]] = {
+_ANSWERS: dict[Any, Callable[[Any], tuple[Any, ...]]] = {
     "None": lambda _: (PLAIN,),
     "float": lambda value: (PLAIN, value),
-    "List[float]": lambda values: (LIST, *values),
-    "List[int]": lambda values: (LIST, *values),
-    "Tuple[List[float], List[float]]": lambda values: (TWO_LISTS, *values[0], *values[1]),
+    "list[float]": lambda values: (LIST, *values),
+    "list[int]": lambda values: (LIST, *values),
+    "tuple[list[float], list[float]]": lambda values: (TWO_LISTS, *values[0], *values[1]),
 }
 
 
@@ -44,7 +45,7 @@ class Values:
         self._runtime = runtime
         self._memory = memory
         self.used: Callable[[], int] = runtime.get_memory_used  # Lua's own count leaves out 5.5's long strings
-        self._stream: List[Any] = []
+        self._stream: list[Any] = []
 
     def close(self) -> None:
         """Let go of the Lua state."""
@@ -58,7 +59,7 @@ class Values:
         self._runtime.gccollect()
         return self.used() > self._memory
 
-    def bridge(self) -> Dict[str, Any]:
+    def bridge(self) -> dict[str, Any]:
         """Return what the Lua side needs for handing values over."""
         return {
             "fresh": self._fresh,
@@ -79,13 +80,13 @@ class Values:
     def _put(self, *values: Any) -> None:
         self._stream.extend(values)
 
-    def _from_stream(self, _given: Tuple[Any, ...]) -> List[Any]:
+    def _from_stream(self, _given: tuple[Any, ...]) -> list[Any]:
         found, self._stream = _from_stream(self._stream), []
         while found and found[-1] is None:  # nil at the end is as good as left out
             found.pop()
         return found
 
-    def readers(self) -> Sequence[Callable[[Tuple[Any, ...]], Optional[Sequence[Any]]]]:
+    def readers(self) -> Sequence[Callable[[tuple[Any, ...]], Sequence[Any] | None]]:
         """Return what makes a function's arguments of what a call handed over, by the form of the call.
 
         They return None where lists hold other things than numbers: the call is to be made anew, with a stream.
@@ -94,14 +95,14 @@ class Values:
 
     # ---- to Lua
 
-    def answer_of(self, function: Callable[..., Any]) -> Callable[[Any], Tuple[Any, ...]]:
+    def answer_of(self, function: Callable[..., Any]) -> Callable[[Any], tuple[Any, ...]]:
         """Return what turns a function's results into an answer to Lua, by what it is annotated to return.
 
         The answer raises ValueError for too much.
         """
         return _ANSWERS.get(function.__annotations__.get("return", ""), self._results)
 
-    def _results(self, value: Any) -> Tuple[Any, ...]:
+    def _results(self, value: Any) -> tuple[Any, ...]:
         if type(value) is not tuple:
             return (PLAIN,) if value is None else (PLAIN, self.to_lua(value))
         return (PLAIN, *self.to_lua(list(value), unpacked=True))
@@ -139,42 +140,42 @@ class Values:
         return self._to_lua(key)
 
 
-def _scalars(given: Tuple[Any, ...]) -> List[Any]:
+def _scalars(given: tuple[Any, ...]) -> list[Any]:
     return [_text(value) if type(value) is bytes else value for value in given]
 
 
-def _first(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+def _first(given: tuple[Any, ...]) -> list[Any] | None:
     second, third, *values = given
     if not _ALL_NUMBERS(map(type, values)):
         return None
     return [values] if second is third is None else [values, second, third]
 
 
-def _second(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+def _second(given: tuple[Any, ...]) -> list[Any] | None:
     first, third, *values = given
     if not _ALL_NUMBERS(map(type, values)):
         return None
     return [first, values] if third is None else [first, values, third]
 
 
-def _third(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+def _third(given: tuple[Any, ...]) -> list[Any] | None:
     first, second, *values = given
     return [first, second, values] if _ALL_NUMBERS(map(type, values)) else None
 
 
-def _first_and_second(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+def _first_and_second(given: tuple[Any, ...]) -> list[Any] | None:
     return [[*given[3:]], [*given[:3]]] if _ALL_NUMBERS(map(type, given)) else None
 
 
-def _second_and_third(given: Tuple[Any, ...]) -> Optional[List[Any]]:
+def _second_and_third(given: tuple[Any, ...]) -> list[Any] | None:
     first, x, y, z, *values = given
     return [first, [x, y, z], values] if _ALL_NUMBERS(map(type, given[1:])) else None
 
 
-def _from_stream(tokens: List[Any]) -> List[Any]:
-    outer: List[List[Any]] = []
-    here: List[Any] = []
-    marks: List[Any] = []
+def _from_stream(tokens: list[Any]) -> list[Any]:
+    outer: list[list[Any]] = []
+    here: list[Any] = []
+    marks: list[Any] = []
     for token in tokens:
         if type(token) in _NUMBERS:
             here.append(token)
@@ -209,12 +210,12 @@ def _as_float(value: int) -> float:
         raise ValueError("a whole number is too large") from None
 
 
-def fields(value: Any) -> Optional[Mapping[Any, Any]]:
+def fields(value: Any) -> Mapping[Any, Any] | None:
     """Return the named fields of a mapping or message object; None for a sequence."""
     if isinstance(value, Mapping):
         return value
     names = getattr(value, "_fields", None) or getattr(value, "__slots__", None)
     if names is not None:
         return {name: getattr(value, name) for name in names if not name.startswith("_")}
-    own: Optional[Dict[str, Any]] = getattr(value, "__dict__", None)
+    own: dict[str, Any] | None = getattr(value, "__dict__", None)
     return own if own is not None and not hasattr(value, "__iter__") else None

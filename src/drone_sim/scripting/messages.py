@@ -11,7 +11,8 @@ import copy
 import re
 import threading
 from collections import deque
-from typing import Any, Callable, Deque, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple, Union
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,13 +22,13 @@ from drone_sim.scripting.script_values import refuse_if_too_large
 # The names by which messages say what is expected.
 Name = str
 Handle = int
-Callback = Union[str, Callable[[Any], None]]
+Callback = str | Callable[[Any], None]
 
 _KEPT = 32  # published messages
 _MOST = 200  # subscriptions and publishers
 _LONGEST_QUEUE = 1000  # messages
 _OWN_TOPICS = {"cmd_vel": "geometry_msgs/Twist"}
-_NONE: List[Callback] = []
+_NONE: list[Callback] = []
 _TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
 
 
@@ -87,7 +88,7 @@ class Published(NamedTuple):
 class _Subscription(NamedTuple):
     topic: str
     callback: Callback
-    messages: Deque[Any]
+    messages: deque[Any]
     begin: Callable[[], Callable[[], None]]  # returns what ends it
     end: Callable[[], None]
 
@@ -95,8 +96,8 @@ class _Subscription(NamedTuple):
 class _Publisher(NamedTuple):
     topic: str
     kind: str
-    begin: Callable[[], Optional[Sender]]
-    sender: Optional[Sender]
+    begin: Callable[[], Sender | None]
+    sender: Sender | None
 
 
 class MessageBus:
@@ -106,20 +107,20 @@ class MessageBus:
     `own_topics` are never asked of it: the drone itself posts them.
     """
 
-    def __init__(self, namespace: str, own_topics: Optional[Mapping[str, str]] = None):
+    def __init__(self, namespace: str, own_topics: Mapping[str, str] | None = None):
         """Take the drone's namespace, such as 'drone', and topics that the drone posts itself, with their types."""
-        self.backend: Optional[Backend] = None
-        self.published: Deque[Published] = deque(maxlen=_KEPT)
+        self.backend: Backend | None = None
+        self.published: deque[Published] = deque(maxlen=_KEPT)
         self._namespace = namespace
         own = _OWN_TOPICS if own_topics is None else own_topics
         self._own_topics = {self._resolve(topic): kind for topic, kind in own.items()}
-        self._new_callbacks: List[Callback] = []
+        self._new_callbacks: list[Callback] = []
         self._lock = threading.Lock()
         self._next_handle = 0
-        self._subscriptions: Dict[int, _Subscription] = {}
-        self._publishers: Dict[int, _Publisher] = {}
+        self._subscriptions: dict[int, _Subscription] = {}
+        self._publishers: dict[int, _Publisher] = {}
 
-    def functions(self) -> Dict[str, Function]:
+    def functions(self) -> dict[str, Function]:
         """Return what a script may call, by name."""
         names = (
             "subscribe",
@@ -141,7 +142,7 @@ class MessageBus:
         Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1.
         """
         resolved = self._resolve(topic)
-        messages: Deque[Any] = deque(maxlen=min(max(1, int(queue)), _LONGEST_QUEUE))
+        messages: deque[Any] = deque(maxlen=min(max(1, int(queue)), _LONGEST_QUEUE))
 
         def begin() -> Callable[[], None]:
             if self.backend is None or resolved in self._own_topics:
@@ -169,7 +170,7 @@ class MessageBus:
         """Advertise a topic; return a handle to publish on."""
         resolved, kept = self._resolve(topic), min(max(1, int(queue)), _LONGEST_QUEUE)
 
-        def begin() -> Optional[Sender]:
+        def begin() -> Sender | None:
             return self.backend.advertise(resolved, kind, kept, bool(latch)) if self.backend else None
 
         self._check_type(resolved, kind)
@@ -194,7 +195,7 @@ class MessageBus:
         """Advertise an image topic; return a handle to publish on."""
         resolved, kept = self._resolve(topic), min(max(1, int(queue)), _LONGEST_QUEUE)
 
-        def begin() -> Optional[Sender]:
+        def begin() -> Sender | None:
             return self.backend.advertise_image(resolved, kept) if self.backend else None
 
         return self._add_publisher(resolved, "sensor_msgs/Image", begin)
@@ -227,7 +228,7 @@ class MessageBus:
                 if subscription.topic == resolved:
                     subscription.messages.append(message)
 
-    def new_callbacks(self) -> List[Callback]:
+    def new_callbacks(self) -> list[Callback]:
         """Return what was subscribed with since the last call."""
         if not self._new_callbacks:
             return _NONE
@@ -236,7 +237,7 @@ class MessageBus:
 
     def deliver(self, call: Callable[[Callback, Any], None]) -> None:
         """Hand every waiting message to `call(callback, message)`, oldest first."""
-        waiting: List[Tuple[Callback, Any]] = []
+        waiting: list[tuple[Callback, Any]] = []
         for subscription in self._subscriptions.values():  # which no other thread changes
             while subscription.messages:
                 waiting.append((subscription.callback, subscription.messages.popleft()))
@@ -278,7 +279,7 @@ class MessageBus:
 
         return recall
 
-    def _add_publisher(self, topic: str, kind: str, begin: Callable[[], Optional[Sender]]) -> int:
+    def _add_publisher(self, topic: str, kind: str, begin: Callable[[], Sender | None]) -> int:
         self._refuse_if_too_many()
         publisher = _Publisher(topic, kind, begin, begin())
         with self._lock:
@@ -320,7 +321,7 @@ def _nothing() -> None:
     pass
 
 
-def _copied(messages: Deque[Any]) -> Deque[Any]:
+def _copied(messages: deque[Any]) -> deque[Any]:
     """Return copies of messages, which a callback may change; other threads may append meanwhile."""
     kept = messages.copy()
     try:

@@ -12,7 +12,6 @@ descendant, the nearest first; [i] takes the i-th of several.
 from __future__ import annotations
 
 import re
-from typing import List, Optional
 
 from drone_sim.objects import ObjectTree, SceneObject, near_names
 
@@ -31,7 +30,7 @@ def find(objects: ObjectTree, path: str, own: str) -> int:
     first, slash, rest = path.partition("/")
     if not slash and first not in _OWN:
         return objects.handle(_SUFFIX.sub("", path))
-    here: Optional[SceneObject] = None
+    here: SceneObject | None = None
     if first in _OWN:
         here = objects[objects.handle(own)]
     elif first:
@@ -46,7 +45,7 @@ def find(objects: ObjectTree, path: str, own: str) -> int:
     return objects.handle_of(here)
 
 
-def _step(objects: ObjectTree, here: Optional[SceneObject], element: str) -> Optional[SceneObject]:
+def _step(objects: ObjectTree, here: SceneObject | None, element: str) -> SceneObject | None:
     if element == ".":
         return here
     if element == "..":
@@ -59,10 +58,10 @@ def _step(objects: ObjectTree, here: Optional[SceneObject], element: str) -> Opt
     return found[index] if index < len(found) else None
 
 
-def _descendants(objects: ObjectTree, root: Optional[SceneObject]) -> List[SceneObject]:
+def _descendants(objects: ObjectTree, root: SceneObject | None) -> list[SceneObject]:
     """Return everything below an object, the nearest first."""
-    level: List[Optional[SceneObject]] = [root]
-    everything: List[SceneObject] = []
+    level: list[SceneObject | None] = [root]
+    everything: list[SceneObject] = []
     while level:
         below = [child for parent in level for _, child in objects.children(parent)]
         everything += below

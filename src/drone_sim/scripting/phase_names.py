@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import logging
-from typing import Collection, Iterator, Optional
+from collections.abc import Collection, Iterator
 
 from drone_sim.scripting.constants import PHASES
 
@@ -65,7 +65,7 @@ def warn(path: str, functions: Collection[str]) -> None:
         _LOG.warning("%s: %s", path, "; ".join([f"has none of {_listed()}: nothing flies the drone", *bare]))
 
 
-def _meant(name: str) -> Optional[str]:
+def _meant(name: str) -> str | None:
     """Return the phase function that a name comes near to, None for one that is known or is none of ours."""
     if name in FUNCTIONS.values() or name in _ELSEWHERE or len(name) > _LONGEST:
         return None

@@ -12,10 +12,11 @@ import importlib.util
 import itertools
 import logging
 import sys
+from collections.abc import Callable, Mapping, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any, Callable, Dict, Mapping, Optional, Sequence, cast
+from typing import Any, cast
 
 from drone_sim.resources import read_bytes
 
@@ -31,14 +32,14 @@ class Helpers:
     def __init__(self, script: str, names: Mapping[str, Any], compiled: Callable[[bytes, str], CodeType]):
         """Take the script's path, the names that its modules find as they find `len`, and what compiles a file."""
         self.files = {script}
-        self.builtins: Dict[str, Any] = {**vars(builtins), **names, "__import__": self._import}
+        self.builtins: dict[str, Any] = {**vars(builtins), **names, "__import__": self._import}
         self._folder = Path(script).parent
         self.package = f"_script{next(_numbers)}"
         above = ModuleType(self.package)
         above.__path__ = [str(self._folder)]
         sys.modules[self.package] = above  # dataclasses and the like look up the module of a class
         self._compiled = compiled
-        self._is_beside: Dict[str, bool] = {}
+        self._is_beside: dict[str, bool] = {}
 
     def close(self) -> None:
         """Forget the modules; may be called twice."""
@@ -47,7 +48,7 @@ class Helpers:
         for name in [*self.modules(), self.package]:
             sys.modules.pop(name, None)
 
-    def modules(self) -> Dict[str, ModuleType]:
+    def modules(self) -> dict[str, ModuleType]:
         """Return the modules that were imported, by their names in sys.modules."""
         return {name: one for name, one in list(sys.modules.items()) if name.startswith(self.package + ".")}
 
@@ -70,8 +71,8 @@ class Helpers:
     def _import(
         self,
         name: str,
-        globals: Optional[Mapping[str, Any]] = None,
-        locals: Optional[Mapping[str, Any]] = None,
+        globals: Mapping[str, Any] | None = None,
+        locals: Mapping[str, Any] | None = None,
         fromlist: Sequence[str] = (),
         level: int = 0,
     ) -> Any:
@@ -99,7 +100,7 @@ class Helpers:
 
     # ---- what Python's import asks
 
-    def find_spec(self, name: str, path: Optional[Sequence[str]], _target: Any = None) -> Optional[ModuleSpec]:
+    def find_spec(self, name: str, path: Sequence[str] | None, _target: Any = None) -> ModuleSpec | None:
         """Return how to load a module below the script's package."""
         if not name.startswith(self.package + ".") or path is None:
             return None

@@ -7,8 +7,9 @@ import copy
 import inspect
 import reprlib
 import traceback
+from collections.abc import Callable, Mapping
 from types import CodeType
-from typing import Any, Callable, Dict, List, Mapping, Tuple
+from typing import Any
 
 from drone_sim.objects import near_names
 from drone_sim.scripting import phase_names, script_log
@@ -51,7 +52,7 @@ class PythonScript:
         self._modules = modules
         found = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: Stopped, **modules}
         self._helpers = Helpers(path, found, _compiled)
-        self._globals: Dict[str, Any] = {
+        self._globals: dict[str, Any] = {
             "__name__": self._helpers.package,
             "__file__": path,
             "__builtins__": self._helpers.builtins,
@@ -156,7 +157,7 @@ class PythonScript:
             path, line, message = self._path, 0, f"{kind}, which cannot be shown"
         return ScriptError(phase, path, line, message)
 
-    def _told(self, error: BaseException) -> Tuple[Tuple[str, int], str]:
+    def _told(self, error: BaseException) -> tuple[tuple[str, int], str]:
         """Return place and message of an exception; whatever the script made of it may raise, or not return."""
         if isinstance(error, SyntaxError) and error.filename in self._helpers.files:
             return (str(error.filename), error.lineno or 0), f"SyntaxError: {error.msg}"
@@ -167,7 +168,7 @@ class PythonScript:
         text = self._helpers.shown(error) if isinstance(error, ImportError) else shown(error)
         return place, mistake(error, self._modules.values()) or (f"{name}: {text}" if text else name)
 
-    def _place(self, error: BaseException) -> Tuple[str, int]:
+    def _place(self, error: BaseException) -> tuple[str, int]:
         """Return file and line, in the script or a module beside it, where an exception was raised."""
         frames = ((frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__))
         return ([(self._path, 0)] + [place for place in frames if place[0] in self._helpers.files])[-1]
@@ -177,15 +178,15 @@ def _compiled(source: bytes, path: str) -> CodeType:
     return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
 
 
-def _copied(*namespaces: Mapping[str, Any]) -> List[Dict[str, Any]]:
-    memo: Dict[int, Any] = {}  # one for all: what is shared stays shared
+def _copied(*namespaces: Mapping[str, Any]) -> list[dict[str, Any]]:
+    memo: dict[int, Any] = {}  # one for all: what is shared stays shared
     return [
         {name: _copy(value, memo) for name, value in variables.items() if name not in _NOT_COPIED}
         for variables in namespaces
     ]
 
 
-def _copy(value: Any, memo: Dict[int, Any]) -> Any:
+def _copy(value: Any, memo: dict[int, Any]) -> Any:
     if isinstance(value, Variables):  # attribute by attribute: one that cannot be copied spoils no other
         made = memo.setdefault(id(value), Variables())
         made.__dict__.update({name: _copy(one, memo) for name, one in vars(value).items()})

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, List, Mapping, Optional, Tuple
+from collections.abc import Callable, Mapping
+from typing import Any
 
 DEEPEST = 16  # levels of nested tables, lists and mappings
 MOST_VALUES = 1_000_000  # in one call or message
@@ -10,10 +11,10 @@ MOST_BYTES = 64 * 1024 * 1024  # of all its strings
 
 _PLAIN = frozenset((float, int, bool, type(None)))
 _STRINGS = (str, bytes, bytearray, memoryview)
-Fields = Callable[[Any], Optional[Mapping[Any, Any]]]
+Fields = Callable[[Any], Mapping[Any, Any] | None]
 
 
-def fields_of_mapping(value: Any) -> Optional[Mapping[Any, Any]]:
+def fields_of_mapping(value: Any) -> Mapping[Any, Any] | None:
     """Return a mapping as it is, None for anything else."""
     return value if isinstance(value, Mapping) else None
 
@@ -26,7 +27,7 @@ def refuse_if_too_large(value: Any, fields: Fields = fields_of_mapping) -> None:
     if type(value) in _PLAIN:
         return
     count = size = 0
-    waiting: List[Tuple[Any, int]] = [(value, 0)]
+    waiting: list[tuple[Any, int]] = [(value, 0)]
     while waiting:
         value, depth = waiting.pop()
         if isinstance(value, _STRINGS):
@@ -45,7 +46,7 @@ def refuse_if_too_large(value: Any, fields: Fields = fields_of_mapping) -> None:
         waiting.extend((one, depth + 1) for one in inner if type(one) not in _PLAIN)
 
 
-def _inner(value: Any, fields: Fields) -> Optional[List[Any]]:
+def _inner(value: Any, fields: Fields) -> list[Any] | None:
     named = fields(value)
     if named is not None:
         return [*named.keys(), *named.values()]

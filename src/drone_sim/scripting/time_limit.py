@@ -17,10 +17,11 @@ import sys
 import threading
 import time
 import weakref
+from collections.abc import Callable, Iterator
 from threading import get_ident
 from time import monotonic
 from types import FrameType
-from typing import Any, Callable, Iterator, Optional
+from typing import Any
 
 _POLL = 0.05  # s between two looks of the watchdog
 _AGAIN = 0.25  # s after which a script that swallowed the exception gets another
@@ -45,7 +46,7 @@ class TimeLimit:
         self.struck = False  # whether the last script that `run` called was stopped
         self._deadline = 0.0
         self._expired = False
-        self._carry: Optional[Callable[[Callable[[], Any]], Any]] = None
+        self._carry: Callable[[Callable[[], Any]], Any] | None = None
         self._traced_by: Any = None  # a debugger's trace function, which comes back afterwards
         self._thread = 0
         # The script's thread writes `armed` and then reads `fired`, the watchdog the other way round: so one
@@ -148,7 +149,7 @@ class TimeLimit:
             else:
                 self._fired = False
 
-    def strike_if_late(self, frame: Optional[FrameType]) -> None:
+    def strike_if_late(self, frame: FrameType | None) -> None:
         """Raise Stopped in a script that is late, and once more in its next line should it swallow that.
 
         Sets the timer again unless no script runs; the timer's handler calls it.
@@ -177,7 +178,7 @@ class _Timer:
     """The process's timer, SIGALRM. It is not set in every call, but goes off and is set anew while scripts run."""
 
     def __init__(self) -> None:
-        self.limit: Optional[TimeLimit] = None  # of the script that runs in the main thread, or did
+        self.limit: TimeLimit | None = None  # of the script that runs in the main thread, or did
         self.next = math.inf  # when it goes off
         self._is_ready = False
 
@@ -194,10 +195,10 @@ _MAIN = threading.main_thread().ident
 _timer = _Timer()
 _watched: weakref.WeakSet[TimeLimit] = weakref.WeakSet()
 _watching = threading.Lock()
-_watchdog: Optional[threading.Thread] = None
+_watchdog: threading.Thread | None = None
 
 
-def _go_off(_number: int, frame: Optional[FrameType]) -> None:
+def _go_off(_number: int, frame: FrameType | None) -> None:
     _timer.next = math.inf
     if _timer.limit is not None:
         _timer.limit.strike_if_late(frame)

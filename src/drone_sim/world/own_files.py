@@ -6,7 +6,6 @@ import copy
 import itertools
 import tempfile
 from pathlib import Path
-from typing import Dict, Tuple
 from xml.etree import ElementTree as Xml
 
 import cv2
@@ -24,8 +23,8 @@ class OwnFiles:
     def __init__(self) -> None:
         """Make the folder. Raises OSError."""
         self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_")
-        self._meshes: Dict[Tuple[str, bool], str] = {}
-        self._origins: Dict[str, str] = {}
+        self._meshes: dict[tuple[str, bool], str] = {}
+        self._origins: dict[str, str] = {}
 
     def close(self) -> None:
         """Remove them all; may be called twice."""

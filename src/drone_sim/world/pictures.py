@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pybullet
@@ -27,9 +28,9 @@ class Pictures:
         self._client = client
         self._origin = origin
         self._floor = -1
-        self._textures: Dict[int, str] = {}
-        self._parts: Dict[int, List[_Part]] = {}
-        self._standing: Dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
+        self._textures: dict[int, str] = {}
+        self._parts: dict[int, list[_Part]] = {}
+        self._standing: dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
 
     def set_floor(self, body: int, texture: str) -> None:
         """Say which body is the floor, which receives the shadows, and its texture; its second visual is the ground."""
@@ -70,7 +71,7 @@ class Pictures:
             parts[index] = parts[index]._replace(local=place)
         return bool(others)
 
-    def visuals(self, bodies: Iterable[int]) -> List[Visual]:
+    def visuals(self, bodies: Iterable[int]) -> list[Visual]:
         """Return all that can be drawn of these bodies."""
         return [part.visual for body in bodies for part in self._of(body)]
 
@@ -104,13 +105,13 @@ class Pictures:
         state = pybullet.getLinkState(body, link, 0, 1, self._client)
         return from_quaternion(state[4], state[5])
 
-    def _of(self, body: int) -> List[_Part]:
+    def _of(self, body: int) -> list[_Part]:
         if body not in self._parts:
             rows = pybullet.getVisualShapeData(body, physicsClientId=self._client)
             self._parts[body] = [self._part((body, index), row) for index, row in enumerate(rows)]
         return self._parts[body]
 
-    def _part(self, key: Tuple[int, int], row: Sequence[Any]) -> _Part:
+    def _part(self, key: tuple[int, int], row: Sequence[Any]) -> _Part:
         _, link, kind, dimensions, file, position, orientation, rgba = row[:8]
         shape, size = _shape_and_size(kind, dimensions)
         source = self._origin(file.decode()) if shape == "mesh" else ""
@@ -130,8 +131,8 @@ class Pictures:
         return _Part(visual, link, from_quaternion(position, orientation))
 
     def tiny(
-        self, camera: np.ndarray, size: Tuple[int, int], vertical_fov: float, depths: Tuple[float, float]
-    ) -> Tuple[np.ndarray, np.ndarray]:
+        self, camera: np.ndarray, size: tuple[int, int], vertical_fov: float, depths: tuple[float, float]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return RGB (height, width, 3) and depth (height, width) of PyBullet's software renderer.
 
         Slow, but always there. `camera` is the (4, 4) pose world from optical frame, `size` (width, height),
@@ -160,7 +161,7 @@ class Pictures:
         return color, depth.astype(np.float32)
 
 
-def _shape_and_size(kind: int, dimensions: Sequence[float]) -> Tuple[str, Tuple[float, ...]]:
+def _shape_and_size(kind: int, dimensions: Sequence[float]) -> tuple[str, tuple[float, ...]]:
     if kind in (pybullet.GEOM_CYLINDER, pybullet.GEOM_CAPSULE):
         length, radius = dimensions[:2]  # PyBullet's order
         return ("cylinder" if kind == pybullet.GEOM_CYLINDER else "capsule"), (radius, length)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, NamedTuple, Sequence, Tuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
 import pybullet
@@ -75,10 +76,10 @@ def dress(client: int, body: int, visual: int, path: str) -> None:
     pybullet.changeVisualShape(body, -1, visual, textureUniqueId=image, physicsClientId=client)
 
 
-def _geometry(shape: Shape, files: OwnFiles) -> Tuple[Dict[str, Any], Dict[str, Any]]:
+def _geometry(shape: Shape, files: OwnFiles) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return PyBullet's arguments for the collision and for the visual shape, which differ in their words."""
     if shape.kind == "box":
-        both: Dict[str, Any] = {"shapeType": pybullet.GEOM_BOX, "halfExtents": [length / 2 for length in shape.size]}
+        both: dict[str, Any] = {"shapeType": pybullet.GEOM_BOX, "halfExtents": [length / 2 for length in shape.size]}
         return both, both
     if shape.kind == "sphere":
         both = {"shapeType": pybullet.GEOM_SPHERE, "radius": shape.size[0]}

@@ -6,7 +6,7 @@ One thread owns it. Every call names its client, so several worlds can live in o
 from __future__ import annotations
 
 import itertools
-from typing import Dict, List, Mapping, Optional, Sequence, Set, Tuple
+from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -38,7 +38,7 @@ class World:
         if self._client < 0:
             raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
         self._sub_step, self._gravity = sub_step, gravity
-        self._snapshots: Set[int] = set()
+        self._snapshots: set[int] = set()
         self._gui = gui
         if gui:
             pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self._client)
@@ -53,13 +53,13 @@ class World:
         pybullet.resetSimulation(physicsClientId=self._client)  # its first argument is another
         pybullet.setGravity(0, 0, self._gravity, self._client)
         pybullet.setTimeStep(self._sub_step, self._client)
-        self._inertial_frames: Dict[int, Tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
-        self._centres: Dict[int, Tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
-        self._beginning: Dict[int, Tuple[Vector, Quaternion, List[float]]] = {}
+        self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
+        self._centres: dict[int, tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
+        self._beginning: dict[int, tuple[Vector, Quaternion, list[float]]] = {}
         self._files.clear()
         self._pictures = Pictures(self._client, self._files.origin)
         # Bodies whose texture PyBullet has not been given, and for which visual shape it is (-1: all).
-        self._undressed: Dict[int, Tuple[str, int]] = {}
+        self._undressed: dict[int, tuple[str, int]] = {}
 
     def close(self) -> None:
         """Free the world; may be called twice."""
@@ -255,11 +255,11 @@ class World:
 
     # ---- pictures
 
-    def visuals(self, bodies: Optional[Sequence[int]] = None) -> List[Visual]:
+    def visuals(self, bodies: Sequence[int] | None = None) -> list[Visual]:
         """Return what can be drawn of these bodies, or of all, in the order of `visual_poses`."""
         return self._pictures.visuals(self._inertial_frames if bodies is None else bodies)
 
-    def visual_poses(self, bodies: Optional[Sequence[int]] = None) -> np.ndarray:
+    def visual_poses(self, bodies: Sequence[int] | None = None) -> np.ndarray:
         """Return the poses world from visual, (N, 4, 4), of these bodies, or of all."""
         chosen = self._inertial_frames if bodies is None else bodies
         return self._pictures.poses({body: self._inertial_frames[body][1] for body in chosen})
@@ -271,7 +271,7 @@ class World:
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
-    ) -> Tuple[np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return RGB and depth of PyBullet's software renderer: see Pictures.tiny."""
         self._dress()
         return self._pictures.tiny(camera, (width, height), vertical_fov, (near, far))
