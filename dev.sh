@@ -2,8 +2,9 @@
 # Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | lint | bench [NAME...] |
 #   fuzz [CASES] | soak [MINUTES]
 #
-# Installs what is missing (Debian 12: its own ROS 1; Ubuntu 20.04: /opt/ros/noetic), keeps the pip packages
-# in .venv, and builds into build/ and devel/. What is there already is left alone, so a second run takes seconds.
+# Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
+# build/ and devel/. What is there already is left alone, so a second run takes seconds. Where another ROS 1 has
+# been sourced (ROS One, RoboStack), that one is used, and no system package is installed.
 set -eo pipefail
 here=$PWD
 cd "$(dirname "${BASH_SOURCE[0]}")"
@@ -12,17 +13,34 @@ root=$PWD
 say() { printf '\033[1m[dev.sh]\033[0m %s\n' "$*" >&2; }
 fail() { say "$*"; exit 1; }
 
+# The folder of a ROS 1 that has been sourced and is not Debian's own, which lies in /usr.
+sourced_ros() {
+  local folder IFS=:
+  for folder in $CMAKE_PREFIX_PATH; do
+    if [ "$folder" != /usr ] && [ -f "$folder/share/catkin/cmake/catkinConfig.cmake" ]; then
+      echo "$folder"
+      return
+    fi
+  done
+}
+ros=$(sourced_ros)
+# Debian's ROS, and ROS One, are of the system's python; a conda environment brings its own.
+python=/usr/bin/python3
+if [ -x "$ros/bin/python3" ]; then python=$ros/bin/python3; fi
+
+wheels=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim/wheels
+PYBULLET_MINUTES=5 # on one core
+PYBULLET_FILES=267
+
+# ros-environment is what lets setup.bash set ROS_PACKAGE_PATH, and python3-dev is for compiling PyBullet; on
+# Debian 12 other packages bring the first, and there is a wheel of the second.
 packages() {
-  local common="python3-venv python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri"
-  if [ -f /opt/ros/noetic/setup.bash ]; then
-    echo "$common $(printf 'ros-noetic-%s ' catkin rospy roslaunch rostest rosbash cv-bridge tf2-ros robot-state-publisher \
-      rviz dynamic-reconfigure interactive-markers std-srvs geometry-msgs nav-msgs sensor-msgs std-msgs)"
-  else
-    echo "$common catkin librostest-dev python3-rospy python3-roslaunch python3-rostest rosbash python3-rostopic \
-      python3-rosnode python3-rosmsg python3-rosservice python3-cv-bridge python3-tf2-ros ros-robot-state-publisher rviz python3-dynamic-reconfigure python3-geometry-msgs python3-nav-msgs \
-      python3-sensor-msgs python3-std-msgs python3-std-srvs python3-interactive-markers \
-      python3-visualization-msgs python3-yaml"
-  fi
+  echo python3-venv python3-dev python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri \
+    catkin ros-environment librostest-dev python3-rospy python3-roslaunch python3-rostest rosbash \
+    python3-rostopic python3-rosnode python3-rosmsg python3-rosservice python3-cv-bridge python3-tf2-ros \
+    ros-robot-state-publisher rviz python3-dynamic-reconfigure python3-geometry-msgs python3-nav-msgs \
+    python3-sensor-msgs python3-std-msgs python3-std-srvs python3-interactive-markers \
+    python3-visualization-msgs python3-setuptools python3-yaml
 }
 
 as_root() {
@@ -31,7 +49,12 @@ as_root() {
 
 install_packages() {
   local wanted missing=() package
-  read -ra wanted <<<"$(packages | tr '\n' ' ')"
+  if [ -n "$ros" ]; then
+    say "using the ROS in $ros"
+    return
+  fi
+  command -v dpkg-query >/dev/null || fail "neither Debian nor a ROS 1 that has been sourced: see README.md"
+  read -ra wanted <<<"$(packages)"
   for package in "${wanted[@]}"; do
     dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
   done
@@ -48,16 +71,44 @@ fresh() { [ "$(cat "$1" 2>/dev/null)" = "$2" ]; }
 
 make_venv() { # make_venv REQUIREMENTS...
   local stamp=.venv/.made-from-$1 wanted
-  wanted="$root $(/usr/bin/python3 --version) $(cksum <"$1")"
+  wanted="$root $("$python" --version) $(cksum <"$1")"
   if fresh "$stamp" "$wanted"; then return; fi
   if ! .venv/bin/python -c "import sys; sys.exit(sys.prefix != '$root/.venv')" 2>/dev/null; then
     say "making .venv beside the system's python packages"
     rm -rf .venv
-    /usr/bin/python3 -m venv --system-site-packages .venv
+    "$python" -m venv --system-site-packages .venv
   fi
+  if [ "$1" = requirements.txt ]; then make_pybullet; fi
   say "installing the python packages of $1 (a minute, once)"
-  .venv/bin/python -m pip install -q --disable-pip-version-check -r "$1" >&2
+  pip install -q --find-links "$wheels" -r "$1" >&2
   echo "$wanted" >"$stamp"
+}
+
+pip() { .venv/bin/python -m pip --disable-pip-version-check "$@"; }
+
+# There is no wheel of PyBullet for Python 3.12 and later. It is compiled once, on all cores, into a wheel that other
+# checkouts of this user find in $wheels.
+make_pybullet() {
+  local wanted tag scratch log=$root/.venv/pybullet.log compiling
+  wanted=$(grep '^pybullet==' requirements.txt)
+  tag=$(.venv/bin/python -c 'import sys; print("cp{}{}".format(*sys.version_info))')
+  mkdir -p "$wheels"
+  if compgen -G "$wheels/${wanted/==/-}-$tag-*.whl" >/dev/null; then return; fi
+  if pip install -q --dry-run --no-deps --only-binary :all: "$wanted" >/dev/null 2>&1; then return; fi
+  say "compiling PyBullet, of which there is no wheel for $("$python" --version): about $((PYBULLET_MINUTES / $(nproc) + 1)) minutes, once"
+  # Without debug information, and with numpy's arrays as the wheels have them, for which gcc 14 has to be lenient.
+  scratch=$(mktemp -d)
+  TMPDIR=$scratch CFLAGS="-g0 -w -Wno-incompatible-pointer-types" pip wheel -v --no-deps --no-build-isolation \
+    --no-binary :all: -w "$scratch" "$wanted" >"$log" 2>&1 &
+  compiling=$!
+  while kill -0 $compiling 2>/dev/null; do
+    printf '\r  %d of %d files' "$(find "$scratch" -name '*.o' 2>/dev/null | wc -l)" $PYBULLET_FILES >&2
+    sleep 2
+  done
+  printf '\n' >&2
+  wait $compiling || { tail -20 "$log" >&2; fail "PyBullet cannot be compiled: the whole story is in $log"; }
+  mv "$scratch"/*.whl "$wheels" # whole, or not at all
+  rm -rf "$scratch"
 }
 
 build() {
@@ -68,7 +119,8 @@ build() {
   rm -rf build devel
   # The venv's python by name: another python3 first on PATH has neither catkin_pkg nor rospy.
   mkdir build
-  if ! { cmake -S . -B build -DCATKIN_DEVEL_PREFIX="$root/devel" -DPYTHON_EXECUTABLE="$root/.venv/bin/python" &&
+  if ! { cmake -S . -B build -DCATKIN_DEVEL_PREFIX="$root/devel" -DPYTHON_EXECUTABLE="$root/.venv/bin/python" \
+      -DPython_EXECUTABLE="$root/.venv/bin/python" &&
     make -C build; } >build/build.log 2>&1; then
     cat build/build.log >&2
     fail "the build failed"
@@ -77,7 +129,6 @@ build() {
 }
 
 setup() {
-  if [ -f /opt/ros/noetic/setup.bash ]; then source /opt/ros/noetic/setup.bash; fi
   install_packages
   grep -qw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
   make_venv requirements.txt
@@ -128,5 +179,5 @@ case "$command" in
   bench) setup; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
-  *) sed -n '2,6s/^# \{0,1\}//p' "$0" ;;
+  *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
 esac

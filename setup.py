@@ -1,8 +1,7 @@
 """catkin reads this (catkin_python_setup); do not call it yourself."""
 
-from distutils.core import setup
-
 from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
 
 PACKAGES = [
     "drone_sim",
