@@ -1,0 +1,54 @@
+"""What is imported is declared: in package.xml for rosdep, in requirements.txt for pip."""
+
+import ast
+import re
+import sys
+from xml.etree import ElementTree as Xml
+
+import yaml
+
+from drone_sim.resources import package_path
+
+ROOT = package_path()
+# Where the key of rosdep, or the name that pip knows, is not that of the module.
+KEYS = {
+    "PIL": "python3-pil",
+    "annotated_types": "python3-pydantic-pip",
+    "cv2": "python3-opencv",
+    "moderngl": "python3-moderngl-pip",
+    "pybullet": "python3-pybullet-pip",
+    "pydantic": "python3-pydantic-pip",
+    "tkinter": "python3-tk",
+    "trimesh": "python3-trimesh-pip",
+}
+# Imported by name, by trimesh, and what the launch file starts.
+INDIRECT = {"python3-lupa-pip", "python3-pycollada-pip", "robot_state_publisher", "rviz"}
+
+
+def imported():
+    """Return the modules of others that the package imports."""
+    files = [*(ROOT / "src").rglob("*.py"), *(one for one in (ROOT / "scripts").iterdir() if one.is_file())]
+    found = set()
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 else []
+            found |= {name.partition(".")[0] for name in names}
+    return found - set(sys.stdlib_module_names) - {"drone_sim"} | (found & {"tkinter"})
+
+
+def test_every_module_has_its_key_in_package_xml():
+    declared = {one.text for one in Xml.parse(ROOT / "package.xml").iter("exec_depend")}
+    modules = imported()
+    candidates = {name: {KEYS.get(name, name), f"python3-{name}"} for name in modules}
+    assert {name for name, keys in candidates.items() if not keys & declared} == set()
+    assert {key for key in declared if not any(key in keys for keys in candidates.values())} == INDIRECT
+
+
+def test_rosdep_and_pip_take_the_same_versions():
+    required = re.findall(r"^([a-z]+)([^;\n]*)", (ROOT / "requirements.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    versions = {name: f"{name}{version.strip()}" for name, version in required}
+    rosdep = yaml.safe_load((ROOT / "rosdep.yaml").read_text(encoding="utf-8"))
+    for key, systems in rosdep.items():
+        name = key.removeprefix("python3-").removesuffix("-pip")
+        assert {one["pip"]["packages"][0] for one in systems.values()} == {versions[name]}
