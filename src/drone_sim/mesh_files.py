@@ -203,6 +203,8 @@ def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:
 def _part(mesh: trimesh.Trimesh) -> Part:
     vertices = np.array(mesh.vertices, dtype=np.float64)
     faces = np.array(mesh.faces)
+    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
+        raise ValueError("a vertex must have 3 numbers, and a face 3 corners or 4")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise ValueError("a face names a vertex that there is not")
     if not np.isfinite(vertices).all():

@@ -109,6 +109,7 @@ DOCTYPE = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;">]>'
 
 V = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 MESHES = {
+    "narrow.obj": ("v 0\nv 1\nv 2\nf 1 2 3\n", "narrow.obj: cannot be read (a vertex must have 3 numbers"),
     "dots.obj": (f"mtllib ..\n{V}f 1 2 3\n", "dots.obj: cannot be read (..: must be a regular file)"),
     "zero.obj": (f"mtllib /dev/zero\n{V}f 1 2 3\n", "/dev/zero: must be a regular file"),
     "fifo.obj": (f"mtllib fifo\n{V}f 1 2 3\n", "fifo: must be a regular file"),
