@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | lint | bench [NAME...] |
-#   fuzz [CASES] | soak [MINUTES]
+#   fuzz [CASES] | soak [MINUTES] | deb
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
 # build/ and devel/. What is there already is left alone, so a second run takes seconds. Where another ROS 1 has
@@ -47,15 +47,14 @@ as_root() {
   if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi
 }
 
-install_packages() {
-  local wanted missing=() package
+install_packages() { # install_packages NAME...
+  local missing=() package
   if [ -n "$ros" ]; then
     say "using the ROS in $ros"
     return
   fi
   command -v dpkg-query >/dev/null || fail "neither Debian nor a ROS 1 that has been sourced: see README.md"
-  read -ra wanted <<<"$(packages)"
-  for package in "${wanted[@]}"; do
+  for package in "$@"; do
     dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
   done
   if [ ${#missing[@]} = 0 ]; then return; fi
@@ -129,7 +128,8 @@ build() {
 }
 
 setup() {
-  install_packages
+  # shellcheck disable=SC2046 # one word each
+  install_packages $(packages)
   grep -qw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
   make_venv requirements.txt
   build
@@ -179,5 +179,7 @@ case "$command" in
   bench) setup; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
+  deb) install_packages python3-matplotlib python3-opencv python3-pil python3-tqdm
+    setup; packaging/deb.sh "$wheels" ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
 esac

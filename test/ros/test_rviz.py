@@ -15,10 +15,9 @@ import rostest
 from geometry_msgs.msg import PoseStamped, Twist
 from listening import Listener, connected
 from std_srvs.srv import SetBool, Trigger
-from tf.transformations import quaternion_matrix
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_sim import parameters
+from drone_sim import frames, parameters
 from drone_sim.ros.node import Node
 
 SCENE = """
@@ -177,8 +176,8 @@ class Rviz(unittest.TestCase):
         self.assertEqual(line.points[0].z, 0)
         q = line.pose.orientation
         tilt = self.node.simulation.drone.state.orientation
-        upright = quaternion_matrix(tilt) @ quaternion_matrix((q.x, q.y, q.z, q.w)) @ (0, 0, 1, 0)
-        self.assertGreater(upright[2], 0.98)
+        turn = frames.multiply_quaternions(tilt, (q.x, q.y, q.z, q.w))
+        self.assertGreater(frames.turned(turn, (0, 0, 1))[2], 0.98)
 
     def test_the_text_says_what_the_simulation_does(self):
         state = self.listen("view/state")

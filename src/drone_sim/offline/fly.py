@@ -206,7 +206,7 @@ def _status_of(action: Callable[[], int | None]) -> int:
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Give one line, as for every other mistake, instead of the usage."""
-        self.exit(_FAILED, f"fly: {message} (see fly --help)\n")
+        self.exit(_FAILED, f"fly: {' '.join(message.split())} (see fly --help)\n")
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -148,6 +148,8 @@ class PythonScript:
 
     def _error(self, phase: str, error: BaseException) -> ScriptError:
         if self._limit.struck:
+            while isinstance(error.__context__, Stopped):  # struck once more, in a handler
+                error = error.__context__
             return ScriptError(phase, *self._place(error), str(self._limit))
         kind = "an exception"
         try:

@@ -1,0 +1,68 @@
+#!/usr/bin/env bash
+# ./dev.sh deb: builds ros-drone-sim_<version>_<architecture>.deb for the Debian that it runs on, in build/deb/.
+#
+# The package lies where Debian's own ROS packages lie, so that roslaunch finds it without a setup.bash. What
+# Debian lacks (PyBullet, lupa, pydantic 2, ...) lies in a python environment of its own under /usr/lib/drone_sim.
+set -eo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+out=build/deb
+stage=$PWD/$out/root
+own=/usr/lib/drone_sim/python # the environment, as it will be installed
+wheels=$1
+version=$(sed -n 's:.*<version>\(.*\)</version>.*:\1:p' package.xml)+deb$(cut -d. -f1 /etc/debian_version)
+architecture=$(dpkg --print-architecture)
+python=$(/usr/bin/python3 -c 'import sys; print("{}.{}".format(*sys.version_info))')
+
+# What Debian has, the package depends on; the environment sees it.
+DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), libegl1, libgl1, libgl1-mesa-dri,
+ python3-cv-bridge, python3-dynamic-reconfigure, python3-genpy, python3-geometry-msgs, python3-interactive-markers,
+ python3-matplotlib, python3-nav-msgs, python3-numpy, python3-opencv, python3-pil, python3-roslaunch, python3-rospy,
+ python3-rosmsg, python3-rosnode, python3-rosservice, python3-rostopic, python3-sensor-msgs, python3-std-msgs,
+ python3-std-srvs, python3-tf2-ros, python3-tqdm, python3-visualization-msgs, python3-yaml, ros-environment,
+ ros-robot-state-publisher, rosbash"
+
+rm -rf "$out"
+mkdir -p "$stage"
+cmake -S . -B "$out/build" -DCMAKE_INSTALL_PREFIX=/usr -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF \
+  -DCATKIN_DEVEL_PREFIX="$PWD/$out/devel" >"$out/cmake.log"
+DESTDIR=$stage make -C "$out/build" install >"$out/install.log"
+
+/usr/bin/python3 -m venv --system-site-packages --without-pip "$stage$own"
+printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" >"$stage$own/pyvenv.cfg"
+rm -f "$stage$own"/bin/[aA]ctivate*
+grep -v '^opencv' requirements.txt >"$out/requirements.txt" # Debian's own will do
+.venv/bin/python -m pip --python "$stage$own/bin/python" install -q --disable-pip-version-check \
+  --find-links "$wheels" --no-compile -r "$out/requirements.txt"
+site=$stage$own/lib/python$python/site-packages
+rm -rf "$site"/pybullet_{data,envs,examples,utils,robots} "$site"/eglRenderer* "$stage$own/include" # not used here
+find "$site" -name '*.so' -exec strip --strip-unneeded {} +
+find "$stage$own/bin" -type f -delete
+find "$stage" -name __pycache__ -prune -exec rm -rf {} +
+sed -i "1s:.*:#!$own/bin/python:" "$stage"/usr/lib/drone_sim/{simulator,key_teleop,view,fly}
+
+mkdir "$stage/DEBIAN"
+cat >"$stage/DEBIAN/control" <<CONTROL
+Package: ros-drone-sim
+Version: $version
+Architecture: $architecture
+Maintainer: $(sed -n 's:.*email="\(.*\)">\(.*\)</maintainer>.*:\2 <\1>:p' package.xml)
+Section: science
+Priority: optional
+Installed-Size: $(du -sk "$stage/usr" | cut -f1)
+Depends: $DEPENDS
+Recommends: rviz, python3-tk
+Description: drone of a V-REP tutorial, without V-REP
+ PyBullet underneath, ROS 1 around it: roslaunch drone_sim drone.launch
+CONTROL
+cat >"$stage/DEBIAN/postinst" <<'POSTINST'
+#!/bin/sh
+set -e
+if [ "$1" = configure ]; then py3compile -p ros-drone-sim /usr/lib/drone_sim || true; fi
+POSTINST
+cat >"$stage/DEBIAN/prerm" <<'PRERM'
+#!/bin/sh
+set -e
+find /usr/lib/drone_sim /usr/lib/python3/dist-packages/drone_sim -name __pycache__ -prune -exec rm -rf {} +
+PRERM
+chmod 755 "$stage/DEBIAN/postinst" "$stage/DEBIAN/prerm"
+dpkg-deb --root-owner-group --build "$stage" "$out/ros-drone-sim_${version}_$architecture.deb" >&2
