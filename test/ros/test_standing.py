@@ -67,6 +67,7 @@ class Standing(unittest.TestCase):
     def setUp(self):
         self.call("start")
         self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1)
+        self.scripts.wait_for()  # the script has advertised its topic anew
         self.assertTrue(rospy.ServiceProxy("~pause", SetBool)(True).success)
 
     def call(self, name):

@@ -103,7 +103,8 @@ class Screen:
 
     def _write(self, first: int, lines: list[str], width: int, look: int) -> None:
         for row, line in enumerate(lines, start=first):
-            self._screen.addnstr(row, 0, line, width - 1, look)  # curses cannot fill the last corner
+            with contextlib.suppress(curses.error):  # how much fits into a tiny screen is curses' to know
+                self._screen.addnstr(row, 0, line, width - 1, look)  # which cannot fill the last corner
 
 
 def _ignore_control_s(terminal: int) -> None:
