@@ -141,3 +141,21 @@ def test_the_time_between_calls_is_not_the_scripts(tmp_path):
         simulation.step()
     simulation.restore(simulation.snapshot())
     simulation.close()
+
+
+def test_a_script_that_keeps_itself_has_snapshots(tmp_path):
+    path = tmp_path / "script.py"
+    path.write_text(
+        "self.me, self.too, self.list, self.count = self, [self], [], 0\n"
+        "def sysCall_sensing(): self.me.count += 1; self.list.append(self)\n",
+        encoding="utf-8",
+    )
+    simulation = Simulation(parameters.load(), script=str(path))
+    simulation.step()
+    snapshot = simulation.snapshot()
+    simulation.step()
+    simulation.restore(snapshot)
+    simulation.step()
+    me = simulation.drone.script._globals["self"]
+    assert (me.me is me, me.too[0] is me, me.count, len(me.list)) == (True, True, 2, 2)
+    simulation.close()

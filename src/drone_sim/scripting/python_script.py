@@ -190,7 +190,9 @@ def _copied(*namespaces: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _copy(value: Any, memo: dict[int, Any]) -> Any:
     if isinstance(value, Variables):  # attribute by attribute: one that cannot be copied spoils no other
-        made = memo.setdefault(id(value), Variables())
+        if id(value) in memo:  # it is among its own attributes
+            return memo[id(value)]
+        made = memo[id(value)] = Variables()
         made.__dict__.update({name: _copy(one, memo) for name, one in vars(value).items()})
         return made
     if isinstance(value, Api):
