@@ -24,8 +24,8 @@ DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), 
 rm -rf "$out"
 mkdir -p "$stage"
 cmake -S . -B "$out/build" -DCMAKE_INSTALL_PREFIX=/usr -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF \
-  -DCATKIN_DEVEL_PREFIX="$PWD/$out/devel" >"$out/cmake.log"
-DESTDIR=$stage make -C "$out/build" install >"$out/install.log"
+  -DCATKIN_DEVEL_PREFIX="$PWD/$out/devel" >"$out/cmake.log" 2>&1
+DESTDIR=$stage make -C "$out/build" install >"$out/install.log" 2>&1
 
 /usr/bin/python3 -m venv --system-site-packages --without-pip "$stage$own"
 printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" >"$stage$own/pyvenv.cfg"

@@ -131,6 +131,7 @@ IN_PYTHON = [
     ("class E(Exception):\n    def __str__(self):\n        while True: pass\nraise E", "which cannot be shown"),
     ("class M(type):\n    def __getattribute__(c, n): raise OSError\nclass E(OSError, metaclass=M): pass\nraise E", ""),
     ("raise ValueError('x' * 10**8)", "ValueError: xxx"),
+    ("def f():\n    try: f()\n    finally: f()\nf()", STOPPED),
     ("import time\ntime.sleep(1000)", STOPPED),
     ("def sysCall_sensing():\n    import time\n    time.sleep(1000)", STOPPED),
     ("import threading\nlock = threading.Lock()\nlock.acquire()\nlock.acquire()", STOPPED),

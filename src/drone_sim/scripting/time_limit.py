@@ -11,6 +11,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import ctypes
+import functools
 import math
 import signal
 import sys
@@ -25,12 +26,22 @@ from typing import Any
 
 _POLL = 0.05  # s between two looks of the watchdog
 _AGAIN = 0.25  # s after which a script that swallowed the exception gets another
+_UNTIL_HEARD = 0.01  # s between two tries to begin: a recursion may leave no room for a signal handler
 _LATER = 0.001  # s, so that the time is used up when the timer goes off
 _LONGEST = 1e6  # s
 
-_raise_in_thread = ctypes.pythonapi.PyThreadState_SetAsyncExc
+_ROOM = 50  # levels of recursion that the signal handler has beyond what the script may use
+
+_set_recursion_limit = sys.setrecursionlimit
+_raise_in_thread = ctypes.PyDLL(None).PyThreadState_SetAsyncExc
 _raise_in_thread.argtypes = (ctypes.c_ulong, ctypes.py_object)
 _NOTHING = ctypes.py_object()  # NULL
+# Trace functions, called with a frame, an event and an argument. Written in C: in one written in Python the exception
+# would be raised at once, or there might be too little room for it, and then it would be the thread's no more.
+_insist = ctypes.PyDLL(None).PyThreadState_SetAsyncExc
+_insist.argtypes, _insist.restype = (*_raise_in_thread.argtypes, *3 * (ctypes.py_object,)), None
+_let_pass = ctypes.PyDLL(None).Py_IsInitialized  # for new frames, such as __exit__: they end by themselves
+_let_pass.argtypes, _let_pass.restype = 3 * (ctypes.py_object,), None
 
 
 class Stopped(BaseException):
@@ -49,9 +60,9 @@ class TimeLimit:
         self._carry: Callable[[Callable[[], Any]], Any] | None = None
         self._traced_by: Any = None  # a debugger's trace function, which comes back afterwards
         self._thread = 0
-        # The script's thread writes `armed` and then reads `fired`, the watchdog the other way round: so one
+        # The script's thread writes `armed` (a script runs) and then reads `fired`, the watchdog the other way round: so one
         # of the two sees the other, without a lock in every call.
-        self._armed = False
+        self.armed = False
         self._fired = False
         self._firing = threading.Lock()
 
@@ -80,13 +91,13 @@ class TimeLimit:
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
         """Do not count what happens inside: it is the simulator's time, not the script's."""
-        began, armed = monotonic(), self._armed
-        self._armed = False
+        began, armed = monotonic(), self.armed
+        self.armed = False
         try:
             yield
         finally:
             self._deadline += monotonic() - began
-            self._armed = armed
+            self.armed = armed
 
     def carry_with(self, carry: Callable[[Callable[[], Any]], Any]) -> None:
         """Take what calls a function in the simulation's thread, for a script that runs in another one."""
@@ -112,22 +123,24 @@ class TimeLimit:
                 _timer.set(self.seconds)
         try:
             try:
-                self._armed = True
+                self.armed = True
                 return function(*arguments)
             finally:
-                self._armed = False
+                self.armed = False
                 if self.struck or self._fired:
                     self._end_strike()
         except Stopped:
             # It may have struck between the end of the function and the beginning of `finally`.
-            self._armed = False
+            self.armed = False
             self._end_strike()
             raise
 
     def _end_strike(self) -> None:
         """Drop an exception that is still on its way."""
-        if sys.gettrace() is _trace:
+        if sys.gettrace() is _let_pass:
             sys.settrace(self._traced_by)
+        with contextlib.suppress(Stopped):
+            _let_it_come()
         while self._fired:
             try:
                 with self._firing:
@@ -138,11 +151,11 @@ class TimeLimit:
 
     def fire_if_late(self) -> None:
         """Stop the script where it is late; the watchdog calls it."""
-        if not (self._armed and self.exceeded()):
+        if not (self.armed and self.exceeded()):
             return
         with self._firing:
             self._fired = True
-            if self._armed and self.exceeded():
+            if self.armed and self.exceeded():
                 self.struck = True
                 self._deadline = monotonic() + _AGAIN
                 _raise_in_thread(self._thread, Stopped)
@@ -150,28 +163,22 @@ class TimeLimit:
                 self._fired = False
 
     def strike_if_late(self, frame: FrameType | None) -> None:
-        """Raise Stopped in a script that is late, and once more in its next line should it swallow that.
+        """Raise Stopped in a script that is late, and in the next line of each of its frames, such as a `finally`.
 
-        Sets the timer again unless no script runs; the timer's handler calls it.
+        Sets the timer again; the timer's handler calls it.
         """
-        if not self._armed:
-            return
         if not self.exceeded():
             _timer.set(self.left() + _LATER)
             return
         _timer.set(_AGAIN)
         if not self.struck:
             self.struck, self._traced_by = True, sys.gettrace()
-        sys.settrace(_trace)
+        sys.settrace(_let_pass)
+        insist = functools.partial(_insist, self._thread, Stopped)
         while frame is not None and frame.f_code is not TimeLimit.run.__code__:
-            frame.f_trace = _trace
+            frame.f_trace = insist
             frame = frame.f_back
         raise Stopped
-
-    def insist(self) -> None:
-        """Raise Stopped once more in a script that goes on."""
-        if self._armed:
-            raise Stopped
 
 
 class _Timer:
@@ -188,7 +195,12 @@ class _Timer:
             atexit.register(signal.setitimer, signal.ITIMER_REAL, 0)  # nobody catches it while Python ends
             self._is_ready = True
         self.next = monotonic() + seconds
-        signal.setitimer(signal.ITIMER_REAL, min(seconds, _LONGEST))
+        signal.setitimer(signal.ITIMER_REAL, min(seconds, _LONGEST), _UNTIL_HEARD)
+
+    def rest(self) -> None:
+        """Do not go off any more."""
+        self.next = math.inf
+        signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 _MAIN = threading.main_thread().ident
@@ -198,18 +210,21 @@ _watching = threading.Lock()
 _watchdog: threading.Thread | None = None
 
 
+def _let_it_come() -> None:
+    """Do nothing, at the beginning of which Python raises what waits to be raised."""
+
+
 def _go_off(_number: int, frame: FrameType | None) -> None:
-    _timer.next = math.inf
-    if _timer.limit is not None:
-        _timer.limit.strike_if_late(frame)
-
-
-def _trace(_frame: FrameType, event: str, _argument: Any) -> Any:
-    if event == "call":
-        return None  # new frames, such as __exit__, end by themselves or at the next strike
-    if event == "line" and _timer.limit is not None:
-        _timer.limit.insist()
-    return _trace
+    limit = sys.getrecursionlimit()
+    _set_recursion_limit(limit + _ROOM)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0)  # heard
+        if _timer.limit is None or not _timer.limit.armed:
+            _timer.rest()
+        else:
+            _timer.limit.strike_if_late(frame)
+    finally:
+        _set_recursion_limit(limit)
 
 
 def _watch(limit: TimeLimit) -> None:
