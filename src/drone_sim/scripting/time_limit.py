@@ -60,8 +60,8 @@ class TimeLimit:
         self._carry: Callable[[Callable[[], Any]], Any] | None = None
         self._traced_by: Any = None  # a debugger's trace function, which comes back afterwards
         self._thread = 0
-        # The script's thread writes `armed` (a script runs) and then reads `fired`, the watchdog the other way round: so one
-        # of the two sees the other, without a lock in every call.
+        # The script's thread writes `armed` (a script runs) and then reads `fired`, the watchdog the other way round:
+        # so one of the two sees the other, without a lock in every call.
         self.armed = False
         self._fired = False
         self._firing = threading.Lock()
