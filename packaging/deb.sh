@@ -5,8 +5,9 @@
 # Debian lacks (PyBullet, lupa, pydantic 2, ...) lies in a python environment of its own under /usr/lib/drone_sim.
 set -eo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-out=build/deb
-stage=$PWD/$out/root
+out=$(mktemp -d) # not below this folder, where roslaunch would find a second drone.launch
+trap 'rm -rf "$out"' EXIT
+stage=$out/root
 own=/usr/lib/drone_sim/python # the environment, as it will be installed
 wheels=$1
 version=$(sed -n 's:.*<version>\(.*\)</version>.*:\1:p' package.xml)+deb$(cut -d. -f1 /etc/debian_version)
@@ -21,10 +22,9 @@ DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), 
  python3-std-srvs, python3-tf2-ros, python3-tqdm, python3-visualization-msgs, python3-yaml, ros-environment,
  ros-robot-state-publisher, rosbash"
 
-rm -rf "$out"
-mkdir -p "$stage"
+mkdir -p "$stage" build/deb
 cmake -S . -B "$out/build" -DCMAKE_INSTALL_PREFIX=/usr -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF \
-  -DCATKIN_DEVEL_PREFIX="$PWD/$out/devel" >"$out/cmake.log" 2>&1
+  -DCATKIN_DEVEL_PREFIX="$out/devel" >"$out/cmake.log" 2>&1
 DESTDIR=$stage make -C "$out/build" install >"$out/install.log" 2>&1
 
 /usr/bin/python3 -m venv --system-site-packages --without-pip "$stage$own"
@@ -65,4 +65,4 @@ set -e
 find /usr/lib/drone_sim /usr/lib/python3/dist-packages/drone_sim -name __pycache__ -prune -exec rm -rf {} +
 PRERM
 chmod 755 "$stage/DEBIAN/postinst" "$stage/DEBIAN/prerm"
-dpkg-deb --root-owner-group --build "$stage" "$out/ros-drone-sim_${version}_$architecture.deb" >&2
+dpkg-deb --root-owner-group --build "$stage" "build/deb/ros-drone-sim_${version}_$architecture.deb" >&2
