@@ -70,7 +70,7 @@ class Scene:
         self._software = software
         self._parts: dict[Visual, tuple[Part, ...]] = {}
         self._buffers: list[moderngl.Buffer] = []
-        self._members = np.zeros(0, dtype=np.intp)
+        self._members: np.ndarray = np.zeros(0, dtype=np.intp)
         self._scales = np.zeros((0, 1, 3))
         self.visuals: tuple[Visual, ...] = ()
         self.batches: list[Batch] = []

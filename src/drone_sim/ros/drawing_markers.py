@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import rospy
@@ -74,8 +75,8 @@ def _polygon(item: Item, radius: float, corners: int) -> list[Sequence[float]]:
     aside = radius * _unit(np.cross(normal, [1.0, 0.0, 0.0] if abs(normal[0]) < 0.9 else [0.0, 1.0, 0.0]))
     up = np.cross(normal, aside)
     angles = 2 * np.pi * np.arange(corners) / corners
-    rim = (middle + np.outer(np.cos(angles), aside) + np.outer(np.sin(angles), up)).tolist()
-    centre = middle.tolist()
+    rim: Any = (middle + np.outer(np.cos(angles), aside) + np.outer(np.sin(angles), up)).tolist()
+    centre: Any = middle.tolist()
     triangles: list[Sequence[float]] = []
     for one, other in zip(rim, [*rim[1:], rim[0]]):
         triangles += [centre, one, other]

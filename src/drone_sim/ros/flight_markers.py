@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Point
@@ -167,7 +168,8 @@ def _flat(middle: np.ndarray, aside: np.ndarray, tip: np.ndarray) -> Marker:
     points: list[Sequence[float]] = []
     for one, other, next_one, next_other in zip(*(side.tolist() for side in (left, right, left[1:], right[1:]))):
         points += [one, other, next_other, one, next_other, next_one]
-    points += np.array([middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]).tolist()
+    head: Any = np.array([middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]).tolist()
+    points += head
     marker = shape(Marker.TRIANGLE_LIST, _BLUE, (1, 1, 1), points)
     marker.colors = [marker.color] * len(points)  # lights it from everywhere
     return marker

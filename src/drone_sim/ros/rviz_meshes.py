@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Hashable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -85,11 +86,15 @@ def _material(number: int, part: Mesh, tint: tuple[float, ...], glow: float, ima
     return [*lines, f"map_Kd {image}"] if image else lines
 
 
+def _rows(array: np.ndarray) -> Any:
+    return array.tolist()
+
+
 def _triangles(part: Mesh, first: int) -> list[str]:
     """Return the lines of a part whose vertices count from `first`."""
     uv = np.zeros((len(part.vertices), 2)) if part.uv is None else part.uv
-    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in part.vertices.tolist()]
-    lines += [f"vt {u:.7g} {v:.7g}" for u, v in uv.tolist()]
-    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in part.normals.tolist()]
-    lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in (part.faces.astype(int) + first).tolist()]
+    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in _rows(part.vertices)]
+    lines += [f"vt {u:.7g} {v:.7g}" for u, v in _rows(uv)]
+    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in _rows(part.normals)]
+    lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in _rows(part.faces.astype(int) + first)]
     return lines

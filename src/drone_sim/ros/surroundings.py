@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import rospy
@@ -68,7 +69,8 @@ class Surroundings:
 def _sky() -> Marker:
     marker = shape(Marker.TRIANGLE_LIST, _OPAQUE, (_SKY, _SKY, _SKY))
     marker.ns = "sky"
-    _paint(marker, sky.dome().reshape(-1, 6).tolist())
+    corners: Any = sky.dome().reshape(-1, 6).tolist()
+    _paint(marker, corners)
     return marker
 
 

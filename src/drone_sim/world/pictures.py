@@ -77,7 +77,7 @@ class Pictures:
 
     def poses(self, root_from_inertial: Mapping[int, Pose]) -> np.ndarray:
         """Return the poses world from visual, (N, 4, 4), of bodies given with the inverse of their inertial frame."""
-        poses = [np.empty((0, 4, 4))]
+        poses: list[np.ndarray] = [np.empty((0, 4, 4))]
         for body, inverse in root_from_inertial.items():
             if body in self._standing:
                 poses.append(self._standing[body])
