@@ -1,16 +1,6 @@
 """catkin reads this (catkin_python_setup); do not call it yourself."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
+from setuptools import find_packages, setup
 
-PACKAGES = [
-    "drone_sim",
-    "drone_sim.camera",
-    "drone_sim.child_scripts",
-    "drone_sim.offline",
-    "drone_sim.ros",
-    "drone_sim.scripting",
-    "drone_sim.world",
-]
-
-setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=find_packages("src"), package_dir={"": "src"}))

@@ -11,8 +11,8 @@ from typing import Any
 
 from benchmarks import loop, node, plot, render
 from benchmarks.cores import one_core
-from drone_sim import writing
-from drone_sim.camera.renderer import Renderer
+from drone_sim.files import writing
+from drone_sim.render.renderer import Renderer
 
 Row = dict[str, Any]
 README = Path(__file__).parents[1] / "README.md"

@@ -9,10 +9,11 @@ import pybullet
 from tqdm import tqdm
 
 from benchmarks.cores import one_core
-from drone_sim import frames, parameters
-from drone_sim.drone import PROPELLERS
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Pose
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.quadricopter import PROPELLERS
 from drone_sim.world import World
 
 Row = dict[str, Any]

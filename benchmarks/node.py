@@ -141,7 +141,7 @@ def _listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
 # The node with a clock at its ear: a command says, in a field that the drone does not use, when it was sent.
 PROBE = """
 import sys, time
-from drone_sim.guardian import Guardian
+from drone_sim.run.guardian import Guardian
 from drone_sim.ros import inputs, node
 delays = []
 heard = inputs.DroneInput._on_twist

@@ -9,7 +9,7 @@ matplotlib.use("Agg")
 
 from matplotlib import pyplot
 
-from drone_sim import writing
+from drone_sim.files import writing
 
 
 def draw(results: dict[str, Any], file: str) -> None:

@@ -16,9 +16,9 @@ import numpy as np
 import pybullet
 import trimesh
 
-from drone_sim.camera.intrinsics import Intrinsics
-from drone_sim.camera.renderer import Renderer
-from drone_sim.visual import Visual
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.renderer import Renderer
+from drone_sim.shapes.visual import Visual
 
 Row = dict[str, Any]
 Scene = tuple[list[Visual], np.ndarray]

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib import image
 
-from drone_sim import parameters
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 DOCS = Path(__file__).resolve().parent
 LEANING = (Twist(Vector3(2, 1.5, 0)), 0.45)  # m/s, s: the body leans forward and to the left

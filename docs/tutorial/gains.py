@@ -7,11 +7,11 @@ import argparse
 import math
 import sys
 
-from drone_sim import parameters
-from drone_sim.frames import to_euler
+from drone_sim.mechanics.frames import to_euler
+from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline.fly import settings
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 BEGIN, STOP, END = 1.0, 7.0, 24.0  # s; begin and stop are those of stages 4 and 5
 HEIGHT = 10.0  # m, to have room

@@ -9,10 +9,10 @@ import rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, WrenchStamped
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from drone_sim.ros.inbox import Inbox
-from drone_sim.ros.inputs import DroneInput
-from drone_sim.ros.markers import Handles
-from drone_sim.simulation import Simulation
+from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.rviz.markers import Handles
+from drone_sim.ros.vehicle.inputs import DroneInput
+from drone_sim.run.simulation import Simulation
 
 _CALLBACKS: dict[str, Callable[[Any], None]] = {}
 _KINDS = {

@@ -15,16 +15,17 @@ from typing import Any
 
 from case import Case
 
-from drone_sim import checks, parameters
-from drone_sim.camera import vision
-from drone_sim.camera.renderer import Renderer
+from drone_sim.config.types import ParameterError
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.mechanics.urdf import UrdfError
 from drone_sim.offline import fly
 from drone_sim.offline.timeline import TimelineError
-from drone_sim.parameter_types import ParameterError
+from drone_sim.render.renderer import Renderer
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
-from drone_sim.urdf import UrdfError
+from drone_sim.sensors import camera as vision
+from drone_sim.vehicles import checks
 
 REFUSALS = (ParameterError, ScriptError, UrdfError, TimelineError, checks.Refused)
 LONGEST = 1200  # characters of a refusal, without the folder that the case lies in

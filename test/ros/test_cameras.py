@@ -17,8 +17,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
-from drone_sim import parameters
-from drone_sim.ros.node import Node
+from drone_sim.ros.node.node import Node
+from drone_sim.run import parameters
 
 CAMERAS = {
     "front": ("/drone/front", "/drone/camera_info", "front_optical", "rgb8"),

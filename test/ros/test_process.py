@@ -25,7 +25,7 @@ HANGS = 30.0  # s; nothing here takes nearly as long unless it hangs
 # The simulator with a call into PyBullet that does not return.
 STUCK = """
 import sys, time
-from drone_sim.guardian import Guardian
+from drone_sim.run.guardian import Guardian
 guardian = Guardian("drone_sim")
 from drone_sim.ros import node
 from drone_sim.world import World

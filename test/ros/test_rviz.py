@@ -17,8 +17,9 @@ from listening import Listener, connected
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_sim import frames, parameters
-from drone_sim.ros.node import Node
+from drone_sim.mechanics import frames
+from drone_sim.ros.node.node import Node
+from drone_sim.run import parameters
 
 SCENE = """
 floor: {size: 6, texture: tiles.png}

@@ -16,8 +16,8 @@ from sensor_msgs.msg import Image
 from std_srvs.srv import SetBool, Trigger
 from tf2_msgs.msg import TFMessage
 
-from drone_sim import parameters
-from drone_sim.ros.node import Node
+from drone_sim.ros.node.node import Node
+from drone_sim.run import parameters
 
 SMALL = {name: {"width": 64, "height": 48} for name in ("front", "depth", "track", "floor")}
 

@@ -21,8 +21,8 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerUpdate, Marker, MarkerArray
 
-from drone_sim import parameters
-from drone_sim.ros.node import Node
+from drone_sim.ros.node.node import Node
+from drone_sim.run import parameters
 
 SCRIPT = """
 def sysCall_init():

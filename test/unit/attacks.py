@@ -43,10 +43,10 @@ class Attacker:
 
 def flight(path, limit):
     """Fly a script for three steps with a command and a snapshot in each; return what was said."""
-    from drone_sim import parameters
+    from drone_sim.mechanics.state import Twist
+    from drone_sim.run import parameters
+    from drone_sim.run.simulation import Simulation
     from drone_sim.scripting.errors import ScriptError
-    from drone_sim.simulation import Simulation
-    from drone_sim.state import Twist
 
     said = []
     simulation = None
@@ -87,8 +87,6 @@ def _attack(path, limit, where, answer):
 
 
 def _serve():
-    import drone_sim.scripting.lua_script
-    import drone_sim.simulation  # noqa: F401 -- imported for those who are forked
 
     for line in sys.stdin:
         read, write = os.pipe()

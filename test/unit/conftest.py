@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_sim.camera.renderer import Renderer
+from drone_sim.render.renderer import Renderer
 
 
 @pytest.fixture(name="shared_renderer", scope="session")

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from drone_sim.camera.intrinsics import Intrinsics
-from drone_sim.visual import Visual
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.shapes.visual import Visual
 
 CAMERA = Intrinsics(320, 240, np.radians(60.0), 0.02, 100.0)
 RED, BLUE, GREY = (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (0.6, 0.6, 0.6, 1.0)

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from drone_sim import checks, parameters
+from drone_sim.run import parameters
+from drone_sim.vehicles import checks
 
 PARAMETERS = parameters.load()
 

@@ -1,7 +1,7 @@
 """What a key press changes: the command in force, or what was sent a moment ago."""
 
-from drone_sim.ros import keys
-from drone_sim.ros.commands import Command, CommandInForce
+from drone_sim.ros.tools import keys
+from drone_sim.ros.tools.commands import Command, CommandInForce
 
 
 class Clock:

@@ -4,9 +4,10 @@ import math
 
 import pytest
 
-from drone_sim import frames, parameters
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 WALL = {"shape": "box", "size": [0.2, 60, 4], "position": [2.1, 0, 2]}
 BOX = {"shape": "box", "size": [1, 1, 0.4], "position": [0, 0, 0.2]}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tutorial_flights import DOCS, TEXT, at, fly, flying, push
 
-from drone_sim.state import Pose, Twist, Vector3
+from drone_sim.mechanics.state import Pose, Twist, Vector3
 
 
 def test_every_stage_tells_what_to_see():

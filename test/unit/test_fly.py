@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from drone_sim import parameters
+from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline.fly import main, settings
 from drone_sim.offline.recording import COLUMNS
-from drone_sim.parameters import ParameterError
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.simulation import Simulation
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = """

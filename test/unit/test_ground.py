@@ -6,10 +6,10 @@ import numpy as np
 import pybullet
 import pytest
 
-from drone_sim import parameters
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose, Twist, Vector3
-from drone_sim.visual import GROUND
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.shapes.visual import GROUND
 
 DOWN, FORWARD = Twist(Vector3(0, 0, -1)), Twist(Vector3(1, 0, 0))
 

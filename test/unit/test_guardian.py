@@ -12,7 +12,7 @@ SOURCE = os.pathsep.join(path for path in sys.path if path)
 HANGS = 20.0  # s; nothing here takes nearly as long unless it hangs
 BEGIN = """
 import os, signal, sys, threading, time
-from drone_sim.guardian import Guardian
+from drone_sim.run.guardian import Guardian
 guardian = Guardian("it")
 """
 

@@ -17,18 +17,19 @@ import numpy as np
 import pytest
 import trimesh
 
-from drone_sim import mesh_files, parameters
-from drone_sim.camera.mesh import load
-from drone_sim.simulation import Simulation
-from drone_sim.visual import Visual
+from drone_sim.files import mesh_files
+from drone_sim.render.mesh import load
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.shapes.visual import Visual
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 HANGS = 120.0  # s for all files of a kind; they take a few
 MEMORY = 4 * 2**30  # bytes
 LOAD = """
 import json, sys
-from drone_sim import parameters
-from drone_sim.simulation import Simulation
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 for name, scene in json.load(open("scenes.json")).items():
     open("scene.yaml", "w").write(scene)

@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
-from drone_sim.ros.held import PATIENCE, Held
-from drone_sim.ros.inbox import Inbox
+from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.rviz.held import PATIENCE, Held
 
 
 def ask(inbox, job):

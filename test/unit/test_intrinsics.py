@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drone_sim.camera.intrinsics import Intrinsics
+from drone_sim.render.intrinsics import Intrinsics
 
 CAMERA = Intrinsics(640, 480, np.radians(60.0), 0.02, 100.0)
 POINTS = [(0.0, 0.0, 1.0), (0.3, -0.2, 1.5), (-2.0, 1.0, 7.0), (0.01, 0.02, 0.05), (30.0, -20.0, 90.0)]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_sim.ros.keys import BACKSPACE, DOWN, ESCAPE, LEFT, PATIENCE, RIGHT, UNKNOWN, UP, KeyDecoder
+from drone_sim.ros.tools.keys import BACKSPACE, DOWN, ESCAPE, LEFT, PATIENCE, RIGHT, UNKNOWN, UP, KeyDecoder
 
 
 class Clock:

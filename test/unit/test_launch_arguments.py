@@ -2,9 +2,9 @@
 
 import pytest
 
-from drone_sim.parameters import ParameterError
-from drone_sim.resources import package_path
-from drone_sim.ros.launch_arguments import check
+from drone_sim.files.resources import package_path
+from drone_sim.ros.node.launch_arguments import check
+from drone_sim.run.parameters import ParameterError
 
 LAUNCH = package_path() / "launch"
 ROSLAUNCH = ["/usr/bin/python3", "/usr/bin/roslaunch"]

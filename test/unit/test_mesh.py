@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from drone_sim.camera.mesh import load
-from drone_sim.visual import Visual
+from drone_sim.render.mesh import load
+from drone_sim.shapes.visual import Visual
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 

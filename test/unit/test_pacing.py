@@ -1,6 +1,6 @@
 """Pacing against a clock that the test turns."""
 
-from drone_sim.pacing import Beat, Pacer, Throttle
+from drone_sim.run.pacing import Beat, Pacer, Throttle
 
 
 class Clock:

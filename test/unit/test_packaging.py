@@ -7,7 +7,7 @@ from xml.etree import ElementTree as Xml
 
 import yaml
 
-from drone_sim.resources import package_path
+from drone_sim.files.resources import package_path
 
 ROOT = package_path()
 # Where the key of rosdep, or the name that pip knows, is not that of the module.

@@ -2,9 +2,9 @@
 
 import pytest
 
-from drone_sim import parameters
-from drone_sim.resources import package_path
-from drone_sim.simulation import Simulation
+from drone_sim.files.resources import package_path
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_sim.ros.paths import from_shell
+from drone_sim.ros.node.paths import from_shell
 
 
 @pytest.mark.parametrize("name", ["", "target", "/a/b.py", "~/a.py", "package://drone_sim/a.yaml"])

@@ -9,7 +9,7 @@ pytest.importorskip("cv_bridge")
 from cv_bridge import CvBridge
 from sensor_msgs.msg import CompressedImage, Image
 
-from drone_sim.ros import pictures
+from drone_sim.ros.tools import pictures
 
 BLUE = np.full((4, 6, 3), (255, 0, 0), np.uint8)
 

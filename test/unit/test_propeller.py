@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drone_sim import frames, parameters
-from drone_sim.propeller import ParticleLaw, Propellers, Wrench
+from drone_sim.forces.propellers import ParticleLaw, Propellers
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.wrench import Wrench
+from drone_sim.run import parameters
 
 NEWTONS_PER_PARTICLE = 8500 * math.pi * 0.005**3 / (6 * 0.05)  # per m/s, at dt = 0.05 s
 

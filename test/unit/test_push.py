@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from drone_sim import parameters
-from drone_sim.simulation import Simulation
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 ZERO = (0.0, 0.0, 0.0)
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, looking, reddish
 
-from drone_sim.camera import context
-from drone_sim.camera.intrinsics import Intrinsics
-from drone_sim.camera.renderer import Renderer, RendererUnavailable
-from drone_sim.visual import Visual
+from drone_sim.render import context
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.renderer import Renderer, RendererUnavailable
+from drone_sim.shapes.visual import Visual
 
 
 def test_a_cube_covers_the_predicted_pixels(renderer):

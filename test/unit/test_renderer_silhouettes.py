@@ -6,8 +6,8 @@ import pytest
 import trimesh
 from drawing import AHEAD, CAMERA, RED, at
 
-from drone_sim.camera.intrinsics import Intrinsics
-from drone_sim.visual import Visual
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.shapes.visual import Visual
 
 
 @pytest.fixture()

@@ -7,10 +7,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from drone_sim import parameters
-from drone_sim.camera.renderer import Renderer
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.render.renderer import Renderer
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 STEPS = 600
 # SHA-256 of position, orientation and velocities after every step. The same with the wheel of PyBullet for Python 3.11

@@ -8,11 +8,12 @@ import pytest
 import trimesh
 import yaml
 
-from drone_sim import frames, parameters
-from drone_sim.parameters import ParameterError
-from drone_sim.resources import package_path
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose
+from drone_sim.files.resources import package_path
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Pose
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.simulation import Simulation
 
 SCENE = """
 floor: {size: 20, texture: pictures/tile.png}

@@ -5,10 +5,10 @@ import pytest
 import trimesh
 from drawing import CAMERA, looking
 
-from drone_sim import parameters
-from drone_sim.parameters import ParameterError
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose, Twist, Vector3
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.simulation import Simulation
 from drone_sim.world import Shape, World
 
 URDF = """<robot name="barrel"><link name="barrel">

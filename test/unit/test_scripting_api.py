@@ -5,13 +5,14 @@ import logging
 import numpy as np
 import pytest
 
-from drone_sim import frames, parameters
-from drone_sim.scripting.api import make_sim
-from drone_sim.scripting.drawings import Drawings
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Pose
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.modules import make_sim
 from drone_sim.scripting.errors import UnknownName
-from drone_sim.scripting.host import Surroundings
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose
 
 SMALL = {"front": {"width": 8, "height": 6}}
 PICTURE = np.array([[[255, 0, 0]] * 3, [[0, 0, 255]] * 3], dtype=np.uint8)  # red above, blue below

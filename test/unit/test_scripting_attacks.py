@@ -194,8 +194,8 @@ def test_ctrl_c_ends_the_wait_for_lua(tmp_path):
     path.write_text("while true do end", encoding="utf-8")
     child = (
         "import signal, sys, threading\n"
-        "from drone_sim import parameters\n"
-        "from drone_sim.simulation import Simulation\n"
+        "from drone_sim.run import parameters\n"
+        "from drone_sim.run.simulation import Simulation\n"
         "threading.Timer(0.5, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT)).start()\n"
         "try:\n"
         "    Simulation(parameters.load({'script_time_limit': 0}), script=sys.argv[1])\n"

@@ -4,12 +4,12 @@ import time
 
 import pytest
 
-from drone_sim import parameters
-from drone_sim.scripting.constants import PHASES
+from drone_sim.mechanics.state import Twist
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.constants import PHASES
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist
 
 PARAMETERS = parameters.load({"script_time_limit": 0.2})
 STOPPED = "stopped after 0.2 s without returning (script_time_limit)"

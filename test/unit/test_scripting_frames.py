@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drone_sim import frames
-from drone_sim.objects import ObjectTree
-from drone_sim.state import State
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.state import State
 
 ANGLE = st.floats(-math.pi, math.pi)
 LENGTH = st.floats(-100, 100)

@@ -6,9 +6,9 @@ import sys
 
 import pytest
 
-from drone_sim import parameters
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.simulation import Simulation
 
 PARAMETERS = parameters.load({"script_time_limit": 0.5})
 

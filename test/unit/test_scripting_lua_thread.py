@@ -5,9 +5,9 @@ import time
 
 import pytest
 
-from drone_sim.scripting import lua_thread
-from drone_sim.scripting.lua_script import _lua_function
-from drone_sim.scripting.lua_thread import LeftBehind, LuaThread
+from drone_sim.scripting.lua import lua_thread
+from drone_sim.scripting.lua.lua_script import _lua_function
+from drone_sim.scripting.lua.lua_thread import LeftBehind, LuaThread
 from drone_sim.scripting.time_limit import TimeLimit
 
 

@@ -4,12 +4,13 @@ import random
 
 import pytest
 
-from drone_sim import frames, parameters
-from drone_sim.scripting import lua_script
-from drone_sim.scripting.calls import Api
-from drone_sim.scripting.lua_script import LuaScript
+from drone_sim.mechanics import frames
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.calls import Api
+from drone_sim.scripting.lua import lua_script
+from drone_sim.scripting.lua.lua_script import LuaScript
 from drone_sim.scripting.time_limit import TimeLimit
-from drone_sim.simulation import Simulation
 
 PROLOGUE = {
     "5.1": b"local _ = function() simGetSimulationTime() end ",

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from drone_sim import parameters
-from drone_sim.scripting.messages import Image, MessageBus
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.messages import Image, MessageBus
 
 
 class FakeSender:

@@ -2,10 +2,11 @@
 
 import pytest
 
-from drone_sim import frames, parameters
-from drone_sim.scripting import object_paths
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Pose
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api import object_paths
 
 
 @pytest.fixture(name="simulation", scope="module")

@@ -4,8 +4,8 @@ import logging
 
 import pytest
 
-from drone_sim import parameters
-from drone_sim.simulation import Simulation
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 DIALECTS = {"5.1": "local _ = function() simGetSimulationTime() end", "newest": "local _ = sim.getSimulationTime"}
 

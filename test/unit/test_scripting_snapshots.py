@@ -4,12 +4,12 @@ import struct
 
 import pytest
 
-from drone_sim import parameters
-from drone_sim.scripting.drawings import Drawings
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.messages import MessageBus
-from drone_sim.simulation import Simulation
-from drone_sim.state import Twist, Vector3
 
 LUA = """
 local count, point = 0, setmetatable({}, {__index = {step = 1}})

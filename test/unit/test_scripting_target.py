@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from drone_sim import frames, parameters
-from drone_sim.simulation import Simulation
+from drone_sim.mechanics import frames
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 LUA = str(Path(__file__).parent / "scripts" / "target_v4.lua")
 MASS, GRAVITY, STEP = 0.52, 9.81, 0.05

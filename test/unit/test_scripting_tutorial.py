@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from drone_sim import frames, parameters
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose, Twist, Vector3
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 SCRIPTS = Path(__file__).parent / "scripts"
 STEPS = 1200  # 60 s

@@ -2,9 +2,9 @@
 
 import pytest
 
-from drone_sim import parameters
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.simulation import Simulation
 
 PARAMETERS = parameters.load()
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import pybullet
 import pytest
 
-from drone_sim import frames, parameters
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Diverged, Simulation
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.simulation import Diverged, Simulation
-from drone_sim.state import Pose, Twist, Vector3
 
 SCRIPTS = Path(__file__).parent / "scripts"
 RUNS = 200

@@ -4,10 +4,10 @@ import random
 
 import pytest
 
-from drone_sim import parameters
+from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline import timeline
 from drone_sim.offline.timeline import Entry, Push, Timeline, TimelineError, first_step
-from drone_sim.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
 
 PARAMETERS = parameters.load()
 

@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from drone_sim import parameters
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose, Twist, Vector3
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 FORWARD, LEFT, UP = Twist(Vector3(1, 0, 0)), Twist(Vector3(0, 1, 0)), Twist(Vector3(0, 0, 1))
 TURN = Twist(Vector3(), Vector3(0, 0, 1))

@@ -4,8 +4,8 @@ import numpy as np
 import pybullet
 import pytest
 
-from drone_sim import frames, urdf
-from drone_sim.resources import package_path
+from drone_sim.files.resources import package_path
+from drone_sim.mechanics import frames, urdf
 
 DRONE = package_path() / "urdf" / "drone.urdf"
 

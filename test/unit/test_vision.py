@@ -7,9 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from drone_sim import parameters
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose
+from drone_sim.mechanics.state import Pose
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 SCENE = {
     "scene": {"objects": [{"shape": "box", "size": [0.5, 0.5, 0.5], "position": [2, 0, 0.8], "color": [1, 0, 0, 1]}]}
@@ -19,9 +19,9 @@ SOURCE = os.pathsep.join(path for path in sys.path if path)
 PICTURE = """
 import logging, sys
 import numpy as np
-from drone_sim import parameters
-from drone_sim.simulation import Simulation
-from drone_sim.state import Pose
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.mechanics.state import Pose
 logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s")
 simulation = Simulation(parameters.load({scene!r}))
 pictures = {{name: simulation.cameras[name].take() for name in ("front", "depth", "front", "depth")}}

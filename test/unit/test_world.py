@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from drone_sim import frames, urdf
-from drone_sim.propeller import Wrench
-from drone_sim.resources import package_path
-from drone_sim.state import Pose
+from drone_sim.files.resources import package_path
+from drone_sim.mechanics import frames, urdf
+from drone_sim.mechanics.state import Pose
+from drone_sim.mechanics.wrench import Wrench
 from drone_sim.world import World
 
 SUB_STEP = 0.005

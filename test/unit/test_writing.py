@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drone_sim import writing
+from drone_sim.files import writing
 from drone_sim.offline.fly import main
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
@@ -68,7 +68,7 @@ def test_what_fails_half_way_keeps_the_old_file_only_on_an_oserror(tmp_path):
 def test_a_full_disk_leaves_what_was_there(tmp_path):
     path = tmp_path / "file"
     path.write_text("old")
-    ended = in_child("import sys; from drone_sim import writing; writing.write(sys.argv[1], 'x' * 100_000)", path)
+    ended = in_child("import sys; from drone_sim.files import writing; writing.write(sys.argv[1], 'x' * 100_000)", path)
     assert f"OSError: {path}: File too large" in ended.stderr
     assert path.read_text() == "old" and os.listdir(tmp_path) == ["file"]
 

@@ -4,8 +4,9 @@ import os
 
 import pytest
 
-from drone_sim import parameters, yaml_files
-from drone_sim.parameters import ParameterError
+from drone_sim.files import yaml_files
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
 
 
 def bomb(levels, start, link):

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from drone_sim import parameters
 from drone_sim.offline import timeline
 from drone_sim.offline.fly import settings
-from drone_sim.simulation import Simulation
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

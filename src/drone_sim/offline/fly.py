@@ -18,18 +18,18 @@ from typing import Any, NoReturn
 
 from tqdm import tqdm
 
-from drone_sim import parameters as parameters_module
-from drone_sim import writing, yaml_files
-from drone_sim.frames import to_euler
-from drone_sim.guardian import Guardian
+from drone_sim.files import writing, yaml_files
+from drone_sim.mechanics.frames import to_euler
 from drone_sim.offline import timeline as timeline_module
 from drone_sim.offline.recording import Recording, TableError
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
-from drone_sim.parameters import ParameterError
-from drone_sim.resources import shown
-from drone_sim.scripting.api_scripts import LOG as SCRIPT_LOG
+from drone_sim.run import parameters as parameters_module
+from drone_sim.run.guardian import Guardian
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.scripts import LOG as SCRIPT_LOG
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.simulation import Simulation
+from drone_sim.wording import shown
 
 _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s

@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from drone_sim import frames, writing
+from drone_sim.files import writing
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Pose, Twist
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import Push, Timeline
-from drone_sim.state import Pose, Twist
 
 _BLUE, _ORANGE, _GREEN, _RED = "#1f5fa8", "#d9730d", "#2c8a57", "#a8325e"
 _GREY, _GRID, _SHADE = "#707070", "#e4e4e4", "#f2c9c4"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TextIO
 
-from drone_sim.frames import Matrix, from_quaternion
-from drone_sim.simulation import Simulation
+from drone_sim.mechanics.frames import Matrix, from_quaternion
+from drone_sim.run.simulation import Simulation
 
 COLUMNS = (
     "t [s]",

@@ -19,14 +19,15 @@ from typing import (
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
-from drone_sim import checks, yaml_files
-from drone_sim.drone import Drone
-from drone_sim.frames import Vector, from_rpy, to_quaternion
-from drone_sim.parameter_errors import told
-from drone_sim.parameter_types import Finite, Location, Within, numeric, readable_key
-from drone_sim.parameters import Parameters
-from drone_sim.resources import shown
-from drone_sim.state import Pose, Twist
+from drone_sim.config.errors import told
+from drone_sim.config.types import Finite, Location, Within, numeric, readable_key
+from drone_sim.files import yaml_files
+from drone_sim.mechanics.frames import Vector, from_rpy, to_quaternion
+from drone_sim.mechanics.state import Pose, Twist
+from drone_sim.run.parameters import Parameters
+from drone_sim.vehicles import checks
+from drone_sim.vehicles.quadricopter import Drone
+from drone_sim.wording import shown
 
 MAX_TIME = 1e6  # s, the longest flight
 _ZERO = (0.0, 0.0, 0.0)

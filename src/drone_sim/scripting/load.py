@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
-from drone_sim.objects import near_names
-from drone_sim.resources import resolve
-from drone_sim.scripting.calls import Api
+from drone_sim.files.resources import resolve
+from drone_sim.scripting.api.calls import Api
+from drone_sim.scripting.api.messages import Callback
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.messages import Callback
-from drone_sim.scripting.python_modules import LARGEST
-from drone_sim.scripting.python_script import PythonScript
+from drone_sim.scripting.python.python_modules import LARGEST
+from drone_sim.scripting.python.python_script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.wording import near_names
 
 _BUILT_IN = Path(__file__).resolve().parents[1] / "child_scripts"
 DEFAULT = "tutorial"
@@ -83,7 +83,7 @@ def load(script: str, modules: Mapping[str, Api], limit: TimeLimit) -> Script:
     try:
         source = _read(path)
         if path.endswith(".lua"):
-            from drone_sim.scripting.lua_script import LuaScript  # whoever flies Python needs no lupa
+            from drone_sim.scripting.lua.lua_script import LuaScript  # whoever flies Python needs no lupa
 
             return LuaScript(path, source, modules, limit)
         return PythonScript(path, source, modules, limit)

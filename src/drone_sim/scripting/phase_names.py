@@ -6,7 +6,7 @@ import difflib
 import logging
 from collections.abc import Collection, Iterator
 
-from drone_sim.scripting.constants import PHASES
+from drone_sim.scripting.api.constants import PHASES
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
 _PREFIX = "sysCall_"

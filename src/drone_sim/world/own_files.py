@@ -10,7 +10,7 @@ from xml.etree import ElementTree as Xml
 
 import cv2
 
-from drone_sim import images, mesh_files
+from drone_sim.files import images, mesh_files
 
 # PyBullet keeps some files by name for as long as the process runs: no name comes twice.
 _NUMBERS = itertools.count()

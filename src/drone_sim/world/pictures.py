@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pybullet
 
-from drone_sim.file_cache import identity_of
-from drone_sim.frames import Matrix, from_quaternion, multiply
-from drone_sim.state import Pose, compose
-from drone_sim.visual import Visual
+from drone_sim.files.file_cache import identity_of
+from drone_sim.mechanics.frames import Matrix, from_quaternion, multiply
+from drone_sim.mechanics.state import Pose, compose
+from drone_sim.shapes.visual import Visual
 
 
 class _Part(NamedTuple):

@@ -12,12 +12,12 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pybullet
 
-from drone_sim.frames import Matrix, Quaternion, Vector, cross, multiply_quaternions, turned
-from drone_sim.propeller import Wrench
-from drone_sim.state import Pose, State, compose, inverse
-from drone_sim.urdf import RigidBody
-from drone_sim.visual import Visual
-from drone_sim.world import shapes
+from drone_sim.mechanics.frames import Matrix, Quaternion, Vector, cross, multiply_quaternions, turned
+from drone_sim.mechanics.state import Pose, State, compose, inverse
+from drone_sim.mechanics.urdf import RigidBody
+from drone_sim.mechanics.wrench import Wrench
+from drone_sim.shapes.visual import Visual
+from drone_sim.world import bodies as shapes
 from drone_sim.world.own_files import OwnFiles
 from drone_sim.world.pictures import Pictures
 

@@ -1,0 +1,189 @@
+"""What is wrong with values that were read from a YAML file: every wrong key, in plain words, with its line."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Sequence
+from types import UnionType
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from drone_sim.config.types import PATTERNS, Key, Location, ParameterError, readable_key
+from drone_sim.files.yaml_files import Lines
+from drone_sim.wording import shown
+
+MOST = 8  # problems that are told
+_UNIONS = (Union, UnionType)  # Union[A, B] and A | B
+LONG = 900  # characters after which no other is
+
+
+class Problem(NamedTuple):
+    """One wrong key: where it stands among the parameters, and what to say."""
+
+    location: Location
+    text: str
+    is_missing: bool = False
+
+
+def problems(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
+    """Return what is wrong; the keys that one mapping lacks are one problem."""
+    found: dict[Problem, None] = {}  # a list that is too short is reported once for each number that it lacks
+    missing: dict[Location, list[_Place]] = {}
+    for one in error.errors():
+        place = _place(model, one["loc"])
+        if one["type"] == "missing" and not place.is_in_list:
+            missing.setdefault(place.location[:-1], []).append(place)
+        else:
+            found[_problem(one, place)] = None
+    return [*found, *map(_missing, missing.values())]
+
+
+def told(placed: Sequence[tuple[int | None, str]], file: str = "") -> str:
+    """Return problems in one line: those with a line of a file by it, then the others."""
+    inside = sorted(((line, text) for line, text in placed if line is not None), key=lambda one: one[0])
+    words = [f"line {line}: {text}" for line, text in inside]
+    words += [text for line, text in placed if line is None]
+    lengths = itertools.accumulate(map(len, words), initial=0)  # of all that comes before
+    first = [word for word, before in zip(words, lengths) if before < LONG][:MOST]
+    more = f"; and {len(words) - len(first)} more" if len(first) < len(words) else ""
+    return (f"{file}: " if file else "") + "; ".join(first) + more
+
+
+def line_of(lines: Lines, problem: Problem) -> int | None:
+    """Return the line of a wrong key, that of the mapping for a missing one; None for what the file does not have."""
+    sought = problem.location[:-1] if problem.is_missing else problem.location
+    depth, line = lines.find(sought)
+    return line if sought and depth == len(sought) else None
+
+
+# ---- where
+
+
+class _Place(NamedTuple):
+    location: Location  # without pydantic's own additions
+    annotation: Any  # of the value that stands there, or of the list that it stands in
+    is_in_list: bool
+    known: tuple[str, ...]  # the keys beside it
+
+
+def _place(model: Any, loc: Location) -> _Place:
+    location: list[Key] = []
+    annotation = model
+    known: tuple[str, ...] = ()
+    for part in loc:
+        if part == "[key]":
+            break
+        union = _tagged(annotation)
+        if union and part in union:
+            annotation = union[str(part)]
+            continue
+        location.append(part)
+        if get_origin(_bare(annotation)) is tuple:
+            return _Place(tuple(location), annotation, True, ())
+        annotation, known = _inside(annotation, part)
+    return _Place(tuple(location), annotation, False, known)
+
+
+def _inside(annotation: Any, part: Key) -> tuple[Any, tuple[str, ...]]:
+    bare = _bare(annotation)
+    fields = getattr(bare, "model_fields", {})
+    if part in fields:
+        return Annotated[fields[part].annotation, fields[part]], tuple(fields)
+    arguments = get_args(bare)
+    return arguments[-1] if arguments and not fields else None, tuple(fields)
+
+
+def _bare(annotation: Any) -> Any:
+    """Return a type without what is annotated, and without None."""
+    while True:
+        arguments = [one for one in get_args(annotation) if one is not type(None)]
+        if get_origin(annotation) is Annotated or (get_origin(annotation) in _UNIONS and len(arguments) == 1):
+            annotation = arguments[0]
+        else:
+            return annotation
+
+
+def _tagged(annotation: Any) -> dict[str, Any]:
+    """Return the models of a union by the word that chooses one of them."""
+    bare = _bare(annotation)
+    if get_origin(bare) not in _UNIONS:
+        return {}
+    return {get_args(one.model_fields["shape"].annotation)[0]: one for one in get_args(bare)}
+
+
+def _description(annotation: Any) -> str:
+    """Return what a value must be, in words, where its type says so."""
+    if get_origin(annotation) is Annotated:
+        inner, *others = get_args(annotation)
+        own = [str(one.description) for one in others if getattr(one, "description", None)]
+        return own[0] if own else _description(inner)
+    bare = _bare(annotation)
+    if bare is not annotation:
+        return _description(bare)
+    if get_origin(bare) is tuple:
+        count = len(get_args(bare))
+        return f"{count} numbers" if count else "left out"
+    if get_origin(bare) is Literal:
+        return f"one of {', '.join(map(repr, get_args(bare)))}"
+    return ""
+
+
+# ---- what
+
+
+def _missing(places: list[_Place]) -> Problem:
+    *above, _ = location = places[0].location
+    if len(places) == 1:
+        return Problem(location, f"parameter {readable_key(location)}: missing{_must(places[0], '; it must be')}", True)
+    keys = ", ".join(str(place.location[-1]) for place in places)
+    return Problem(location, f"parameter {readable_key(tuple(above))}: {keys} are missing", True)
+
+
+def _problem(error: Any, place: _Place) -> Problem:
+    raised = error.get("ctx", {}).get("error")
+    if isinstance(raised, ParameterError):  # of several keys at once: it names them itself
+        return Problem(raised.location or place.location, str(raised))
+    location, value = place.location, error["input"]
+    if error["type"] == "missing":  # a number of a list
+        location = location[:-1]
+    if error["type"] == "union_tag_not_found":
+        return Problem(
+            (*location, "shape"), f"parameter {readable_key((*location, 'shape'))}: missing{_shapes(place)}", True
+        )
+    if error["type"] == "union_tag_invalid":
+        location, value = (*location, "shape"), value["shape"]
+    key = f"parameter {readable_key(location)}"
+    if error["type"] == "extra_forbidden":
+        return Problem(location, f"{key}: unknown key{_near(str(location[-1]), place.known)}")
+    return Problem(location, f"{key} = {shown(value)}: {_reason(error, place)}")
+
+
+def _reason(error: Any, place: _Place) -> str:
+    kind, message = error["type"], error["msg"].replace("Value error, ", "")
+    if (place.is_in_list and kind == "missing") or kind in ("tuple_type", "too_long"):
+        return _must(place, "must be") or message
+    fields = getattr(_bare(place.annotation), "model_fields", None) or {}
+    plain = {
+        "model_type": f"must hold `key: value` lines with {', '.join(fields)}",
+        "model_attributes_type": "must hold `key: value` lines, of which one is `shape`",
+        "union_tag_invalid": _shapes(place)[2:],
+        "bool_type": "must be true or false",
+        "string_pattern_mismatch": PATTERNS.get(error.get("ctx", {}).get("pattern"), message),
+    }
+    return plain.get(kind) or f"{message[0].lower()}{message[1:]}"
+
+
+def _must(place: _Place, verb: str) -> str:
+    what = _description(place.annotation)
+    return f"{verb} {what}" if what else ""
+
+
+def _shapes(place: _Place) -> str:
+    return f"; must be one of {', '.join(map(repr, _tagged(place.annotation)))}"
+
+
+def _near(key: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(key[:80], known, n=3) or known
+    return f"; known are {', '.join(near)}" if near else ""

@@ -1,0 +1,206 @@
+"""What a value in a YAML file may be, and the one line that a wrong one gets."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from annotated_types import Ge, GroupedMetadata, Le
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+)
+
+from drone_sim.files import yaml_files
+from drone_sim.files.resources import resolve
+from drone_sim.wording import MAX_NAME, shown
+
+MAX_FILE_NAME = 4096  # characters
+_EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$")
+
+
+Key = int | str
+Location = tuple[Key, ...]  # the keys and indices on the way to a value
+
+
+class ParameterError(ValueError):
+    """A parameter is wrong; the message is one line that names key, value and what is allowed."""
+
+    def __init__(self, message: str, location: Location = ()):
+        """Take where the wrong value stands, if it is one."""
+        super().__init__(message)
+        self.location = location
+
+
+# ---- numbers
+
+
+def numeric(value: Any) -> Any:
+    """Let nothing but a number be one. YAML 1.1, which rosparam reads, takes `1e3` for a text."""
+    if isinstance(value, str) and len(value) < MAX_NAME and _EXPONENT.match(value):
+        return float(value)
+    if isinstance(value, (bool, str)):
+        raise ValueError("input should be a valid number")
+    if isinstance(value, int) and abs(value) > 1e300:
+        return 1e300 if value > 0 else -1e300  # beyond every range, and still a float
+    return value
+
+
+@dataclass(frozen=True)
+class Within(GroupedMetadata):
+    """Beside `float` or `int` in Annotated: a finite number from `low` to `high`, or also 0."""
+
+    low: float
+    high: float
+    or_zero: bool = False
+
+    def __iter__(self) -> Iterator[Any]:
+        """Give what pydantic is to check."""
+        if self.or_zero:
+            yield Ge(0)
+            yield AfterValidator(self._check)
+        else:
+            yield Ge(self.low)
+            yield Le(self.high)
+        yield BeforeValidator(numeric)
+
+    def _check(self, value: float) -> float:
+        if value != 0 and not self.low <= value <= self.high:
+            raise ValueError(f"must be 0, or from {self.low:g} to {self.high:g}")
+        return value
+
+
+def _increasing(pair: tuple[float, float] | None) -> tuple[float, float] | None:
+    if pair is not None and not pair[0] < pair[1]:
+        raise ValueError("must be [lowest, highest] with lowest < highest")
+    return pair
+
+
+def _none_from_word(value: Any) -> Any:
+    # ROS's parameter server cannot hold YAML's null.
+    return None if isinstance(value, (str, list)) and value in ("none", "null", "", []) else value
+
+
+def _opaque(color: Any) -> Any:
+    return (*color, 1.0) if isinstance(color, (list, tuple)) and len(color) == 3 else color
+
+
+Finite = Annotated[float, AllowInfNan(False)]
+Coordinate = Annotated[Finite, Within(-1e5, 1e5)]  # m
+Angle = Annotated[Finite, Within(-1e3, 1e3)]  # rad
+Length = Annotated[Finite, Within(1e-4, 1e4)]  # m, of a thing
+Mass = Annotated[Finite, Within(1e-6, 1e6, or_zero=True)]  # kg
+Gain = Annotated[Finite, Within(0, 1e4)]
+Velocity = Annotated[Finite, Within(-1e4, 1e4)]  # m/s
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(description="3 numbers, [x, y, z] in m")]
+Angles = Annotated[tuple[Angle, Angle, Angle], Field(description="3 numbers, [roll, pitch, yaw] in rad")]
+Fraction = Annotated[Finite, Within(0, 1)]
+Color = Annotated[
+    tuple[Fraction, Fraction, Fraction, Fraction],
+    BeforeValidator(_opaque),
+    Field(description="3 or 4 numbers from 0 to 1, [red, green, blue] or [red, green, blue, opacity]"),
+]
+MarginOrNone = Annotated[Annotated[Finite, Within(0.001, 1)] | None, BeforeValidator(_none_from_word)]  # rad
+Limits = Annotated[
+    tuple[Velocity, Velocity] | None,
+    BeforeValidator(_none_from_word),
+    AfterValidator(_increasing),
+    Field(description="2 numbers, [lowest, highest] in m/s, or none"),
+]
+Switch = Annotated[bool, Field(strict=True)]
+
+# ---- words
+
+NAME = r"^[A-Za-z][A-Za-z0-9_]*$"
+TOPIC = r"^[A-Za-z][A-Za-z0-9_]*(/[A-Za-z0-9_]+)*$"
+PATTERNS = {
+    NAME: "must be a letter and then letters, digits or _",
+    TOPIC: "must be like rear/image: letters, digits and _, a letter first, parted by /",
+}
+Name = Annotated[str, Field(pattern=NAME, max_length=MAX_NAME)]
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be printable")
+    return text
+
+
+Label = Annotated[str, Field(max_length=MAX_NAME), AfterValidator(_printable)]
+FileName = Annotated[str, Field(max_length=MAX_FILE_NAME), AfterValidator(_printable)]
+
+
+class FoundFile(str):
+    """The absolute path of a file that is there; `given` is its name as the user wrote it, seen from `folder`."""
+
+    given: str
+    folder: str
+
+    def seen_from(self, folder: Path) -> str:
+        """Return the name by which a file in `folder` can name it: as it was given, where that leads to it."""
+        absolute = self.given.startswith(("package://", "~", "/"))
+        return self.given if absolute or Path(self.folder or ".").resolve() == folder.resolve() else str(self)
+
+
+def named_in(folder: Path, name: str) -> FoundFile:
+    """Return a file's name that was found in a file in `folder`; not yet looked for."""
+    absolute = name.startswith(("package://", "~", "/"))
+    found = FoundFile(name if absolute else folder / name)
+    found.given, found.folder = name, str(folder)
+    return found
+
+
+def _existing_file(allow_none: bool) -> Callable[[Any], str]:
+    def check(value: Any) -> str:
+        if not isinstance(value, str):
+            raise ValueError("input should be a valid string")
+        if len(value) > MAX_FILE_NAME:
+            raise ValueError(f"must have at most {MAX_FILE_NAME} characters")
+        if allow_none and not value:
+            return ""
+        try:
+            found = FoundFile(resolve(value))
+        except FileNotFoundError as error:
+            raise ValueError(str(error)) from None
+        found.given, found.folder = getattr(value, "given", str(value)), getattr(value, "folder", "")
+        return found
+
+    return check
+
+
+File = Annotated[str, PlainValidator(_existing_file(False)), PlainSerializer(str)]
+OptionalFile = Annotated[str, PlainValidator(_existing_file(True)), PlainSerializer(str)]
+
+
+# ---- mappings
+
+
+class Checked(BaseModel):
+    """Every key is known, every value checked, and nothing changes after that."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def read_yaml(path: str | Path) -> dict[str, Any]:
+    """Return the mapping in a YAML file; raises ParameterError, in one line, where there is none."""
+    try:
+        values = yaml_files.read(path)
+    except yaml_files.YamlError as error:
+        raise ParameterError(str(error)) from None
+    if not isinstance(values, dict):
+        raise ParameterError(f"{path}: must hold `key: value` lines, not {type(values).__name__}")
+    return values
+
+
+def readable_key(location: Location) -> str:
+    """Return the path to a value as a message shows it: cut, and on one line."""
+    return "/".join(part if part.isprintable() and len(part) < 80 else shown(part) for part in map(str, location))

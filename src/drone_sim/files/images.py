@@ -1,0 +1,64 @@
+"""Pictures from files, for textures: their size is looked at before anything is unpacked."""
+
+from __future__ import annotations
+
+import io
+import warnings
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from drone_sim.files.file_cache import FileCache, Reading
+from drone_sim.files.resources import MEBIBYTE, read_bytes
+
+MAX_SIZE = 32 * MEBIBYTE  # bytes of a file
+MAX_SIDE = 4096  # px
+FORMATS = ("BMP", "JPEG", "PNG", "PPM", "TIFF", "WEBP")
+
+
+def read(path: str) -> np.ndarray:
+    """Return an 8-bit picture (h, w, 3 or 4) RGB or RGBA, top row first; not to be written to.
+
+    Raises ValueError, in one line that names the file.
+    """
+    return _CACHE.get(path)
+
+
+def check(content: bytes) -> None:
+    """Raise ValueError, in one line without a name, for a picture that is too large; look at its header only."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        try:
+            with Image.open(io.BytesIO(content), formats=FORMATS) as image:
+                width, height = image.size
+        except Image.DecompressionBombError:
+            raise ValueError(f"too large: at most {MAX_SIDE} x {MAX_SIDE} px are allowed") from None
+    if width > MAX_SIDE or height > MAX_SIDE:
+        raise ValueError(f"{width} x {height} px: at most {MAX_SIDE} x {MAX_SIDE} px are allowed")
+
+
+def _read(path: str) -> Reading:
+    try:
+        content = read_bytes(path, MAX_SIZE)
+        check(content)
+    except Image.UnidentifiedImageError:
+        raise ValueError(f"texture {path}: cannot be read as an 8-bit image ({', '.join(FORMATS)})") from None
+    except OSError as error:
+        raise ValueError(f"texture {path}: cannot be read ({error.strerror or error})") from None
+    except Exception as error:  # PIL's readers raise whatever a broken header leads to
+        raise ValueError(f"texture {path}: {' '.join(str(error).split()):.200}") from None
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None or image.dtype != np.uint8:
+        raise ValueError(f"texture {path}: cannot be read as an 8-bit image")
+    if max(image.shape[:2]) > MAX_SIDE:
+        raise ValueError(f"texture {path}: at most {MAX_SIDE} x {MAX_SIDE} px are allowed")
+    if image.ndim == 2:
+        image = cv2.cvtColor(image, cv2.COLOR_GRAY2RGB)
+    else:
+        image = cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA if image.shape[2] == 4 else cv2.COLOR_BGR2RGB)
+    image.setflags(write=False)
+    return Reading(image, image.nbytes)
+
+
+_CACHE: FileCache[np.ndarray] = FileCache(_read, 256 * MEBIBYTE)

@@ -1,0 +1,94 @@
+"""V-REP's propeller script: a fan of particles whose momentum lifts the drone.
+
+With v the particle velocity (m/s) and n the particles emitted in a step of dt seconds:
+
+    n      = floor(430 dt + carry)          carry: the fraction left over by the step before
+    thrust = n * 8500 * v * pi * 0.005^3 / (6 dt)     along the propeller's +z   (N)
+    torque = rotation * 0.002 * v                     about the same axis        (N m)
+
+V-REP 3.x keeps the carry (21, 22, 21, ... particles at dt = 0.05 s), CoppeliaSim 4.x drops it (always
+21). Source: the Lua script in V-REP's stock quadricopter model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from drone_sim.mechanics.frames import Matrix, Vector, rotate
+from drone_sim.mechanics.wrench import Wrench
+from drone_sim.run.parameters import PropellerParameters
+
+
+class ParticleLaw:
+    """Counts the particles of a step, which are as many for every propeller."""
+
+    def __init__(self, parameters: PropellerParameters, time_step: float):
+        """Take the law's constants, and the step in seconds."""
+        self._rate = parameters.particles_per_second * time_step
+        self._keeps_carry = parameters.law == "3.x"
+        volume = math.pi * parameters.particle_size**3 / 6
+        self._newtons = parameters.particle_density * volume / time_step
+        self.carry = 0.0  # the fraction of a particle left over by the last step
+
+    def emit(self) -> float:
+        """Emit one step's particles; return the thrust in newtons per m/s of their velocity."""
+        particles = math.floor(self._rate + self.carry)
+        if self._keeps_carry:
+            self.carry += self._rate - particles
+        return particles * self._newtons
+
+
+class Propellers:
+    """A drone's propellers: what they blow, and how far their blades have gone with it."""
+
+    def __init__(
+        self,
+        parameters: PropellerParameters,
+        axes: Sequence[Vector],
+        points: Sequence[Vector],
+        rotations: Sequence[int],
+        time_step: float,
+    ):
+        """Take where each pushes along (unit, root link's frame) and acts (m, inertial frame), and its sense (+-1)."""
+        self.air = [0.0] * len(axes)  # m of it that went through each
+        self._law = ParticleLaw(parameters, time_step)
+        self._time_step = time_step
+        self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
+        by_axis: dict[Vector, list[tuple[int, float, float, float, float]]] = {}
+        for number, (axis, point, rotation) in enumerate(zip(axes, points, rotations)):
+            by_axis.setdefault(axis, []).append((number, *point, rotation * parameters.torque_per_velocity))
+        self._by_axis = list(by_axis.items())
+
+    def blow(self, velocities: Sequence[float], body: Matrix, wrench: Wrench) -> None:
+        """Emit a step's particles at these velocities (m/s), within limits, from a body there; add to its wrench."""
+        if min(velocities) < self._slowest or max(velocities) > self._fastest:
+            velocities = [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
+        newtons, air, time_step = self._law.emit(), self.air, self._time_step
+        for axis, members in self._by_axis:
+            force = torque = x = y = z = 0.0
+            for number, px, py, pz, newton_metres in members:
+                velocity = velocities[number]
+                thrust = newtons * velocity
+                force += thrust
+                torque += newton_metres * velocity
+                x += px * thrust
+                y += py * thrust
+                z += pz * thrust
+                air[number] += velocity * time_step
+            along_x, along_y, along_z = along = rotate(body, axis)
+            wrench.add_parallel(
+                (along_x * force, along_y * force, along_z * force),
+                (along_x * torque, along_y * torque, along_z * torque),
+                (x, y, z),
+                along,
+            )
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back the fraction of a particle and the blades' way."""
+        carry, air = self._law.carry, list(self.air)
+
+        def recall() -> None:
+            self._law.carry, self.air = carry, list(air)
+
+        return recall

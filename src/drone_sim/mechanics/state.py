@@ -1,0 +1,68 @@
+"""What a drone is doing, and what it is told to do: plain immutable values, SI units."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from drone_sim.mechanics.frames import (
+    Matrix,
+    Quaternion,
+    Vector,
+    from_quaternion,
+    invert,
+    multiply_quaternions,
+    position,
+    transform,
+)
+
+
+class Pose(NamedTuple):
+    """A position (m) and a unit quaternion (x, y, z, w), of a body in the world."""
+
+    position: Vector
+    orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+    @property
+    def matrix(self) -> Matrix:
+        """The transform, in V-REP's 12 numbers."""
+        return from_quaternion(self.position, self.orientation)
+
+
+def compose(a: Pose, b: Pose) -> Pose:
+    """Return the pose b, given in the frame of the pose a, in the frame that a is given in."""
+    return Pose(transform(a.matrix, b.position), multiply_quaternions(a.orientation, b.orientation))
+
+
+def inverse(pose: Pose) -> Pose:
+    """Return the pose that undoes `pose`."""
+    x, y, z, w = pose.orientation
+    return Pose(position(invert(pose.matrix)), (-x, -y, -z, w))
+
+
+class State(NamedTuple):
+    """Pose and velocity of a body's frame; all four in the world frame (m, m/s, rad/s)."""
+
+    position: Vector
+    orientation: Quaternion
+    linear_velocity: Vector
+    angular_velocity: Vector
+
+    @property
+    def matrix(self) -> Matrix:
+        """The transform world from body, in V-REP's 12 numbers."""
+        return from_quaternion(self.position, self.orientation)
+
+
+class Vector3(NamedTuple):
+    """Three numbers with the field names of geometry_msgs/Vector3."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+class Twist(NamedTuple):
+    """A command, with the field names of geometry_msgs/Twist (m/s and rad/s, track frame)."""
+
+    linear: Vector3 = Vector3()
+    angular: Vector3 = Vector3()

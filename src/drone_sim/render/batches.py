@@ -1,0 +1,246 @@
+"""What is on the graphics card: shared meshes, one record per instance, and the draws they make."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from drone_sim.render import mesh
+from drone_sim.shapes.visual import Visual
+
+SHADE = 0.55  # what a shadow leaves of the floor's brightness
+VERTEX_LAYOUT = (("position", "3f", 12), ("normal", "3f", 12), ("uv", "2f", 8))
+MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
+FIXED_LAYOUT = (("paint", "4f", 16), ("label", "1f", 4))
+ANISOTROPY = 8.0
+
+Programs = dict[str, Any]  # moderngl.Program by role
+
+
+@dataclass
+class Part:
+    """One material's triangles on the card."""
+
+    vertices: moderngl.Buffer
+    indices: moderngl.Buffer
+    texture: moderngl.Texture | None
+    rgba: tuple[float, ...]
+    transparent: bool
+    closed: bool
+    top: float
+    centre: np.ndarray
+
+    def release(self) -> None:
+        """Free its memory on the card."""
+        for resource in (self.vertices, self.indices, self.texture):
+            if resource is not None:
+                resource.release()
+
+
+@dataclass
+class Batch:
+    """Instances of one part that are drawn by one call."""
+
+    part: Part
+    members: list[int]  # indices into the visuals
+    floor: bool = False
+    transparent: bool = False
+    ground: bool = False
+    first: int = 0  # record
+    arrays: dict[str, moderngl.VertexArray] = field(default_factory=dict)
+
+    def draw(self, role: str) -> None:
+        """Draw with the program of this role: surface, shadow or data."""
+        if role == "surface" and self.part.texture is not None:
+            self.part.texture.use(0)
+        self.arrays[role].render(instances=len(self.members))
+
+
+class Scene:
+    """The visuals as batches; must be used with its context current."""
+
+    def __init__(self, context: moderngl.Context, programs: Programs, software: bool) -> None:
+        """Empty. programs: by name: plain, textured, floor, shadow, data; software: whether the CPU draws."""
+        self._context = context
+        self._programs = programs
+        self._software = software
+        self._parts: dict[Visual, tuple[Part, ...]] = {}
+        self._buffers: list[moderngl.Buffer] = []
+        self._members: np.ndarray = np.zeros(0, dtype=np.intp)
+        self._scales = np.zeros((0, 1, 3))
+        self.visuals: tuple[Visual, ...] = ()
+        self.batches: list[Batch] = []
+        self.solids: list[Batch] = []
+        self.floors: list[Batch] = []
+        self.has_ground = False  # which the picture is cleared to; it has a depth, too
+        self.glass: list[Batch] = []
+
+    def update(self, visuals: Sequence[Visual]) -> None:
+        """Follow the list; on ValueError (an unreadable mesh) the scene stays as it was."""
+        visuals = tuple(visuals)
+        if visuals == self.visuals:
+            return
+        shared = [_shared(visual) for visual in visuals]
+        loaded = {form: mesh.load(form) for form, _ in shared if form not in self._parts}
+        self._release_batches()
+        for form in set(self._parts) - {form for form, _ in shared}:
+            for part in self._parts.pop(form):
+                part.release()
+        for form, meshes in loaded.items():
+            self._parts[form] = tuple(self._upload(one) for one in meshes)
+        self.visuals = visuals
+        self.batches = self._sort(visuals, [form for form, _ in shared])
+        self.solids = [batch for batch in self.batches if not (batch.floor or batch.transparent or batch.ground)]
+        self.floors = [batch for batch in self.batches if batch.floor]
+        self.has_ground = any(batch.ground for batch in self.batches)
+        self.glass = [batch for batch in self.batches if batch.transparent]
+        self._members = np.array([i for batch in self.batches for i in batch.members], dtype=np.intp)
+        self._scales = np.array([shared[i][1] for i in self._members]).reshape(-1, 1, 3)
+        self._link()
+
+    def move(self, origin: np.ndarray, poses: np.ndarray) -> None:
+        """Write the instances' matrices, world-from-visual (N, 4, 4), relative to `origin` (3,), metres.
+
+        The difference is taken in double precision, so that far from the world's origin nothing trembles.
+        """
+        if poses.shape != (len(self.visuals), 4, 4):
+            raise ValueError(f"poses of shape {poses.shape} for {len(self.visuals)} visuals")
+        if not self._buffers:
+            return
+        rows = poses[self._members, :3, :]
+        rows[:, :, 3] -= origin
+        rows[:, :, :3] *= self._scales
+        self._buffers[0].write(rows.astype(np.float32))
+
+    def floor_height(self, poses: np.ndarray) -> float | None:
+        """World z of the top of the first floor, metres, or None without a floor."""
+        if not self.floors:
+            return None
+        floor = self.floors[0]
+        return float(poses[floor.members[0], 2, 3] + floor.part.top * self._scales[floor.first, 0, 2])
+
+    def glass_from_far(self, axis: np.ndarray, poses: np.ndarray) -> list[Batch]:
+        """The transparent batches, the farthest along `axis` (3,) first."""
+
+        def depth(batch: Batch) -> float:
+            pose = poses[batch.members[0]]
+            return float(axis @ (pose[:3, :3] @ (batch.part.centre * self._scales[batch.first, 0]) + pose[:3, 3]))
+
+        return sorted(self.glass, key=depth, reverse=True) if len(self.glass) > 1 else self.glass
+
+    def release(self) -> None:
+        """Free everything on the card."""
+        self._release_batches()
+        for parts in self._parts.values():
+            for part in parts:
+                part.release()
+        self._parts = {}
+
+    def _release_batches(self) -> None:
+        for batch in self.batches:
+            for array in batch.arrays.values():
+                array.release()
+        for buffer in self._buffers:
+            buffer.release()
+        self._buffers, self.batches, self.visuals = [], [], ()
+        self.solids, self.floors, self.glass = [], [], []
+
+    def _upload(self, one: mesh.Mesh) -> Part:
+        uv = np.zeros((len(one.vertices), 2), dtype=np.float32) if one.uv is None else one.uv
+        low, high = one.vertices.min(axis=0), one.vertices.max(axis=0)
+        return Part(
+            vertices=self._context.buffer(np.hstack([one.vertices, one.normals, uv]).astype(np.float32)),
+            indices=self._context.buffer(np.ascontiguousarray(one.faces, dtype=np.uint32)),
+            texture=None if one.texture is None else self._upload_texture(one.texture),
+            rgba=one.rgba,
+            transparent=one.transparent,
+            closed=one.closed,
+            top=float(high[2]),
+            centre=(low + high) / 2.0,
+        )
+
+    def _upload_texture(self, image: np.ndarray) -> moderngl.Texture:
+        height, width, channels = image.shape
+        rgba = np.full((height, width, 4), 255, dtype=np.uint8)
+        rgba[:, :, :channels] = image
+        texture = self._context.texture((width, height), 4, rgba[::-1].tobytes())  # v counts from the bottom
+        texture.build_mipmaps()
+        texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        if not self._software:
+            texture.anisotropy = min(ANISOTROPY, self._context.max_anisotropy)
+        return texture
+
+    def _sort(self, visuals: Sequence[Visual], forms: Sequence[Visual]) -> list[Batch]:
+        """Solid instances of a part share a batch; transparent ones are drawn singly, in the order of depth."""
+        solids: dict[int, Batch] = {}
+        singles: list[Batch] = []
+        for index, (visual, form) in enumerate(zip(visuals, forms)):
+            for part in self._parts[form]:
+                if visual.ground:
+                    singles.append(Batch(part, [index], ground=True))
+                elif visual.floor:
+                    singles.append(Batch(part, [index], floor=True))
+                elif part.transparent or visual.rgba[3] < 1.0:
+                    singles.append(Batch(part, [index], transparent=True))
+                elif id(part) in solids:
+                    solids[id(part)].members.append(index)
+                else:
+                    solids[id(part)] = Batch(part, [index])
+        alike = sorted(solids.values(), key=lambda batch: (batch.part.texture is not None, batch.part.closed))
+        batches = alike + singles
+        first = 0
+        for batch in batches:
+            batch.first = first
+            first += len(batch.members)
+        return batches
+
+    def _link(self) -> None:
+        """Make the record buffers and the vertex arrays that read them."""
+        if not self.batches:
+            return
+        records = [(*self._paint(batch, index), float(index)) for batch in self.batches for index in batch.members]
+        moving = self._context.buffer(reserve=48 * len(records), dynamic=True)
+        fixed = self._context.buffer(np.array(records, dtype=np.float32))
+        self._buffers = [moving, fixed]
+        for batch in self.batches:
+            surface = "plain" if batch.part.texture is None else "floor" if batch.floor else "textured"
+            for role, name in (("surface", surface), ("shadow", "shadow"), ("data", "data")):
+                batch.arrays[role] = self._array(batch, self._programs[name])
+
+    def _paint(self, batch: Batch, index: int) -> tuple[float, ...]:
+        red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.part.rgba)
+        return (red, green, blue, SHADE if batch.floor else alpha if batch.transparent else 1.0)
+
+    def _array(self, batch: Batch, program: Any) -> moderngl.VertexArray:
+        array = self._context.vertex_array(program, [], index_buffer=batch.part.indices, index_element_size=4)
+        moving, fixed = self._buffers
+        for layout, buffer, first, divisor in (
+            (VERTEX_LAYOUT, batch.part.vertices, 0, 0),
+            (MOVING_LAYOUT, moving, batch.first, 1),
+            (FIXED_LAYOUT, fixed, batch.first, 1),
+        ):
+            stride = sum(size for _, _, size in layout)
+            offset = first * stride
+            for name, kind, size in layout:
+                if name in program:
+                    location = program[name].location
+                    array.bind(location, "f", buffer, kind, offset=offset, stride=stride, divisor=divisor)
+                offset += size
+        return array
+
+
+def _shared(visual: Visual) -> tuple[Visual, tuple[float, ...]]:
+    """The geometry to upload, one for all that share it, and the scale that makes it this visual's."""
+    form = Visual(None, visual.shape, (), mesh.WHITE, texture=visual.texture, edition=visual.edition)
+    if visual.shape == "box":
+        return replace(form, size=(1.0, 1.0, 1.0)), visual.size
+    if visual.shape == "sphere":
+        return replace(form, size=(1.0,)), visual.size * 3
+    if visual.shape == "cylinder":
+        radius, length = visual.size
+        return replace(form, size=(1.0, 1.0)), (radius, radius, length)
+    return replace(form, size=visual.size, file=visual.file), (1.0, 1.0, 1.0)

@@ -1,0 +1,205 @@
+"""Triangles with normals and materials for every shape a Visual can have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from drone_sim.files import images, mesh_files
+from drone_sim.files.mesh_files import WHITE
+from drone_sim.shapes.visual import Visual
+
+SECTIONS = 24  # of a cylinder or capsule around its axis
+PLANE_HALF_SIZE = 200.0  # metres; a plane is infinite, a camera sees 100 m
+CREASE = np.radians(40.0)  # faces that meet more sharply than this keep an edge
+MOST_FACES = 32  # at a point; where more meet, as in the middle of a disc, each keeps its own normal
+_SPHERE = 1.0029  # radius of the polyhedron of 1280 faces that has the volume of the unit sphere
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """One material's triangles, in the visual's frame, metres.
+
+    vertices, normals: (n, 3) float32; uv: (n, 2) float32, v upwards, or None; faces: (m, 3) uint32;
+    rgba: 0..1; texture: (h, w, 3 or 4) uint8, top row first, or None; never one without uv.
+    closed: the faces enclose a volume and are counter-clockwise seen from outside.
+    """
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None = None
+    rgba: tuple[float, float, float, float] = WHITE
+    texture: np.ndarray | None = None
+    closed: bool = False
+
+    @property
+    def transparent(self) -> bool:
+        """Whether anything behind it can be seen through it."""
+        return self.rgba[3] < 1.0 or (
+            self.texture is not None and self.texture.shape[2] == 4 and int(self.texture[:, :, 3].min()) < 255
+        )
+
+
+def load(visual: Visual) -> tuple[Mesh, ...]:
+    """The visual's meshes, one per material; its own rgba is not applied.
+
+    A texture shows on boxes (once per face), planes (once per metre) and meshes that bring uv coordinates;
+    on other shapes there is nothing to lay it by and it is left out.
+    Raises ValueError, in one line that names the file, for a mesh or texture that cannot be read, and for an
+    unknown shape.
+    """
+    if visual.shape == "mesh":
+        return tuple(_read_file(visual))
+    uv = None
+    if visual.shape == "box":
+        corners, uv = _box(visual.size)
+    elif visual.shape == "plane":
+        corners, uv = _plane()
+    elif visual.shape == "cylinder":
+        radius, length = visual.size
+        corners = _triangles(trimesh.creation.cylinder(_outer(radius), length, sections=SECTIONS))
+    elif visual.shape == "sphere":
+        corners = _triangles(trimesh.creation.icosphere(subdivisions=3, radius=_SPHERE * visual.size[0]))
+    elif visual.shape == "capsule":
+        radius, length = visual.size
+        corners = _triangles(trimesh.creation.capsule(length, _outer(radius), count=[SECTIONS, SECTIONS]))
+    else:
+        raise ValueError(f"visual {visual.key}: unknown shape {visual.shape!r}")
+    return (_assemble(corners, uv, WHITE, images.read(visual.texture) if visual.texture else None),)
+
+
+def _outer(radius: float) -> float:
+    """Circumradius of the polygon that has the area of the circle, so that silhouettes agree on average."""
+    angle = 2.0 * np.pi / SECTIONS
+    return float(radius * np.sqrt(angle / np.sin(angle)))
+
+
+def _triangles(mesh: trimesh.Trimesh) -> np.ndarray:
+    return np.asarray(mesh.vertices, dtype=np.float64)[np.asarray(mesh.faces)]
+
+
+def _box(size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (12, 3, 3) and uv (12, 3, 2); each side shows the picture upright (z up) from outside."""
+    corners = _triangles(trimesh.creation.box(extents=(1.0, 1.0, 1.0)))
+    normals = _areas(corners)
+    axis = np.abs(normals).argmax(axis=1)
+    sign = np.sign(normals[np.arange(len(normals)), axis])
+    x, y, z = np.moveaxis(corners, 2, 0)
+    side = sign[:, None]
+    right = np.choose(axis[:, None], [side * y, -side * x, x])
+    up = np.choose(axis[:, None], [z, z, side * y])
+    return corners * np.asarray(size), np.stack([right, up], axis=2) + 0.5
+
+
+def _plane() -> tuple[np.ndarray, np.ndarray]:
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * PLANE_HALF_SIZE
+    corners = square[np.array([[0, 1, 2], [0, 2, 3]])]
+    return corners, corners[:, :, :2]
+
+
+def _assemble(
+    corners: np.ndarray,
+    uv: np.ndarray | None,
+    rgba: tuple[float, float, float, float],
+    texture: np.ndarray | None,
+) -> Mesh:
+    """Index the corners (m, 3, 3) of loose triangles, with normals, merging those that are alike."""
+    normals = crease_normals(corners).reshape(-1, 3)
+    table, alike = [corners.reshape(-1, 3), normals], [_points(corners).ravel(), _numbered(normals)]
+    if uv is None or texture is None:
+        uv = texture = None
+    else:
+        table.append(uv.reshape(-1, 2))
+        alike.append(_numbered(uv.reshape(-1, 2)))
+    first, inverse = trimesh.grouping.unique_rows(np.column_stack(alike))
+    merged = [np.ascontiguousarray(column[first], dtype=np.float32) for column in table]
+    return Mesh(
+        vertices=merged[0],
+        normals=merged[1],
+        faces=inverse.reshape(-1, 3).astype(np.uint32),
+        uv=None if uv is None else merged[2],
+        rgba=rgba,
+        texture=texture,
+        closed=is_closed(corners),
+    )
+
+
+def crease_normals(corners: np.ndarray, crease: float = float(CREASE)) -> np.ndarray:
+    """Unit normals (m, 3, 3) at the corners of triangles (m, 3, 3).
+
+    A corner's normal is the mean, weighted by the angles there (so that it does not matter which way a quad was
+    cut), over the faces at that point which are turned from its own by less than `crease` rad: round things
+    look round and edges stay sharp, whatever the file's own normals say.
+    """
+    area = _areas(corners)
+    unit = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-30)
+    point = _points(corners).ravel()
+    order = np.argsort(point, kind="stable")  # the corners at one point stand beside each other
+    unit = np.repeat(unit, 3, axis=0)[order]
+    share = unit * _angles(corners).reshape(-1, 1)[order]
+    many = np.bincount(point)
+    count, start = many[point[order]], (np.cumsum(many) - many)[point[order]]
+    total, here = share.copy(), np.flatnonzero(count <= MOST_FACES)
+    rank, near = np.arange(len(order)) - start, np.cos(crease)
+    for shift in range(1, MOST_FACES):
+        here = here[count[here] > shift]
+        other = start[here] + (rank[here] + shift) % count[here]
+        total[here] += share[other] * (np.einsum("ij,ij->i", unit[here], unit[other]) > near)[:, None]
+    normals = np.empty_like(total)
+    normals[order] = total
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.where(length > 0, normals / np.maximum(length, 1e-30), [0.0, 0.0, 1.0]).reshape(-1, 3, 3)
+
+
+def _areas(corners: np.ndarray) -> np.ndarray:
+    """Normals (m, 3) as long as twice the triangles' areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _angles(corners: np.ndarray) -> np.ndarray:
+    """Interior angles (m, 3), rad."""
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    sine = np.linalg.norm(np.cross(ahead, back), axis=2)
+    return np.arctan2(sine, np.einsum("ijk,ijk->ij", ahead, back))
+
+
+def _points(corners: np.ndarray) -> np.ndarray:
+    """A number (m, 3) for each corner, the same where corners meet."""
+    extent = max(float(np.ptp(corners)), 1e-30)
+    return _numbered(corners.reshape(-1, 3) / extent, 6).reshape(-1, 3)
+
+
+def _numbered(rows: np.ndarray, digits: int = 5) -> np.ndarray:
+    """A number (n,) for each row of numbers, the same for rows that agree to so many digits."""
+    numbers: np.ndarray = trimesh.grouping.unique_rows(rows, digits=digits)[1]
+    return numbers.ravel()
+
+
+def is_closed(corners: np.ndarray) -> bool:
+    """Whether triangles (m, 3, 3) enclose a volume, all seen counter-clockwise from outside.
+
+    They do when every edge is run through once in each direction and the volume, the sum of the signed
+    tetrahedra to the origin, is positive.
+    """
+    point = _points(corners)
+    point = point[(point != np.roll(point, 1, axis=1)).all(axis=1)]  # slivers have no area to see
+    watertight, alike = trimesh.graph.is_watertight(trimesh.geometry.faces_to_edges(point)) if len(point) else (0, 0)
+    volume = np.einsum("ij,ij->", corners[:, 0] - corners[0, 0], _areas(corners))
+    return bool(watertight and alike and volume > 0)
+
+
+def _read_file(visual: Visual) -> Iterator[Mesh]:
+    texture = images.read(visual.texture) if visual.texture else None
+    for part in mesh_files.read(visual.file):
+        faces = part.faces
+        if np.prod(visual.size) < 0:
+            faces = faces[:, ::-1]  # a mirror image turns the faces inside out
+        corners = (part.vertices * np.asarray(visual.size))[faces]
+        uv = None if part.uv is None else part.uv[faces]
+        yield _assemble(
+            corners, uv, part.rgba if texture is None else WHITE, part.texture if texture is None else texture
+        )

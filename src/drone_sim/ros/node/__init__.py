@@ -1,0 +1,1 @@
+"""The node's life: parameters, start, steps, services, end."""

@@ -1,0 +1,212 @@
+"""The node: the simulation at the pace of the clock, with ROS around it.
+
+Parameters (private): every key of config/drone.yaml.
+Topics, in the drone's namespace: see inputs.py, outputs.py, cameras.py and markers.py; services: services.py.
+/clock is published with use_sim_time: see step_time.py.
+Frames: world -> base_link, Track_base, and the cameras that have a `mount`; the rest comes from the URDF.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import logging
+import sys
+import time
+from collections.abc import Callable
+
+import rospy
+
+from drone_sim.mechanics.frames import position, to_euler
+from drone_sim.ros.node.ending import Ending
+from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.node.launch_arguments import check_launch_arguments
+from drone_sim.ros.node.master_watch import MasterWatch
+from drone_sim.ros.node.player import Player
+from drone_sim.ros.node.services import Services
+from drone_sim.ros.node.starting import init_node, read_parameters, reported, use_sim_time
+from drone_sim.ros.node.step_time import StepTime
+from drone_sim.ros.rviz.markers import Handles
+from drone_sim.ros.rviz.rviz_view import RvizView
+from drone_sim.ros.vehicle.cameras import CameraOutput
+from drone_sim.ros.vehicle.inputs import DroneInput
+from drone_sim.ros.vehicle.outputs import DroneOutput
+from drone_sim.ros.vehicle.script_topics import RosBackend
+from drone_sim.run.guardian import Guardian
+from drone_sim.run.pacing import Beat, Pacer
+from drone_sim.run.parameters import Parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.errors import ScriptError
+
+_NAME = "drone_sim"
+_SOON, _SELDOM = 0.05, 0.2  # s between two messages while the simulation stands: after a change, and without one
+
+
+class Node:
+    """Steps the simulation in the thread that calls `run`, and no other."""
+
+    def __init__(self, parameters: Parameters):
+        """Build the scene and advertise. Raises what Simulation raises."""
+        self._parameters = parameters
+        logging.getLogger("drone_sim").handlers = [_ToRosout()]
+        drone = parameters.drone.name
+        images = {rospy.resolve_name(f"{drone}/{camera.topic}") for camera in parameters.cameras.values()}
+        drawings = Drawings()
+        self.simulation = Simulation(
+            parameters,
+            script=parameters.script,
+            gui=parameters.gui,
+            backend=RosBackend(images, lambda: self._time.stamp()),
+            drawings=drawings,
+            started=False,
+        )
+        self._time = StepTime(self.simulation, use_sim_time())
+        self.player = Player(self.simulation, self._step_and_show, self._time.simulated)
+        self._inbox = Inbox()
+        self._services = Services(self.player, self._inbox)
+        factor = parameters.real_time_factor
+        self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
+        inputs = DroneInput(self.simulation, self._inbox)
+        self._handles = Handles(self.simulation, inputs, self._inbox)
+        self._view = RvizView(self.simulation, self.player, drawings)
+        self._cameras = [
+            CameraOutput(drone, camera, parameters.cameras[name]) for name, camera in self.simulation.cameras.items()
+        ]
+        self._output = DroneOutput(self.simulation)
+        self._beat = Beat(_SOON, _SELDOM)
+        self._shown = -1  # the world's changes, when it was shown
+        for camera in self.simulation.cameras.values():
+            camera.look()  # the first picture takes long: compiling shaders must not make a step late
+
+    def run(self, ending: Callable[[], bool] = lambda: False) -> None:
+        """Start, and step until it is time to end, or ROS shuts the node down."""
+
+        def over() -> bool:
+            return ending() or rospy.is_shutdown()
+
+        if over():
+            return
+        with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
+            self.player.start()
+        gc.collect()
+        gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
+        commands = rospy.resolve_name(f"{self._parameters.drone.name}/cmd_vel")
+        rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; commands on {commands}")
+        steps, seconds = 0, 0.0
+        self._pacer.restart()
+        while not over():
+            began = time.monotonic()
+            if self.player.playing:
+                self._wait(over)
+                steps += self.step()
+                seconds += time.monotonic() - began
+            else:
+                self._stand()
+                self._pacer.restart()
+        flown = steps * self._parameters.time_step
+        factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
+        late = f"{self._pacer.overruns} late steps, by {self._pacer.worst * 1e3:.0f} ms at most"
+        rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {late}")
+
+    def _wait(self, over: Callable[[], bool]) -> None:
+        if self.player.begun:  # reading scene and script took its time, which no step is late for
+            self.player.begun = False
+            self._pacer.restart()
+        late = self._pacer.wait(over)
+        if late:
+            rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
+
+    def step(self) -> bool:
+        """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
+        self._inbox.empty()
+        return self.player.playing and self.player.step()
+
+    def _step_and_show(self) -> None:
+        self._time.begin()
+        self.simulation.step()
+        self._show()
+        self._time.end(at_once=self.player.paused)  # who asks for single steps is told of each
+
+    def _stand(self) -> None:
+        """Paused or stopped: wait for something to do, and show what it changed."""
+        self._inbox.wait(self._left())
+        self._time.begin()
+        self._inbox.empty()
+        if self.player.playing or self._left():
+            return
+        if self._time.simulated:
+            self._show_at_the_same_time()
+        else:
+            self.simulation.look()
+            self._show()
+
+    def _left(self) -> float:
+        return self._beat.left(self.simulation.world.changes != self._shown)
+
+    # ---- what is there
+
+    def _show(self) -> None:
+        self._show_state()
+        self._output.publish_transforms(self._time.stamp)
+        self._show_to_eyes()
+
+    def _show_at_the_same_time(self) -> None:
+        """Show what has changed under a stamp that was used before: no transforms, which tf2 takes only once."""
+        self._time.end(at_once=True)
+        if self.simulation.world.changes != self._shown:
+            self.simulation.look()
+            self._show_state()
+        self._show_to_eyes()
+
+    def _show_state(self) -> None:
+        for camera in self._cameras:
+            camera.publish(self._time.stamp)
+        self._output.publish_state(self._time.stamp)
+        self._shown = self.simulation.world.changes
+
+    def _show_to_eyes(self) -> None:
+        self._output.publish_command(self._time.stamp)
+        self._handles.update()
+        self._view.update()
+        if self._parameters.gui:
+            track = self.simulation.drone.track
+            self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
+        self._beat.restart()
+
+    def close(self) -> None:
+        """Run the script's cleanup, remove what rviz read, and free the world. Raises ScriptError."""
+        self._view.close()
+        self.simulation.close()
+
+
+class _ToRosout(logging.Handler):
+    """Hands what the modules without ROS log to rosout."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        logging.getLogger("rosout").log(record.levelno, record.getMessage())
+
+
+def main(guardian: Guardian) -> int:
+    """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
+    # The time of messages is the simulation's; hearing its own /clock would cost the node half of its speed.
+    if not init_node(_NAME, disable_signals=True, disable_rostime=True):
+        return 1
+    ending = Ending(guardian)
+    nodes = []
+
+    def run() -> None:
+        check_launch_arguments()
+        nodes.append(Node(read_parameters()))
+        MasterWatch().start()
+        nodes[0].run(ending.asked)
+
+    status = reported(_NAME, run)
+    for node in nodes:
+        status = reported(_NAME, node.close) or status
+    ending.complete()
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main(Guardian(_NAME)))

@@ -1,0 +1,120 @@
+"""Start, stop, pause and step: what V-REP's toolbar does, and what happens when a script fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import rospy
+from std_msgs.msg import String
+
+from drone_sim.run.simulation import Diverged, Simulation
+from drone_sim.scripting.errors import ScriptError
+
+
+class Player:
+    """Plays a simulation; the thread that owns the simulation calls all of this.
+
+    The latched topic ~state tells at once whether it is `flying`, `paused` or `stopped`.
+    """
+
+    def __init__(self, simulation: Simulation, step: Callable[[], None], simulated_time: bool):
+        """Begin stopped. `step` runs one step and shows it.
+
+        `simulated_time`: the node publishes /clock, so that others wait when it stands still.
+        """
+        self.simulation = simulation
+        self._step = step
+        self.paused = False
+        self.begun = False  # since this was last set to False
+        self._simulated_time = simulated_time
+        self._publisher = rospy.Publisher("~state", String, queue_size=10, latch=True)
+        self._told = ""
+        self._tell_state()
+
+    def _tell_state(self) -> None:
+        state = "flying" if self.playing else "paused" if self.simulation.running else "stopped"
+        if state != self._told:
+            self._told = state
+            self._publisher.publish(state)
+
+    @property
+    def playing(self) -> bool:
+        """Whether the next step is due when the clock says so."""
+        return self.simulation.running and not self.paused
+
+    def start(self, scene_file: str | None = None) -> str:
+        """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
+        self.paused = False
+        self.attempt(lambda: self.simulation.start(scene_file))
+        self.simulation.look()  # meshes and textures are read now, which the first step would be late for
+        self.begun = True
+        scene = self.simulation.parameters.scene_file
+        rospy.loginfo(f"started{f' in {scene}' if scene else ''}")
+        return "started"
+
+    def stop(self) -> str:
+        """Run the script's cleanup, and restore the initial scene. Raises ScriptError."""
+        if not self.simulation.running:
+            return "is stopped already"
+        try:
+            self.simulation.stop()
+        finally:
+            self._tell_state()
+        self._say_that_the_clock_stands("stopped")
+        return "stopped"
+
+    def restart(self) -> str:
+        """Stop and start. Raises what `start` does; errors in the script's cleanup are said and do not hinder it."""
+        if self.simulation.running:
+            try:
+                self.stop()
+            except ScriptError as error:
+                rospy.logerr(f"script error: {error}")
+        return self.start()
+
+    def pause(self, on: bool) -> str:
+        """Pause or go on. Raises ValueError when stopped."""
+        if not self.simulation.running:
+            raise ValueError("is stopped: start it first")
+        self.paused = on
+        self._tell_state()
+        if on:
+            self._say_that_the_clock_stands("paused")
+        else:
+            rospy.loginfo("goes on")
+        return f"{'paused' if on else 'goes on'} at t = {self.simulation.time:.2f} s"
+
+    def one_step(self) -> str:
+        """Run one step while paused. Raises ValueError when it is not, ScriptError."""
+        if not self.simulation.running or not self.paused:
+            raise ValueError("is not paused: one step at a time needs `pause` first")
+        self.attempt(self._step)
+        return f"t = {self.simulation.time:.2f} s"
+
+    def step(self) -> bool:
+        """Run one step; when the script fails or the dynamics diverges, say so once, stop, and return False."""
+        try:
+            self.attempt(self._step)
+        except (ScriptError, Diverged):
+            return False
+        return True
+
+    def attempt(self, action: Callable[[], None]) -> None:
+        """Start or step. When script or dynamics fails, log its one line, run cleanup, and raise it again."""
+        try:
+            action()
+        except (ScriptError, Diverged) as error:
+            rospy.logerr(f"script error: {error}" if isinstance(error, ScriptError) else str(error))
+            try:
+                self.simulation.stop()
+            except ScriptError as second:
+                rospy.logerr(f"script error: {second}")
+            self._say_that_the_clock_stands("stopped; `start` runs the edited file")
+            raise
+        finally:
+            self._tell_state()
+
+    def _say_that_the_clock_stands(self, state: str) -> None:
+        if self._simulated_time:
+            state += ": /clock stands still, and whoever waits on simulated time waits with it"
+        rospy.loginfo(state)

@@ -1,0 +1,106 @@
+"""What may be wrong before a node runs: the environment, the master, the parameters. Each gets one line."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import socket
+import sys
+import xmlrpc.client
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import urlsplit
+
+import rosgraph
+import rospy
+
+from drone_sim.ros.node.paths import from_shell
+from drone_sim.run import parameters as parameters_module
+from drone_sim.run.parameters import ParameterError, Parameters
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.load import script_path
+
+_MASTER_GONE = (ConnectionError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
+_EXPECTED = (ScriptError, ValueError, RuntimeError, OSError, rospy.ROSException)  # their messages are for the user
+_PATIENCE = 5.0  # s, for a master's answer
+
+
+def init_node(name: str, **options: Any) -> bool:
+    """Call rospy.init_node; return False, after one line on stderr, where it cannot become a node.
+
+    rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach.
+    """
+    patience = socket.getdefaulttimeout()
+    socket.setdefaulttimeout(_PATIENCE)
+    try:
+        _check_master()
+        _check_own_address()
+    except (ValueError, OSError) as error:
+        print(f"{name}: {error}", file=sys.stderr, flush=True)
+        return False
+    finally:
+        socket.setdefaulttimeout(patience)
+    return not reported(name, lambda: rospy.init_node(name, **options))
+
+
+def _check_master() -> None:
+    uri = str(rosgraph.get_master_uri())
+    try:
+        there = urlsplit(uri)
+        host, port = there.hostname, there.port
+    except ValueError:  # of the port
+        host = None
+    if not host or there.scheme != "http":
+        raise ValueError(f"ROS_MASTER_URI = '{uri}': must be like http://localhost:11311")
+    try:
+        socket.getaddrinfo(host, port)
+    except (OSError, UnicodeError):
+        raise ValueError(f"ROS_MASTER_URI = '{uri}': the host '{host}' is not known") from None
+    if not rosgraph.is_master_online():
+        raise OSError(f"no ROS master at {uri}: start roscore, or use roslaunch")
+
+
+def _check_own_address() -> None:
+    """Raise ValueError where other nodes could not find this one."""
+    given = next((name for name in ("ROS_HOSTNAME", "ROS_IP") if name in os.environ), None)
+    host = os.environ[given] if given else rosgraph.network.get_host_name()
+    try:
+        socket.getaddrinfo(host or " ", None)
+    except (OSError, UnicodeError):
+        what = f"{given or 'the name of this machine'} = '{host}'"
+        raise ValueError(f"{what}: is not known here; ROS_HOSTNAME=localhost will do on one machine") from None
+
+
+def reported(name: str, action: Callable[[], Any]) -> int:
+    """Return the exit status of an action: 0, or 1 after one line for what a user may have done wrong."""
+    try:
+        action()
+        return 0
+    except _MASTER_GONE as error:
+        said = f"the ROS master at {rosgraph.get_master_uri()} has gone, or refuses: {error}"
+    except _EXPECTED as error:
+        said = str(error)
+    rospy.logfatal(f"{name}: {' '.join(said.split())}")
+    return 1
+
+
+def read_parameters() -> Parameters:
+    """Return the node's private parameters. Raises ParameterError, and ScriptError for a script that is not there."""
+    given: dict[str, Any] = rospy.get_param("~", {})
+    if not isinstance(given, dict):
+        name = rospy.get_name()
+        raise ParameterError(f"parameter {name} = {str(given)[:80]}: must hold parameters, such as {name}/script")
+    for key in ("config", "script", "scene_file"):
+        if isinstance(given.get(key), str):
+            given[key] = from_shell(given[key])
+    parameters = parameters_module.load(given)
+    script_path(parameters.script)  # a file that is not there ends the node; an error in one that is stops the flight
+    return parameters
+
+
+def use_sim_time() -> bool:
+    """Return ROS's parameter /use_sim_time. Raises ParameterError."""
+    given = rospy.get_param("/use_sim_time", False)
+    if not isinstance(given, bool):
+        raise ParameterError(f"parameter /use_sim_time = {str(given)[:80]}: must be true or false")
+    return given

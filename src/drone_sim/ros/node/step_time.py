@@ -1,0 +1,50 @@
+"""The stamp of a step, and /clock."""
+
+from __future__ import annotations
+
+import rospy
+from rosgraph_msgs.msg import Clock
+
+from drone_sim.run.pacing import Throttle
+from drone_sim.run.simulation import Simulation
+
+_CLOCK_PERIOD = 1 / 200  # s of real time, between two of /clock while nothing else is sent
+
+
+class StepTime:
+    """What everything that belongs to a step is stamped with.
+
+    In real time that is the moment at which the step began. In simulated time it is the simulation's, and /clock
+    has said it before anything is sent under it; where nothing is sent, /clock need not tell of every step.
+    """
+
+    def __init__(self, simulation: Simulation, simulated: bool):
+        """Advertise /clock, if the time is `simulated`."""
+        self.simulated = simulated
+        self._simulation = simulation
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if simulated else None
+        self._throttle = Throttle(_CLOCK_PERIOD)
+        self._began = rospy.Time()
+        self._said = 0.0  # by /clock, s; 0 is no time for ROS
+
+    def begin(self) -> None:
+        """Say that a step begins."""
+        if not self.simulated:
+            self._began = rospy.Time.now()
+
+    def stamp(self) -> rospy.Time:
+        """Return the stamp of what is sent now."""
+        if self._clock is None:
+            return self._began
+        time = self._simulation.time
+        stamp = rospy.Time.from_sec(time)
+        if time != self._said:
+            self._said = time
+            if time:
+                self._clock.publish(stamp)
+        return stamp
+
+    def end(self, at_once: bool = False) -> None:
+        """Say that the step has been shown; `at_once`: /clock tells of it in any case."""
+        if self.simulated and (at_once or self._throttle.passes()):
+            self.stamp()

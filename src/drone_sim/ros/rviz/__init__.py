@@ -1,0 +1,1 @@
+"""What only rviz asks for."""

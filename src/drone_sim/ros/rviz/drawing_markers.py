@@ -1,0 +1,87 @@
+"""What a script draws, in rviz: `<drone>/drawing`, a latched MarkerArray."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point, Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from drone_sim.ros.vehicle.messages import WORLD
+from drone_sim.run.pacing import Throttle
+from drone_sim.scripting.api.drawings import DrawingObject, Drawings, Item
+
+_PERIOD = 0.09  # s of real time, between two looks at what was drawn
+_PIXEL = 0.005  # m; rviz measures points and lines in the world
+_KINDS = {
+    "points": Marker.POINTS,
+    "lines": Marker.LINE_LIST,
+    "linestrip": Marker.LINE_STRIP,
+    "spherepoints": Marker.SPHERE_LIST,
+    "cubepoints": Marker.CUBE_LIST,  # level, whatever their normal is
+    "triangles": Marker.TRIANGLE_LIST,
+}
+_CORNERS = {"trianglepoints": 3, "quadpoints": 4, "discpoints": 24}  # of what rviz has only as triangles
+
+
+class DrawingMarkers:
+    """Shows drawing objects, each as one marker."""
+
+    def __init__(self, drone: str, drawings: Drawings):
+        """Advertise in the drone's namespace."""
+        self._drawings = drawings
+        self._throttle = Throttle(_PERIOD)
+        self._shown = 0
+        self._publisher = rospy.Publisher(f"{drone}/drawing", MarkerArray, queue_size=1, latch=True)
+
+    def update(self) -> None:
+        """Publish what has changed, if anybody listens."""
+        if self._shown == self._drawings.changes or not self._publisher.get_num_connections():
+            return
+        if self._throttle.passes():
+            self._shown = self._drawings.changes
+            drawn = [_marker(handle, one) for handle, one in self._drawings.objects.items() if one.items]
+            self._publisher.publish(MarkerArray([Marker(action=Marker.DELETEALL), *drawn]))
+
+
+def _marker(handle: int, drawn: DrawingObject) -> Marker:
+    marker = Marker(type=_KINDS.get(drawn.kind, Marker.TRIANGLE_LIST), ns="drawing", id=handle, frame_locked=True)
+    marker.header.frame_id = WORLD
+    marker.pose.orientation.w = 1.0
+    marker.color = ColorRGBA(*drawn.rgba)
+    if marker.type == Marker.TRIANGLE_LIST:
+        scale = 1.0
+    else:
+        scale = drawn.size * (_PIXEL if drawn.kind in ("points", "lines", "linestrip") else 1.0)
+    marker.scale = Vector3(scale, scale, scale)
+    marker.points = [Point(*point) for item in drawn.items for point in _points(drawn, item)]
+    return marker
+
+
+def _points(drawn: DrawingObject, item: Item) -> list[Sequence[float]]:
+    if drawn.kind in _CORNERS:
+        return _polygon(item, drawn.size / 2, _CORNERS[drawn.kind])
+    points: list[Sequence[float]] = [item[first : first + 3] for first in range(0, len(item), 3)]
+    return points[:1] if drawn.kind == "cubepoints" else points
+
+
+def _polygon(item: Item, radius: float, corners: int) -> list[Sequence[float]]:
+    """Return the triangles of a regular polygon about a point, across a normal."""
+    middle, normal = np.array(item[:3]), _unit(np.array(item[3:]))
+    aside = radius * _unit(np.cross(normal, [1.0, 0.0, 0.0] if abs(normal[0]) < 0.9 else [0.0, 1.0, 0.0]))
+    up = np.cross(normal, aside)
+    angles = 2 * np.pi * np.arange(corners) / corners
+    rim: Any = (middle + np.outer(np.cos(angles), aside) + np.outer(np.sin(angles), up)).tolist()
+    centre: Any = middle.tolist()
+    triangles: list[Sequence[float]] = []
+    for one, other in zip(rim, [*rim[1:], rim[0]]):
+        triangles += [centre, one, other]
+    return triangles
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / max(float(np.linalg.norm(vector)), 1e-9)

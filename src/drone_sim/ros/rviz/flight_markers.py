@@ -1,0 +1,175 @@
+"""How high the drone is, what it is told to do, how it fares, in rviz: `<drone>/view/height`, `command`, `state`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.state import State, Twist
+from drone_sim.ros.node.player import Player
+from drone_sim.ros.rviz.marker_topic import EYES, WORDS, MarkerTopic, beside, shape
+from drone_sim.run.pacing import Throttle
+from drone_sim.run.simulation import Simulation
+
+_ABOVE_FLOOR = 0.004  # m, so that the shadow is not hidden by it
+_SHADOW = 0.24, 0.05  # m, its radius, and what a metre of height adds to it
+_DARK = 0.55  # opacity of the shadow's middle
+_RIM = 24  # corners
+_TICK = 0.5  # m
+_TICKS = 40
+_THIN = 0.006  # m
+_INK = (0.10, 0.12, 0.16, 1.0)
+_SECONDS = 1.0  # an arrow is as long as the way that is commanded for this time
+_BLUE = (0.0, 0.30, 0.95, 1.0)
+_AWAY = 0.3  # m, from the drone's middle: what is about the drone must not hide it
+_HALF, _WIDE, _HEAD = 0.018, 0.065, 0.12  # m: half the width of an arrow and of its head, and the head's length
+_TEXT_ABOVE, _TEXT_SIZE = 0.34, 0.042  # m
+
+
+class HeightMarkers:
+    """A soft shadow straight below, and a plumb line with a tick for every half metre."""
+
+    def __init__(self, simulation: Simulation):
+        """Advertise in the drone's namespace."""
+        self._simulation = simulation
+        self._topic = MarkerTopic(f"{simulation.drone.name}/view/height", EYES)
+        self._shown: State | None = None
+
+    def update(self) -> None:
+        """Publish where the drone has moved, if anybody listens."""
+        state = self._simulation.drone.state
+        if state != self._shown and self._topic.due():
+            self._shown = state
+            above = state.position[2] > 0
+            self._topic.show([_shadow(state), beside(state, _plumb_line(state.position[2]))] if above else [None, None])
+
+
+class CommandMarkers:
+    """An arrow for the velocity that is commanded, and one around the drone for the turn."""
+
+    def __init__(self, simulation: Simulation):
+        """Advertise in the drone's namespace."""
+        self._simulation = simulation
+        self._topic = MarkerTopic(f"{simulation.drone.name}/view/command", EYES)
+        self._shown: tuple[Twist, frames.Matrix, State] | None = None
+
+    def update(self) -> None:
+        """Publish command and place where they have changed, if anybody listens."""
+        drone = self._simulation.drone
+        seen = command, base, state = drone.command, drone.track, drone.state
+        if seen != self._shown and self._topic.due():
+            self._shown = seen
+            markers = [_arrow(command, base), _turn(command, base)]
+            self._topic.show([beside(state, marker) if marker else None for marker in markers])
+
+
+class StateText:
+    """What the simulation does, its time, and the drone's height and speed, above the drone."""
+
+    def __init__(self, simulation: Simulation, player: Player):
+        """Advertise in the drone's namespace."""
+        self._simulation = simulation
+        self._player = player
+        self._topic = MarkerTopic(f"{simulation.drone.name}/view/state", EYES)
+        self._words = Throttle(WORDS)
+        self._text = ""
+        self._shown: tuple[str, State] | None = None
+
+    def update(self) -> None:
+        """Publish text and place where they have changed, if anybody listens."""
+        state = self._simulation.drone.state
+        if not self._topic.due():
+            return
+        if self._words.passes():
+            self._text = self._say()
+        if (self._text, state) != self._shown:
+            self._shown = self._text, state
+            marker = shape(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
+            marker.text, marker.pose.position.z = self._text, _TEXT_ABOVE
+            self._topic.show([beside(state, marker)])
+
+    def _say(self) -> str:
+        simulation, state = self._simulation, self._simulation.drone.state
+        if not simulation.running:
+            return "stopped"
+        doing = "paused" if self._player.paused else "flying"
+        speed = math.hypot(*state.linear_velocity)
+        return f"{doing}  {simulation.time:.1f} s\nheight {state.position[2]:.2f} m  speed {speed:.2f} m/s"
+
+
+def _shadow(state: State) -> Marker:
+    """Return a disc on the floor, dark in the middle, wider and paler with the height."""
+    x, y, height = state.position
+    radius = _SHADOW[0] + _SHADOW[1] * height
+    angles = [2 * math.pi * number / _RIM for number in range(_RIM)]
+    rim = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
+    points: list[Sequence[float]] = []
+    for one, other in zip(rim, [*rim[1:], rim[0]]):
+        points += [(0.0, 0.0, 0.0), one, other]
+    marker = shape(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), points)
+    dark = _DARK * (_SHADOW[0] / radius) ** 0.5
+    marker.colors = [ColorRGBA(0, 0, 0, dark), ColorRGBA(0, 0, 0, 0), ColorRGBA(0, 0, 0, 0)] * _RIM
+    marker.pose.position = Point(x, y, _ABOVE_FLOOR)
+    marker.ns = "shadow"
+    return marker
+
+
+def _plumb_line(height: float) -> Marker:
+    """Return it as seen from the drone."""
+    points: list[Vector] = [(0.0, 0.0, 0.0), (0.0, 0.0, -height)]
+    for number in range(1, min(_TICKS, math.ceil(height / _TICK))):
+        half, z = (0.05 if number % 2 else 0.1), number * _TICK - height
+        points += [(-half, 0.0, z), (half, 0.0, z), (0.0, -half, z), (0.0, half, z)]
+    marker = shape(Marker.LINE_LIST, _INK, (_THIN, 0, 0), points)
+    marker.ns = "plumb line"
+    return marker
+
+
+def _arrow(command: Twist, base: frames.Matrix) -> Marker | None:
+    """Return it as seen from the drone; a command counts in `base`, Track_base."""
+    speed = math.hypot(*command.linear)
+    if not speed:
+        return None
+    ahead = np.array(frames.rotate(base, command.linear)) / speed
+    aside = np.cross((0.0, 0.0, 1.0), ahead)
+    if not aside.any():  # straight up or down
+        aside = np.array(frames.rotate(base, (0.0, 1.0, 0.0)))
+    aside /= np.linalg.norm(aside)
+    reach = _SECONDS * speed
+    neck = max(reach - _HEAD, 0.0)
+    return _flat(np.array([ahead * _AWAY, ahead * (_AWAY + neck)]), np.array([aside, aside]), ahead * (_AWAY + reach))
+
+
+def _turn(command: Twist, base: frames.Matrix) -> Marker | None:
+    """Return an arc from the front, as far as the turn that is commanded goes."""
+    turn = max(-3.0, min(3.0, _SECONDS * command.angular[2]))
+    if not turn:
+        return None
+    neck = turn - math.copysign(min(_HEAD / _AWAY, abs(turn)), turn)
+    rays = [(math.cos(a), math.sin(a), 0.0) for a in (*(neck * part / 24 for part in range(25)), turn)]
+    *asides, last = np.array([frames.rotate(base, ray) for ray in rays])
+    return _flat(_AWAY * np.array(asides), np.array(asides), _AWAY * last)
+
+
+def _flat(middle: np.ndarray, aside: np.ndarray, tip: np.ndarray) -> Marker:
+    """Return a flat arrow along points (n, 3), across unit vectors (n, 3), with its head from the last one to the tip.
+
+    rviz's own arrows are dark when they are seen from behind.
+    """
+    left, right = middle + _HALF * aside, middle - _HALF * aside
+    points: list[Sequence[float]] = []
+    for one, other, next_one, next_other in zip(*(side.tolist() for side in (left, right, left[1:], right[1:]))):
+        points += [one, other, next_other, one, next_other, next_one]
+    head: Any = np.array([middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]).tolist()
+    points += head
+    marker = shape(Marker.TRIANGLE_LIST, _BLUE, (1, 1, 1), points)
+    marker.colors = [marker.color] * len(points)  # lights it from everywhere
+    return marker

@@ -1,0 +1,67 @@
+"""Markers on one topic for rviz: made while somebody listens, and not more often than eyes need."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import rospy
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import State
+from drone_sim.ros.vehicle.messages import WORLD
+from drone_sim.ros.vehicle.outputs import BASE_LINK
+from drone_sim.run.pacing import Throttle
+
+EYES = 0.03  # s of real time, between two messages about what moves
+WORDS = 0.19  # s, between two texts: numbers that change faster cannot be read
+
+
+class MarkerTopic:
+    """A latched MarkerArray, in the frame `world` where its markers do not say another; their order is their id."""
+
+    def __init__(self, topic: str, period: float):
+        """Advertise; `period` is in s of real time."""
+        self._name = topic.rpartition("/")[2]
+        self._throttle = Throttle(period)
+        self._publisher = rospy.Publisher(topic, MarkerArray, queue_size=1, latch=True)
+
+    @property
+    def watched(self) -> bool:
+        """Whether somebody listens."""
+        return bool(self._publisher.get_num_connections())
+
+    def due(self) -> bool:
+        """Tell whether it is time for another message; it counts as sent then."""
+        return self.watched and self._throttle.passes()
+
+    def show(self, markers: Sequence[Marker | None]) -> None:
+        """Publish; None takes away what may be shown in that place."""
+        message = MarkerArray([marker or Marker(action=Marker.DELETE) for marker in markers])
+        for number, marker in enumerate(message.markers):
+            marker.header.frame_id, marker.id = marker.header.frame_id or WORLD, number
+            marker.ns = marker.ns or self._name
+        self._publisher.publish(message)
+
+
+def shape(kind: int, rgba: Sequence[float], scale: Sequence[float], points: Sequence[Sequence[float]] = ()) -> Marker:
+    """Return a marker at the world's origin, of points in m where its kind has some."""
+    marker = Marker(type=kind, color=ColorRGBA(*rgba), scale=Vector3(*scale), points=[Point(*one) for one in points])
+    marker.pose.orientation.w = 1.0
+    return marker
+
+
+def beside(state: State, marker: Marker) -> Marker:
+    """Let a marker, which is given in world axes from the drone's place, follow the drone in rviz.
+
+    It hangs on the drone's frame, turned back upright: rviz shows that where it is by now, and a marker in the
+    world where it was when it was sent.
+    """
+    back = frames.invert(frames.from_quaternion((0, 0, 0), state.orientation))
+    marker.header.frame_id, marker.frame_locked = BASE_LINK, True
+    place = marker.pose.position
+    marker.pose.position = Point(*frames.rotate(back, (place.x, place.y, place.z)))
+    marker.pose.orientation = Quaternion(*frames.to_quaternion(back))
+    return marker

@@ -1,0 +1,100 @@
+"""What has a texture, as files that rviz can read: OBJ, its materials, PNG."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Hashable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from drone_sim.render import mesh
+from drone_sim.render.mesh import Mesh
+from drone_sim.shapes.visual import Visual
+
+_SEEN_THROUGH = 0.98  # opacity below which rviz looks at a texture's own alpha
+
+
+class RvizMeshes:
+    """Writes visuals into a folder of its own, each once: rviz keeps for ever what it has read under a name."""
+
+    def __init__(self) -> None:
+        """Begin without a folder; the first file makes it."""
+        self._folder: tempfile.TemporaryDirectory | None = None
+        self._written: dict[Hashable, str] = {}
+
+    def resource(self, visual: Visual, glow: float) -> str:
+        """Return the URL of a visual's mesh, laid with its texture as the cameras lay it, tinted with its rgba.
+
+        `glow` is the share of its light (0..1) that does not depend on where it is seen from: rviz's only lamp is
+        carried by who looks. Raises ValueError for what cannot be read, OSError for what cannot be written.
+        """
+        key = (replace(visual, key=None), glow, _age(visual.file), _age(visual.texture))
+        if key not in self._written:
+            self._written[key] = self._write(visual, glow)
+        return self._written[key]
+
+    def close(self) -> None:
+        """Remove folder and files."""
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+        self._written.clear()
+
+    def _write(self, visual: Visual, glow: float) -> str:
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_rviz_")
+        stem = Path(self._folder.name) / f"{len(self._written)}"
+        lines, materials, first = [f"mtllib {stem.name}.mtl"], [], 1
+        for number, part in enumerate(mesh.load(visual)):
+            image = "" if part.texture is None else f"{stem.name}_{number}.png"
+            if part.texture is not None:
+                _write_image(stem.with_name(image), part.texture)
+            materials += _material(number, part, visual.rgba, glow, image)
+            lines += [f"usemtl {number}", *_triangles(part, first)]
+            first += len(part.vertices)
+        stem.with_suffix(".mtl").write_text("\n".join([*materials, ""]), encoding="utf-8")
+        stem.with_suffix(".obj").write_text("\n".join([*lines, ""]), encoding="utf-8")
+        return f"file://{stem}.obj"
+
+
+def _age(file: str) -> tuple[int, int]:
+    """Return what changes when a file is written anew."""
+    if not file:
+        return (0, 0)
+    state = os.stat(file)
+    return state.st_mtime_ns, state.st_size
+
+
+def _write_image(path: Path, image: np.ndarray) -> None:
+    order = cv2.COLOR_RGBA2BGRA if image.shape[2] == 4 else cv2.COLOR_RGB2BGR
+    if not cv2.imwrite(str(path), cv2.cvtColor(image, order)):
+        raise OSError(f"{path}: cannot be written")
+
+
+def _material(number: int, part: Mesh, tint: tuple[float, ...], glow: float, image: str) -> list[str]:
+    red, green, blue, alpha = np.multiply(tint, part.rgba)
+    if part.transparent:
+        alpha = min(alpha, _SEEN_THROUGH)
+    lines = [f"newmtl {number}", "Ka 0 0 0", "Ks 0 0 0", f"d {alpha:g}", "illum 1"]
+    for name, share in (("Kd", 1 - glow), ("Ke", glow)):
+        lines.append(f"{name} {red * share:g} {green * share:g} {blue * share:g}")
+    return [*lines, f"map_Kd {image}"] if image else lines
+
+
+def _rows(array: np.ndarray) -> Any:
+    return array.tolist()
+
+
+def _triangles(part: Mesh, first: int) -> list[str]:
+    """Return the lines of a part whose vertices count from `first`."""
+    uv = np.zeros((len(part.vertices), 2)) if part.uv is None else part.uv
+    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in _rows(part.vertices)]
+    lines += [f"vt {u:.7g} {v:.7g}" for u, v in _rows(uv)]
+    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in _rows(part.normals)]
+    lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in _rows(part.faces.astype(int) + first)]
+    return lines

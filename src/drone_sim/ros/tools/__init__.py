@@ -1,0 +1,1 @@
+"""Nodes of their own beside the simulation: the keyboard, the window."""

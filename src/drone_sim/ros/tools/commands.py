@@ -1,0 +1,94 @@
+"""The command that the keys change, and which one is in force. Neither a terminal nor ROS is needed."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+from drone_sim.ros.tools import keys
+
+_STEP = 0.1  # m/s, per key press
+_TURN_STEP = 0.2  # rad/s, per key press
+_PATIENCE = 0.5  # s, until what was sent should be in force
+
+
+class Command(NamedTuple):
+    """Speeds forward, left and up (m/s), and turning left (rad/s)."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    vz: float = 0.0
+    wz: float = 0.0
+
+    def after(self, key: str) -> Command | None:
+        """Return the command after a key press, or None for a key that commands nothing."""
+        if key == " ":
+            return Command()
+        if key not in _KEYS:
+            return None
+        return Command(*(old + change for old, change in zip(self, _KEYS[key]))).rounded()
+
+    def rounded(self) -> Command:
+        """Return it without the last digits, that sums of steps have wrong."""
+        return Command(*(round(value, 6) for value in self))
+
+    def __str__(self) -> str:
+        """Return it with its units."""
+        return "vx {:+.2f}  vy {:+.2f}  vz {:+.2f} m/s   wz {:+.2f} rad/s".format(*self)
+
+
+_KEYS = {
+    keys.UP: (_STEP, 0, 0, 0),
+    keys.DOWN: (-_STEP, 0, 0, 0),
+    keys.LEFT: (0, _STEP, 0, 0),
+    keys.RIGHT: (0, -_STEP, 0, 0),
+    "u": (0, 0, _STEP, 0),
+    "d": (0, 0, -_STEP, 0),
+    "e": (0, 0, 0, _TURN_STEP),
+    "r": (0, 0, 0, -_TURN_STEP),
+}
+
+
+class CommandInForce:
+    """What the simulator says is in force, and what was sent and cannot be in force yet. Any thread may call it."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        """Begin knowing nothing; take a monotonic clock."""
+        self._clock = clock
+        self._lock = threading.Lock()
+        self.forget()
+
+    def forget(self) -> None:
+        """Know nothing: the simulator has gone, or another one has come."""
+        with self._lock:
+            self.heard: Command | None = None
+            self.sent = Command()
+            self._awaited = False
+            self._others = 0
+            self._since = self._clock()
+
+    @property
+    def next(self) -> Command:
+        """The command that a key press changes: that in force, or what was sent a moment ago."""
+        with self._lock:
+            return self.sent if self._awaited or self.heard is None else self.heard
+
+    def send(self, command: Command) -> None:
+        """Say that a command is being sent."""
+        with self._lock:
+            self.sent, self._awaited = command, True
+            self._others, self._since = 0, self._clock()
+
+    def hear(self, command: Command) -> None:
+        """Take the command in force.
+
+        Another one than was sent may be on its way from before; one that stays has come from elsewhere.
+        """
+        with self._lock:
+            self.heard = command.rounded()
+            self._others += 1
+            late = self._others > 1 and self._clock() - self._since > _PATIENCE
+            if self.heard == self.sent or late:
+                self._awaited = False

@@ -1,0 +1,154 @@
+"""Fly from the keyboard: the keys of the tutorial's teleop node, and height, the simulation's toolbar, a read-out.
+
+A command holds until the next key, as on the topic. Leaving in any way sends a stop.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import curses
+import os
+import select
+import signal
+import sys
+import termios
+import time
+from typing import Any
+
+import rospy
+
+from drone_sim.ros.node.starting import init_node, reported
+from drone_sim.ros.tools import keys
+from drone_sim.ros.tools.keys import KeyDecoder
+from drone_sim.ros.tools.teleop import Teleop
+
+_NAME = "key_teleop"
+_PERIOD = 0.1  # s between read-outs
+_CONNECTING = 1.0  # s at most, before the first key counts
+_LEAVE = (keys.ESCAPE, "q")
+# Ctrl-C, Ctrl-\ and Ctrl-Z among them: a command would hold while nobody is at the keys.
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+_INPUT_FLAGS = 0  # where they stand in what termios tells
+
+HELP = (
+    "UP / DOWN     forward / backward      s          start / stop the simulation",
+    "LEFT / RIGHT  left / right            p          pause / go on",
+    "e / r         turn left / right       backspace  restart",
+    "u / d         up / down",
+    "space         stop the drone          q, ESC     stop the drone and leave",
+)
+
+
+class Screen:
+    """Reads keys and shows the read-out, until somebody wants to leave or the terminal is gone."""
+
+    def __init__(self, teleop: Teleop):
+        """Take what does the work."""
+        self._teleop = teleop
+        self._decoder = KeyDecoder()
+        self._terminal = sys.stdin.fileno()
+        self._unknown = False  # whether the last key was
+
+    def run(self, screen: Any) -> None:
+        """Run in a curses screen."""
+        self._screen = screen
+        with contextlib.suppress(OSError, termios.error):  # the terminal is gone
+            _ignore_control_s(self._terminal)
+            self._connect()
+            self._fly()
+
+    def _fly(self) -> None:
+        while not rospy.is_shutdown():
+            self._draw()
+            for key in self._read():
+                if key in _LEAVE:
+                    return
+                self._unknown = not self._teleop.press(key)
+
+    def _connect(self) -> None:
+        """Give the topics a moment to connect, and forget what was typed meanwhile, sequences cut in two among it."""
+        deadline = time.monotonic() + _CONNECTING
+        while not self._teleop.connected and time.monotonic() < deadline and not rospy.is_shutdown():
+            self._teleop.said = "connecting ..."
+            self._draw()
+            time.sleep(_PERIOD / 2)
+        self._teleop.said = ""
+        termios.tcflush(self._terminal, termios.TCIFLUSH)
+
+    def _read(self) -> list[str]:
+        """Wait a little for keys, and return them. Raises OSError when there will be none any more."""
+        if not select.select([self._terminal], [], [], _PERIOD)[0]:
+            return self._decoder.feed(b"")
+        data = os.read(self._terminal, 1024)
+        if not data:
+            raise OSError("the terminal is gone")
+        return self._decoder.feed(data)
+
+    def _draw(self) -> None:
+        size = os.get_terminal_size(self._terminal)
+        if curses.is_term_resized(size.lines, size.columns):
+            curses.resizeterm(size.lines, size.columns)
+        height, width = self._screen.getmaxyx()
+        lines = self._teleop.lines()
+        room = height > len(HELP) + len(lines)
+        if self._unknown:
+            lines[-1] = "no such key; the keys are above" if room else "no such key; a larger window shows the keys"
+        if not room:
+            lines = [line for line in (lines[-1], *lines[:-1]) if line]  # what there is to say comes first
+        self._screen.erase()
+        if room:
+            self._write(0, list(HELP), width, curses.A_BOLD if self._unknown else curses.A_NORMAL)
+        self._write(len(HELP) + 1 if room else 0, lines[:height], width, curses.A_NORMAL)
+        self._screen.refresh()
+
+    def _write(self, first: int, lines: list[str], width: int, look: int) -> None:
+        for row, line in enumerate(lines, start=first):
+            with contextlib.suppress(curses.error):  # how much fits into a tiny screen is curses' to know
+                self._screen.addnstr(row, 0, line, width - 1, look)  # which cannot fill the last corner
+
+
+def _ignore_control_s(terminal: int) -> None:
+    """Let Ctrl-S not hold up the output, and with it the keys, while the drone flies on."""
+    settings = termios.tcgetattr(terminal)
+    settings[_INPUT_FLAGS] &= ~termios.IXON
+    termios.tcsetattr(terminal, termios.TCSANOW, settings)
+
+
+def _fly(teleop: Teleop) -> None:
+    """Show the screen until it is left in any way, and stop the drone."""
+    try:
+        for number in _SIGNALS:
+            signal.signal(number, signal.default_int_handler)
+        curses.wrapper(Screen(teleop).run)
+    except (KeyboardInterrupt, curses.error):  # the latter where there is no terminal any more to leave
+        pass
+    finally:
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+        teleop.stop()
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_DFL)  # where the master does not answer, another one ends it
+
+
+def main() -> int:
+    """Run the node until ESC, q, a signal, or the terminal closes; return its exit status."""
+    if not sys.stdin.isatty() or not sys.stdout.isatty():
+        print(f"{_NAME}: needs a terminal to read keys from", file=sys.stderr)
+        return 1
+    try:
+        curses.setupterm()
+    except curses.error as error:
+        print(f"{_NAME}: TERM = '{os.environ.get('TERM', '')}': {error}", file=sys.stderr)
+        return 1
+    # rospy's own handlers would close the topics before the last stop is sent, and its time may stand still.
+    if not init_node(_NAME, anonymous=True, disable_signals=True, disable_rostime=True):
+        return 1
+    teleop = Teleop()
+    status = reported(_NAME, lambda: _fly(teleop))
+    rest_of_line = (curses.tigetstr("el") or b"").decode()  # what was typed before it began stands there
+    try:
+        print(f"\r{rest_of_line}{_NAME}: {teleop.farewell}", flush=True)
+    except OSError:  # the terminal is gone
+        status = 1
+    rospy.signal_shutdown("left")
+    return status

@@ -1,0 +1,55 @@
+"""What a camera publishes, as image_transport's subscribers expect it; nothing is made that nobody listens to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import rospy
+from cv_bridge import CvBridge
+from sensor_msgs.msg import CameraInfo, Image
+
+from drone_sim.ros.vehicle import messages
+from drone_sim.ros.vehicle.compression import CompressedPublisher
+from drone_sim.run.parameters import CameraParameters
+from drone_sim.sensors.camera import Camera
+
+_ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
+
+
+class CameraOutput:
+    """One camera: `<topic>`, `<topic>/compressed` (colour), and camera_info in the same namespace."""
+
+    def __init__(self, namespace: str, camera: Camera, parameters: CameraParameters):
+        """Advertise in the drone's namespace; the camera takes pictures only while somebody listens."""
+        topic = f"{namespace}/{parameters.topic}"
+        info_topic = topic.rpartition("/")[0] + "/camera_info"  # image_transport's rule
+        self._camera = camera
+        self._parameters = parameters
+        self._bridge = CvBridge()
+        self._image = rospy.Publisher(topic, Image, queue_size=1)
+        self._compressed = CompressedPublisher(topic) if parameters.kind == "color" else None
+        self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
+        self._info = messages.camera_info(camera.intrinsics, parameters.frame)
+        camera.watched = self._watched
+
+    def _watched(self) -> bool:
+        compressed = self._compressed
+        return self._image.get_num_connections() > 0 or bool(compressed and compressed.get_num_connections())
+
+    def publish(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish what the camera sees, and the model that belongs to it, under what `stamp` returns."""
+        if self._info_publisher.get_num_connections():
+            self._info.header.stamp = stamp()
+            self._info_publisher.publish(self._info)
+        if self._camera.image is not None:
+            self._publish_image(stamp(), self._camera.image)
+
+    def _publish_image(self, stamp: rospy.Time, image: np.ndarray) -> None:
+        frame = self._parameters.frame
+        if self._image.get_num_connections():
+            message = self._bridge.cv2_to_imgmsg(image, _ENCODINGS[self._camera.kind])
+            message.header.stamp, message.header.frame_id = stamp, frame
+            self._image.publish(message)
+        if self._compressed is not None:
+            self._compressed.publish(stamp, frame, image)

@@ -1,0 +1,1 @@
+"""What runs: the simulation, its player, its pace, its parameters."""

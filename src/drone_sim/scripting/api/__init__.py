@@ -1,0 +1,1 @@
+"""The script API: what a child script reaches as `sim` and `simROS`."""

@@ -1,0 +1,62 @@
+"""What the script API needs from the drone that the script flies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.signals import Signals
+
+Parameters = dict[str, Any]
+
+
+def _call(function: Callable[[], Any]) -> Any:
+    return function()
+
+
+class Host(Protocol):
+    """The drone, as the API sees it."""
+
+    @property
+    def objects(self) -> ObjectTree:
+        """The objects of the scene."""
+
+    @property
+    def script_parameters(self) -> Mapping[str, Parameters]:
+        """Simulation parameters of the script that is attached to each object, by the object's name."""
+
+    @property
+    def signals(self) -> Signals:
+        """The signals that scripts leave."""
+
+    @property
+    def own_script(self) -> str:
+        """Name of the object that this script is attached to."""
+
+    @property
+    def drawings(self) -> Drawings | None:
+        """Where to draw, if anywhere."""
+
+    drawings_made: int  # the last handle that was given away
+
+    def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
+        """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m)."""
+
+    def turn_joint(self, joint: str, angle: float | None) -> float:
+        """Turn a joint to an angle (rad), unless None; return the angle. Raises ValueError for what is none."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What the API needs besides the drone: the simulation's clock, and the vision sensors by object name."""
+
+    clock: Callable[[], float]
+    time_step: float
+    pictures: Mapping[str, Callable[[], np.ndarray]] = field(default_factory=dict)
+    outside: Callable[[Callable[[], Any]], Any] = _call  # calls a function where OpenGL is, on nobody's time limit

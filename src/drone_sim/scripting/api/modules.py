@@ -1,0 +1,35 @@
+"""The script API, under CoppeliaSim's names: what a child script reaches as `sim`.
+
+Positions are [x, y, z] in metres, orientations V-REP's Euler angles [alpha, beta, gamma] in radians
+(R = Rx Ry Rz), matrices 12 numbers, velocities world-frame. `relativeTo` is a handle, -1 the world.
+A wrong name, number or kind of values raises ValueError or TypeError; where the script does not catch it, the
+log names the function, what it got, and what it takes.
+"""
+
+from __future__ import annotations
+
+from drone_sim.scripting.api.calls import Api, public_functions
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.drawing import Drawing
+from drone_sim.scripting.api.host import Host, Surroundings
+from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.objects import Objects
+from drone_sim.scripting.api.scripts import Scripts
+from drone_sim.scripting.api.vision import VisionSensors
+
+
+def make_sim(host: Host, surroundings: Surroundings) -> Api:
+    """Return `sim` for the script that flies a drone."""
+    parts = (
+        Objects(host),
+        Scripts(host, surroundings),
+        host.signals,
+        VisionSensors(host, surroundings),
+    )
+    functions = {**public_functions(parts), **Drawing(host).functions()}
+    return Api("sim", functions, CONSTANTS)
+
+
+def make_sim_ros(bus: MessageBus) -> Api:
+    """Return `simROS` for the script that flies a drone."""
+    return Api("simROS", bus.functions(), {})

@@ -1,0 +1,209 @@
+"""`sim`: the objects of the scene, where they are, how they move, the forces on them; matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.object_tree import WORLD
+from drone_sim.scripting.api import object_paths
+from drone_sim.scripting.api.calls import WrongValue, numbers
+from drone_sim.scripting.api.host import Host
+
+# The names by which messages say what is expected.
+Handle = int
+Name = str
+ThreeNumbers = Sequence[float]
+FourNumbers = Sequence[float]
+SevenNumbers = Sequence[float]
+TwelveNumbers = Sequence[float]
+Number = float
+
+
+class Objects:
+    """The functions on objects."""
+
+    def __init__(self, host: Host):
+        """Take the drone whose objects they are."""
+        self._host = host
+        self._objects = host.objects
+
+    # ---- names
+
+    def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
+        """Return the handle of an object by path or name; -1 for none with the option noError."""
+        try:
+            return object_paths.find(self._objects, path, self._host.own_script)
+        except ValueError:
+            if options and options.get("noError"):
+                return -1
+            raise
+
+    def getObjectHandle(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
+        """Return the handle of an object by name (3.x) or path."""
+        return self.getObject(path, options)
+
+    def getObjectName(self, handle: Handle) -> str:
+        """Return the 3.x name of an object."""
+        return self._objects[handle].name
+
+    def getObjectAlias(self, handle: Handle, options: int = -1) -> str:
+        """Return the 4.x alias of an object; its path from the root where options is 1 or more."""
+        return self._objects.path(handle) if options > 0 else self._objects[handle].alias
+
+    def getNameSuffix(self, name: Name | None = None) -> int:
+        """Return the number of the model's copy in a name such as 'Quadricopter#0'; -1 for the first."""
+        digits = (name or "").rpartition("#")[2]
+        return int(digits) if "#" in (name or "") and digits.isdigit() else -1
+
+    def getObjectParent(self, handle: Handle) -> int:
+        """Return the handle of an object's parent, -1 for none."""
+        return self._objects.handle_of(self._objects[handle].parent)
+
+    def setObjectParent(self, handle: Handle, parent: Handle = WORLD, keepInPlace: bool = True) -> None:
+        """Hang an object on another one, or on nothing (-1)."""
+        self._objects.set_parent(handle, parent, bool(keepInPlace))
+
+    def getObjectSizeFactor(self, handle: Handle) -> float:
+        """Return how much an object was scaled: 1, nothing here is."""
+        self._objects[handle]
+        return 1.0
+
+    # ---- where they are
+
+    def getObjectPosition(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
+        """Return the position of an object."""
+        m = self._objects.matrix(handle, relativeTo)
+        return [m[3], m[7], m[11]]
+
+    def setObjectPosition(self, handle: Handle, relativeTo: Handle, position: ThreeNumbers = ()) -> None:
+        """Move an object: (handle, relativeTo, position), or (handle, position, relativeTo) as in 4.x."""
+        frame, place = _frame_and_values(relativeTo, position, 3)
+        m0, m1, m2, _, m4, m5, m6, _, m8, m9, m10, _ = self._objects.matrix(handle, frame)
+        x, y, z = place
+        self._objects.set_matrix(handle, frame, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
+
+    def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
+        """Return the Euler angles of an object."""
+        return list(frames.to_euler(self._objects.matrix(handle, relativeTo)))
+
+    def setObjectOrientation(self, handle: Handle, relativeTo: Handle, angles: ThreeNumbers = ()) -> None:
+        """Turn an object: (handle, relativeTo, angles), or (handle, angles, relativeTo) as in 4.x."""
+        frame, turn = _frame_and_values(relativeTo, angles, 3)
+        m = self._objects.matrix(handle, frame)
+        self._objects.set_matrix(handle, frame, frames.from_euler((m[3], m[7], m[11]), turn))
+
+    def getObjectQuaternion(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
+        """Return the quaternion (x, y, z, w) of an object."""
+        return list(frames.to_quaternion(self._objects.matrix(handle, relativeTo)))
+
+    def setObjectQuaternion(self, handle: Handle, relativeTo: Handle, quaternion: FourNumbers = ()) -> None:
+        """Turn an object to a quaternion (x, y, z, w); the arguments in either order."""
+        frame, turn = _frame_and_values(relativeTo, quaternion, 4)
+        m = self._objects.matrix(handle, frame)
+        self._objects.set_matrix(handle, frame, frames.from_quaternion((m[3], m[7], m[11]), _unit(turn)))
+
+    def getObjectPose(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
+        """Return position and quaternion of an object, 7 numbers."""
+        m = self._objects.matrix(handle, relativeTo)
+        return [*frames.position(m), *frames.to_quaternion(m)]
+
+    def setObjectPose(self, handle: Handle, relativeTo: Handle, pose: SevenNumbers = ()) -> None:
+        """Move and turn an object to a position and a quaternion; the arguments in either order."""
+        frame, place = _frame_and_values(relativeTo, pose, 7)
+        self._objects.set_matrix(handle, frame, frames.from_quaternion(place[:3], _unit(place[3:])))
+
+    def getObjectMatrix(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
+        """Return the 12 numbers of an object's transform."""
+        return list(self._objects.matrix(handle, relativeTo))
+
+    def setObjectMatrix(self, handle: Handle, relativeTo: Handle, matrix: TwelveNumbers = ()) -> None:
+        """Move and turn an object to a transform; the arguments in either order."""
+        frame, place = _frame_and_values(relativeTo, matrix, 12)
+        self._objects.set_matrix(handle, frame, place)
+
+    # ---- how they move
+
+    def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
+        """Return the linear and the angular velocity of an object, in the world frame."""
+        linear, angular = self._objects[handle].velocity()
+        return list(linear), list(angular)
+
+    def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
+        """Return the linear and the angular velocity of an object, in the world frame."""
+        return self.getObjectVelocity(handle)
+
+    def addForceAndTorque(
+        self, handle: Handle, force: ThreeNumbers = (0, 0, 0), torque: ThreeNumbers = (0, 0, 0)
+    ) -> None:
+        """Let a force (N) at a body's centre of mass and a torque (N m) act in the next step.
+
+        Both are in the world frame, and keep their direction through the sub-steps of the step, whatever the body does.
+        """
+        shape = self._objects[handle].name
+        self._host.add_force(shape, _vector(force), _vector(torque), (0.0, 0.0, 0.0))
+
+    def addForce(self, handle: Handle, position: ThreeNumbers, force: ThreeNumbers) -> None:
+        """Let a force (N) act in the next step at a position (m); both in the frame of the body."""
+        shape = self._objects[handle]
+        x, y, z = frames.rotate(shape.matrix(), _vector(force))
+        self._host.add_force(shape.name, (x, y, z), (0.0, 0.0, 0.0), _vector(position))
+
+    def setJointPosition(self, handle: Handle, position: Number) -> None:
+        """Turn the blades of a propeller to an angle (rad): looks only."""
+        self._host.turn_joint(self._objects[handle].name, float(position))
+
+    def getJointPosition(self, handle: Handle) -> float:
+        """Return the angle of a propeller's blades (rad)."""
+        return self._host.turn_joint(self._objects[handle].name, None)
+
+    # ---- matrices
+
+    def multiplyVector(self, matrix: TwelveNumbers, vector: ThreeNumbers) -> list[float]:
+        """Return matrix · vector."""
+        m, v = numbers(matrix, 12), numbers(vector, 3)
+        return list(frames.transform(m, v))
+
+    def multiplyMatrices(self, first: TwelveNumbers, second: TwelveNumbers) -> list[float]:
+        """Return first · second."""
+        return list(frames.multiply(numbers(first, 12), numbers(second, 12)))
+
+    def buildMatrix(self, position: ThreeNumbers, angles: ThreeNumbers) -> list[float]:
+        """Return the transform of a position and Euler angles."""
+        return list(frames.from_euler(numbers(position, 3), numbers(angles, 3)))
+
+    def getEulerAnglesFromMatrix(self, matrix: TwelveNumbers) -> list[float]:
+        """Return the Euler angles of a transform."""
+        return list(frames.to_euler(numbers(matrix, 12)))
+
+    def getMatrixInverse(self, matrix: TwelveNumbers) -> list[float]:
+        """Return the inverse of a transform."""
+        return list(frames.invert(numbers(matrix, 12)))
+
+    def getInvertedMatrix(self, matrix: TwelveNumbers) -> list[float]:
+        """Return the inverse of a transform (3.x)."""
+        return list(frames.invert(numbers(matrix, 12)))
+
+
+def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[float, ...]]:
+    """Tell a handle and values apart, which come in either order, or the values alone."""
+    if isinstance(first, (int, float)):
+        return int(first), numbers(second, count)
+    if isinstance(second, (int, float)):
+        return int(second), numbers(first, count)
+    if second != ():
+        raise WrongValue(f"a handle and {count} numbers are expected")
+    return WORLD, numbers(first, count)
+
+
+def _vector(values: Sequence[float]) -> frames.Vector:
+    x, y, z = numbers(values, 3)
+    return x, y, z
+
+
+def _unit(quaternion: Sequence[float]) -> tuple[float, ...]:
+    length = sum(value * value for value in quaternion) ** 0.5
+    if length == 0:
+        raise WrongValue("a quaternion that is not zero is expected")
+    return tuple(value / length for value in quaternion)

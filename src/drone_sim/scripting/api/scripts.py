@@ -1,0 +1,181 @@
+"""`sim`: time, the simulation parameters of scripts, and the log."""
+
+from __future__ import annotations
+
+import difflib
+import logging
+from collections.abc import Iterable
+from math import isfinite
+from typing import Any
+
+from drone_sim.scripting.api import object_paths
+from drone_sim.scripting.api.calls import WrongValue
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.host import Host, Parameters, Surroundings
+from drone_sim.scripting.api.script_values import refuse_if_too_large
+from drone_sim.scripting.script_log import LOG, say
+from drone_sim.wording import near_names
+
+__all__ = ["LOG", "Scripts"]
+
+_LOG = logging.getLogger(__name__)  # not the script's own words
+Handle = int
+Name = str
+
+_VERSION = 40600  # the CoppeliaSim whose API this is nearest to
+_MOST = 1000  # parameters of one script
+_NEAR = 0.8  # of difflib's ratio
+_LONGEST = 80  # characters of a name that is looked at
+_SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
+
+
+class Scripts:
+    """The functions on scripts and time."""
+
+    def __init__(self, host: Host, surroundings: Surroundings):
+        """Take the drone whose scripts they are, and the clock."""
+        self._host = host
+        self._names = list(host.script_parameters)
+        self._parameters: dict[int, Parameters] = dict(enumerate(host.script_parameters.values()))
+        self._own = self._names.index(host.own_script)
+        self._read = [set(parameters) for parameters in self._parameters.values()]  # names that something reads
+        self._clock = surroundings.clock
+        self._time_step = surroundings.time_step
+
+    # ---- time
+
+    def getSimulationTime(self) -> float:
+        """Return the simulated time in seconds."""
+        return self._clock()
+
+    def getSimulationTimeStep(self) -> float:
+        """Return the simulation step in seconds."""
+        return self._time_step
+
+    def getInt32Parameter(self, parameter: int) -> int:
+        """Return sim.intparam_program_version; there is no other."""
+        if parameter != CONSTANTS["intparam_program_version"]:
+            raise ValueError(f"no integer parameter {parameter}; known is sim.intparam_program_version")
+        return _VERSION
+
+    def getInt32Param(self, parameter: int) -> int:
+        """Return sim.intparam_program_version; there is no other."""
+        return self.getInt32Parameter(parameter)
+
+    # ---- scripts
+
+    def getScriptHandle(self, name: Name | None = None) -> int:
+        """Return the handle of the script that is attached to an object; of this one without a name."""
+        if name is None:
+            return self._own
+        if name in self._names:
+            return self._names.index(name)
+        objects = self._host.objects
+        try:
+            attached = objects[object_paths.find(objects, name, self._host.own_script)].name
+        except ValueError:
+            attached = ""
+        if attached not in self._names:
+            raise ValueError(f"no script is attached to '{name}'; {near_names(name, self._names)}")
+        return self._names.index(attached)
+
+    def getObjectAssociatedWithScript(self, script: Handle) -> int:
+        """Return the handle of the object that a script is attached to."""
+        return self._host.objects.handle(self._names[self._index(script)])
+
+    def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
+        """Return a simulation parameter of a script."""
+        parameters = self._parameters[self._index(script)]
+        if name not in parameters:
+            raise ValueError(f"no script parameter '{name}'; {near_names(name, parameters)}")
+        value = parameters[name]
+        return list(value) if isinstance(value, tuple) else value
+
+    def setScriptSimulationParameter(self, script: Handle, name: Name, value: Any) -> None:
+        """Set a simulation parameter of a script: `particleVelocity` (m/s) drives a propeller.
+
+        With sim.handle_tree it is set in this script and those below. A name that a propeller does not have is
+        refused where it comes near to one that it has; of any other the log says once that nothing reads it.
+        """
+        known = self._parameters.get(script)
+        if known and name in known and type(value) is float and isfinite(value):  # four times a step, so at once
+            known[name] = value
+            return
+        scripts = [*self._parameters] if script == _TREE else [self._index(script)]
+        if script == _TREE or name not in self._parameters[scripts[0]]:
+            self._check_name(scripts, name)
+        for one in scripts:
+            _set(self._parameters[one], name, value)
+
+    def _check_name(self, scripts: Iterable[int], name: Any) -> None:
+        """Raise ValueError for a misspelt parameter of a propeller; say of one that nothing reads that it is so."""
+        of_propellers = set().union(*(names for number, names in enumerate(self._read) if number != self._own))
+        if list(scripts) == [self._own]:
+            if name in of_propellers:
+                _LOG.warning(
+                    "'%s' is a parameter of the propellers; in the script of %s nothing reads it",
+                    name,
+                    self._names[self._own],
+                )
+            return
+        if name in of_propellers or name in self._read[self._own]:
+            return
+        plain = {known.lower(): known for known in sorted(of_propellers)}
+        near = difflib.get_close_matches(str(name)[:_LONGEST].replace("_", "").lower(), plain, cutoff=_NEAR)
+        if near:
+            known = ", ".join(plain[one] for one in near)
+            raise ValueError(f"a propeller has no script parameter '{name}'; near names are {known}")
+        _LOG.warning("nothing reads '%.80s' of a propeller; particleVelocity drives it", name)
+
+    def _index(self, script: int) -> int:
+        if script == _SELF:
+            return self._own
+        if not isinstance(script, (int, float)):
+            raise WrongValue("the handle of a script is expected")
+        if not 0 <= script < len(self._parameters):
+            raise ValueError(f"no script has the handle {script}")
+        return int(script)
+
+    # ---- log
+
+    def addStatusbarMessage(self, message: Any) -> None:
+        """Write a line to the log."""
+        say(message)
+
+    def addLog(self, _verbosity: int, message: Any) -> None:
+        """Write a line to the log."""
+        say(message)
+
+
+def _set(parameters: Parameters, name: Any, value: Any) -> None:
+    """Keep a value; raises WrongValue, ValueError."""
+    value = _stored(value, parameters.get(name))
+    refuse_if_too_large([name, value])
+    if name not in parameters and len(parameters) >= _MOST:
+        raise ValueError(f"a script has at most {_MOST} parameters")
+    parameters[name] = value
+
+
+def _stored(value: Any, before: Any) -> Any:
+    """Return a value as V-REP keeps it, where '5.33' is a number and 'true' is true.
+
+    Raises WrongValue where something else comes in the place of a number.
+    """
+    if isinstance(value, str):
+        value = _from_text(value)
+    if type(value) is float or type(value) is int:
+        if not isfinite(value):
+            raise WrongValue("a finite number is expected")
+    elif type(before) is float or type(before) is int:
+        raise WrongValue("a number is expected")
+    return value
+
+
+def _from_text(text: str) -> Any:
+    words: dict[str, tuple[Any]] = {"true": (True,), "false": (False,)}
+    if text in words:
+        return words[text][0]
+    try:
+        return float(text)
+    except ValueError:
+        return text

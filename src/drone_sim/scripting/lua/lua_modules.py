@@ -1,0 +1,74 @@
+"""Helper files beside a Lua child script, which it requires by name."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from drone_sim.files.resources import read_bytes
+from drone_sim.scripting.lua.lua_source import LuaSource
+from drone_sim.wording import near_names
+
+LARGEST = 1024 * 1024  # bytes of a script or helper
+_CHUNK_LENGTH = 50  # Lua cuts longer chunk names
+_NAME = re.compile(r"[\w-]+(?:[./][\w-]+)*")
+_LONGEST, _MOST = 200, 1000  # characters of a name; helpers
+
+
+class LuaModules:
+    """Reads the files that a script requires: regular ones of limited size in its own folder, or below that."""
+
+    def __init__(self, script: str):
+        """Take the script's path."""
+        self.chunk = self._chunk(Path(script).name)
+        self._paths = {self.chunk: script}
+        self._folder = Path(script).parent
+
+    def path(self, chunk: str) -> str:
+        """Return the file behind a chunk's name, the script's for any other name."""
+        return self._paths.get(chunk, self._paths[self.chunk])
+
+    def placed(self, text: str) -> tuple[str, int, str]:
+        """Return file, line (0: not known) and the rest of a message of Lua's."""
+        for chunk, path in self._paths.items():
+            match = re.match(rf"{re.escape(chunk)}:(\d+): (.*)$", text, re.DOTALL)
+            if match:
+                return path, int(match.group(1)), match.group(2)
+        return self._paths[self.chunk], 0, text
+
+    def read(self, name: bytes) -> tuple[bool, bytes, bytes]:
+        """Return true, text and chunk name of a module; or false and a message."""
+        try:
+            text, chunk = self._read(name.decode("utf-8"))
+        except (OSError, ValueError) as error:
+            said = getattr(error, "strerror", None) or error
+            return False, f"no module '{name.decode('utf-8', 'replace')[:80]}': {said}".encode("utf-8", "replace"), b""
+        return True, text, chunk.encode("utf-8", "replace")
+
+    def _read(self, name: str) -> tuple[bytes, str]:
+        if len(name) > _LONGEST or not _NAME.fullmatch(name):
+            raise ValueError("a module's name is made of letters, digits, _ and -; dots stand for folders")
+        inner = name.replace(".", "/")
+        for file in (f"{inner}.lua", f"{inner}/init.lua"):
+            path = self._folder / file
+            if path.exists():
+                return self._text(path), self._known(file, path)
+        beside = [path.stem for path in self._folder.glob("*.lua") if str(path) not in self._paths.values()]
+        near = near_names(name, beside)
+        raise ValueError(f"no file {inner}.lua beside the script{f'; {near}' if beside else ''}")
+
+    def _text(self, path: Path) -> bytes:
+        if not path.resolve().is_relative_to(self._folder.resolve()):
+            raise ValueError("leads out of the script's folder")
+        return LuaSource(read_bytes(path, LARGEST)).text
+
+    def _known(self, file: str, path: Path) -> str:
+        if len(self._paths) > _MOST:
+            raise ValueError(f"a script has at most {_MOST} modules")
+        chunk = self._chunk(file)
+        self._paths[chunk] = str(path)
+        return chunk
+
+    @staticmethod
+    def _chunk(file: str) -> str:
+        return file.encode("utf-8", "replace")[-_CHUNK_LENGTH:].decode("utf-8", "ignore")

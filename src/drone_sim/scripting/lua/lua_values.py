@@ -1,0 +1,221 @@
+"""Values on their way between Python and Lua: tables are 1-based in Lua, lists in Python.
+
+Strings of Lua arrive as str, or as bytes where they are no UTF-8 (images). A tuple of several results
+becomes several values; a message object becomes a table of its fields.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Real
+from typing import Any
+
+from drone_sim.scripting.api.script_values import DEEPEST, MOST_BYTES, MOST_VALUES, refuse_if_too_large
+
+_NUMBERS = frozenset((float, int, bool))
+_ALL_NUMBERS = _NUMBERS.issuperset
+_LARGEST = 2**63  # whole numbers beyond are floats in Lua
+
+# How the values of an answer to Lua are read there (lua_crossing.py).
+FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM, TOO_MUCH = range(6)
+
+
+# What functions of the API return, most often, and the answer that it is.
+_ANSWERS: dict[Any, Callable[[Any], tuple[Any, ...]]] = {
+    "None": lambda _: (PLAIN,),
+    "float": lambda value: (PLAIN, value),
+    "list[float]": lambda values: (LIST, *values),
+    "list[int]": lambda values: (LIST, *values),
+    "tuple[list[float], list[float]]": lambda values: (TWO_LISTS, *values[0], *values[1]),
+}
+
+
+class _Mark:
+    """A mark in a stream of values: where a table begins or ends."""
+
+
+_OPEN_LIST, _OPEN_FIELDS, _CLOSE = _Mark(), _Mark(), _Mark()
+
+
+class Values:
+    """Converts for one Lua state. `close` lets go of it: Python cannot see a cycle that leads through Lua."""
+
+    def __init__(self, runtime: Any, memory: int):
+        """Take lupa's runtime, and how much memory (bytes) the script may use."""
+        self._runtime = runtime
+        self._memory = memory
+        self.used: Callable[[], int] = runtime.get_memory_used  # Lua's own count leaves out 5.5's long strings
+        self._stream: list[Any] = []
+
+    def close(self) -> None:
+        """Let go of the Lua state."""
+        self._runtime = None
+        self.used = int
+
+    def too_much(self) -> bool:
+        """Tell whether the script uses more memory than it may, without what it does not need any more."""
+        if self.used() <= self._memory:
+            return False
+        self._runtime.gccollect()
+        return self.used() > self._memory
+
+    def bridge(self) -> dict[str, Any]:
+        """Return what the Lua side needs for handing values over."""
+        return {
+            "fresh": self._fresh,
+            "put": self._put,
+            "open_list": _OPEN_LIST,
+            "open_fields": _OPEN_FIELDS,
+            "close": _CLOSE,
+            "deepest": DEEPEST,
+            "most_values": MOST_VALUES,
+            "most_bytes": MOST_BYTES,
+        }
+
+    # ---- to Python
+
+    def _fresh(self) -> None:
+        self._stream = []
+
+    def _put(self, *values: Any) -> None:
+        self._stream.extend(values)
+
+    def _from_stream(self, _given: tuple[Any, ...]) -> list[Any]:
+        found, self._stream = _from_stream(self._stream), []
+        while found and found[-1] is None:  # nil at the end is as good as left out
+            found.pop()
+        return found
+
+    def readers(self) -> Sequence[Callable[[tuple[Any, ...]], Sequence[Any] | None]]:
+        """Return what makes a function's arguments of what a call handed over, by the form of the call.
+
+        They return None where lists hold other things than numbers: the call is to be made anew, with a stream.
+        """
+        return (tuple, _first, _second, _third, _first_and_second, _second_and_third, self._from_stream, _scalars)
+
+    # ---- to Lua
+
+    def answer_of(self, function: Callable[..., Any]) -> Callable[[Any], tuple[Any, ...]]:
+        """Return what turns a function's results into an answer to Lua, by what it is annotated to return.
+
+        The answer raises ValueError for too much.
+        """
+        return _ANSWERS.get(function.__annotations__.get("return", ""), self._results)
+
+    def _results(self, value: Any) -> tuple[Any, ...]:
+        if type(value) is not tuple:
+            return (PLAIN,) if value is None else (PLAIN, self.to_lua(value))
+        return (PLAIN, *self.to_lua(list(value), unpacked=True))
+
+    def to_lua(self, value: Any, unpacked: bool = False) -> Any:
+        """Return a value as Lua takes it: scalars as they are, everything else as a table.
+
+        `unpacked` is for a list: its items, each so. Raises ValueError for a value that is too large.
+        """
+        refuse_if_too_large(value, fields)
+        return [self._to_lua(item) for item in value] if unpacked else self._to_lua(value)
+
+    def _to_lua(self, value: Any) -> Any:
+        if type(value) is int:
+            return value if -_LARGEST <= value < _LARGEST else _as_float(value)
+        if value is None or isinstance(value, (float, bool, bytes)):
+            return value
+        if isinstance(value, str):
+            return value.encode("utf-8", "replace")
+        if isinstance(value, Real):
+            return float(value)
+        return value.to_sec() if hasattr(value, "to_sec") else self._table(value)  # ROS's times
+
+    def _table(self, value: Any) -> Any:
+        if isinstance(value, (bytearray, memoryview)):
+            return bytes(value)
+        named = fields(value)
+        if named is None:
+            return self._runtime.table_from([self._to_lua(item) for item in value])
+        return self._runtime.table_from({self._key(key): self._to_lua(item) for key, item in named.items()})
+
+    def _key(self, key: Any) -> Any:
+        if key is None or key != key:
+            raise ValueError(f"{key} cannot be a key")
+        return self._to_lua(key)
+
+
+def _scalars(given: tuple[Any, ...]) -> list[Any]:
+    return [_text(value) if type(value) is bytes else value for value in given]
+
+
+def _first(given: tuple[Any, ...]) -> list[Any] | None:
+    second, third, *values = given
+    if not _ALL_NUMBERS(map(type, values)):
+        return None
+    return [values] if second is third is None else [values, second, third]
+
+
+def _second(given: tuple[Any, ...]) -> list[Any] | None:
+    first, third, *values = given
+    if not _ALL_NUMBERS(map(type, values)):
+        return None
+    return [first, values] if third is None else [first, values, third]
+
+
+def _third(given: tuple[Any, ...]) -> list[Any] | None:
+    first, second, *values = given
+    return [first, second, values] if _ALL_NUMBERS(map(type, values)) else None
+
+
+def _first_and_second(given: tuple[Any, ...]) -> list[Any] | None:
+    return [[*given[3:]], [*given[:3]]] if _ALL_NUMBERS(map(type, given)) else None
+
+
+def _second_and_third(given: tuple[Any, ...]) -> list[Any] | None:
+    first, x, y, z, *values = given
+    return [first, [x, y, z], values] if _ALL_NUMBERS(map(type, given[1:])) else None
+
+
+def _from_stream(tokens: list[Any]) -> list[Any]:
+    outer: list[list[Any]] = []
+    here: list[Any] = []
+    marks: list[Any] = []
+    for token in tokens:
+        if type(token) in _NUMBERS:
+            here.append(token)
+        elif token is _CLOSE:
+            made: Any = here
+            if marks.pop() is _OPEN_FIELDS:
+                made = dict(zip(here[::2], here[1::2])) or []
+            here = outer.pop()
+            here.append(made)
+        elif type(token) is _Mark:
+            outer.append(here)
+            marks.append(token)
+            here = []
+        else:
+            here.append(_text(token))
+    return here
+
+
+def _text(value: Any) -> Any:
+    if type(value) is not bytes:
+        return value
+    try:
+        return value.decode("utf-8")
+    except UnicodeDecodeError:
+        return value
+
+
+def _as_float(value: int) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        raise ValueError("a whole number is too large") from None
+
+
+def fields(value: Any) -> Mapping[Any, Any] | None:
+    """Return the named fields of a mapping or message object; None for a sequence."""
+    if isinstance(value, Mapping):
+        return value
+    names = getattr(value, "_fields", None) or getattr(value, "__slots__", None)
+    if names is not None:
+        return {name: getattr(value, name) for name in names if not name.startswith("_")}
+    own: dict[str, Any] | None = getattr(value, "__dict__", None)
+    return own if own is not None and not hasattr(value, "__iter__") else None

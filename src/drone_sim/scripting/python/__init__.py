@@ -1,0 +1,1 @@
+"""Child scripts in Python."""

@@ -1,0 +1,224 @@
+"""Load a Python child script and call its phases."""
+
+from __future__ import annotations
+
+import ast
+import copy
+import inspect
+import reprlib
+import traceback
+from collections.abc import Callable, Mapping
+from types import CodeType
+from typing import Any
+
+from drone_sim.scripting import phase_names, script_log
+from drone_sim.scripting.api.calls import Api, mistake
+from drone_sim.scripting.api.messages import Callback
+from drone_sim.scripting.errors import ScriptError, UnknownName, no_function
+from drone_sim.scripting.phase_names import FUNCTIONS
+from drone_sim.scripting.python.process import process_kept
+from drone_sim.scripting.python.python_modules import Helpers
+from drone_sim.scripting.script_log import say, shown
+from drone_sim.scripting.time_limit import Stopped, TimeLimit
+from drone_sim.wording import near_names
+
+__all__ = ["PythonScript", "ScriptError"]
+
+_STOPPED = "__stopped__"  # Stopped, among a script's globals
+_RARE = frozenset(("init", "cleanup"))
+_NOT_COPIED = ("__builtins__", "__loader__", "__spec__")
+
+
+class Variables:
+    """An empty object to keep variables in: a script's `self`. Python reads it faster than a SimpleNamespace."""
+
+    @reprlib.recursive_repr()
+    def __repr__(self) -> str:
+        """Show what is in it."""
+        return f"self({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
+
+
+class PythonScript:
+    """A file that defines sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup as it needs them.
+
+    It finds `sim`, `simROS`, `require` and `self` (an empty object to keep variables in), as
+    CoppeliaSim's Python scripts do; so do the modules beside it that it imports. What it prints goes to the log.
+    """
+
+    def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
+        """Run the file's top level; raises ScriptError."""
+        self._path = path
+        self._limit = limit
+        self._modules = modules
+        found = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: Stopped, **modules}
+        self._helpers = Helpers(path, found, _compiled)
+        self._globals: dict[str, Any] = {
+            "__name__": self._helpers.package,
+            "__file__": path,
+            "__builtins__": self._helpers.builtins,
+            **found,
+        }
+        try:
+            with process_kept():
+                self._run("load", lambda: exec(_compiled(source, path), self._globals))
+            self._check_names()
+        except ScriptError:
+            self.close()
+            raise
+
+    def _check_names(self) -> None:
+        """Raise ScriptError for a function that was meant to be a phase, but would not be called as one."""
+        functions = {name: one for name, one in self._globals.items() if callable(one) and not name.startswith("__")}
+        for name, meant in phase_names.misspelt(functions):
+            raise self._error_at(functions[name], phase_names.never_called(name, meant))
+        for name in FUNCTIONS.values():
+            one = functions.get(name)
+            if inspect.isgeneratorfunction(one) or inspect.iscoroutinefunction(one) or inspect.isasyncgenfunction(one):
+                raise self._error_at(one, f"{name} would not run: it has a `yield` or is `async`")
+        phase_names.warn(self._path, functions)
+
+    def _error_at(self, function: Any, message: str) -> ScriptError:
+        code = getattr(function, "__code__", None)
+        path, line = (code.co_filename, code.co_firstlineno) if inspect.iscode(code) else (self._path, 0)
+        return ScriptError("load", path, line, message)
+
+    def call(self, phase: str) -> None:
+        """Call `sysCall_<phase>` if the script has it; raises ScriptError."""
+        function = self._globals.get(FUNCTIONS[phase])
+        if function is None:
+            return
+        if phase in _RARE:
+            with process_kept():
+                self._run(phase, function)
+        else:
+            self._run(phase, function)
+
+    def callback(self, callback: Callback, message: Any) -> None:
+        """Call the script's function (or that of this name) with a message; raises ScriptError."""
+        if callable(callback):
+            self._run(getattr(callback, "__name__", "callback"), callback, message)
+            return
+        self.check(callback)
+        self._run(callback, self._globals[callback], message)
+
+    def check(self, callback: Callback) -> None:
+        """Raise ScriptError where there is no function to call back."""
+        if not callable(callback) and not callable(self._globals.get(callback)):
+            known = [name for name, one in self._globals.items() if inspect.isfunction(one)]
+            raise ScriptError(str(callback), self._path, 0, no_function(callback, known))
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that gives `self` and the global variables the values that they have now.
+
+        So it does for those of the modules beside the script. Values that cannot be copied (open files, modules, API
+        objects) stay as they are.
+        """
+        modules = self._helpers.modules()
+        kept = _copied(self._globals, *map(vars, modules.values()))
+
+        def recall() -> None:
+            for name in set(self._helpers.modules()) - set(modules):
+                self._helpers.forget(name)
+            for variables, fresh in zip((self._globals, *map(vars, modules.values())), _copied(*kept)):
+                for name in set(variables) - set(fresh) - set(_NOT_COPIED):
+                    del variables[name]
+                variables.update(fresh)
+
+        return recall
+
+    def close(self) -> None:
+        """Forget the script; it cannot be called after that."""
+        self._globals.clear()
+        self._helpers.close()
+
+    def _run(self, phase: str, function: Any, *arguments: Any) -> None:
+        failed = None
+        try:
+            self._limit.run(function, *arguments)
+        except BaseException as error:  # KeyboardInterrupt, too: whose it is cannot be told
+            failed = self._error(phase, error)
+        script_log.end_call()
+        if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive
+            raise failed
+
+    def _require(self, name: str) -> Api:
+        if name not in self._modules:
+            raise UnknownName(f"no module '{name}'; {near_names(str(name), self._modules)}")
+        return self._modules[name]
+
+    def _error(self, phase: str, error: BaseException) -> ScriptError:
+        if self._limit.struck:
+            while isinstance(error.__context__, Stopped):  # struck once more, in a handler
+                error = error.__context__
+            return ScriptError(phase, *self._place(error), str(self._limit))
+        kind = "an exception"
+        try:
+            kind = type(error).__name__
+            (path, line), message = self._limit.run(self._told, error)
+        except BaseException:
+            path, line, message = self._path, 0, f"{kind}, which cannot be shown"
+        return ScriptError(phase, path, line, message)
+
+    def _told(self, error: BaseException) -> tuple[tuple[str, int], str]:
+        """Return place and message of an exception; whatever the script made of it may raise, or not return."""
+        if isinstance(error, SyntaxError) and error.filename in self._helpers.files:
+            return (str(error.filename), error.lineno or 0), f"SyntaxError: {error.msg}"
+        place = self._place(error)
+        if isinstance(error, UnknownName):
+            return place, str(error)
+        name = type(error).__name__
+        text = self._helpers.shown(error) if isinstance(error, ImportError) else shown(error)
+        return place, mistake(error, self._modules.values()) or (f"{name}: {text}" if text else name)
+
+    def _place(self, error: BaseException) -> tuple[str, int]:
+        """Return file and line, in the script or a module beside it, where an exception was raised."""
+        frames = ((frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__))
+        return ([(self._path, 0)] + [place for place in frames if place[0] in self._helpers.files])[-1]
+
+
+def _compiled(source: bytes, path: str) -> CodeType:
+    return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
+
+
+def _copied(*namespaces: Mapping[str, Any]) -> list[dict[str, Any]]:
+    memo: dict[int, Any] = {}  # one for all: what is shared stays shared
+    return [
+        {name: _copy(value, memo) for name, value in variables.items() if name not in _NOT_COPIED}
+        for variables in namespaces
+    ]
+
+
+def _copy(value: Any, memo: dict[int, Any]) -> Any:
+    if isinstance(value, Variables):  # attribute by attribute: one that cannot be copied spoils no other
+        if id(value) in memo:  # it is among its own attributes
+            return memo[id(value)]
+        made = memo[id(value)] = Variables()
+        made.__dict__.update({name: _copy(one, memo) for name, one in vars(value).items()})
+        return made
+    if isinstance(value, Api):
+        return value
+    try:
+        return copy.deepcopy(value, memo)
+    except Exception:  # whatever a class of the script's raises when it is copied
+        return value
+
+
+def _print(*values: Any, sep: str = " ", file: Any = None, **options: Any) -> None:
+    if file is not None:
+        print(*values, sep=sep, file=file, **options)
+    else:
+        say((sep if sep is not None else " ").join(map(shown, values)))
+
+
+def _let_stopped_pass(tree: ast.Module) -> ast.Module:
+    """Let no handler of the script catch Stopped: `while True: try: ... except: pass` has to end, too."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Try) and node.handlers:
+            name = ast.Name(id=_STOPPED, ctx=ast.Load())
+            handler = ast.ExceptHandler(type=name, name=None, body=[ast.Raise(exc=None, cause=None)])
+            first = node.handlers[0]
+            for part in ast.walk(handler):
+                if isinstance(part, (ast.expr, ast.stmt, ast.excepthandler)):
+                    ast.copy_location(part, first)
+            node.handlers.insert(0, handler)
+    return tree

@@ -1,0 +1,119 @@
+"""Vision sensors on a drone, and the renderer that they share."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from drone_sim.mechanics.frames import Matrix
+from drone_sim.render.context import RendererUnavailable
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.renderer import Renderer
+from drone_sim.shapes.visual import Visual
+
+_LOG = logging.getLogger(__name__)
+
+
+class Scene(Protocol):
+    """What a picture is taken of."""
+
+    @property
+    def changes(self) -> int:
+        """Return another number than before whenever a picture of it may look different."""
+
+    def visuals(self) -> list[Visual]:
+        """Return everything that can be drawn."""
+
+    def visual_poses(self) -> np.ndarray:
+        """Return the poses world from visual (N, 4, 4), in the same order."""
+
+    def tiny_picture(
+        self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return RGB (height, width, 3) and depth (height, width), drawn without OpenGL."""
+
+
+class Vision:
+    """Takes pictures of a scene: with OpenGL where EGL is to be had, with the scene's own renderer elsewhere."""
+
+    def __init__(self, scene: Scene, samples: int = 0):
+        """Make the renderer when the first picture is asked for: not every run needs one.
+
+        `samples` per pixel smooth the edges, as far as the renderer can.
+        """
+        self._scene = scene
+        self._samples = samples
+        self._renderer: Renderer | None = None
+        self._fallback = False
+
+    def look_at(self, scene: Scene) -> None:
+        """Take the pictures of another scene from now on."""
+        self._scene = scene
+
+    def picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
+        """Return the picture from `pose` (4, 4), world from optical frame.
+
+        `kind` "color": (height, width, 3) uint8 RGB. "depth": (height, width) float32, metres along the
+        optical z, NaN beyond the far plane.
+        """
+        if self._renderer is None and not self._fallback:
+            self._open()
+        if self._renderer is None:
+            return self._tiny_picture(kind, intrinsics, pose)
+        self._renderer.set_visuals(self._scene.visuals())
+        render = self._renderer.render if kind == "color" else self._renderer.render_depth
+        return render(intrinsics, pose, self._scene.visual_poses())
+
+    def _tiny_picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
+        vertical_fov = 2 * np.arctan(intrinsics.height / 2 / intrinsics.fy)
+        color, depth = self._scene.tiny_picture(
+            pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far
+        )
+        return color if kind == "color" else depth
+
+    def _open(self) -> None:
+        try:
+            self._renderer = Renderer(samples=self._samples)
+        except RendererUnavailable as error:
+            self._fallback = True
+            _LOG.warning("%s; pictures come from PyBullet's TinyRenderer, at a few frames per second", error)
+
+    @property
+    def changes(self) -> int:
+        """Return another number than before whenever a picture may look different."""
+        return self._scene.changes
+
+    def close(self) -> None:
+        """Free the renderer; may be called twice."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+class Camera:
+    """One vision sensor: where it is, what it sees, and who looks."""
+
+    def __init__(self, kind: str, intrinsics: Intrinsics, pose: Callable[[], Matrix], vision: Vision):
+        """Take what it measures ("color" or "depth"), how, from where (world from optical frame), and by what."""
+        self.kind = kind
+        self.intrinsics = intrinsics
+        self.every = 1  # steps between two pictures
+        self.watched: Callable[[], bool] = lambda: False
+        self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
+        self.pose = pose
+        self._vision = vision
+        self._last: tuple[int, Matrix, np.ndarray] | None = None  # the scene's changes, the pose, the picture
+
+    def take(self) -> np.ndarray:
+        """Return a picture of the scene as it stands; shape and type as Vision.picture says."""
+        return self._vision.picture(self.kind, self.intrinsics, np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4)))
+
+    def look(self) -> np.ndarray:
+        """Return what it sees now: the last picture where nothing has changed since, else a new one."""
+        changes, pose = self._vision.changes, self.pose()
+        if self._last is None or self._last[:2] != (changes, pose):
+            self._last = changes, pose, self.take()
+        return self._last[2]

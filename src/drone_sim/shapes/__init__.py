@@ -1,0 +1,1 @@
+"""What a thing looks like: shapes from YAML to Bullet, mesh and rviz."""

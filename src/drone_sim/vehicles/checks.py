@@ -1,0 +1,48 @@
+"""Commands from outside are checked before they reach the drone; what is refused says why in one line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run.parameters import Parameters
+
+
+class Refused(ValueError):
+    """A command is a mistake; the message names the field, the value and what is allowed."""
+
+
+def twist(linear: Sequence[float], angular: Sequence[float], parameters: Parameters) -> Twist:
+    """Return the command (m/s, rad/s); raises Refused beyond cmd_vel_limits."""
+    _check_within("linear", linear, parameters.cmd_vel_limits.linear, "m/s")
+    _check_within("angular", angular, parameters.cmd_vel_limits.angular, "rad/s")
+    return Twist(Vector3(*linear), Vector3(*angular))
+
+
+def push(force: Sequence[float], torque: Sequence[float], parameters: Parameters) -> tuple[Vector, Vector, float]:
+    """Return force (N), torque (N m) and how long a push lasts (s); raises Refused beyond the limits."""
+    limits = parameters.push
+    _check_within("force", force, limits.force_limit, "N")
+    _check_within("torque", torque, limits.torque_limit, "N m")
+    return (force[0], force[1], force[2]), (torque[0], torque[1], torque[2]), limits.duration
+
+
+def pose(position: Sequence[float], orientation: Sequence[float], parameters: Parameters) -> Pose:
+    """Return the pose (m, quaternion made exactly unit); raises Refused where nothing could stand."""
+    limit = parameters.position_limit
+    for axis, value, lowest in zip("xyz", position, (-limit, -limit, 0.0)):
+        if not lowest <= value <= limit:
+            raise Refused(f"position.{axis} = {value}: must lie within {lowest} and {limit} m")
+    length = math.sqrt(sum(value * value for value in orientation))
+    if not 0.99 < length < 1.01:
+        raise Refused(f"orientation {tuple(orientation)}: must be a unit quaternion, its length is {length:.3g}")
+    x, y, z, w = (value / length for value in orientation)
+    return Pose((position[0], position[1], position[2]), (x, y, z, w))
+
+
+def _check_within(kind: str, values: Sequence[float], limit: float, unit: str) -> None:
+    for axis, value in zip("xyz", values):
+        if not abs(value) <= limit:  # so written, it refuses NaN
+            raise Refused(f"{kind}.{axis} = {value}: must lie within +-{limit} {unit}")

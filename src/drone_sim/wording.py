@@ -1,0 +1,33 @@
+"""How a message shows a value, and the names that come near to a wrong one."""
+
+from __future__ import annotations
+
+import difflib
+import reprlib
+from collections.abc import Iterable
+from typing import Any
+
+MAX_NAME = 64  # characters of a name, in any file
+_MOST_NAMES = 12  # in an error message
+_SHORT = reprlib.Repr()
+_SHORT.maxstring, _SHORT.maxother, _SHORT.maxlevel = 300, 60, 3
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it: on one line and short, however large it is."""
+    if isinstance(value, str):
+        return _SHORT.repr(value)
+    try:
+        return f"{_SHORT.repr(value):.60}"
+    except Exception:  # an int of more digits than Python writes, a __repr__ that fails
+        return f"(a {type(value).__name__})"
+
+
+def near_names(name: str, known: Iterable[str]) -> str:
+    """Return 'near names are a, b' for an error message, or what is known where nothing is near."""
+    known = sorted(known)
+    near = difflib.get_close_matches(name, known, n=4, cutoff=0.5)
+    if near:
+        return f"near names are {', '.join(near)}"
+    more = f" and {len(known) - _MOST_NAMES} more" if len(known) > _MOST_NAMES else ""
+    return f"known are {', '.join(known[:_MOST_NAMES])}{more}"
