@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pybullet
+from drone_sim.vehicles.quadricopter import PROPELLERS
 from tqdm import tqdm
 
 from benchmarks.cores import one_core
@@ -13,7 +14,6 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.quadricopter import PROPELLERS
 from drone_sim.world import World
 
 Row = dict[str, Any]
@@ -79,7 +79,7 @@ def ours(*cameras: str) -> Callable[[], None]:
     """Return a step of the whole loop: script, propellers, dynamics, sensing, and the pictures of the cameras named."""
     simulation = Simulation(parameters.load())
     for camera in cameras:
-        simulation.cameras[camera].watched = lambda: True
+        simulation.drone.cameras[camera].watched = lambda: True
     return simulation.step
 
 

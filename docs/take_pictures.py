@@ -61,7 +61,7 @@ def cameras():
     simulation.drone.receive(Twist(Vector3(0.6, 0, 0)))
     fly(simulation, 1.5)
     simulation.drone.show_blades()
-    front, track, depth = (simulation.cameras[name].take() for name in ("front", "track", "depth"))
+    front, track, depth = (simulation.drone.cameras[name].take() for name in ("front", "track", "depth"))
     simulation.close()
     near = np.uint8(255 / (1 + np.nan_to_num(depth, nan=np.inf) / 2))
     return np.hstack([front, track, np.dstack([near] * 3)])
@@ -76,7 +76,7 @@ def fly(simulation, seconds):
 def take(simulation, camera):
     """Return a camera's picture of now, and end the simulation."""
     simulation.drone.show_blades()
-    picture = simulation.cameras[camera].take()
+    picture = simulation.drone.cameras[camera].take()
     simulation.close()
     return picture
 

@@ -85,7 +85,7 @@ def _fly_a_little(simulation: Simulation, steps: int = 3) -> None:
     for _ in range(steps):
         simulation.step()
     simulation.restore(snapshot)
-    for camera in simulation.cameras.values():
+    for camera in simulation.drone.cameras.values():
         camera.take()
     simulation.step()
     state = simulation.drone.state
@@ -98,7 +98,7 @@ def _simulate(given: dict[str, Any], folder: Path) -> None:
     try:
         _fly_a_little(simulation)
         saved = folder / "saved.yaml"
-        simulation.scene.save(saved, simulation.drone.matrix)
+        simulation.save_scene(saved)
         if simulation.parameters.time_step < 1.0:  # in a long step things go anywhere
             _load_again(simulation, saved)
         simulation.stop()

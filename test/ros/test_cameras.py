@@ -118,7 +118,7 @@ class Cameras(unittest.TestCase):
         message = depth.messages[-1]
         metres = np.frombuffer(message.data, np.float32).reshape(message.height, message.width)
         self.assertTrue(np.isnan(metres[0]).all())  # the sky
-        camera = self.node.simulation.cameras["front"]
+        camera = self.node.simulation.drone.cameras["front"]
         height = camera.pose()[11]
         rows = np.arange(440, 480)
         expected = height * camera.intrinsics.fy / (rows - camera.intrinsics.cy)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drone_sim.vehicles.quadricopter import PROPELLERS
 from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.fly import main as fly_main
-from drone_sim.vehicles.quadricopter import PROPELLERS
 
 FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
 RIPPLE = 0.01  # m/s, of vz: particles come whole
@@ -144,7 +144,7 @@ def test_the_camera_stage_publishes_every_step_s_picture():
     with flying("7_camera", "cameras.front.width=64", f"scene_file={DOCS / 'tutorial' / '7_scene.yaml'}") as simulation:
         fly(simulation, 0.15)
         published = list(simulation.drone.bus.published)
-        seen = simulation.cameras["front"].take()
+        seen = simulation.drone.cameras["front"].take()
     assert [one.topic for one in published] == ["/drone/my_front"] * 3
     assert published[-1].kind == "sensor_msgs/Image"
     picture = published[-1].message

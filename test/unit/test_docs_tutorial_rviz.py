@@ -81,10 +81,10 @@ def test_a_turn_to_the_left_moves_the_posts_to_the_right():
     scene = f"scene_file={DOCS / 'tutorial' / '7_scene.yaml'}"
     with flying("7_camera", "cameras.front.width=160", "cameras.front.height=120", scene) as simulation:
         fly(simulation, 0.5)
-        before = orange(simulation.cameras["front"].take())
+        before = orange(simulation.drone.cameras["front"].take())
         simulation.drone.bus.post("/drone/cmd_vel", Twist(Vector3(), Vector3(0, 0, 0.3)))
         fly(simulation, 0.8)
-        assert orange(simulation.cameras["front"].take()) > before + 10
+        assert orange(simulation.drone.cameras["front"].take()) > before + 10
 
 
 def orange(picture):

@@ -105,7 +105,7 @@ def test_solution_every_fourth_picture_has_no_red():
     with flying(str(SOLUTIONS["7_camera"]), "cameras.front.width=64", "cameras.front.height=48") as simulation:
         fly(simulation, 0.6)
         published = list(simulation.drone.bus.published)
-        seen = simulation.cameras["front"].take()
+        seen = simulation.drone.cameras["front"].take()
     assert len(published) == 3
     picture = np.frombuffer(published[-1].message.data, np.uint8).reshape(seen.shape)
     assert not picture[..., 0].any()

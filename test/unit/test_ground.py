@@ -64,19 +64,19 @@ def test_at_an_edge_it_falls_and_is_told_so_once(caplog):
 
 def test_pictures_and_depth_show_the_ground():
     simulation = simulation_at(8.0)  # looking away from the floor
-    picture, depth = (simulation.cameras[name].look() for name in ("front", "depth"))
+    picture, depth = (simulation.drone.cameras[name].look() for name in ("front", "depth"))
     bottom = picture[-1].astype(float) / 255
     assert np.abs(bottom - GROUND).max() < 0.01
     assert np.isnan(depth[0]).all()
     # 0.8 m above the ground, half a picture below the axis at a field of view of 60 degrees across 640 x 480.
-    assert depth[-1, 320] == pytest.approx(0.8 / (239.5 / simulation.cameras["depth"].intrinsics.fy), rel=0.01)
+    assert depth[-1, 320] == pytest.approx(0.8 / (239.5 / simulation.drone.cameras["depth"].intrinsics.fy), rel=0.01)
     simulation.close()
 
 
 def test_the_shadow_falls_on_the_ground():
     simulation = simulation_at(9.0)
     simulation.step()  # the tracking camera comes along
-    picture = simulation.cameras["track"].look().astype(float) / 255
+    picture = simulation.drone.cameras["track"].look().astype(float) / 255
     dark = np.abs(picture - np.multiply(GROUND, 0.55)).max(axis=2) < 0.02
     assert 200 < dark.sum() < 20000
     simulation.close()

@@ -1,6 +1,7 @@
 """V-REP's particle law against its closed form, and world-fixed forces against their definition."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -48,7 +49,8 @@ def test_propellers_push_along_their_axes_and_turn_against_their_rotation(veloci
     rotations = [-1, 1, -1, 1]
     body = frames.from_euler((0, 0, 0), angles)
     wrench = Wrench()
-    Propellers(parameters.load().propellers, axes, points, rotations, 0.05).blow(velocities, body, wrench)
+    propellers = Propellers(parameters.load().propellers, axes, points, rotations, 0.05, lambda: velocities)
+    propellers.add_to(wrench, SimpleNamespace(matrix=body))
     force, torque = np.zeros(3), np.zeros(3)
     for velocity, axis, point, rotation in zip(velocities, axes, points, rotations):
         thrust = np.multiply(frames.rotate(body, axis), 21 * NEWTONS_PER_PARTICLE * velocity)

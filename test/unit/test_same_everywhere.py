@@ -36,7 +36,7 @@ def test_the_tutorials_flight_is_the_same_to_the_last_bit():
 def test_a_picture_is_the_same():
     size = {"width": 160, "height": 120}
     simulation = Simulation(parameters.load({"cameras": {"front": size}}))
-    shown = simulation.cameras["front"].look().astype(int)
+    shown = simulation.drone.cameras["front"].look().astype(int)
     simulation.close()
     expected = cv2.cvtColor(cv2.imread(str(PICTURE)), cv2.COLOR_BGR2RGB).astype(int)
     differences = np.abs(shown - expected)

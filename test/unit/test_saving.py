@@ -49,14 +49,14 @@ def files(path):
 
 def test_files_keep_the_names_that_they_were_given(simulation, scene):
     before = files(scene)
-    simulation.scene.save(scene, simulation.drone.matrix)
+    simulation.save_scene(scene)
     assert files(scene) == before
     assert yaml.safe_load(scene.read_text(encoding="utf-8"))["objects"][0]["name"] == "Å"
 
 
 def test_saved_elsewhere_they_are_found_all_the_same(simulation, scene, tmp_path):
     there = tmp_path / "there" / "scene.yaml"
-    simulation.scene.save(there, simulation.drone.matrix)
+    simulation.save_scene(there)
     texture, ball, *others = files(there)
     assert (texture, ball) == (str(tmp_path / "pictures" / "tile.png"), str(tmp_path / "ball.stl"))
     assert others == files(scene)[2:]
@@ -67,7 +67,7 @@ def test_names_given_beside_a_file_are_found_from_another_folder(tmp_path, monke
     monkeypatch.chdir(tmp_path)
     ball = {"shape": "mesh", "file": "ball.stl", "position": [3, 0, 1]}
     simulation = Simulation(parameters.load({"scene": {"objects": [ball]}}))
-    simulation.scene.save(tmp_path / "there" / "scene.yaml", simulation.drone.matrix)
+    simulation.save_scene(tmp_path / "there" / "scene.yaml")
     simulation.close()
     monkeypatch.chdir("/")
     (again,) = parameters.load({"scene_file": str(tmp_path / "there" / "scene.yaml")}).scene.objects
@@ -78,15 +78,15 @@ def test_names_given_beside_a_file_are_found_from_another_folder(tmp_path, monke
 def test_yaw_is_the_heading_however_the_drone_leans(simulation, scene, yaw):
     leaning = frames.from_rpy((0, 0, 2), (0.7, -0.6, yaw))
     simulation.drone.move(Pose((0, 0, 2), frames.to_quaternion(leaning)))
-    simulation.scene.save(scene, simulation.drone.matrix)
+    simulation.save_scene(scene)
     assert parameters.load({"scene_file": str(scene)}).drone.yaw == pytest.approx(yaw)
 
 
 def test_what_could_not_be_loaded_is_not_saved(simulation, scene):
     before = scene.read_text(encoding="utf-8")
-    below = frames.from_rpy((0, 0, -0.5), (0, 0, 0))
+    simulation.drone.move(Pose((0, 0, -0.5)))
     with pytest.raises(ParameterError, match=r"cannot be saved: .*drone/position/2 = -0\.5") as refused:
-        simulation.scene.save(scene, below)
+        simulation.save_scene(scene)
     assert "\n" not in str(refused.value)
     assert scene.read_text(encoding="utf-8") == before
 
@@ -99,7 +99,7 @@ def test_a_full_disk_leaves_the_last_scene(simulation, scene, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match=r"scene\.yaml: No space left on device"):
-        simulation.scene.save(scene, simulation.drone.matrix)
+        simulation.save_scene(scene)
     assert scene.read_text(encoding="utf-8") == before
     assert sorted(os.listdir(scene.parent)) == ["ball.stl", "pictures", "scene.yaml"]
 
@@ -109,7 +109,7 @@ def test_every_shipped_scene_can_be_saved(tmp_path):
         simulation = Simulation(
             parameters.load({"scene_file": str(package_path() / "config" / "scenes" / f"{name}.yaml")})
         )
-        simulation.scene.save(tmp_path / f"{name}.yaml", simulation.drone.matrix)
+        simulation.save_scene(tmp_path / f"{name}.yaml")
         simulation.close()
         assert parameters.load({"scene_file": str(tmp_path / f"{name}.yaml")}).scene.floor.size == pytest.approx(
             simulation.parameters.scene.floor.size

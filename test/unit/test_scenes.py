@@ -91,7 +91,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     for _ in range(10):
         simulation.step()
     saved = tmp_path / "elsewhere" / "saved.yaml"
-    simulation.scene.save(saved, simulation.drone.matrix)
+    simulation.save_scene(saved)
     loaded = simulate(str(saved))
     assert loaded.drone.state.position == simulation.drone.state.position
     for ours, theirs in zip(simulation.parameters.scene.objects, loaded.parameters.scene.objects):
@@ -309,7 +309,7 @@ def test_a_mesh_written_anew_is_seen_anew(tmp_path):
     simulation = Simulation(parameters.load({"scene_file": str(scene)}))
 
     def red():
-        picture = simulation.cameras["front"].look().astype(int)
+        picture = simulation.drone.cameras["front"].look().astype(int)
         return int((picture[:, :, 0] > picture[:, :, 1] + 60).sum())
 
     small = red()

@@ -241,7 +241,7 @@ def test_a_script_sees_each_step_once(tmp_path):
     look = "sim.getVisionSensorCharImage(sim.getObject('/FrontVision'))"
     script.write_text(f"def sysCall_sensing():\n    assert {look} == {look}", encoding="utf-8")
     simulation = Simulation(parameters.load({"cameras": SMALL}), script=str(script))
-    camera, taken = simulation.cameras["front"], []
+    camera, taken = simulation.drone.cameras["front"], []
     take = camera.take
     camera.take = lambda: taken.append(simulation.steps) or take()
     simulation.step()

@@ -174,7 +174,7 @@ def test_a_scene_that_cannot_be_read_leaves_the_last_one(simulate, tmp_path, wro
         simulation.start()
     assert str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
     assert (simulation.running, simulation.time, simulation.drone.state.position) == (False, 0.0, (1.0, 0.0, 2.0))
-    assert simulation.cameras["front"].take().shape == (12, 16, 3)
+    assert simulation.drone.cameras["front"].take().shape == (12, 16, 3)
     scene.write_text(good)
     simulation.start()
     assert fly(simulation, 10) == path

@@ -24,7 +24,7 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.mechanics.state import Pose
 logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s")
 simulation = Simulation(parameters.load({scene!r}))
-pictures = {{name: simulation.cameras[name].take() for name in ("front", "depth", "front", "depth")}}
+pictures = {{name: simulation.drone.cameras[name].take() for name in ("front", "depth", "front", "depth")}}
 np.savez(sys.argv[1], **pictures)
 simulation.close()
 """
@@ -66,7 +66,7 @@ def test_without_egl_pybullet_draws_the_same_view_after_one_warning(tmp_path):
 
 def test_a_picture_is_taken_only_while_somebody_looks():
     simulation = Simulation(parameters.load())
-    front = simulation.cameras["front"]
+    front = simulation.drone.cameras["front"]
     simulation.step()
     assert front.image is None
     front.watched = lambda: True
@@ -80,7 +80,7 @@ def test_a_picture_is_taken_only_while_somebody_looks():
 
 def test_the_own_body_is_not_in_the_front_picture():
     simulation = Simulation(parameters.load())
-    depth = simulation.cameras["depth"].take()
+    depth = simulation.drone.cameras["depth"].take()
     assert np.nanmin(depth) > 0.5
     simulation.close()
 
@@ -97,7 +97,7 @@ def test_the_track_camera_stays_level_while_its_parent_is_the_track_frame():
         simulation = Simulation(parameters.load({"cameras": {"track": {"mount": {"parent": parent}}}}))
         simulation.drone.move(simulation.drone.state._replace(orientation=(0.2, 0.0, 0.0, 0.98)))
         simulation.step()
-        across = simulation.cameras["track"].pose()[8]  # z of the optical x axis in the world
+        across = simulation.drone.cameras["track"].pose()[8]  # z of the optical x axis in the world
         level[parent] = abs(across) < 1e-6
         simulation.close()
     assert level == {"Track_base": True, "Quadricopter_base": False}
@@ -128,7 +128,7 @@ def _simulation(tmp_path):
 
 
 def test_a_camera_sees_what_is_there_now(simulation):
-    front = simulation.cameras["front"]
+    front = simulation.drone.cameras["front"]
     front.watched = lambda: True
     first = front.take()
     assert simulation.drone.signals.getStringSignal("init") == as_script(first)
@@ -152,7 +152,7 @@ def test_a_camera_sees_what_is_there_now(simulation):
 
 
 def test_another_scene_is_seen_at_once(simulation, tmp_path):
-    front = simulation.cameras["front"]
+    front = simulation.drone.cameras["front"]
     first = front.look()
     (tmp_path / "scene.yaml").write_text("objects: [{shape: box, size: [1, 1, 1], position: [3, 0, 0.8]}]")
     simulation.start(str(tmp_path / "scene.yaml"))
@@ -161,7 +161,7 @@ def test_another_scene_is_seen_at_once(simulation, tmp_path):
 
 
 def test_what_has_not_changed_is_not_drawn_again(simulation):
-    front = simulation.cameras["front"]
+    front = simulation.drone.cameras["front"]
     assert front.look() is front.look()
     simulation.drone.move(Pose((0, 0, 1)))
     assert front.look() is not None

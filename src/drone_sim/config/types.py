@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Union
 
 from annotated_types import Ge, GroupedMetadata, Le
 from pydantic import (
@@ -181,13 +182,46 @@ File = Annotated[str, PlainValidator(_existing_file(False)), PlainSerializer(str
 OptionalFile = Annotated[str, PlainValidator(_existing_file(True)), PlainSerializer(str)]
 
 
+# ---- what a script is given
+
+
+def _script_value(value: Any) -> Any:
+    """Let a number, true or false, a text, or a list of numbers be one."""
+    if isinstance(value, (bool, str)):
+        return value
+    several = value if isinstance(value, (list, tuple)) else [value]
+    if not all(isinstance(one, (int, float)) and not isinstance(one, bool) and math.isfinite(one) for one in several):
+        raise ValueError("must be a finite number, true, false, a text, or a list of numbers")
+    return tuple(map(float, value)) if isinstance(value, (list, tuple)) else float(value)
+
+
+ScriptValue = Annotated[Any, PlainValidator(_script_value)]
+
+
 # ---- mappings
+
+
+def merged(base: Any, overrides: Any) -> Any:
+    """Return nested mappings with other values laid over them."""
+    if not (isinstance(base, Mapping) and isinstance(overrides, Mapping)):
+        return overrides
+    laid = dict(base)
+    for key, value in overrides.items():
+        laid[key] = merged(base[key], value) if key in base else value
+    return laid
 
 
 class Checked(BaseModel):
     """Every key is known, every value checked, and nothing changes after that."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def one_of(*models: type[Checked]) -> Any:
+    """Return the type of a value that is one of these, which the key `kind` tells apart."""
+    if len(models) == 1:
+        return models[0]
+    return Annotated[Union[models], Field(discriminator="kind")]  # noqa: UP007 -- of a tuple
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:

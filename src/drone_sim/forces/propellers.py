@@ -14,10 +14,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Annotated, Literal
 
-from drone_sim.mechanics.frames import Matrix, Vector, rotate
+from drone_sim.config.types import Checked, Finite, Limits, Within
+from drone_sim.forces.force import Carried, Force
+from drone_sim.mechanics.frames import Vector, rotate
 from drone_sim.mechanics.wrench import Wrench
-from drone_sim.run.parameters import PropellerParameters
+
+
+class PropellerParameters(Checked):
+    """V-REP's particle law."""
+
+    law: Literal["3.x", "4.x"]
+    particles_per_second: Annotated[Finite, Within(1e-3, 1e6)]
+    particle_density: Annotated[Finite, Within(1e-3, 1e6)]
+    particle_size: Annotated[Finite, Within(1e-6, 1)]
+    torque_per_velocity: Annotated[Finite, Within(0, 1e3)]
+    velocity_limits: Limits
 
 
 class ParticleLaw:
@@ -39,8 +52,8 @@ class ParticleLaw:
         return particles * self._newtons
 
 
-class Propellers:
-    """A drone's propellers: what they blow, and how far their blades have gone with it."""
+class Propellers(Force):
+    """A drone's propellers: their thrust, and how much air has gone through them."""
 
     def __init__(
         self,
@@ -49,8 +62,13 @@ class Propellers:
         points: Sequence[Vector],
         rotations: Sequence[int],
         time_step: float,
+        commanded: Callable[[], Sequence[float]],
     ):
-        """Take where each pushes along (unit, root link's frame) and acts (m, inertial frame), and its sense (+-1)."""
+        """Take where each pushes along (unit, root link's frame) and acts (m, inertial frame), and its sense (+-1).
+
+        `commanded` returns the particle velocities (m/s) that are asked for.
+        """
+        self._commanded = commanded
         self.air = [0.0] * len(axes)  # m of it that went through each
         self._law = ParticleLaw(parameters, time_step)
         self._time_step = time_step
@@ -60,8 +78,9 @@ class Propellers:
             by_axis.setdefault(axis, []).append((number, *point, rotation * parameters.torque_per_velocity))
         self._by_axis = list(by_axis.items())
 
-    def blow(self, velocities: Sequence[float], body: Matrix, wrench: Wrench) -> None:
-        """Emit a step's particles at these velocities (m/s), within limits, from a body there; add to its wrench."""
+    def add_to(self, wrench: Wrench, body: Carried) -> None:
+        """Emit a step's particles at the velocities that are commanded, within limits."""
+        velocities, matrix = self._commanded(), body.matrix
         if min(velocities) < self._slowest or max(velocities) > self._fastest:
             velocities = [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
         newtons, air, time_step = self._law.emit(), self.air, self._time_step
@@ -76,7 +95,7 @@ class Propellers:
                 y += py * thrust
                 z += pz * thrust
                 air[number] += velocity * time_step
-            along_x, along_y, along_z = along = rotate(body, axis)
+            along_x, along_y, along_z = along = rotate(matrix, axis)
             wrench.add_parallel(
                 (along_x * force, along_y * force, along_z * force),
                 (along_x * torque, along_y * torque, along_z * torque),

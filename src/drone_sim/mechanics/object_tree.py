@@ -124,6 +124,16 @@ class ObjectTree:
         self._handles.update((known, handle) for known in (name, *also))
         return handle
 
+    def remove(self, root: int) -> None:
+        """Take an object and all below it out of the tree."""
+        gone = [root]
+        for handle in gone:
+            gone += [child for child, _ in self.children(self._objects[handle])]
+        for handle in gone:
+            one = self._objects.pop(handle)
+            for name in one.names:
+                self._handles.pop(name, None)
+
     def handle(self, name: str) -> int:
         """Return the handle of a name; raises ValueError that lists the near names."""
         if name in self._handles:

@@ -42,6 +42,9 @@ class RigidBody:
     centre_of_mass: np.ndarray  # (3,)
     inertia: np.ndarray  # (3, 3), about the centre of mass, root link's axes
     links: dict[str, Matrix]  # root from link, joints at zero
+    parents: dict[str, tuple[str, Matrix]]  # of each link but the root: the link above, and above from link
+    blade_joints: dict[str, str]  # of each link that turns about its z axis: the joint
+    visuals: tuple[tuple[str, Matrix], ...]  # of each visual: its link, and link from visual
     blades: tuple[Blades, ...]
     xml: str  # the same body as a URDF of one link
 
@@ -77,6 +80,11 @@ def _merge(robot: Xml.Element) -> RigidBody:
         centre_of_mass=centre,
         inertia=inertia,
         links=poses,
+        parents={name: (_end(joint, "parent"), _origin(joint)) for name, joint in joints.items()},
+        blade_joints={
+            name: joint.attrib["name"] for name, joint in joints.items() if joint.attrib["type"] == "continuous"
+        },
+        visuals=tuple((name, _origin(visual)) for name, visual in visuals),
         blades=tuple(_blades(visuals, joints, poses)),
         xml=_one_link(robot, roots[0], poses, (mass, centre, inertia)),
     )

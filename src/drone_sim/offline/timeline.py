@@ -11,22 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import (
-    Annotated,  # typing has it from Python 3.9 on
-    Any,
-    NamedTuple,
-)
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from drone_sim.config.errors import told
 from drone_sim.config.types import Finite, Location, Within, numeric, readable_key
 from drone_sim.files import yaml_files
+from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.frames import Vector, from_rpy, to_quaternion
 from drone_sim.mechanics.state import Pose, Twist
 from drone_sim.run.parameters import Parameters
 from drone_sim.vehicles import checks
-from drone_sim.vehicles.quadricopter import Drone
+from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.wording import shown
 
 MAX_TIME = 1e6  # s, the longest flight
@@ -36,14 +33,6 @@ _TOLERANCE = 1e-6  # of a step: decimal times are not exact multiples of a binar
 
 class TimelineError(ValueError):
     """A timeline is wrong; one line that names file, entry (from 1), key, value and what is allowed."""
-
-
-class Push(NamedTuple):
-    """A force (N) at the centre of mass and a torque (N m), world frame, for `duration` seconds."""
-
-    force: Vector
-    torque: Vector
-    duration: float
 
 
 class Entry(NamedTuple):
@@ -57,14 +46,14 @@ class Entry(NamedTuple):
         """The time (s) at which a push is over; of anything else `at`."""
         return self.at + (self.action.duration if isinstance(self.action, Push) else 0.0)
 
-    def apply(self, drone: Drone) -> None:
+    def apply(self, vehicle: Vehicle) -> None:
         """Do it."""
         if isinstance(self.action, Twist):
-            drone.receive(self.action)
+            vehicle.receive(self.action)
         elif isinstance(self.action, Pose):
-            drone.move(self.action)
+            vehicle.move(self.action)
         else:
-            drone.push(*self.action)
+            vehicle.push(*self.action)
 
 
 class Timeline:
@@ -82,10 +71,10 @@ class Timeline:
         """The time (s) at which the last command is given and the last push is over; 0 without entries."""
         return max((entry.end for entry in self.entries), default=0.0)
 
-    def apply(self, step: int, drone: Drone) -> None:
+    def apply(self, step: int, vehicle: Vehicle) -> None:
         """Do what is due in a step (counted from 0), just before it runs."""
         for entry in self._due.get(step, ()):
-            entry.apply(drone)
+            entry.apply(vehicle)
 
 
 def first_step(time: float, time_step: float) -> int:
@@ -160,8 +149,7 @@ class _Push(_Model):
     duration: Annotated[Finite, Within(1e-4, MAX_TIME)]
 
     def checked(self, parameters: Parameters) -> Push:
-        force, torque, _ = checks.push(self.force, self.torque, parameters)
-        return Push(force, torque, self.duration)
+        return checks.push(self.force, self.torque, parameters)._replace(duration=self.duration)
 
 
 _KINDS: dict[str, type[_Twist | _Pose | _Push]] = {"twist": _Twist, "pose": _Pose, "push": _Push}

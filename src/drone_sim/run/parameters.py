@@ -9,24 +9,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
 from drone_sim.config.errors import Problem, line_of, problems, told
 from drone_sim.config.types import (
-    Angle,
-    Checked,
-    Coordinate,
-    File,
     FileName,
     Finite,
-    Gain,
-    Limits,
     Location,
-    MarginOrNone,
     Name,
     ParameterError,
     Switch,
     Within,
+    merged,
     named_in,
     numeric,
     read_yaml,
@@ -35,99 +29,59 @@ from drone_sim.files import yaml_files
 from drone_sim.files.resources import package_path, resolve
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
-from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters, check_together
+from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.vehicles.parameters import DroneParameters, EquipmentParameters, VehicleParameters, laid_over
 from drone_sim.wording import shown
 
 __all__ = ["CameraParameters", "ParameterError", "Parameters", "load", "read_yaml"]
 
 MAX_SUB_STEPS = 1000
+MAX_VEHICLES = 256
+_SPACING = 1.0  # m, between two vehicles in a row
 
 
-class TwistLimits(Checked):
-    """Beyond these a command is a mistake."""
-
-    linear: Annotated[Finite, Within(1e-6, 1e3)]
-    angular: Annotated[Finite, Within(1e-6, 1e3)]
-
-
-class PushParameters(Checked):
-    """How long a push on the topic `push` lasts, and what is a mistake."""
-
-    duration: Annotated[Finite, Within(1e-4, 1e4)]
-    force_limit: Annotated[Finite, Within(1e-6, 1e6)]
-    torque_limit: Annotated[Finite, Within(1e-6, 1e6)]
-
-
-class DroneParameters(Checked):
-    """Name, body and starting place of the drone."""
-
-    name: Name
-    urdf: File
-    position: Annotated[
-        tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]], Field(description="3 numbers, [x, y, z] in m")
-    ]
-    yaw: Angle
-
-
-class PropellerParameters(Checked):
-    """V-REP's particle law; see propeller.py."""
-
-    law: Literal["3.x", "4.x"]
-    particles_per_second: Annotated[Finite, Within(1e-3, 1e6)]
-    particle_density: Annotated[Finite, Within(1e-3, 1e6)]
-    particle_size: Annotated[Finite, Within(1e-6, 1)]
-    torque_per_velocity: Annotated[Finite, Within(0, 1e3)]
-    velocity_limits: Limits
-
-
-class ControlParameters(Checked):
-    """The tutorial's gains; a child script reads them by name with getScriptSimulationParameter."""
-
-    thrust_gravity: Annotated[Finite, Within(1e-3, 1e4)]
-    thrust_limits: Limits
-    Dthrust: Gain
-    Kzref: Gain
-    Dzref: Gain
-    Dyaw: Gain
-    angle_min: Gain
-    angle_max: Gain
-    Pangle: Gain
-    Dangle: Gain
-    Kvcorr: Gain
-    recovery_margin: MarginOrNone
-    Precovery: Gain
-
-
-class Parameters(Checked):
+class Parameters(EquipmentParameters):
     """Everything in config/drone.yaml."""
 
     config: FileName
     gui: Switch
-    script: FileName
     script_time_limit: Annotated[Finite, Within(0.01, 1e4, or_zero=True)]
     real_time_factor: Annotated[Finite, Within(1e-3, 1e3, or_zero=True)]
-    cmd_vel_timeout: Annotated[Finite, Within(1e-4, 1e6, or_zero=True)]
-    cmd_vel_limits: TwistLimits
-    position_limit: Annotated[Finite, Within(1e-3, 1e5)]
-    push: PushParameters
     time_step: Annotated[Finite, Within(1e-4, 1)]
     sub_step: Annotated[Finite, Within(1e-5, 1)]
     gravity: Annotated[Finite, Within(-100, 100)]
     scene_file: FileName
     scene: SceneParameters
     drone: DroneParameters
-    propellers: PropellerParameters
-    control: ControlParameters
+    vehicles: Annotated[dict[Name, VehicleParameters], Field(max_length=MAX_VEHICLES)]
     samples: Annotated[Literal[0, 2, 4, 8], BeforeValidator(numeric)]
-    cameras: Annotated[dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
     _given: dict[str, Any] = PrivateAttr(default_factory=dict)  # what stands without the scene file
 
-    _drone_in_scene: tuple[str, ...] = PrivateAttr(default=())
+    _in_scene_file: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _fleet: tuple[VehicleParameters, ...] = PrivateAttr(default=())
+
+    @model_validator(mode="before")
+    @classmethod
+    def _lay_vehicles_over(cls, values: Any) -> Any:
+        if not isinstance(values, Mapping) or "vehicles" not in values:
+            return values
+        entries = _entries(values["vehicles"], values.get("drone"))
+        if isinstance(entries, Mapping):
+            entries = {
+                name: laid_over(entry, str(name), values) if isinstance(entry, Mapping) else entry
+                for name, entry in entries.items()
+            }
+        return {**values, "vehicles": entries}
 
     @property
-    def drone_in_scene(self) -> tuple[str, ...]:
-        """The keys of `drone` that the scene file gives."""
-        return self._drone_in_scene
+    def fleet(self) -> tuple[VehicleParameters, ...]:
+        """What flies: the `vehicles`, or the drone alone where there are none."""
+        return self._fleet
+
+    @property
+    def in_scene_file(self) -> Mapping[str, Any]:
+        """What the scene file says of `drone` and `vehicles`."""
+        return self._in_scene_file
 
     @property
     def sub_steps(self) -> int:
@@ -140,6 +94,10 @@ class Parameters(Checked):
         '' is the scene that was given without a file.
         """
         return _in_scene(self._given, file)
+
+    def with_vehicles(self, entries: Any) -> Parameters:
+        """Return the parameters with other `vehicles` given beside the scene file's. Raises ParameterError."""
+        return _in_scene({**self._given, "vehicles": entries}, self.scene_file)
 
     def check_scene(self, content: dict[str, Any], file: Path) -> None:
         """Raise ParameterError where a scene file with this content could not be loaded."""
@@ -165,7 +123,27 @@ class Parameters(Checked):
                 f"at most {MAX_SUB_STEPS} are allowed",
                 ("sub_step",),
             )
-        check_together(self.cameras)
+        super().model_post_init(_context)
+        self._fleet = tuple(self.vehicles.values()) or (VehicleParameters.only(self.drone, self),)
+
+
+def _entries(given: Any, drone: Any) -> Any:
+    """Return the entries that a number of vehicles stands for: drone1, drone2, ... in a row about the drone."""
+    if isinstance(given, bool) or not isinstance(given, (int, float)):
+        return given
+    if not (given == int(given) and 0 <= given <= MAX_VEHICLES):
+        raise ParameterError(
+            f"parameter vehicles = {shown(given)}: must be a whole number from 0 to {MAX_VEHICLES}, "
+            "or entries such as drone1: {position: [0, 0, 0.8]}",
+            ("vehicles",),
+        )
+    try:
+        x, y, z = map(float, drone["position"])
+    except (TypeError, KeyError, ValueError):  # refused with the other values
+        return {}
+    middle = (given - 1) / 2
+    sides = [_SPACING * (middle - number) for number in range(int(given))]
+    return {f"drone{number}": {"position": [x, y + side, z]} for number, side in enumerate(sides, start=1)}
 
 
 def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
@@ -182,9 +160,9 @@ def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
     if not isinstance(config, str):
         raise ParameterError(f"parameter config = {shown(config)}: must be the name of a file")
     if config:
-        given = _merge(given, _config(config))
+        given = merged(given, _config(config))
         _checked(given, "", {}, config)
-    given = _merge(given, overrides)
+    given = merged(given, overrides)
     return _in_scene(given, given["scene_file"])
 
 
@@ -216,13 +194,26 @@ def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str
     What is wrong may stand in the file `named`, which is the scene file or one laid over config/drone.yaml.
     """
     try:
-        parameters = Parameters.model_validate(_merge({**given, "scene_file": file}, scene))
+        parameters = Parameters.model_validate(merged({**given, "scene_file": file}, scene))
     except ValidationError as error:
-        raise ParameterError(_told(problems(error, Parameters), named, bool(scene))) from None
+        found = [one for one in problems(error, Parameters) if _is_given(one, given, scene)]
+        raise ParameterError(_told(found, named, bool(scene))) from None
     parameters._given = given
-    drone = scene.get("drone")
-    parameters._drone_in_scene = tuple(drone) if isinstance(drone, dict) else ()
+    parameters._in_scene_file = {key: scene[key] for key in ("drone", "vehicles") if key in scene}
     return parameters
+
+
+def _is_given(problem: Problem, *sources: Mapping[str, Any]) -> bool:
+    """Tell a wrong value of a vehicle's own from one that it has from the keys at the top, which is told of there."""
+    if problem.location[:1] != ("vehicles",) or len(problem.location) < 3:
+        return True
+    for source in sources:
+        here: Any = source
+        for key in problem.location[:3]:
+            here = here.get(key) if isinstance(here, Mapping) else None
+        if here is not None:
+            return True
+    return False
 
 
 def _told(found: list[Problem], file: str, is_scene: bool) -> str:
@@ -233,12 +224,3 @@ def _told(found: list[Problem], file: str, is_scene: bool) -> str:
         line = line_of(lines, inner) if inner is not None else None
         placed.append((line, problem.text if line is None or inner is None else inner.text))
     return told(placed, file if not is_scene or any(line for line, _ in placed) else "")
-
-
-def _merge(base: Any, overrides: Any) -> Any:
-    if not (isinstance(base, dict) and isinstance(overrides, Mapping)):
-        return overrides
-    merged = dict(base)
-    for key, value in overrides.items():
-        merged[key] = _merge(base[key], value) if key in base else value
-    return merged

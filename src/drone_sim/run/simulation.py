@@ -11,30 +11,24 @@ For example:
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from drone_sim.render.intrinsics import Intrinsics
-from drone_sim.run import memory
-from drone_sim.run.parameters import CameraParameters, ParameterError, Parameters
+from drone_sim.run import memory, saving
+from drone_sim.run.parameters import Parameters
+from drone_sim.run.setting import Setting
+from drone_sim.run.whereabouts import Whereabouts
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting import load
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.messages import Backend
-from drone_sim.scripting.api.scripts import LOG
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.sensors.camera import Camera, Vision
-from drone_sim.vehicles.quadricopter import Drone
+from drone_sim.scripting.script_log import LOG
+from drone_sim.sensors.camera import Vision
+from drone_sim.vehicles.parameters import VehicleParameters
+from drone_sim.vehicles.shared import Shared
+from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.world import World
-
-MAX_OVERLAPS = 500  # pairs of moving bodies, at the start: with more a step takes seconds
-_NOWHERE = 1e9  # m, m/s and rad/s, summed
-
-
-class Diverged(RuntimeError):
-    """The dynamics has ended in numbers that mean nothing; one line that says when."""
 
 
 class Snapshot(NamedTuple):
@@ -42,15 +36,15 @@ class Snapshot(NamedTuple):
 
     steps: int
     world: int
-    recall: Callable[[], None]
-    run: int
+    recall: tuple[Callable[[], None], ...]
+    era: int
 
 
 class Simulation:
-    """A world, the drone in it, its cameras, and the clock that counts steps.
+    """A world, what flies in it, and the clock that counts steps.
 
-    Not thread-safe: one thread owns it. `drone.bus` alone may be used from others. `drone` and `scene` are
-    new ones after every start.
+    Not thread-safe: one thread owns it. The `bus` of a vehicle alone may be used from others. World, scene and
+    vehicles are new ones after every start.
     """
 
     def __init__(
@@ -63,25 +57,26 @@ class Simulation:
         drawings: Drawings | None = None,
         started: bool = True,
     ):
-        """Build the scene and, if `started`, run the init of the child script ('' is the tutorial's).
+        """Build the scene and, if `started`, run the init of the child scripts.
 
-        `backend` carries what the script subscribes to and publishes; without it the messages stay in
-        `drone.bus`. `drawings` takes what the script draws; without it that is ignored.
+        `script` flies the vehicles that name none of their own; '' is the parameters', or the tutorial's. `backend`
+        carries what scripts subscribe to and publish; without it the messages stay in the vehicles' `bus`.
+        `drawings` takes what scripts draw; without it that is ignored.
 
         Raises ParameterError, UrdfError, ScriptError, and RuntimeError where `gui` finds no display.
         """
         self.parameters = parameters
         self.script = script
         self.running = False
-        self._backend = backend
-        self._drawings = drawings
+        self._backend, self._drawings, self._gui = backend, drawings, gui
         self._runs = 0
-        self._gui = gui
-        load.script_path(script)  # one that is not there needs no world
-        self._take(_Built(parameters, World(parameters.sub_step, parameters.gravity, gui)))
+        self._era = 0  # another one whenever what is in the world has become something else
+        for one in parameters.fleet:  # a script that is not there needs no world
+            load.script_path(self._script_of(one))
+        world = World(parameters.sub_step, parameters.gravity, gui)
+        self.vision = Vision(world, parameters.samples)
+        self._take(self._built(parameters, world))
         try:
-            self.vision = Vision(self.world, parameters.samples)
-            self.cameras: dict[str, Camera] = {name: self._camera(one) for name, one in parameters.cameras.items()}
             if started:
                 self._run()
         except BaseException:
@@ -91,72 +86,138 @@ class Simulation:
                 LOG.error("%s", second)
             raise
 
-    def _build(self, parameters: Parameters) -> None:
-        """Put the scene and a drone without a script into a new world, which then takes the last one's place."""
-        built = _Built(parameters, World(parameters.sub_step, parameters.gravity))
+    def _built(self, parameters: Parameters, world: World) -> Setting:
+        """Return scene and vehicles in an empty world. Raises ParameterError and UrdfError."""
+        shared = Shared(
+            world=world,
+            vision=self.vision,
+            time=lambda: self.time,
+            time_step=parameters.time_step,
+            script_time_limit=parameters.script_time_limit,
+            backend=self._backend,
+            drawings=self._drawings,
+        )
+        return Setting(parameters, shared)
+
+    def _rebuild(self, parameters: Parameters) -> None:
+        """Put scene and vehicles without scripts into a new world, which then takes the last one's place."""
+        built = self._built(parameters, World(parameters.sub_step, parameters.gravity))
         if self._gui:  # a process has one window: what can be built is built there once more
             built.world.close()
             self.world.clear()
-            built = _Built(parameters, self.world)
+            built = self._built(parameters, self.world)
         else:
             self.world.close()
         self._take(built)
         self.vision.look_at(self.world)
 
-    def _take(self, built: _Built) -> None:
+    def _take(self, built: Setting) -> None:
         """Begin in what has been built."""
+        self._setting = built
         self.parameters = built.parameters
         self._sub_steps = built.parameters.sub_steps
-        self.world, self.scene, self.drone = built.world, built.scene, built.drone
-        self.drone.bus.backend = self._backend
-        self.drone.drawings = self._drawings
-        self.world.keep_beginning()
+        self.world: World = built.world
+        self.scene: Scene = built.scene
         self._begin()
 
     def _begin(self) -> None:
         """Be at time 0 of a new run, in the initial scene."""
-        floor = self.parameters.scene.floor
-        self._edge = floor.size / 2 if floor.edge else None  # m, of what the drone can stand on
+        self._whereabouts = Whereabouts(self.parameters.scene.floor)
         self.steps = 0
         self._runs += 1
+        self._changed_vehicles()
         if self._drawings is not None:
             self._drawings.clear()
 
-    def _camera(self, parameters: CameraParameters) -> Camera:
-        size = (parameters.width, parameters.height)
-        intrinsics = Intrinsics(*size, parameters.horizontal_fov, parameters.near, parameters.far)
-        camera = Camera(parameters.kind, intrinsics, lambda: self.drone.optical(parameters), self.vision)
-        camera.every = parameters.every
-        return camera
+    def _changed_vehicles(self) -> None:
+        self._era += 1
+        self._flying = tuple(self.vehicles.values())
+        self._any_in_sub_steps = any(vehicle.sub_step_forces for vehicle in self._flying)
+
+    # ---- what flies
+
+    @property
+    def vehicles(self) -> dict[str, Vehicle]:
+        """The vehicles, by name."""
+        return self._setting.vehicles
+
+    @property
+    def drone(self) -> Vehicle:
+        """The first vehicle, most often the only one."""
+        return self._flying[0]
+
+    @property
+    def era(self) -> int:
+        """Another number after every start, every stop, and whenever a vehicle has come or gone."""
+        return self._era
+
+    def set_vehicles(self, entries: Any) -> tuple[list[str], list[str]]:
+        """Let those fly that `entries` say, as the parameter `vehicles` does; return who came and who went.
+
+        Who was there and still is flies on, as it would have, to the last bit. A new one whose script fails in init
+        goes again. Snapshots are forgotten. Raises ParameterError, UrdfError and ScriptError.
+        """
+        parameters = self.parameters.with_vehicles(entries)
+        wanted = {one.name: one for one in parameters.fleet}
+        came = [name for name in wanted if name not in self.vehicles]
+        went = [name for name in self.vehicles if name not in wanted]
+        for name in came:
+            load.script_path(self._script_of(wanted[name]))
+        for name in came:
+            self._add(wanted[name])
+        for name in went:
+            self._remove(name)
+        self.parameters = parameters
+        return came, went
+
+    def _add(self, parameters: VehicleParameters) -> None:
+        vehicle = self._setting.add(parameters)
+        try:
+            if self.running:
+                vehicle.load_script(self._script_of(parameters))
+        except BaseException:
+            self._setting.remove(parameters.name)
+            raise
+        finally:
+            self._changed_vehicles()
+
+    def _remove(self, name: str) -> None:
+        try:
+            if self.running:
+                self.vehicles[name].script.call("cleanup")
+        finally:
+            self._setting.remove(name)
+            self._changed_vehicles()
 
     # ---- start and stop
 
     def start(self, scene_file: str | None = None) -> None:
-        """Read scene and script from disk, and run the script's init; another scene file may take the last one's place.
+        """Read scene and scripts from disk, run the scripts' init; another scene file may take the last one's place.
 
-        Where scene or drone cannot be read, the last ones stay, stopped. Raises ParameterError, UrdfError,
+        Where scene or vehicles cannot be read, the last ones stay, stopped. Raises ParameterError, UrdfError,
         ScriptError.
         """
         self.stop()
-        parameters = self.parameters.in_scene(self.parameters.scene_file if scene_file is None else scene_file)
-        self._build(parameters)
+        self._rebuild(self.parameters.in_scene(self.parameters.scene_file if scene_file is None else scene_file))
         memory.give_back()
         self._run()
 
     def _run(self) -> None:
-        """Load the script and run its init."""
+        """Load the scripts and run their init."""
         self.running = True
-        pictures = {name: partial(self._look, camera) for name, camera in self.cameras.items()}
-        self.drone.load_script(self.script, lambda: self.time, pictures)
+        for vehicle in self._flying:
+            vehicle.load_script(self._script_of(vehicle.parameters))
+
+    def _script_of(self, vehicle: VehicleParameters) -> str:
+        has_own = vehicle.script != self.parameters.script
+        return vehicle.script if has_own or not self.script else self.script
 
     def stop(self) -> None:
-        """Run the script's cleanup, and restore the initial scene, at time 0. Raises ScriptError."""
+        """Run the scripts' cleanup, and restore the initial scene, at time 0. Raises ScriptError."""
         try:
             self._clean_up()
         finally:
-            self.world.begin_anew()
-            self.drone.reset()
-            self.scene.name_objects(self.drone.objects)
+            self._setting.begin_anew()
             self._begin()
 
     def close(self) -> None:
@@ -168,14 +229,21 @@ class Simulation:
             self.world.close()
 
     def _clean_up(self) -> None:
-        if not hasattr(self, "drone"):
-            return
-        try:
-            if self.running:
-                self.running = False
-                self.drone.script.call("cleanup")
-        finally:
-            self.drone.close()
+        """Call every script's cleanup, whatever the others' do. Raises the first ScriptError."""
+        was_running, self.running = self.running, False
+        errors: list[ScriptError] = []
+        for vehicle in self._flying:
+            try:
+                if was_running:
+                    vehicle.script.call("cleanup")
+            except ScriptError as error:
+                errors.append(error)
+            finally:
+                vehicle.close()
+        for second in errors[1:]:
+            LOG.error("%s", second)
+        if errors:
+            raise errors[0]
 
     # ---- stepping
 
@@ -191,76 +259,59 @@ class Simulation:
 
     def step(self) -> None:
         """Run one simulation step: actuation, dynamics, vision, sensing. Raises ScriptError and Diverged."""
-        drone = self.drone
-        drone.actuation()
-        self.world.advance(drone.wrenches(), self._sub_steps)
-        drone.refresh()
+        vehicles = self._flying
+        for vehicle in vehicles:
+            vehicle.actuation()
+        before = self._before_sub_step if self._any_in_sub_steps else None
+        wrenches = {vehicle.body.number: vehicle.wrench() for vehicle in vehicles}
+        self.world.advance(wrenches, self._sub_steps, before)
+        for vehicle in vehicles:
+            vehicle.body.refresh()
         self.steps += 1
-        self._check_state()
-        for camera in self.cameras.values():
-            camera.image = self._look(camera) if camera.watched() and self.steps % camera.every == 0 else None
-        drone.script.call("sensing")
+        self._whereabouts.check(vehicles, self.time)
+        for vehicle in vehicles:
+            vehicle.take_pictures(self.steps)
+        for vehicle in vehicles:
+            vehicle.script.call("sensing")
 
-    def _check_state(self) -> None:
-        """Raise Diverged where the drone is nowhere any more."""
-        (x, y, z), _, (vx, vy, vz), (wx, wy, wz) = self.drone.state
-        # Of a NaN no comparison is true. One sum, since this runs in every step.
-        if not -_NOWHERE < x + y + z + vx + vy + vz + wx + wy + wz < _NOWHERE:
-            where = f"position {x:g} {y:g} {z:g} m, velocity {vx:g} {vy:g} {vz:g} m/s"
-            raise Diverged(f"the simulation has diverged at t = {self.time:.2f} s: {where}; `start` begins anew")
-        if self._edge is not None and max(abs(x), abs(y)) > self._edge:
-            LOG.warning("the drone is past the edge of the floor, at %.2f %.2f m: nothing carries it there", x, y)
-            self._edge = None  # said once
+    def _before_sub_step(self) -> None:
+        for vehicle in self._flying:
+            vehicle.before_sub_step()
+
+    def look(self) -> None:
+        """Let cameras that are watched show what is there now, between two steps."""
+        for vehicle in self._flying:
+            vehicle.take_pictures(0)
+
+    # ---- snapshots and files
 
     def snapshot(self) -> Snapshot:
-        """Remember the exact dynamic state, the script's variables included, until the next start or stop."""
-        return Snapshot(self.steps, self.world.snapshot(), self.drone.remember(), self._runs)
+        """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
+        shared = self._setting.shared
+        parts: list[Any] = [shared.objects, shared.signals, *self._flying]
+        if self._drawings is not None:
+            parts.append(self._drawings)
+        return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Bring a snapshot back: the flight goes on as it did from there, to the last bit. May be repeated.
 
-        Raises ValueError for a snapshot of an earlier run.
+        Raises ValueError for a snapshot of another era.
         """
-        if snapshot.run != self._runs:
-            raise ValueError("the snapshot is of an earlier run: start and stop forget it")
+        if snapshot.era != self._era:
+            raise ValueError(
+                "the snapshot is of an earlier run: start, stop, and a vehicle that comes or goes, forget it"
+            )
         self.world.restore(snapshot.world)
         self.steps = snapshot.steps
-        snapshot.recall()
+        for recall in snapshot.recall:
+            recall()
 
     def forget(self, snapshot: Snapshot) -> None:
         """Free a snapshot; start and stop forget all of theirs."""
-        if snapshot.run == self._runs:
+        if snapshot.era == self._era:
             self.world.forget(snapshot.world)
 
-    # ---- pictures
-
-    def look(self) -> None:
-        """Let cameras that are watched show what is there now, between two steps."""
-        for camera in self.cameras.values():
-            camera.image = self._look(camera) if camera.watched() else None
-
-    def _look(self, camera: Camera) -> np.ndarray:
-        self.drone.show_blades()
-        return camera.look()
-
-
-class _Built:
-    """A scene and a drone in a world; where they cannot be built, the world is closed again."""
-
-    def __init__(self, parameters: Parameters, world: World):
-        """Fill an empty world. Raises ParameterError and UrdfError."""
-        self.parameters = parameters
-        self.world = world
-        try:
-            self.scene = Scene(parameters, world)
-            self.drone = Drone(parameters, world)
-            self.scene.name_objects(self.drone.objects)
-            if not world.is_finite():
-                raise ParameterError("the scene as it begins: a position or a velocity is not finite")
-            overlaps = world.overlaps()
-            if overlaps > MAX_OVERLAPS:
-                said = f"{overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may"
-                raise ParameterError(f"scene/objects: {said}")
-        except BaseException:
-            world.close()
-            raise
+    def save_scene(self, path: Path) -> None:
+        """Write floor, objects and vehicles as they stand now, as a scene file. Raises ParameterError and OSError."""
+        saving.save(path, self.parameters, self.scene, self._flying)

@@ -31,6 +31,7 @@ from drone_sim.files.resources import resolve
 from drone_sim.wording import shown
 
 MAX_OBJECTS = 1000
+_BESIDE = ("drone", "vehicles")  # what a scene file holds besides the scene
 _Scale = Annotated[Finite, Within(1e-6, 1e6)]
 
 
@@ -131,8 +132,10 @@ def read(file: str) -> dict[str, Any]:
 
 def from_content(content: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return what `read` does, of a scene file's content."""
-    scene = {key: value for key, value in content.items() if key != "drone"}  # unknown keys are refused with the rest
-    found = {"scene": scene, "drone": content.get("drone", {})}
+    scene = {
+        key: value for key, value in content.items() if key not in _BESIDE
+    }  # the unknown are refused with the rest
+    found = {"scene": scene, **{key: content[key] for key in _BESIDE if key in content}}
     find_files_beside(folder, found)
     return found
 
@@ -141,19 +144,21 @@ def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
     """Let the file names among `scene` and `drone` lead to files in a folder."""
     scene = values.get("scene")
     places = [scene.get("floor"), *_listed(scene.get("objects"))] if isinstance(scene, dict) else []
-    for place in (values.get("drone"), *places):
+    vehicles = values.get("vehicles")
+    entries = vehicles.values() if isinstance(vehicles, dict) else ()
+    for place in (values.get("drone"), *places, *entries):
         _find_beside(folder, place)
 
 
 def problem_in_file(problem: Problem) -> Problem | None:
     """Return a problem as the scene file has it, where floor and objects stand beside the drone; None for any other."""
-    if problem.location[:1] == ("drone",):
+    if problem.location[:1] in (("drone",), ("vehicles",)):
         return problem
     if problem.location[:1] != ("scene",):
         return None
     location, text = problem.location[1:], problem.text.replace("parameter scene/", "parameter ", 1)
     if len(location) == 1 and "unknown key" in text:
-        text = f"unknown key {readable_key(location)}; known are drone, floor, objects"
+        text = f"unknown key {readable_key(location)}; known are drone, floor, objects, vehicles"
     return problem._replace(location=location, text=text)
 
 
@@ -162,7 +167,9 @@ def _listed(objects: Any) -> list[Any]:
 
 
 def _find_beside(folder: Path, place: Any) -> None:
-    for key in ("file", "texture", "urdf"):
+    for key in ("file", "texture", "urdf", "script"):
         name = place.get(key) if isinstance(place, dict) else None
+        if key == "script" and not Path(str(name)).suffix:  # tutorial and target have none
+            continue
         if isinstance(name, str) and name and not hasattr(name, "given"):  # an alias is the same mapping once more
             place[key] = named_in(folder, name)

@@ -17,7 +17,7 @@ MAX_PIXELS = 4096 * 4096  # of all cameras together
 RESERVED_TOPICS = (
     *("cmd_vel", "set_pose", "initialpose", "push", "target_pose", "odom", "propellers", "joint_states"),
     *("command", "scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
-    *(f"view/{what}" for what in ("surroundings", "path", "height", "command", "state")),
+    *(f"view/{what}" for what in ("surroundings", "bodies", "path", "height", "command", "state")),
 )
 
 

@@ -5,31 +5,31 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from drone_sim.mechanics.frames import Vector
+from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.state import Pose, Twist, Vector3
-from drone_sim.run.parameters import Parameters
+from drone_sim.vehicles.parameters import EquipmentParameters
 
 
 class Refused(ValueError):
     """A command is a mistake; the message names the field, the value and what is allowed."""
 
 
-def twist(linear: Sequence[float], angular: Sequence[float], parameters: Parameters) -> Twist:
+def twist(linear: Sequence[float], angular: Sequence[float], parameters: EquipmentParameters) -> Twist:
     """Return the command (m/s, rad/s); raises Refused beyond cmd_vel_limits."""
     _check_within("linear", linear, parameters.cmd_vel_limits.linear, "m/s")
     _check_within("angular", angular, parameters.cmd_vel_limits.angular, "rad/s")
     return Twist(Vector3(*linear), Vector3(*angular))
 
 
-def push(force: Sequence[float], torque: Sequence[float], parameters: Parameters) -> tuple[Vector, Vector, float]:
-    """Return force (N), torque (N m) and how long a push lasts (s); raises Refused beyond the limits."""
+def push(force: Sequence[float], torque: Sequence[float], parameters: EquipmentParameters) -> Push:
+    """Return a push (N, N m), as long as the parameters say; raises Refused beyond the limits."""
     limits = parameters.push
     _check_within("force", force, limits.force_limit, "N")
     _check_within("torque", torque, limits.torque_limit, "N m")
-    return (force[0], force[1], force[2]), (torque[0], torque[1], torque[2]), limits.duration
+    return Push((force[0], force[1], force[2]), (torque[0], torque[1], torque[2]), limits.duration)
 
 
-def pose(position: Sequence[float], orientation: Sequence[float], parameters: Parameters) -> Pose:
+def pose(position: Sequence[float], orientation: Sequence[float], parameters: EquipmentParameters) -> Pose:
     """Return the pose (m, quaternion made exactly unit); raises Refused where nothing could stand."""
     limit = parameters.position_limit
     for axis, value, lowest in zip("xyz", position, (-limit, -limit, 0.0)):

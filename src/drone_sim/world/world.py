@@ -6,7 +6,7 @@ One thread owns it. Every call names its client, so several worlds can live in o
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -116,8 +116,12 @@ class World:
     def remove(self, body: int) -> None:
         """Take a body out of the world."""
         self.changes = next(_changes)
+        for number in self._snapshots:  # of other bodies than there will be
+            pybullet.removeState(number, physicsClientId=self._client)
+        self._snapshots.clear()
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
+        self._beginning.pop(body, None)
         self._undressed.pop(body, None)
         self._centres.pop(body, None)
         self._pictures.remove(body)
@@ -193,8 +197,11 @@ class World:
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
 
-    def advance(self, wrenches: Mapping[int, Wrench], sub_steps: int) -> None:
-        """Step `sub_steps` times, re-applying each body's wrench every time (PyBullet forgets it)."""
+    def advance(self, wrenches: Mapping[int, Wrench], sub_steps: int, before: Callable[[], None] | None = None) -> None:
+        """Step `sub_steps` times, re-applying each body's wrench every time (PyBullet forgets it).
+
+        `before` is called before each of these sub-steps, with everything where it is by then.
+        """
         # Local names and positional arguments: this loop is most of a step.
         client, in_world = self._client, pybullet.WORLD_FRAME
         where, push, turn, step = (
@@ -206,6 +213,8 @@ class World:
         known = self._centres  # in the first sub-step
         loads = [(body, wrench.force, wrench.torque_under) for body, wrench in wrenches.items()]
         for _ in range(sub_steps):
+            if before is not None:
+                before()
             for body, force, torque_under in loads:
                 centre, orientation = (known and known.get(body)) or where(body, client)
                 push(body, -1, force, centre, in_world, client)
@@ -215,13 +224,24 @@ class World:
         self._centres.clear()
         self.changes = next(_changes)
 
+    def push(self, body: int, wrench: Wrench) -> None:
+        """Let a wrench act on a body in the next sub-step, beside what `advance` applies."""
+        centre, orientation = self._centres.get(body) or pybullet.getBasePositionAndOrientation(body, self._client)
+        pybullet.applyExternalForce(body, -1, wrench.force, centre, pybullet.WORLD_FRAME, self._client)
+        torque = wrench.torque_under(orientation)
+        pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, self._client)
+
     def keep_beginning(self) -> None:
         """Remember where everything stands, at rest, for `begin_anew`: a snapshot would copy every mesh."""
         for body in self._inertial_frames:
-            joints = range(pybullet.getNumJoints(body, self._client))
-            angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in joints]
-            self._beginning[body] = (*pybullet.getBasePositionAndOrientation(body, self._client), angles)
+            self.keep_beginning_of(body)
         self.begin_anew()  # so that the first time is like every other, to the last bit
+
+    def keep_beginning_of(self, body: int) -> None:
+        """Remember where a body stands, at rest, for `begin_anew`."""
+        joints = range(pybullet.getNumJoints(body, self._client))
+        angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in joints]
+        self._beginning[body] = (*pybullet.getBasePositionAndOrientation(body, self._client), angles)
 
     def begin_anew(self) -> None:
         """Put everything where it stood, at rest."""

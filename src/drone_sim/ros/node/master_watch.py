@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import rosgraph
@@ -23,12 +24,16 @@ _USE_SIM_TIME = "/use_sim_time"
 class MasterWatch(threading.Thread):
     """Asks the master for its process number now and then; a daemon thread."""
 
-    def __init__(self) -> None:
-        """Remember the master that the node is registered with."""
+    def __init__(self, parameters: Callable[[], Iterable[str]]) -> None:
+        """Remember the master that the node is registered with.
+
+        `parameters` returns the names of those that the node has set, beside its own.
+        """
         super().__init__(name="master watch", daemon=True)
         self._done = threading.Event()
         self._master = rosgraph.Master(rospy.get_name())
         self._parameters: dict[str, Any] = {}
+        self._names = parameters
         self._pid = self._ask()
 
     def run(self) -> None:
@@ -57,7 +62,7 @@ class MasterWatch(threading.Thread):
             return None
 
     def _remember(self) -> None:
-        for name in (rospy.get_name(), _USE_SIM_TIME):
+        for name in (rospy.get_name(), _USE_SIM_TIME, *self._names()):
             with contextlib.suppress(rosgraph.MasterException):  # there is no such parameter
                 self._parameters[name] = self._master.getParam(name)
 

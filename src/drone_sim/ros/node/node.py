@@ -1,9 +1,8 @@
 """The node: the simulation at the pace of the clock, with ROS around it.
 
 Parameters (private): every key of config/drone.yaml.
-Topics, in the drone's namespace: see inputs.py, outputs.py, cameras.py and markers.py; services: services.py.
-/clock is published with use_sim_time: see step_time.py.
-Frames: world -> base_link, Track_base, and the cameras that have a `mount`; the rest comes from the URDF.
+Topics, in the namespace of each vehicle: see ros/vehicle; for rviz: see ros/rviz; services: services.py.
+/clock is published with use_sim_time: see step_time.py. Frames: see ros/vehicle/transforms.py.
 """
 
 from __future__ import annotations
@@ -16,25 +15,24 @@ import time
 from collections.abc import Callable
 
 import rospy
+from std_msgs.msg import String
 
 from drone_sim.mechanics.frames import position, to_euler
 from drone_sim.ros.node.ending import Ending
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.launch_arguments import check_launch_arguments
 from drone_sim.ros.node.master_watch import MasterWatch
-from drone_sim.ros.node.player import Player
 from drone_sim.ros.node.services import Services
 from drone_sim.ros.node.starting import init_node, read_parameters, reported, use_sim_time
 from drone_sim.ros.node.step_time import StepTime
-from drone_sim.ros.rviz.markers import Handles
+from drone_sim.ros.rviz.handles import Handles
 from drone_sim.ros.rviz.rviz_view import RvizView
-from drone_sim.ros.vehicle.cameras import CameraOutput
-from drone_sim.ros.vehicle.inputs import DroneInput
-from drone_sim.ros.vehicle.outputs import DroneOutput
+from drone_sim.ros.vehicle.fleet_topics import FleetTopics
 from drone_sim.ros.vehicle.script_topics import RosBackend
 from drone_sim.run.guardian import Guardian
 from drone_sim.run.pacing import Beat, Pacer
 from drone_sim.run.parameters import Parameters
+from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.errors import ScriptError
@@ -50,8 +48,11 @@ class Node:
         """Build the scene and advertise. Raises what Simulation raises."""
         self._parameters = parameters
         logging.getLogger("drone_sim").handlers = [_ToRosout()]
-        drone = parameters.drone.name
-        images = {rospy.resolve_name(f"{drone}/{camera.topic}") for camera in parameters.cameras.values()}
+        images = {
+            rospy.resolve_name(f"{vehicle.name}/{camera.topic}")
+            for vehicle in parameters.fleet
+            for camera in vehicle.cameras.values()
+        }
         drawings = Drawings()
         self.simulation = Simulation(
             parameters,
@@ -62,21 +63,18 @@ class Node:
             started=False,
         )
         self._time = StepTime(self.simulation, use_sim_time())
-        self.player = Player(self.simulation, self._step_and_show, self._time.simulated)
+        self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
+        self.player = Player(self.simulation, self._step_and_show, self._state.publish, self._time.simulated)
         self._inbox = Inbox()
         self._services = Services(self.player, self._inbox)
         factor = parameters.real_time_factor
         self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
-        inputs = DroneInput(self.simulation, self._inbox)
-        self._handles = Handles(self.simulation, inputs, self._inbox)
+        self._topics = FleetTopics(self.simulation, self._inbox)
+        self._handles = Handles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
-        self._cameras = [
-            CameraOutput(drone, camera, parameters.cameras[name]) for name, camera in self.simulation.cameras.items()
-        ]
-        self._output = DroneOutput(self.simulation)
         self._beat = Beat(_SOON, _SELDOM)
         self._shown = -1  # the world's changes, when it was shown
-        for camera in self.simulation.cameras.values():
+        for camera in self.simulation.drone.cameras.values():
             camera.look()  # the first picture takes long: compiling shaders must not make a step late
 
     def run(self, ending: Callable[[], bool] = lambda: False) -> None:
@@ -91,7 +89,7 @@ class Node:
             self.player.start()
         gc.collect()
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
-        commands = rospy.resolve_name(f"{self._parameters.drone.name}/cmd_vel")
+        commands = ", ".join(rospy.resolve_name(f"{name}/cmd_vel") for name in self.simulation.vehicles)
         rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; commands on {commands}")
         steps, seconds = 0, 0.0
         self._pacer.restart()
@@ -147,12 +145,14 @@ class Node:
     # ---- what is there
 
     def _show(self) -> None:
+        self._topics.follow()
         self._show_state()
-        self._output.publish_transforms(self._time.stamp)
+        self._topics.publish_transforms(self._time.stamp)
         self._show_to_eyes()
 
     def _show_at_the_same_time(self) -> None:
         """Show what has changed under a stamp that was used before: no transforms, which tf2 takes only once."""
+        self._topics.follow()
         self._time.end(at_once=True)
         if self.simulation.world.changes != self._shown:
             self.simulation.look()
@@ -160,19 +160,21 @@ class Node:
         self._show_to_eyes()
 
     def _show_state(self) -> None:
-        for camera in self._cameras:
-            camera.publish(self._time.stamp)
-        self._output.publish_state(self._time.stamp)
+        self._topics.publish_state(self._time.stamp)
         self._shown = self.simulation.world.changes
 
     def _show_to_eyes(self) -> None:
-        self._output.publish_command(self._time.stamp)
+        self._topics.publish_command(self._time.stamp)
         self._handles.update()
         self._view.update()
         if self._parameters.gui:
             track = self.simulation.drone.track
             self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
         self._beat.restart()
+
+    def descriptions(self) -> list[str]:
+        """Return the names of the parameters that hold the vehicles' URDFs."""
+        return [rospy.resolve_name(f"{name}/robot_description") for name in list(self.simulation.vehicles)]
 
     def close(self) -> None:
         """Run the script's cleanup, remove what rviz read, and free the world. Raises ScriptError."""
@@ -198,7 +200,7 @@ def main(guardian: Guardian) -> int:
     def run() -> None:
         check_launch_arguments()
         nodes.append(Node(read_parameters()))
-        MasterWatch().start()
+        MasterWatch(nodes[0].descriptions).start()
         nodes[0].run(ending.asked)
 
     status = reported(_NAME, run)

@@ -11,8 +11,8 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, Trig
 from drone_sim.files.resources import locate, package_path
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.paths import from_shell
-from drone_sim.ros.node.player import Player
 from drone_sim.run.parameters import ParameterError
+from drone_sim.run.player import Player
 from drone_sim.run.simulation import Snapshot
 from drone_sim.scripting.errors import ScriptError
 
@@ -20,9 +20,10 @@ _HOME = Path("~/.ros/drone_sim/scene.yaml")
 
 
 class Services:
-    """~start, ~stop, ~restart, ~step, ~pause; ~save_scene, ~load_scene; ~snapshot, ~restore.
+    """~start, ~stop, ~restart, ~step, ~pause; ~save_scene, ~load_scene; ~set_vehicles; ~snapshot, ~restore.
 
-    Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`.
+    Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`, the vehicles
+    are those of the private parameter `vehicles`.
     """
 
     def __init__(self, player: Player, inbox: Inbox):
@@ -30,7 +31,8 @@ class Services:
         self._player = player
         self._inbox = inbox
         self._snapshot: Snapshot | None = None
-        for name in ("start", "stop", "restart", "step", "save_scene", "load_scene", "snapshot", "restore"):
+        jobs = ("start", "stop", "restart", "step", "save_scene", "load_scene", "set_vehicles", "snapshot", "restore")
+        for name in jobs:
             rospy.Service(f"~{name}", Trigger, self._trigger(getattr(self, name)))
         rospy.Service("~pause", SetBool, self._on_pause)
 
@@ -73,13 +75,19 @@ class Services:
         path = locate(name) if name else _HOME.expanduser()
         if package_path() in path.resolve().parents:
             path = _HOME.expanduser()
-        simulation.scene.save(path, simulation.drone.matrix)
+        simulation.save_scene(path)
         return f"saved {path}"
 
     def load_scene(self) -> str:
         """Start anew in the scene of `scene_file`."""
         file = _scene_parameter()
         return f"{self._player.start(file)} in {file or 'the scene of the parameters'}"
+
+    def set_vehicles(self) -> str:
+        """Let those fly that the parameter `vehicles` says; who was there and still is flies on."""
+        came, went = self._player.simulation.set_vehicles(rospy.get_param("~vehicles", {}))
+        told = [f"{', '.join(names)} {verb}" for names, verb in ((came, "came"), (went, "went")) if names]
+        return "; ".join(told) or "all are as they were"
 
     def snapshot(self) -> str:
         """Remember the exact dynamic state."""

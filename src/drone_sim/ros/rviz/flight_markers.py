@@ -1,4 +1,4 @@
-"""How high the drone is, what it is told to do, how it fares, in rviz: `<drone>/view/height`, `command`, `state`."""
+"""How high the drone is, what it is told to do, how it fares, in rviz: `view/height`, `view/command`, `view/state`."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from visualization_msgs.msg import Marker
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.state import State, Twist
-from drone_sim.ros.node.player import Player
-from drone_sim.ros.rviz.marker_topic import EYES, WORDS, MarkerTopic, beside, shape
+from drone_sim.ros.rviz.marker_topic import EYES, WORDS, MarkerTopic, beside, namespace, shape
 from drone_sim.run.pacing import Throttle
+from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.vehicle import Vehicle
 
 _ABOVE_FLOOR = 0.004  # m, so that the shadow is not hidden by it
 _SHADOW = 0.24, 0.05  # m, its radius, and what a metre of height adds to it
@@ -38,71 +39,87 @@ class HeightMarkers:
     """A soft shadow straight below, and a plumb line with a tick for every half metre."""
 
     def __init__(self, simulation: Simulation):
-        """Advertise in the drone's namespace."""
+        """Advertise."""
         self._simulation = simulation
-        self._topic = MarkerTopic(f"{simulation.drone.name}/view/height", EYES)
-        self._shown: State | None = None
+        self._topic = MarkerTopic(f"{namespace(simulation)}/view/height", EYES)
+        self._shown: list[State] = []
 
     def update(self) -> None:
-        """Publish where the drone has moved, if anybody listens."""
-        state = self._simulation.drone.state
-        if state != self._shown and self._topic.due():
-            self._shown = state
-            above = state.position[2] > 0
-            self._topic.show([_shadow(state), beside(state, _plumb_line(state.position[2]))] if above else [None, None])
+        """Publish where a vehicle has moved, if anybody listens."""
+        vehicles = self._simulation.vehicles.values()
+        states = [vehicle.state for vehicle in vehicles]
+        if states != self._shown and self._topic.due():
+            self._shown = states
+            self._topic.show([marker for vehicle in vehicles for marker in _below(vehicle)])
 
 
 class CommandMarkers:
-    """An arrow for the velocity that is commanded, and one around the drone for the turn."""
+    """An arrow for the velocity that is commanded, and one around the vehicle for the turn."""
 
     def __init__(self, simulation: Simulation):
-        """Advertise in the drone's namespace."""
+        """Advertise."""
         self._simulation = simulation
-        self._topic = MarkerTopic(f"{simulation.drone.name}/view/command", EYES)
-        self._shown: tuple[Twist, frames.Matrix, State] | None = None
+        self._topic = MarkerTopic(f"{namespace(simulation)}/view/command", EYES)
+        self._shown: list[tuple[Twist, frames.Matrix, State]] = []
 
     def update(self) -> None:
-        """Publish command and place where they have changed, if anybody listens."""
-        drone = self._simulation.drone
-        seen = command, base, state = drone.command, drone.track, drone.state
+        """Publish commands and places where they have changed, if anybody listens."""
+        vehicles = self._simulation.vehicles.values()
+        seen = [(vehicle.command, vehicle.track, vehicle.state) for vehicle in vehicles]
         if seen != self._shown and self._topic.due():
             self._shown = seen
-            markers = [_arrow(command, base), _turn(command, base)]
-            self._topic.show([beside(state, marker) if marker else None for marker in markers])
+            self._topic.show([marker for vehicle in vehicles for marker in _commanded(vehicle)])
 
 
 class StateText:
-    """What the simulation does, its time, and the drone's height and speed, above the drone."""
+    """What the simulation does, its time, and the vehicle's height and speed, above each."""
 
     def __init__(self, simulation: Simulation, player: Player):
-        """Advertise in the drone's namespace."""
+        """Advertise."""
         self._simulation = simulation
         self._player = player
-        self._topic = MarkerTopic(f"{simulation.drone.name}/view/state", EYES)
+        self._topic = MarkerTopic(f"{namespace(simulation)}/view/state", EYES)
         self._words = Throttle(WORDS)
-        self._text = ""
-        self._shown: tuple[str, State] | None = None
+        self._texts: dict[str, str] = {}
+        self._shown: list[tuple[str, State]] = []
 
     def update(self) -> None:
-        """Publish text and place where they have changed, if anybody listens."""
-        state = self._simulation.drone.state
+        """Publish texts and places where they have changed, if anybody listens."""
         if not self._topic.due():
             return
+        vehicles = self._simulation.vehicles.values()
         if self._words.passes():
-            self._text = self._say()
-        if (self._text, state) != self._shown:
-            self._shown = self._text, state
-            marker = shape(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
-            marker.text, marker.pose.position.z = self._text, _TEXT_ABOVE
-            self._topic.show([beside(state, marker)])
+            self._texts = {vehicle.name: self._say(vehicle) for vehicle in vehicles}
+        seen = [(self._texts.get(vehicle.name, ""), vehicle.state) for vehicle in vehicles]
+        if seen != self._shown:
+            self._shown = seen
+            self._topic.show([_text(vehicle, text) for vehicle, (text, _) in zip(vehicles, seen)])
 
-    def _say(self) -> str:
-        simulation, state = self._simulation, self._simulation.drone.state
+    def _say(self, vehicle: Vehicle) -> str:
+        simulation, state = self._simulation, vehicle.state
         if not simulation.running:
             return "stopped"
         doing = "paused" if self._player.paused else "flying"
         speed = math.hypot(*state.linear_velocity)
-        return f"{doing}  {simulation.time:.1f} s\nheight {state.position[2]:.2f} m  speed {speed:.2f} m/s"
+        who = "" if vehicle.parameters.is_alone else f"{vehicle.name}  "
+        return f"{who}{doing}  {simulation.time:.1f} s\nheight {state.position[2]:.2f} m  speed {speed:.2f} m/s"
+
+
+def _text(vehicle: Vehicle, text: str) -> Marker:
+    marker = shape(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
+    marker.text, marker.pose.position.z = text, _TEXT_ABOVE
+    return beside(vehicle, marker)
+
+
+def _below(vehicle: Vehicle) -> list[Marker | None]:
+    state = vehicle.state
+    height = state.position[2]
+    return [_shadow(state), beside(vehicle, _plumb_line(height))] if height > 0 else [None, None]
+
+
+def _commanded(vehicle: Vehicle) -> list[Marker | None]:
+    markers = [_arrow(vehicle.command, vehicle.track), _turn(vehicle.command, vehicle.track)]
+    return [beside(vehicle, marker) if marker else None for marker in markers]
 
 
 def _shadow(state: State) -> Marker:

@@ -10,13 +10,19 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.state import State
 from drone_sim.ros.vehicle.messages import WORLD
-from drone_sim.ros.vehicle.outputs import BASE_LINK
 from drone_sim.run.pacing import Throttle
+from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.vehicle import Vehicle
 
 EYES = 0.03  # s of real time, between two messages about what moves
 WORDS = 0.19  # s, between two texts: numbers that change faster cannot be read
+
+
+def namespace(simulation: Simulation) -> str:
+    """Return where the topics on all that flies are: in the only vehicle's namespace, or in the node's."""
+    drone = simulation.drone
+    return drone.name if drone.parameters.is_alone else str(rospy.get_name())
 
 
 class MarkerTopic:
@@ -27,6 +33,7 @@ class MarkerTopic:
         self._name = topic.rpartition("/")[2]
         self._throttle = Throttle(period)
         self._publisher = rospy.Publisher(topic, MarkerArray, queue_size=1, latch=True)
+        self._shown: list[Marker] = []
 
     @property
     def watched(self) -> bool:
@@ -38,12 +45,15 @@ class MarkerTopic:
         return self.watched and self._throttle.passes()
 
     def show(self, markers: Sequence[Marker | None]) -> None:
-        """Publish; None takes away what may be shown in that place."""
-        message = MarkerArray([marker or Marker(action=Marker.DELETE) for marker in markers])
-        for number, marker in enumerate(message.markers):
+        """Publish; None takes away what may be shown in that place, and so does a shorter list at its end."""
+        shown = [marker or Marker(action=Marker.DELETE) for marker in markers]
+        shown += [Marker(action=Marker.DELETE) for _ in self._shown[len(shown) :]]
+        for number, marker in enumerate(shown):
             marker.header.frame_id, marker.id = marker.header.frame_id or WORLD, number
-            marker.ns = marker.ns or self._name
-        self._publisher.publish(message)
+            before = self._shown[number].ns if number < len(self._shown) else ""
+            marker.ns = marker.ns or (marker.action == Marker.DELETE and before) or self._name
+        self._shown = shown
+        self._publisher.publish(MarkerArray(shown))
 
 
 def shape(kind: int, rgba: Sequence[float], scale: Sequence[float], points: Sequence[Sequence[float]] = ()) -> Marker:
@@ -53,14 +63,14 @@ def shape(kind: int, rgba: Sequence[float], scale: Sequence[float], points: Sequ
     return marker
 
 
-def beside(state: State, marker: Marker) -> Marker:
-    """Let a marker, which is given in world axes from the drone's place, follow the drone in rviz.
+def beside(vehicle: Vehicle, marker: Marker) -> Marker:
+    """Let a marker, which is given in world axes from the vehicle's place, follow the vehicle in rviz.
 
-    It hangs on the drone's frame, turned back upright: rviz shows that where it is by now, and a marker in the
+    It hangs on the vehicle's frame, turned back upright: rviz shows that where it is by now, and a marker in the
     world where it was when it was sent.
     """
-    back = frames.invert(frames.from_quaternion((0, 0, 0), state.orientation))
-    marker.header.frame_id, marker.frame_locked = BASE_LINK, True
+    back = frames.invert(frames.from_quaternion((0, 0, 0), vehicle.state.orientation))
+    marker.header.frame_id, marker.frame_locked = vehicle.parameters.base_link, True
     place = marker.pose.position
     marker.pose.position = Point(*frames.rotate(back, (place.x, place.y, place.z)))
     marker.pose.orientation = Quaternion(*frames.to_quaternion(back))

@@ -1,4 +1,4 @@
-"""Where the drone has flown, in rviz: `<drone>/view/path`."""
+"""Where the vehicles have flown, in rviz: `view/path`."""
 
 from __future__ import annotations
 
@@ -7,58 +7,80 @@ import math
 from visualization_msgs.msg import Marker
 
 from drone_sim.mechanics.frames import Vector
-from drone_sim.ros.rviz.marker_topic import MarkerTopic, shape
+from drone_sim.ros.rviz.marker_topic import MarkerTopic, namespace, shape
 from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.vehicle import Vehicle
 
 _PERIOD = 0.1  # s of real time
 _SPACING = 0.05  # m between two points
 _LENGTH = 1500  # points; the oldest go
 _WIDTH = 0.012  # m
 _ORANGE = (1.0, 0.42, 0.0, 1.0)
+_Seen = tuple[list[int], Vector]
 
 
 class PathMarkers:
-    """Shows the flight since the last start, load or stop as lines, drawn while somebody listens.
-
-    Where the drone was put somewhere else, a line ends and another begins.
-    """
+    """Shows the flights since the last start, load or stop as lines, drawn while somebody listens."""
 
     def __init__(self, simulation: Simulation):
-        """Advertise in the drone's namespace."""
+        """Advertise."""
         self._simulation = simulation
-        self._topic = MarkerTopic(f"{simulation.drone.name}/view/path", _PERIOD)
+        self._topic = MarkerTopic(f"{namespace(simulation)}/view/path", _PERIOD)
         self._run = -1
-        self._jumps: int | None = None  # None where nobody has looked for a while
-        self._lines: list[list[Vector]] = []
-        self._shown: tuple[int, list[int], Vector | None] = (-1, [], None)
+        self._paths: dict[str, _Path] = {}
+        self._shown: list[_Seen] = []
 
     def update(self) -> None:
-        """Follow the drone, and publish what is new, if anybody listens."""
+        """Follow the vehicles, and publish what is new, if anybody listens."""
+        vehicles = self._simulation.vehicles
+        if self._run != self._simulation.run or not self._topic.watched:
+            self._paths = {} if self._run != self._simulation.run else self._paths
+            self._run = self._simulation.run
+            for path in self._paths.values():
+                path.interrupt()
         if not self._topic.watched:
-            self._jumps = None
             return
-        place = self._follow()
-        state = self._run, [len(line) for line in self._lines], place
-        if state != self._shown and self._topic.due():
-            self._shown = state
-            lines = [*self._lines[:-1], [*self._lines[-1], place]]
-            clear = Marker(action=Marker.DELETEALL)
-            self._topic.show([clear, *(_line(points) for points in lines if len(points) > 1)])
+        self._paths = {name: self._paths.get(name) or _Path() for name in vehicles}
+        for name, vehicle in vehicles.items():
+            self._paths[name].follow(vehicle)
+        seen = [path.seen for path in self._paths.values()]
+        if seen != self._shown and self._topic.due():
+            self._shown = seen
+            lines = [line for path in self._paths.values() for line in path.lines() if len(line) > 1]
+            self._topic.show([Marker(action=Marker.DELETEALL), *map(_line, lines)])
 
-    def _follow(self) -> Vector:
-        """Return where the drone is; keep it where that is some way from the last point."""
-        drone, run = self._simulation.drone, self._simulation.run
-        place = drone.state.position
-        if run != self._run:
-            self._lines.clear()
-        if run != self._run or drone.jumps != self._jumps:
+
+class _Path:
+    """Where one vehicle has flown. Where it was put somewhere else, a line ends and another begins."""
+
+    def __init__(self) -> None:
+        self._lines: list[list[Vector]] = []
+        self._jumps: int | None = None  # None where nobody has looked for a while
+        self._place: Vector = (0.0, 0.0, 0.0)
+
+    @property
+    def seen(self) -> _Seen:
+        """What changes when it looks different."""
+        return [len(line) for line in self._lines], self._place
+
+    def lines(self) -> list[list[Vector]]:
+        """Return its lines, the last of them to where the vehicle is now."""
+        return [*self._lines[:-1], [*self._lines[-1], self._place]]
+
+    def interrupt(self) -> None:
+        """Begin another line the next time."""
+        self._jumps = None
+
+    def follow(self, vehicle: Vehicle) -> None:
+        """Keep where it is, where that is some way from the last point."""
+        self._place = vehicle.state.position
+        if vehicle.jumps != self._jumps:
             self._lines = [line for line in self._lines if len(line) > 1]
-            self._lines.append([place])
-        elif math.dist(place, self._lines[-1][-1]) > _SPACING:
-            self._lines[-1].append(place)
+            self._lines.append([self._place])
+        elif math.dist(self._place, self._lines[-1][-1]) > _SPACING:
+            self._lines[-1].append(self._place)
             self._shorten()
-        self._run, self._jumps = run, drone.jumps
-        return place
+        self._jumps = vehicle.jumps
 
     def _shorten(self) -> None:
         if sum(map(len, self._lines)) > _LENGTH:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from drone_sim.ros.node.player import Player
+from drone_sim.ros.rviz.bodies import Bodies
 from drone_sim.ros.rviz.drawing_markers import DrawingMarkers
 from drone_sim.ros.rviz.flight_markers import CommandMarkers, HeightMarkers, StateText
+from drone_sim.ros.rviz.marker_topic import namespace
 from drone_sim.ros.rviz.path_markers import PathMarkers
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.ros.rviz.scene_markers import SceneMarkers
 from drone_sim.ros.rviz.surroundings import Surroundings
+from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
 
@@ -22,7 +24,8 @@ class RvizView:
         self._markers = (
             Surroundings(simulation, self._files),
             SceneMarkers(simulation, self._files),
-            DrawingMarkers(simulation.drone.name, drawings),
+            Bodies(simulation, self._files),
+            DrawingMarkers(namespace(simulation), drawings),
             PathMarkers(simulation),
             HeightMarkers(simulation),
             CommandMarkers(simulation),

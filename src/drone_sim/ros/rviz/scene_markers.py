@@ -13,6 +13,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from drone_sim.mechanics import frames
 from drone_sim.render.mesh import WHITE
 from drone_sim.ros.rviz import boxes
+from drone_sim.ros.rviz.marker_topic import namespace
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.ros.vehicle.messages import WORLD
 from drone_sim.run.pacing import Throttle
@@ -36,7 +37,7 @@ class SceneMarkers:
         self._files = files
         self._throttle = Throttle(_PERIOD)
         self._shown: tuple[list[Visual], np.ndarray] | None = None
-        name = f"{simulation.drone.name}/scene"
+        name = f"{namespace(simulation)}/scene"
         self._publisher = rospy.Publisher(name, MarkerArray, queue_size=1, latch=True)
 
     def update(self) -> None:
@@ -49,22 +50,23 @@ class SceneMarkers:
         self._shown = visuals, poses
         markers = [Marker(action=Marker.DELETEALL)]
         for visual, pose in zip(visuals, poses):
-            markers += self._textured(visual, tuple(pose[:3].ravel().tolist()))
+            markers += markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
         for number, marker in enumerate(markers):
             marker.header.frame_id, marker.ns, marker.id = WORLD, "scene", number
             marker.frame_locked = True
         self._publisher.publish(MarkerArray(markers))
 
-    def _textured(self, visual: Visual, matrix: frames.Matrix) -> Sequence[Marker]:
-        """Return what rviz makes of one visual, with its texture where the cameras show one, too."""
-        if visual.texture and visual.shape in _TEXTURED:
-            try:
-                marker = _marker(Marker.MESH_RESOURCE, matrix, (1, 1, 1), _FROM_ITS_FILE)
-                marker.mesh_resource, marker.mesh_use_embedded_materials = self._files.resource(visual, _GLOW), True
-                return [marker]
-            except (ValueError, OSError) as error:
-                rospy.logwarn_throttle(5, f"rviz gets an object without texture: {error}")
-        return _markers(visual, matrix)
+
+def markers_of(visual: Visual, matrix: frames.Matrix, files: RvizMeshes) -> Sequence[Marker]:
+    """Return what rviz makes of one visual at `matrix`, with its texture where the cameras show one, too."""
+    if visual.texture and visual.shape in _TEXTURED:
+        try:
+            marker = _marker(Marker.MESH_RESOURCE, matrix, (1, 1, 1), _FROM_ITS_FILE)
+            marker.mesh_resource, marker.mesh_use_embedded_materials = files.resource(visual, _GLOW), True
+            return [marker]
+        except (ValueError, OSError) as error:
+            rospy.logwarn_throttle(5, f"rviz gets an object without texture: {error}")
+    return _markers(visual, matrix)
 
 
 def _markers(visual: Visual, matrix: frames.Matrix) -> Sequence[Marker]:

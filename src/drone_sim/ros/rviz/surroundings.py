@@ -13,7 +13,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from drone_sim.render import sky
-from drone_sim.ros.rviz.marker_topic import WORDS, MarkerTopic, shape
+from drone_sim.ros.rviz.marker_topic import WORDS, MarkerTopic, namespace, shape
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.scene import Scene
@@ -42,7 +42,7 @@ class Surroundings:
         self._simulation = simulation
         self._files = files
         self._shown: Scene | None = None
-        self._topic = MarkerTopic(f"{simulation.drone.name}/view/surroundings", WORDS)
+        self._topic = MarkerTopic(f"{namespace(simulation)}/view/surroundings", WORDS)
 
     def update(self) -> None:
         """Publish what is new, if anybody listens."""

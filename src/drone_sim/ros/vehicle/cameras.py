@@ -11,8 +11,9 @@ from sensor_msgs.msg import CameraInfo, Image
 
 from drone_sim.ros.vehicle import messages
 from drone_sim.ros.vehicle.compression import CompressedPublisher
-from drone_sim.run.parameters import CameraParameters
 from drone_sim.sensors.camera import Camera
+from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.vehicles.parameters import VehicleParameters
 
 _ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
 
@@ -20,18 +21,28 @@ _ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
 class CameraOutput:
     """One camera: `<topic>`, `<topic>/compressed` (colour), and camera_info in the same namespace."""
 
-    def __init__(self, namespace: str, camera: Camera, parameters: CameraParameters):
-        """Advertise in the drone's namespace; the camera takes pictures only while somebody listens."""
-        topic = f"{namespace}/{parameters.topic}"
+    def __init__(self, vehicle: VehicleParameters, camera: Camera, parameters: CameraParameters):
+        """Advertise in the vehicle's namespace; the camera takes pictures only while somebody listens."""
+        topic = f"{vehicle.name}/{parameters.topic}"
+        self._frame = f"{vehicle.frame_prefix}{parameters.frame}"
         info_topic = topic.rpartition("/")[0] + "/camera_info"  # image_transport's rule
-        self._camera = camera
-        self._parameters = parameters
         self._bridge = CvBridge()
         self._image = rospy.Publisher(topic, Image, queue_size=1)
         self._compressed = CompressedPublisher(topic) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
-        self._info = messages.camera_info(camera.intrinsics, parameters.frame)
+        self._info = messages.camera_info(camera.intrinsics, self._frame)
+        self.follow(camera)
+
+    def follow(self, camera: Camera) -> None:
+        """Publish what this camera sees from now on; it has taken the place of the last one."""
+        self._camera = camera
         camera.watched = self._watched
+
+    def close(self) -> None:
+        """Advertise no more."""
+        for publisher in (self._image, self._compressed, self._info_publisher):
+            if publisher is not None:
+                publisher.unregister()
 
     def _watched(self) -> bool:
         compressed = self._compressed
@@ -46,7 +57,7 @@ class CameraOutput:
             self._publish_image(stamp(), self._camera.image)
 
     def _publish_image(self, stamp: rospy.Time, image: np.ndarray) -> None:
-        frame = self._parameters.frame
+        frame = self._frame
         if self._image.get_num_connections():
             message = self._bridge.cv2_to_imgmsg(image, _ENCODINGS[self._camera.kind])
             message.header.stamp, message.header.frame_id = stamp, frame

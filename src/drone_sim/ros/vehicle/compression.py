@@ -68,6 +68,7 @@ class CompressedPublisher:
         self._server = Server(_plugin_parameters(), self._keep, topic)
         self._waiting: deque[_Picture] = deque(maxlen=1)
         self._came = threading.Event()
+        self._open = True
         threading.Thread(target=self._work, name=f"{topic} encoder", daemon=True).start()
 
     def _keep(self, settings: dict[str, Any], _level: int) -> dict[str, Any]:
@@ -81,6 +82,14 @@ class CompressedPublisher:
         """Return how many listen."""
         return self._publisher.get_num_connections()
 
+    def unregister(self) -> None:
+        """Advertise no more."""
+        self._open = False
+        self._came.set()
+        for publisher in (self._publisher, self._server.descr_topic, self._server.update_topic):
+            publisher.unregister()
+        self._server.set_service.shutdown()
+
     def publish(self, stamp: rospy.Time, frame: str, image: np.ndarray) -> None:
         """Have an RGB picture (height, width, 3) encoded and published if somebody listens; it must not change."""
         if self.get_num_connections():
@@ -88,7 +97,7 @@ class CompressedPublisher:
             self._came.set()
 
     def _work(self) -> None:
-        while True:
+        while self._open:
             self._came.wait()
             self._came.clear()
             while self._waiting:

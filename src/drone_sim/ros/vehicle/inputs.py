@@ -1,8 +1,9 @@
-"""What a drone listens to. Callbacks run in rospy's threads: they check, and leave a job for the next step."""
+"""What a vehicle listens to. Callbacks run in rospy's threads: they check, and leave a job for the next step."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import rospy
 from geometry_msgs.msg import Pose as PoseMessage
@@ -12,90 +13,93 @@ from geometry_msgs.msg import Twist as TwistMessage
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.vehicle.messages import WORLD
-from drone_sim.run.parameters import Parameters
+from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
-from drone_sim.vehicles.drone_objects import TARGET
+from drone_sim.vehicles.parameters import EquipmentParameters, VehicleParameters
+from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.wording import shown
 
+_QUIET = 5.0  # s, between two warnings
+_Job = Callable[[Vehicle], Any]
 
-class DroneInput:
-    """The commands of one drone, in its namespace."""
 
-    def __init__(self, simulation: Simulation, inbox: Inbox):
+class VehicleInputs:
+    """The commands of one vehicle, in its namespace."""
+
+    def __init__(self, simulation: Simulation, parameters: VehicleParameters, inbox: Inbox):
         """Subscribe."""
         self._simulation = simulation
-        self._parameters: Parameters = simulation.parameters
+        self._name, self._parameters = parameters.name, parameters
         self._inbox = inbox
-        for topic, kind, callback in (
-            ("cmd_vel", TwistMessage, self._on_twist),
-            ("set_pose", PoseStamped, self._on_pose),
-            ("initialpose", PoseWithCovarianceStamped, self._on_pose_estimate),
-            ("target_pose", PoseStamped, self._on_target),
-            ("push", WrenchStamped, self._on_push),
-        ):
-            name = f"{simulation.drone.name}/{topic}"
-            rospy.Subscriber(name, kind, callback, queue_size=1, tcp_nodelay=True)
+        self._subscribers = [
+            rospy.Subscriber(f"{self._name}/{topic}", kind, self._taking(topic, read), queue_size=1, tcp_nodelay=True)
+            for topic, kind, read in (
+                ("cmd_vel", TwistMessage, self._twist),
+                ("set_pose", PoseStamped, self._pose),
+                ("initialpose", PoseWithCovarianceStamped, self._pose_estimate),
+                ("target_pose", PoseStamped, self._target),
+                ("push", WrenchStamped, self._push),
+            )
+        ]
 
-    def _on_twist(self, message: TwistMessage) -> None:
-        try:
-            twist = checks.twist(_numbers(message.linear), _numbers(message.angular), self._parameters)
-        except checks.Refused as refused:
-            rospy.logwarn_throttle(5, f"cmd_vel refused, the last good one is kept: {refused}")
-            return
-        self._inbox.put(lambda: self._simulation.drone.receive(twist))
+    def close(self) -> None:
+        """Listen no more."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
 
-    def _on_pose(self, message: PoseStamped) -> None:
-        try:
-            pose = self.checked(message.header.frame_id, message.pose)
-        except checks.Refused as refused:
-            rospy.logwarn_throttle(5, f"set_pose refused: {refused}")
-            return
-        self._inbox.put(lambda: self._simulation.drone.move(pose))
+    def _taking(self, topic: str, read: Callable[[Any], _Job]) -> Callable[[Any], None]:
+        """Return a callback that leaves what a message asks for to the simulation's thread, or says why not."""
+        kept = ", the last good one is kept" if topic == "cmd_vel" else ""
+        throttle = Throttle(_QUIET)
 
-    def _on_pose_estimate(self, message: PoseWithCovarianceStamped) -> None:
+        def take(message: Any) -> None:
+            try:
+                job = read(message)
+            except checks.Refused as refused:
+                if throttle.passes():
+                    rospy.logwarn(f"{topic} refused{kept}: {refused}")
+                return
+            self._inbox.put(lambda: self._carry_out(job))
+
+        return take
+
+    def _carry_out(self, job: _Job) -> None:
+        vehicle = self._simulation.vehicles.get(self._name)
+        if vehicle is not None:  # it may have gone meanwhile
+            job(vehicle)
+
+    # ---- what a message asks for; raise Refused
+
+    def _twist(self, message: TwistMessage) -> _Job:
+        twist = checks.twist(_numbers(message.linear), _numbers(message.angular), self._parameters)
+        return lambda vehicle: vehicle.receive(twist)
+
+    def _pose(self, message: PoseStamped) -> _Job:
+        pose = checked_pose(message.header.frame_id, message.pose, self._parameters)
+        return lambda vehicle: vehicle.move(pose)
+
+    def _pose_estimate(self, message: PoseWithCovarianceStamped) -> _Job:
         """Take rviz's 2D Pose Estimate: a place on the floor, a yaw; the height stays as it is."""
-        try:
-            (x, y, _), turn = self.checked(message.header.frame_id, message.pose.pose)
-        except checks.Refused as refused:
-            rospy.logwarn_throttle(5, f"initialpose refused: {refused}")
-            return
+        (x, y, _), turn = checked_pose(message.header.frame_id, message.pose.pose, self._parameters)
+        return lambda vehicle: vehicle.move(Pose((x, y, vehicle.state.position[2]), turn))
 
-        def move() -> None:
-            drone = self._simulation.drone
-            drone.move(Pose((x, y, drone.state.position[2]), turn))
+    def _target(self, message: PoseStamped) -> _Job:
+        pose = checked_pose(message.header.frame_id, message.pose, self._parameters)
+        return lambda vehicle: vehicle.move_target(pose)
 
-        self._inbox.put(move)
-
-    def _on_target(self, message: PoseStamped) -> None:
-        try:
-            pose = self.checked(message.header.frame_id, message.pose)
-        except checks.Refused as refused:
-            rospy.logwarn_throttle(5, f"target_pose refused: {refused}")
-            return
-        self._inbox.put(lambda: move_target(self._simulation, pose))
-
-    def _on_push(self, message: WrenchStamped) -> None:
-        try:
-            _check_frame(message.header.frame_id)
-            force, torque = _numbers(message.wrench.force), _numbers(message.wrench.torque)
-            push = checks.push(force, torque, self._parameters)
-        except checks.Refused as refused:
-            rospy.logwarn_throttle(5, f"push refused: {refused}")
-            return
-        self._inbox.put(lambda: self._simulation.drone.push(*push))
-
-    def checked(self, frame: str, message: PoseMessage) -> Pose:
-        """Return a pose that came in a frame; raises Refused."""
-        _check_frame(frame)
-        turn = message.orientation
-        return checks.pose(_numbers(message.position), (turn.x, turn.y, turn.z, turn.w), self._parameters)
+    def _push(self, message: WrenchStamped) -> _Job:
+        _check_frame(message.header.frame_id)
+        force, torque = _numbers(message.wrench.force), _numbers(message.wrench.torque)
+        push = checks.push(force, torque, self._parameters)
+        return lambda vehicle: vehicle.push(*push)
 
 
-def move_target(simulation: Simulation, pose: Pose) -> None:
-    """Put the green sphere, DronePosition, there."""
-    objects = simulation.drone.objects
-    objects[objects.handle(TARGET)].put(pose.matrix)
+def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters) -> Pose:
+    """Return a pose that came in a frame; raises Refused."""
+    _check_frame(frame)
+    turn = message.orientation
+    return checks.pose(_numbers(message.position), (turn.x, turn.y, turn.z, turn.w), parameters)
 
 
 def _check_frame(frame: str) -> None:

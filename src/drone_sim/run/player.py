@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
-import rospy
-from std_msgs.msg import String
-
-from drone_sim.run.simulation import Diverged, Simulation
+from drone_sim.run.simulation import Simulation
+from drone_sim.run.whereabouts import Diverged
 from drone_sim.scripting.errors import ScriptError
+
+_LOG = logging.getLogger(__name__)
+_LOG.setLevel(logging.INFO)
 
 
 class Player:
     """Plays a simulation; the thread that owns the simulation calls all of this.
 
-    The latched topic ~state tells at once whether it is `flying`, `paused` or `stopped`.
+    `tell` is called at once with what it does from now on: `flying`, `paused` or `stopped`.
     """
 
-    def __init__(self, simulation: Simulation, step: Callable[[], None], simulated_time: bool):
+    def __init__(
+        self, simulation: Simulation, step: Callable[[], None], tell: Callable[[str], None], simulated_time: bool
+    ):
         """Begin stopped. `step` runs one step and shows it.
 
-        `simulated_time`: the node publishes /clock, so that others wait when it stands still.
+        `simulated_time`: others go by the simulation's clock, and wait when it stands still.
         """
         self.simulation = simulation
         self._step = step
         self.paused = False
         self.begun = False  # since this was last set to False
         self._simulated_time = simulated_time
-        self._publisher = rospy.Publisher("~state", String, queue_size=10, latch=True)
+        self._tell = tell
         self._told = ""
         self._tell_state()
 
@@ -35,7 +39,7 @@ class Player:
         state = "flying" if self.playing else "paused" if self.simulation.running else "stopped"
         if state != self._told:
             self._told = state
-            self._publisher.publish(state)
+            self._tell(state)
 
     @property
     def playing(self) -> bool:
@@ -49,7 +53,7 @@ class Player:
         self.simulation.look()  # meshes and textures are read now, which the first step would be late for
         self.begun = True
         scene = self.simulation.parameters.scene_file
-        rospy.loginfo(f"started{f' in {scene}' if scene else ''}")
+        _LOG.info(f"started{f' in {scene}' if scene else ''}")
         return "started"
 
     def stop(self) -> str:
@@ -69,7 +73,7 @@ class Player:
             try:
                 self.stop()
             except ScriptError as error:
-                rospy.logerr(f"script error: {error}")
+                _LOG.error(f"script error: {error}")
         return self.start()
 
     def pause(self, on: bool) -> str:
@@ -81,7 +85,7 @@ class Player:
         if on:
             self._say_that_the_clock_stands("paused")
         else:
-            rospy.loginfo("goes on")
+            _LOG.info("goes on")
         return f"{'paused' if on else 'goes on'} at t = {self.simulation.time:.2f} s"
 
     def one_step(self) -> str:
@@ -104,11 +108,11 @@ class Player:
         try:
             action()
         except (ScriptError, Diverged) as error:
-            rospy.logerr(f"script error: {error}" if isinstance(error, ScriptError) else str(error))
+            _LOG.error(f"script error: {error}" if isinstance(error, ScriptError) else str(error))
             try:
                 self.simulation.stop()
             except ScriptError as second:
-                rospy.logerr(f"script error: {second}")
+                _LOG.error(f"script error: {second}")
             self._say_that_the_clock_stands("stopped; `start` runs the edited file")
             raise
         finally:
@@ -117,4 +121,4 @@ class Player:
     def _say_that_the_clock_stands(self, state: str) -> None:
         if self._simulated_time:
             state += ": /clock stands still, and whoever waits on simulated time waits with it"
-        rospy.loginfo(state)
+        _LOG.info(state)

@@ -1,9 +1,9 @@
-"""Handles in rviz: the green target sphere, and the drone itself, to be dragged with the mouse while it flies."""
+"""Handles in rviz: the green target spheres, and the vehicles themselves, to be dragged with the mouse in flight."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
@@ -14,52 +14,69 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.rviz.held import Held
-from drone_sim.ros.vehicle.inputs import DroneInput, move_target
+from drone_sim.ros.rviz.marker_topic import namespace
+from drone_sim.ros.vehicle.inputs import checked_pose
 from drone_sim.ros.vehicle.messages import WORLD
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
-from drone_sim.vehicles.drone_objects import TARGET
+from drone_sim.vehicles.quadricopter_objects import DRONE, TARGET
 
 _PERIOD = 0.19  # s of real time, between two updates: five a second are enough for handles
-_DRONE = "Drone"
 _UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # a control acts along, about, or across its x axis: turned to z
 
 
-class Handles:
-    """An interactive marker server at `<drone>/markers`."""
+class _Handle(NamedTuple):
+    """What a handle moves: a vehicle, or its green sphere."""
 
-    def __init__(self, simulation: Simulation, inputs: DroneInput, inbox: Inbox):
-        """Show both handles."""
+    vehicle: str
+    object: str
+    is_target: bool
+
+
+class Handles:
+    """An interactive marker server at `markers`, with a ring for every vehicle and a ball for its green sphere."""
+
+    def __init__(self, simulation: Simulation, inbox: Inbox):
+        """Show them."""
         self._simulation = simulation
-        self._inputs = inputs
         self._inbox = inbox
         self._held = Held()
         self._throttle = Throttle(_PERIOD)
-        self._server = _Server(f"{simulation.drone.name}/markers")
-        self._looks = {TARGET: _ball(), _DRONE: _ring()}
-        self._shown: set[str] = set()
-        self._show({_DRONE})
+        self._server = _Server(f"{namespace(simulation)}/markers")
+        self._looks = {True: _ball(), False: _ring()}
+        self._shown: dict[str, _Handle] = {}
+        self._show(self._wanted())
         self._server.applyChanges()
 
     def update(self) -> None:
         """Let the handles follow what they stand for, unless they are being dragged."""
         if not self._server.update_pub.get_num_connections() or not self._throttle.passes():
             return
+        self._show(self._wanted())
         objects = self._simulation.drone.objects
-        self._show({_DRONE} | ({TARGET} if objects[objects.handle(TARGET)].parent is None else set()))
-        for name in self._shown - self._held.names():
-            matrix = objects.matrix(objects.handle(name))
+        for name in self._shown.keys() - self._held.names():
+            matrix = objects.matrix(objects.handle(self._shown[name].object))
             yaw = frames.to_euler(matrix)[2]
             level = frames.from_euler(frames.position(matrix), (0, 0, yaw))
             self._server.setPose(name, _pose(level))
         self._server.applyChanges()
 
-    def _show(self, wanted: set[str]) -> None:
-        """Show these handles: the sphere once a script has taken it off the drone, which it would only hide."""
-        for name in wanted - self._shown:
-            self._server.insert(_handle(name, self._looks[name]), self._on_feedback)
-        for name in self._shown - wanted:
+    def _wanted(self) -> dict[str, _Handle]:
+        """Return the handles by name: a sphere once a script has taken it off the drone, which it would only hide."""
+        wanted = {}
+        for vehicle in self._simulation.vehicles.values():
+            alone = vehicle.parameters.is_alone
+            drone, target = DRONE + vehicle.suffix, TARGET + vehicle.suffix
+            wanted[DRONE if alone else vehicle.name] = _Handle(vehicle.name, drone, False)
+            if vehicle.objects[vehicle.objects.handle(target)].parent is None:
+                wanted[TARGET if alone else f"{vehicle.name}/target"] = _Handle(vehicle.name, target, True)
+        return wanted
+
+    def _show(self, wanted: dict[str, _Handle]) -> None:
+        for name in wanted.keys() - self._shown.keys():
+            self._server.insert(_handle(name, self._looks[wanted[name].is_target]), self._on_feedback)
+        for name in self._shown.keys() - wanted.keys():
             self._server.erase(name)
         self._shown = wanted
 
@@ -75,14 +92,15 @@ class Handles:
             self._move(name, feedback)
 
     def _move(self, name: str, feedback: InteractiveMarkerFeedback) -> None:
+        handle = self._shown.get(name)
+        vehicle = self._simulation.vehicles.get(handle.vehicle) if handle else None
+        if handle is None or vehicle is None:  # it has gone meanwhile
+            return
         try:
-            pose = self._inputs.checked(feedback.header.frame_id, feedback.pose)
+            pose = checked_pose(feedback.header.frame_id, feedback.pose, vehicle.parameters)
         except checks.Refused:
             return  # dragged below the floor, or to the horizon: it stays where it was
-        if name == TARGET:
-            self._inbox.put(lambda: move_target(self._simulation, pose))
-        else:
-            self._inbox.put(lambda: self._simulation.drone.move(pose))
+        self._inbox.put(lambda: vehicle.move_target(pose) if handle.is_target else vehicle.move(pose))
 
 
 class _Server(InteractiveMarkerServer):

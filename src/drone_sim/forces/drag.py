@@ -1,0 +1,53 @@
+"""Air drag, and the steady wind that it lets one feel.
+
+    F = -c (v - w)    N: c the coefficients along the body's axes (kg/s), v and w velocities of body and air (m/s)
+
+Linear in the velocity, as the drag of propellers that turn is: R. Mahony, V. Kumar, P. Corke, "Multirotor Aerial
+Vehicles", IEEE Robotics & Automation Magazine 19(3), 2012, section on blade flapping and induced drag.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from drone_sim.config.types import Checked, Finite, Within
+from drone_sim.forces.force import Carried, Force
+from drone_sim.mechanics.frames import invert, rotate
+from drone_sim.mechanics.wrench import Wrench
+
+_Coefficient = Annotated[Finite, Within(0, 100)]
+_Coefficients = tuple[_Coefficient, _Coefficient, _Coefficient]
+_Speed = Annotated[Finite, Within(-100, 100)]
+_Velocity = tuple[_Speed, _Speed, _Speed]
+_LIGHT = (0.1, 0.1, 0.1)  # kg/s
+
+
+class DragParameters(Checked):
+    """`coefficients` along the body's x, y and z; `wind` is the velocity of the air, in the world."""
+
+    kind: Literal["drag"]
+    coefficients: Annotated[_Coefficients, Field(description="3 numbers, along the body's [x, y, z] in kg/s")] = _LIGHT
+    wind: Annotated[_Velocity, Field(description="3 numbers, [x, y, z] in m/s, in the world")] = (0.0, 0.0, 0.0)
+
+    def make(self) -> Drag:
+        """Return the force."""
+        return Drag(self)
+
+
+class Drag(Force):
+    """What the air does to a body that moves in it; at the centre of mass, in every sub-step."""
+
+    every_sub_step: ClassVar[bool] = True
+
+    def __init__(self, parameters: DragParameters):
+        """Take coefficients and wind."""
+        self._coefficients, self._wind = parameters.coefficients, parameters.wind
+
+    def add_to(self, wrench: Wrench, body: Carried) -> None:
+        """Add the drag of this moment."""
+        (vx, vy, vz), (wx, wy, wz) = body.state.linear_velocity, self._wind
+        x, y, z = rotate(invert(body.matrix), (vx - wx, vy - wy, vz - wz))
+        cx, cy, cz = self._coefficients
+        wrench.add(rotate(body.matrix, (-cx * x, -cy * y, -cz * z)), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

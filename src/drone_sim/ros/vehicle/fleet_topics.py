@@ -1,0 +1,58 @@
+"""The topics of all vehicles, as they come and go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import rospy
+
+from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.vehicle.transforms import Transforms
+from drone_sim.ros.vehicle.vehicle_topics import VehicleTopics
+from drone_sim.run.simulation import Simulation
+
+
+class FleetTopics:
+    """Topics for every vehicle of a simulation, and their frames."""
+
+    def __init__(self, simulation: Simulation, inbox: Inbox):
+        """Advertise for those that are there."""
+        self._simulation = simulation
+        self._inbox = inbox
+        self._topics: dict[str, VehicleTopics] = {}
+        self._transforms = Transforms()
+        self._era = -1
+        self.follow()
+
+    def follow(self) -> None:
+        """Advertise for vehicles that have come, and no more for those that have gone."""
+        if self._era == self._simulation.era:
+            return
+        self._era = self._simulation.era
+        vehicles = self._simulation.vehicles
+        for name, topics in list(self._topics.items()):
+            if name not in vehicles or not topics.fits(vehicles[name]):
+                del self._topics[name]
+                topics.close()
+        for name, vehicle in vehicles.items():
+            if name in self._topics:
+                self._topics[name].follow(vehicle)
+            else:
+                self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox)
+        self._transforms.tell_fixed(vehicles.values())
+
+    def publish_state(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish pictures and state of every vehicle, under what `stamp` returns."""
+        for topics in self._topics.values():
+            topics.publish_state(stamp)
+
+    def publish_transforms(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish what is or becomes transforms: tf2 takes but one for each stamp."""
+        for topics in self._topics.values():
+            topics.publish_joints(stamp)
+        self._transforms.publish(self._simulation.vehicles.values(), stamp)
+
+    def publish_command(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish the commands in force; they may change while the simulation stands."""
+        for topics in self._topics.values():
+            topics.publish_command(stamp)

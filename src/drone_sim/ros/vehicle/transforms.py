@@ -1,0 +1,71 @@
+"""The frames of all vehicles: one tree, below `world`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+
+from drone_sim.mechanics import frames
+from drone_sim.ros.vehicle import messages
+from drone_sim.run.pacing import Throttle
+from drone_sim.vehicles.vehicle import Vehicle
+
+_EYES = 1 / 30  # s of real time, between two turns of the blades, which are for eyes
+
+
+class Transforms:
+    """Broadcasts where the vehicles are, once a step, and where the links of their URDFs sit on them.
+
+    world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says. Those that
+    do not move are told once, by /tf_static.
+    """
+
+    def __init__(self) -> None:
+        """Advertise."""
+        self._moving = tf2_ros.TransformBroadcaster()
+        self._fixed = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)
+        self._eyes = Throttle(_EYES)
+
+    def tell_fixed(self, vehicles: Iterable[Vehicle]) -> None:
+        """Say where the links are that do not move; of vehicles that are new, or no longer there."""
+        now = rospy.Time.now()
+        links = [_link(now, one, name) for one in vehicles for name in one.links if name not in one.blade_joints]
+        self._fixed.publish(TFMessage(links))
+
+    def publish(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
+        """Publish all that moves under what `stamp` returns: tf2 takes but one for each stamp."""
+        if not self._moving.pub_tf.get_num_connections():
+            return
+        now, blades = stamp(), self._eyes.passes()
+        self._moving.sendTransform([one for vehicle in vehicles for one in _moving(now, vehicle, blades)])
+
+
+def _moving(now: rospy.Time, vehicle: Vehicle, blades: bool) -> list[TransformStamped]:
+    own, world = vehicle.parameters, messages.WORLD
+    prefix = own.frame_prefix
+    told = [
+        messages.transform(now, world, own.base_link, vehicle.matrix),
+        messages.transform(now, world, own.track_base, vehicle.track),
+        *(
+            messages.transform(now, world, f"{prefix}{camera.frame}", vehicle.optical(camera))
+            for camera in own.cameras.values()
+            if camera.mount is not None  # the URDF does not know them
+        ),
+    ]
+    if blades:
+        angles = vehicle.blade_angles
+        told += [_link(now, vehicle, link, angles.get(joint, 0.0)) for link, joint in vehicle.blade_joints.items()]
+    return told
+
+
+def _link(now: rospy.Time, vehicle: Vehicle, name: str, angle: float = 0.0) -> TransformStamped:
+    """Return where a link sits on the one that it hangs on, turned about its z axis."""
+    parent, matrix = vehicle.links[name]
+    if angle:
+        matrix = frames.multiply(matrix, frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angle)))
+    prefix = vehicle.parameters.frame_prefix
+    return messages.transform(now, f"{prefix}{parent}", f"{prefix}{name}", matrix)

@@ -1,0 +1,61 @@
+"""Everything that one vehicle hears and publishes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import rospy
+
+from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.vehicle.cameras import CameraOutput
+from drone_sim.ros.vehicle.description import set_description
+from drone_sim.ros.vehicle.inputs import VehicleInputs
+from drone_sim.ros.vehicle.outputs import VehicleOutputs
+from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.vehicle import Vehicle
+
+
+class VehicleTopics:
+    """The topics in the namespace of one vehicle, which may be another object after every start."""
+
+    def __init__(self, simulation: Simulation, vehicle: Vehicle, inbox: Inbox):
+        """Advertise, subscribe, and set its robot_description."""
+        self.vehicle = vehicle
+        self._inputs = VehicleInputs(simulation, vehicle.parameters, inbox)
+        self._outputs = VehicleOutputs(vehicle.parameters)
+        self._cameras = {
+            name: CameraOutput(vehicle.parameters, camera, vehicle.parameters.cameras[name])
+            for name, camera in vehicle.cameras.items()
+        }
+        set_description(vehicle.parameters)
+
+    def fits(self, vehicle: Vehicle) -> bool:
+        """Whether these would be the topics of this vehicle, too."""
+        return vehicle.parameters == self.vehicle.parameters
+
+    def follow(self, vehicle: Vehicle) -> None:
+        """Serve this vehicle from now on."""
+        self.vehicle = vehicle
+        for name, camera in vehicle.cameras.items():
+            self._cameras[name].follow(camera)
+
+    def close(self) -> None:
+        """Hear and publish no more."""
+        self._inputs.close()
+        self._outputs.close()
+        for camera in self._cameras.values():
+            camera.close()
+
+    def publish_state(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish pictures and state."""
+        for camera in self._cameras.values():
+            camera.publish(stamp)
+        self._outputs.publish_state(self.vehicle, stamp)
+
+    def publish_joints(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish what becomes transforms elsewhere, too."""
+        self._outputs.publish_joints(self.vehicle, stamp)
+
+    def publish_command(self, stamp: Callable[[], rospy.Time]) -> None:
+        """Publish the command in force."""
+        self._outputs.publish_command(self.vehicle, stamp)

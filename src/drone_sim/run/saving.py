@@ -1,0 +1,77 @@
+"""A scene as it stands, written as a scene file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from drone_sim.config.types import Checked, FoundFile, ParameterError
+from drone_sim.files import writing, yaml_files
+from drone_sim.mechanics import frames
+from drone_sim.run.parameters import Parameters
+from drone_sim.scene.scene import Scene
+from drone_sim.vehicles.vehicle import Vehicle
+
+
+def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Vehicle]) -> None:
+    """Write floor, objects and vehicles as they stand now. The scene's own files keep their names.
+
+    Raises ParameterError where that would be no scene that can be loaded, such as with the drone below the
+    floor, and OSError; what was in the file is then still there.
+    """
+    content: dict[str, Any] = {"floor": _plain(scene.parameters.floor, path.parent)}
+    content.update(_flying(parameters, vehicles, path.parent))
+    content["objects"] = _objects(scene, path.parent)
+    text = "# metres, radians\n" + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    try:
+        parameters.check_scene(yaml_files.parse(text), path)
+    except ValueError as error:
+        raise ParameterError(f"the scene as it stands cannot be saved: {error}") from None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    writing.write(path, text)
+
+
+def _flying(parameters: Parameters, vehicles: Iterable[Vehicle], folder: Path) -> dict[str, Any]:
+    """Return the drone, or the vehicles, where they are, with what the last scene file said of them."""
+    said = parameters.in_scene_file
+    if not parameters.vehicles:
+        (drone,) = vehicles
+        return {"drone": {**_named(said.get("drone"), folder), **_place(drone)}}
+    entries = said.get("vehicles")
+    own = entries if isinstance(entries, dict) else {}
+    return {"vehicles": {one.name: {**_named(own.get(one.name), folder), **_place(one)} for one in vehicles}}
+
+
+def _place(vehicle: Vehicle) -> dict[str, Any]:
+    return {"position": list(frames.position(vehicle.matrix)), "yaw": frames.to_rpy(vehicle.matrix)[2]}
+
+
+def _named(said: Any, folder: Path) -> dict[str, Any]:
+    """Return what a scene file said, its files named as a scene file in `folder` can name them."""
+    return {key: _file_name(value, folder) for key, value in said.items()} if isinstance(said, dict) else {}
+
+
+def _objects(scene: Scene, folder: Path) -> list[dict[str, Any]]:
+    saved = []
+    for one, body in zip(scene.parameters.objects, scene.bodies):
+        values = _plain(one, folder)
+        values["position"] = list(body.state.position)
+        values["rpy"] = list(frames.to_rpy(body.matrix))
+        saved.append(values)
+    return saved
+
+
+def _plain(values: Checked, folder: Path) -> dict[str, Any]:
+    """Return them as YAML has them, their files named as a scene file in `folder` can name them."""
+    plain = values.model_dump(mode="json", exclude_defaults=True)
+    for key in ("file", "texture"):
+        if plain.get(key):
+            plain[key] = _file_name(getattr(values, key), folder)
+    return plain
+
+
+def _file_name(value: Any, folder: Path) -> Any:
+    return value.seen_from(folder) if isinstance(value, FoundFile) else value

@@ -1,0 +1,97 @@
+"""A scene and the vehicles in it, in a world of their own."""
+
+from __future__ import annotations
+
+import itertools
+
+from drone_sim.config.types import ParameterError
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.run.parameters import Parameters
+from drone_sim.scene.scene import Scene
+from drone_sim.scripting.api.signals import Signals
+from drone_sim.vehicles.parameters import VehicleParameters
+from drone_sim.vehicles.shared import Shared
+from drone_sim.vehicles.vehicle import Vehicle
+
+MAX_OVERLAPS = 500  # pairs of moving bodies, at the start: with more a step takes seconds
+
+
+class Setting:
+    """Scene, vehicles, and the tree of their objects. Where it cannot be built, its world is closed again."""
+
+    def __init__(self, parameters: Parameters, shared: Shared):
+        """Fill the empty world of `shared`. Raises ParameterError and UrdfError."""
+        self.parameters = parameters
+        self.shared = shared
+        self.world = shared.world
+        self.vehicles: dict[str, Vehicle] = {}
+        shared.before_pictures = self._show_blades
+        self._blades_shown = -1  # the world's changes, when they were
+        try:
+            self._empty_tree()
+            self.scene = Scene(parameters.scene, self.world)
+            for one in parameters.fleet:
+                self._put(one)
+            self._name_objects()
+            self._check()
+        except BaseException:
+            self.world.close()
+            raise
+        self.world.keep_beginning()
+
+    def begin_anew(self) -> None:
+        """Put everything where it began, at rest, without scripts."""
+        self.world.begin_anew()
+        self._empty_tree()
+        for vehicle in self.vehicles.values():
+            vehicle.reset()
+        self._name_objects()
+
+    def add(self, parameters: VehicleParameters) -> Vehicle:
+        """Put one more vehicle into the world, without a script. Raises ParameterError and UrdfError."""
+        vehicle = self._put(parameters)
+        self.world.keep_beginning_of(vehicle.body.number)
+        return vehicle
+
+    def remove(self, name: str) -> None:
+        """Take a vehicle out of the world, and its objects out of the tree; its script is gone already."""
+        vehicle = self.vehicles.pop(name)
+        vehicle.close()
+        self.shared.objects.remove(vehicle.handle)
+        self.world.remove(vehicle.body.number)
+
+    def _put(self, parameters: VehicleParameters) -> Vehicle:
+        vehicle = Vehicle(parameters, self._free_suffix(), self.shared)
+        self.vehicles[vehicle.name] = vehicle
+        return vehicle
+
+    def _free_suffix(self) -> str:
+        """Return what the names of V-REP's copies end in: nothing for the first, then #0, #1, ..."""
+        taken = {vehicle.suffix for vehicle in self.vehicles.values()}
+        return next(one for one in itertools.chain([""], map("#{}".format, itertools.count())) if one not in taken)
+
+    def _empty_tree(self) -> None:
+        self.shared.objects, self.shared.signals = ObjectTree(), Signals()
+        self.shared.objects.add("Floor", also=("ResizableFloor_5_25",))
+
+    def _name_objects(self) -> None:
+        try:
+            self.scene.name_objects(self.shared.objects)
+        except ParameterError as error:
+            raise ParameterError(f"{self.parameters.scene_place(error.location)}: {error}") from None
+
+    def _check(self) -> None:
+        if not self.world.is_finite():
+            raise ParameterError("the scene as it begins: a position or a velocity is not finite")
+        overlaps = self.world.overlaps()
+        if overlaps > MAX_OVERLAPS:
+            said = f"{overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may"
+            raise ParameterError(f"scene/objects: {said}")
+
+    def _show_blades(self) -> None:
+        """Turn the blades of all vehicles in the world's pictures to where they are, once for all cameras."""
+        if self._blades_shown == self.world.changes and not any(one.turned for one in self.vehicles.values()):
+            return
+        for vehicle in self.vehicles.values():
+            vehicle.show_blades()
+        self._blades_shown = self.world.changes

@@ -1,0 +1,68 @@
+"""A vehicle's body in the world: where it is, how it moves, what pushes it."""
+
+from __future__ import annotations
+
+from drone_sim.forces.force import Force
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Matrix, Vector
+from drone_sim.mechanics.state import Pose, State
+from drone_sim.mechanics.urdf import RigidBody
+from drone_sim.mechanics.wrench import Wrench
+from drone_sim.world import World
+
+
+class Body:
+    """One rigid body; its frame is the URDF's root link."""
+
+    state: State  # after the last sub-step that was looked at, or move
+    matrix: Matrix  # world from root link
+
+    def __init__(self, rigid: RigidBody, start: Pose, world: World):
+        """Put it into the world, at rest."""
+        self.rigid = rigid
+        self.mass = rigid.mass
+        self.jumps = 0  # how often it was put somewhere else
+        self.number = world.add_rigid_body(rigid, start)
+        self.inertial_from_root: Matrix = frames.invert(world.inertial_frame(self.number))
+        self._start = start
+        self._world = world
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the start, at rest, with nothing that pushes."""
+        self._world.set_pose(self.number, self._start)
+        self.wrench = Wrench()  # of the next step
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read the state back from the world."""
+        self.state = self._world.state(self.number)
+        self.matrix = self.state.matrix
+
+    def move(self, pose: Pose) -> None:
+        """Put it somewhere else, at rest."""
+        self.jumps += 1
+        self._world.set_pose(self.number, pose)
+        self.refresh()
+
+    def restored(self) -> None:
+        """Follow the world, which was put back to what it had been."""
+        self.jumps += 1
+        self.wrench = Wrench()
+        self.refresh()
+
+    def add_force(self, force: Vector, torque: Vector, point: Vector) -> None:
+        """Let a force (N, world) act in the next step at a point (m, inertial frame), and a torque (N m, world)."""
+        self.wrench.add(force, torque, point)
+
+    def take_wrench(self) -> Wrench:
+        """Return the wrench of this step, and begin that of the next."""
+        wrench, self.wrench = self.wrench, Wrench()
+        return wrench
+
+    def push(self, force: Force) -> None:
+        """Let a force act in the sub-step that comes, as it is at this moment."""
+        self.refresh()
+        wrench = Wrench()
+        force.add_to(wrench, self)
+        self._world.push(self.number, wrench)

@@ -1,0 +1,148 @@
+"""What a vehicle may be: name, body, place, script, propellers, gains, cameras, and the limits of its commands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field, PrivateAttr
+
+from drone_sim.config.types import (
+    Angle,
+    Checked,
+    Coordinate,
+    File,
+    FileName,
+    Finite,
+    Gain,
+    Label,
+    Limits,
+    MarginOrNone,
+    Name,
+    ParameterError,
+    ScriptValue,
+    Within,
+    merged,
+)
+from drone_sim.forces import ForceParameters
+from drone_sim.forces.propellers import PropellerParameters
+from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters, check_together
+
+MAX_FORCES = 16
+MAX_SCRIPT_PARAMETERS = 256
+
+
+class TwistLimits(Checked):
+    """Beyond these a command is a mistake."""
+
+    linear: Annotated[Finite, Within(1e-6, 1e3)]
+    angular: Annotated[Finite, Within(1e-6, 1e3)]
+
+
+class PushParameters(Checked):
+    """How long a push on the topic `push` lasts, and what is a mistake."""
+
+    duration: Annotated[Finite, Within(1e-4, 1e4)]
+    force_limit: Annotated[Finite, Within(1e-6, 1e6)]
+    torque_limit: Annotated[Finite, Within(1e-6, 1e6)]
+
+
+class ControlParameters(Checked):
+    """The tutorial's gains; a child script reads them by name with getScriptSimulationParameter."""
+
+    thrust_gravity: Annotated[Finite, Within(1e-3, 1e4)]
+    thrust_limits: Limits
+    Dthrust: Gain
+    Kzref: Gain
+    Dzref: Gain
+    Dyaw: Gain
+    angle_min: Gain
+    angle_max: Gain
+    Pangle: Gain
+    Dangle: Gain
+    Kvcorr: Gain
+    recovery_margin: MarginOrNone
+    Precovery: Gain
+
+
+class PlaceParameters(Checked):
+    """Body and starting place of a vehicle."""
+
+    urdf: File
+    position: Annotated[
+        tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]], Field(description="3 numbers, [x, y, z] in m")
+    ]
+    yaw: Angle
+
+
+class DroneParameters(PlaceParameters):
+    """Name, body and starting place of the drone."""
+
+    name: Name
+
+
+class EquipmentParameters(Checked):
+    """What a vehicle carries and obeys; of the only vehicle these keys stand at the top."""
+
+    script: FileName
+    cmd_vel_timeout: Annotated[Finite, Within(1e-4, 1e6, or_zero=True)]
+    cmd_vel_limits: TwistLimits
+    position_limit: Annotated[Finite, Within(1e-3, 1e5)]
+    push: PushParameters
+    propellers: PropellerParameters
+    control: ControlParameters
+    script_parameters: Annotated[dict[Label, ScriptValue], Field(max_length=MAX_SCRIPT_PARAMETERS)]
+    cameras: Annotated[dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
+    forces: Annotated[dict[Name, ForceParameters], Field(max_length=MAX_FORCES)]
+
+    def model_post_init(self, _context: Any) -> None:
+        """Check what concerns several keys at once."""
+        check_together(self.cameras)
+
+
+class VehicleParameters(EquipmentParameters, PlaceParameters):
+    """One vehicle: an entry of `vehicles`, or what `drone` and the keys beside it say of the only one."""
+
+    name: Name
+    _is_alone: bool = PrivateAttr(default=False)
+
+    @classmethod
+    def only(cls, drone: DroneParameters, equipment: EquipmentParameters) -> VehicleParameters:
+        """Return the only vehicle of a simulation, whose frames have no prefix."""
+        place = {key: getattr(drone, key) for key in DroneParameters.model_fields}
+        carried = {key: getattr(equipment, key) for key in EquipmentParameters.model_fields}
+        made = cls.model_construct(**place, **carried)
+        made._is_alone = True
+        return made
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether there can be no other, so that its frames need no prefix."""
+        return self._is_alone
+
+    @property
+    def frame_prefix(self) -> str:
+        """What its frames' names begin with: '' or `drone1/`."""
+        return "" if self._is_alone else f"{self.name}/"
+
+    @property
+    def base_link(self) -> str:
+        """Name of the frame of its root link."""
+        return f"{self.frame_prefix}base_link"
+
+    @property
+    def track_base(self) -> str:
+        """Name of its level frame, in which commands count."""
+        return f"{self.frame_prefix}Track_base"
+
+
+def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an entry of `vehicles` with what it leaves out, from the keys at the top. Raises ParameterError."""
+    if "name" in entry:
+        raise ParameterError(
+            f"parameter vehicles/{name}/name: unknown key; the entry's own key is its name", ("vehicles", name, "name")
+        )
+    drone = everything.get("drone")
+    base = {key: everything[key] for key in EquipmentParameters.model_fields if key in everything}
+    place = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}
+    return {**merged({**base, **place}, entry), "name": name}

@@ -1,0 +1,111 @@
+"""A vehicle as a child script finds it: V-REP's quadricopter, under its 3.x names and in its 4.x paths.
+
+    Drone                                        /Quadcopter             carried by the dynamics
+      Quadricopter_base                          /Quadcopter/base        the pose that scripts read
+      Track_base                                 /Quadcopter/Track_base
+      Quadricopter_propeller<i>                  /Quadcopter/propeller[i-1]
+        Quadricopter_propeller_respondable<i>    .../respondable
+        Quadricopter_propeller_joint<i>          .../joint
+      FrontVision, TrackCam, one for every camera  /FrontVision
+      Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
+      DronePosition                              /target                 the green sphere
+
+The names of the second vehicle end in #0, those of the third in #1, and so on, as those of V-REP's copies do.
+Cameras and vision sensors look along their z axis, with y up and x to the left, as V-REP's do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from drone_sim.config.types import ParameterError
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.object_tree import Body, ObjectTree
+from drone_sim.sensors.camera_parameters import CameraParameters
+
+DRONE = "Drone"
+TARGET = "DronePosition"  # the green sphere
+TRACK_BASE = "Track_base"
+BASE = frames.from_rpy((0.0, 0.0, -0.01), (0.0, 0.0, 0.0))  # Quadricopter_base in the root's frame
+_ALONG_X = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)  # z forward, y up, x left
+OPTICAL_FROM_SENSOR = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # optical frames: y down, x right
+
+
+def respondable(number: int) -> str:
+    """Return the name of propeller 1 to 4's body: forces act on it, its script takes particleVelocity."""
+    return f"Quadricopter_propeller_respondable{number}"
+
+
+def joint(number: int) -> str:
+    """Return the name of the joint that turns the blades of propeller 1 to 4."""
+    return f"Quadricopter_propeller_joint{number}"
+
+
+class QuadricopterObjects:
+    """Puts the objects of one vehicle into the tree, all under names with its suffix."""
+
+    def __init__(self, objects: ObjectTree, suffix: str):
+        """Take the tree, and '' or '#0' and so on."""
+        self._objects = objects
+        self._suffix = suffix
+
+    def add(
+        self,
+        body: Body,
+        links: Mapping[str, Matrix],
+        propellers: Sequence[Matrix],
+        cameras: Mapping[str, CameraParameters],
+    ) -> int:
+        """Return the handle of the vehicle; `links` and `propellers` are poses in the root link's frame.
+
+        Raises ParameterError for a camera that cannot be where it is said to be.
+        """
+        root = self._add(DRONE, body=body, alias="Quadcopter", also=("Quadricopter", "Quadcopter"))
+        self._add("Quadricopter_base", DRONE, BASE, alias="base")
+        self._add(TRACK_BASE, DRONE, BASE)
+        for number, link in enumerate(propellers, start=1):
+            name = f"Quadricopter_propeller{number}"
+            self._add(name, DRONE, link, alias="propeller")
+            self._add(respondable(number), name, alias="respondable")
+            self._add(joint(number), name, alias="joint")
+        down = frames.from_rpy((0.0, 0.0, -0.01), (0.0, math.pi / 2, 0.0))
+        self._add("Quadricopter_floorCamera", DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera")
+        front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self._add("Quadricopter_frontCamera", DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera")
+        self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
+        for camera in cameras.values():
+            self._add_camera(links, camera)
+        return root
+
+    def _add(
+        self,
+        name: str,
+        parent: str | None = None,
+        local: Matrix = frames.IDENTITY,
+        *,
+        body: Body | None = None,
+        alias: str = "",
+        also: Sequence[str] = (),
+    ) -> int:
+        above = None if parent is None else f"{parent}{self._suffix}"
+        others = [f"{one}{self._suffix}" for one in also]
+        return self._objects.add(f"{name}{self._suffix}", above, local, body, alias=alias or name, also=others)
+
+    def _add_camera(self, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
+        if camera.mount is None:
+            if camera.frame not in links:
+                raise ParameterError(f"camera frame {camera.frame}: neither a link of the URDF, nor a `mount` given")
+            parent, optical = DRONE, links[camera.frame]
+        else:
+            parent, optical = camera.mount.parent, camera.mount.matrix
+        own = f"{parent}{self._suffix}"
+        above = own if own in self._objects else parent  # its own, or one of the scene, such as Floor
+        if above not in self._objects:
+            raise ParameterError(f"camera frame {camera.frame}: no object is named {parent}")
+        name = f"{camera.object}{self._suffix}"
+        if name in self._objects:
+            raise ParameterError(f"camera frame {camera.frame}: an object named '{camera.object}' is there already")
+        local = frames.multiply(optical, OPTICAL_FROM_SENSOR)
+        self._objects.add(name, above, local, alias=camera.object)

@@ -1,0 +1,326 @@
+"""A vehicle: its body, what pushes it, what it sees with, its objects under V-REP's names, and its child script."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from drone_sim.forces.force import Force
+from drone_sim.forces.pushes import Push, Pushes
+from drone_sim.mechanics import frames, urdf
+from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.state import Pose, State, Twist
+from drone_sim.mechanics.wrench import Wrench
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.scripting import load
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.sensors.camera import Camera
+from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.vehicles.body import Body
+from drone_sim.vehicles.parameters import VehicleParameters
+from drone_sim.vehicles.quadricopter_objects import (
+    DRONE,
+    OPTICAL_FROM_SENSOR,
+    TARGET,
+    TRACK_BASE,
+    QuadricopterObjects,
+    joint,
+    respondable,
+)
+from drone_sim.vehicles.rotors import Rotors
+from drone_sim.vehicles.shared import Shared
+from drone_sim.wording import near_names
+
+_PARTICLE_VELOCITY = "particleVelocity"
+_NUMBERS = (1, 2, 3, 4)  # of the propellers
+
+
+class Vehicle:
+    """A quadricopter in a world. What it shares with others is in `Shared`, and nothing else is."""
+
+    def __init__(self, parameters: VehicleParameters, suffix: str, shared: Shared):
+        """Put it at its starting place, at rest, without a script; its objects' names get the suffix.
+
+        Raises UrdfError and ParameterError.
+        """
+        self.name = parameters.name
+        self.parameters = parameters
+        self.suffix = suffix
+        self.bus = MessageBus(parameters.name)
+        self.bus.backend = shared.backend
+        self._shared = shared
+        self._timeout, self._time_step = parameters.cmd_vel_timeout, shared.time_step  # asked for in every step
+        rigid = urdf.read(parameters.urdf)
+        self._rotors = Rotors(rigid, parameters.urdf)
+        self._links = {
+            name: (above if above in rigid.parents else "base_link", matrix)
+            for name, (above, matrix) in rigid.parents.items()
+        }
+        start = Pose(parameters.position, frames.to_quaternion(frames.from_rpy((0, 0, 0), (0, 0, parameters.yaw))))
+        self.body = Body(rigid, start, shared.world)
+        shapes = [(respondable(number), link) for number, link in zip(_NUMBERS, self._rotors.links)]
+        self._shapes = {
+            name + suffix: frames.multiply(self.body.inertial_from_root, link)
+            for name, link in [(DRONE, IDENTITY), *shapes]
+        }
+        self.script: load.Script = load.NoScript()
+        self.cameras = {name: self._camera(one) for name, one in parameters.cameras.items()}
+        self.reset()
+
+    def _camera(self, parameters: CameraParameters) -> Camera:
+        size = (parameters.width, parameters.height)
+        intrinsics = Intrinsics(*size, parameters.horizontal_fov, parameters.near, parameters.far)
+        camera = Camera(parameters.kind, intrinsics, lambda: self.optical(parameters), self._shared.vision)
+        camera.every = parameters.every
+        return camera
+
+    def reset(self) -> None:
+        """Return to the starting place, at rest, with no script loaded, and its objects anew in the shared tree."""
+        self.close()
+        self.body.reset()
+        law, from_root = self.parameters.propellers, self.body.inertial_from_root
+        self._propellers = self._rotors.propellers(law, from_root, self._time_step, lambda: self.particle_velocities)
+        self._pushes = Pushes(self._time_step)
+        others = [one.make() for one in self.parameters.forces.values()]
+        self._forces: list[Force] = [self._propellers, self._pushes, *(one for one in others if not one.every_sub_step)]
+        self.sub_step_forces = [one for one in others if one.every_sub_step]
+        self.command = Twist()
+        self._command_age = 0.0
+        self._joint_angles: dict[str, float] = {}
+        self.turned = False  # by its script, since the blades were shown
+        self.drawings_made = 0
+        objects = QuadricopterObjects(self.objects, self.suffix)
+        self.handle = objects.add(self.body, self.body.rigid.links, self._rotors.links, self.parameters.cameras)
+        self._track = self.objects[self.objects.handle(TRACK_BASE + self.suffix)]
+        self.script_parameters = self._script_parameters()
+        self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in _NUMBERS]
+
+    def _script_parameters(self) -> dict[str, dict[str, Any]]:
+        """Return what V-REP's scripts have as simulation parameters, the gains of control, and the user's own."""
+        law = self.parameters.propellers
+        seen = {"particlesAreVisible": True, "simulateParticles": True, "fakeShadow": True}
+        particles = {
+            "particleCountPerSecond": law.particles_per_second,
+            "particleDensity": law.particle_density,
+            "particleSize": 1.0,  # a factor, in the stock scripts
+        }
+        own = {**self.parameters.control.model_dump(), **seen, **particles, "propeller_law": law.law}
+        own.update(self.parameters.script_parameters)
+        return {
+            self.own_script: own,
+            **{respondable(number) + self.suffix: {_PARTICLE_VELOCITY: 0.0, **particles} for number in _NUMBERS},
+        }
+
+    # ---- what scripts and topics see
+
+    @property
+    def own_script(self) -> str:
+        """Name of the object that the child script is attached to."""
+        return DRONE + self.suffix
+
+    @property
+    def objects(self) -> ObjectTree:
+        """The objects of the scene, those of every vehicle among them."""
+        return self._shared.objects
+
+    @property
+    def signals(self) -> Signals:
+        """The signals that scripts leave for each other."""
+        return self._shared.signals
+
+    @property
+    def drawings(self) -> Drawings | None:
+        """Where scripts draw, if anywhere."""
+        return self._shared.drawings
+
+    @property
+    def state(self) -> State:
+        """Pose and velocity of base_link, after the last step or move."""
+        return self.body.state
+
+    @property
+    def matrix(self) -> Matrix:
+        """World from base_link."""
+        return self.body.matrix
+
+    @property
+    def jumps(self) -> int:
+        """How often it was put somewhere else."""
+        return self.body.jumps
+
+    @property
+    def track(self) -> Matrix:
+        """World from Track_base: at the drone, level, turned by its yaw."""
+        return self._track.matrix()
+
+    @property
+    def particle_velocities(self) -> tuple[float, ...]:
+        """What the script commands: m/s, propellers 1 to 4."""
+        (first, second, third, fourth), key = self._commanded, _PARTICLE_VELOCITY
+        return first[key], second[key], third[key], fourth[key]
+
+    @property
+    def blade_angles(self) -> dict[str, float]:
+        """Angle (rad) of each propeller's blades, by joint of the URDF."""
+        return self._rotors.by_joint([self.turn_joint(joint(number) + self.suffix) for number in _NUMBERS])
+
+    def turn_joint(self, name: str, angle: float | None = None) -> float:
+        """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError."""
+        names = [joint(number) + self.suffix for number in _NUMBERS]
+        if name not in names:
+            raise ValueError(f"'{name}' is not a joint; {near_names(name, names)}")
+        if angle is not None:
+            self._joint_angles[name] = angle
+            self.turned = True
+        number = names.index(name)
+        return self._joint_angles.get(name, self._rotors.angle(number, self._propellers.air[number]))
+
+    def show_blades(self) -> None:
+        """Turn the blades in the world's pictures to where they are."""
+        self.turned = False
+        self._shared.world.place_visuals(self.body.number, self._rotors.visuals(self.blade_angles))
+
+    def optical(self, camera: CameraParameters) -> Matrix:
+        """World from a camera's optical frame (z forward, x right, y down)."""
+        sensor = self.objects.matrix(self.objects.handle(camera.object + self.suffix))
+        return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
+
+    @property
+    def links(self) -> dict[str, tuple[str, Matrix]]:
+        """Of each link of the URDF but the root: the one above (`base_link` is the root), and where it sits on it."""
+        return self._links
+
+    @property
+    def visual_places(self) -> list[tuple[str, Matrix]]:
+        """Of each of the body's visuals: the link that it belongs to, and where it sits on that."""
+        links = self._links
+        return [(name if name in links else "base_link", matrix) for name, matrix in self.body.rigid.visuals]
+
+    @property
+    def blade_joints(self) -> dict[str, str]:
+        """Of each link that turns: the joint about whose z axis it does."""
+        return self.body.rigid.blade_joints
+
+    # ---- commands
+
+    def receive(self, twist: Twist) -> None:
+        """Take a command for the next step; held until the next one, or for cmd_vel_timeout."""
+        self.command = twist
+        self._command_age = 0.0
+        self.bus.post("cmd_vel", twist)
+
+    def move(self, pose: Pose) -> None:
+        """Put it somewhere else, at rest."""
+        self.body.move(pose)
+
+    def move_target(self, pose: Pose) -> None:
+        """Put its green sphere, DronePosition, there."""
+        self.objects[self.objects.handle(TARGET + self.suffix)].put(pose.matrix)
+
+    def push(self, force: Vector, torque: Vector, duration: float) -> None:
+        """Push with a force (N) at the centre of mass and a torque (N m), fixed in the world, for `duration` s."""
+        self._pushes.add(Push(force, torque, duration))
+
+    def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
+        """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m, world).
+
+        Both keep their direction through the sub-steps. Raises ValueError for an object that is no dynamic shape.
+        """
+        if shape not in self._shapes:
+            raise ValueError(f"'{shape}' is not a dynamic shape; there are: {', '.join(self._shapes)}")
+        self.body.add_force(force, torque, frames.transform(self._shapes[shape], offset))
+
+    # ---- script
+
+    def load_script(self, path: str) -> None:
+        """Load a child script ('' for the tutorial's) and call its init. Raises ScriptError."""
+        self.close()
+        limit = TimeLimit(self._shared.script_time_limit)
+        cameras = self.parameters.cameras
+        pictures = {cameras[name].object + self.suffix: partial(self.look, one) for name, one in self.cameras.items()}
+        surroundings = Surroundings(self._shared.time, self._time_step, pictures, limit.outside)
+        modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
+        self.script = load.load(path, modules, limit)
+        self.script.call("init")
+        self._check_callbacks()
+
+    def _check_callbacks(self) -> None:
+        """Raise ScriptError for a subscription since the last check whose function the script does not have."""
+        for callback in self.bus.new_callbacks():
+            self.script.check(callback)
+
+    def close(self) -> None:
+        """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
+        self.script.close()
+        self.script = load.NoScript()
+        self.bus.close()
+
+    # ---- phases
+
+    def actuation(self) -> None:
+        """Hand waiting messages to the script, then let it command the propellers."""
+        timeout = self._timeout
+        if timeout and self._command_age > timeout - self._time_step / 2 and self.command != Twist():
+            self.receive(Twist())
+        self._command_age += self._time_step
+        self._check_callbacks()
+        self.bus.deliver(self.script.callback)
+        self.script.call("actuation")
+
+    def wrench(self) -> Wrench:
+        """Return what pushes the body through this step, the forces of single sub-steps aside."""
+        body = self.body
+        wrench = body.take_wrench()
+        for force in self._forces:
+            force.add_to(wrench, body)
+        return wrench
+
+    def before_sub_step(self) -> None:
+        """Let the forces act that follow the body through the sub-steps."""
+        for force in self.sub_step_forces:
+            self.body.push(force)
+
+    def take_pictures(self, steps: int) -> None:
+        """Let the cameras that are watched, and due after so many steps, take a picture."""
+        for camera in self.cameras.values():
+            camera.image = self.look(camera) if camera.watched() and steps % camera.every == 0 else None
+
+    def look(self, camera: Camera) -> np.ndarray:
+        """Return what a camera sees now."""
+        self._shared.before_pictures()
+        return camera.look()
+
+    # ---- snapshots
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back what the body is not: forces, script, messages, parameters."""
+        own = (self.command, self._command_age, self.drawings_made, dict(self._joint_angles))
+        parameters = copy.deepcopy(self.script_parameters)
+        others = [one.remember() for one in (*self._forces, *self.sub_step_forces, self.bus, self.script)]
+
+        def recall() -> None:
+            self.command, self._command_age, self.drawings_made, angles = own
+            self._joint_angles, self.turned = dict(angles), True
+            _set_all(self.script_parameters, parameters)
+            for one in others:
+                one()
+            self.body.restored()
+
+        return recall
+
+
+def _set_all(values: Mapping[str, dict[str, Any]], kept: Mapping[str, dict[str, Any]]) -> None:
+    """Give every mapping what was kept of it; the mappings stay the same ones."""
+    for name, one in copy.deepcopy(dict(kept)).items():
+        values[name].clear()
+        values[name].update(one)
