@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 import pybullet
-from drone_sim.vehicles.quadricopter import PROPELLERS
 from tqdm import tqdm
 
 from benchmarks.cores import one_core
@@ -14,6 +13,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.rotors import PROPELLERS
 from drone_sim.world import World
 
 Row = dict[str, Any]

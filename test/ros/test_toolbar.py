@@ -200,7 +200,9 @@ class Toolbar(unittest.TestCase):
         self.assertLess(box["position"][2], 4.0)  # it was falling
         self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
         self.scene.write_text("object: []\n")
-        self.assertIn("unknown key object; known are drone, floor, objects", self.call("load_scene", expected=False))
+        self.assertIn(
+            "unknown key object; known are drone, floor, objects, vehicles", self.call("load_scene", expected=False)
+        )
 
     def test_rviz_sees_the_objects_and_where_they_go(self):
         trimesh.creation.box().export(str(self.scene.parent / "one.stl"))

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drone_sim.vehicles.quadricopter import PROPELLERS
 from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.fly import main as fly_main
+from drone_sim.vehicles.rotors import PROPELLERS
 
 FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
 RIPPLE = 0.01  # m/s, of vz: particles come whole

@@ -37,7 +37,7 @@ def test_it_slides_over_the_rim_of_the_floor():
         )
     )
     simulation.drone.move(Pose((0.0, 3.0, 0.8)))
-    ball = simulation.scene._bodies[0]
+    ball = simulation.scene.bodies[0]
     pybullet.resetBaseVelocity(ball._body, [2, 0, 0], [0, 20, 0], simulation.world._client)
     for _ in range(60):
         simulation.step()

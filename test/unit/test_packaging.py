@@ -22,7 +22,7 @@ KEYS = {
     "trimesh": "python3-trimesh-pip",
 }
 # Imported by name, by trimesh, and what the launch file starts.
-INDIRECT = {"python3-lupa-pip", "python3-pycollada-pip", "robot_state_publisher", "rviz"}
+INDIRECT = {"python3-lupa-pip", "python3-pycollada-pip", "rviz"}
 
 
 def imported():

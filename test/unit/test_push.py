@@ -38,9 +38,9 @@ def test_torque_gives_its_angular_impulse(floating, axis):
     torque[axis] = 2e-4
     drone.push(ZERO, torque.tolist(), 0.1)
     step(floating, 2)
-    expected = np.linalg.solve(drone.body.inertia, torque) * 0.1
+    expected = np.linalg.solve(drone.body.rigid.inertia, torque) * 0.1
     assert drone.state.angular_velocity == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    centre = drone.state.linear_velocity + np.cross(drone.state.angular_velocity, drone.body.centre_of_mass)
+    centre = drone.state.linear_velocity + np.cross(drone.state.angular_velocity, drone.body.rigid.centre_of_mass)
     assert centre == pytest.approx(ZERO, abs=1e-4)  # it turns about its centre of mass
 
 

@@ -182,7 +182,7 @@ def test_what_cannot_be_drawn_is_said_once(sim, caplog):
 
 @pytest.fixture(name="drawings")
 def _drawings(simulation):
-    simulation.drone.drawings = Drawings()
+    simulation.drone._shared.drawings = Drawings()
     return simulation.drone.drawings
 
 

@@ -10,7 +10,8 @@ import pytest
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
-from drone_sim.run.simulation import Diverged, Simulation
+from drone_sim.run.simulation import Simulation
+from drone_sim.run.whereabouts import Diverged
 from drone_sim.scripting.errors import ScriptError
 
 SCRIPTS = Path(__file__).parent / "scripts"

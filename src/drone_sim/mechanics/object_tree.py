@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Protocol
 
 from drone_sim.mechanics import frames
@@ -103,6 +104,7 @@ class ObjectTree:
         """Start empty."""
         self._objects: dict[int, SceneObject] = {}
         self._handles: dict[str, int] = {}
+        self._numbers = itertools.count()  # none is given twice
 
     def add(
         self,
@@ -118,21 +120,23 @@ class ObjectTree:
 
         `alias` is what it is called in 4.x paths (its name by default), `also` are further names of it.
         """
-        handle = len(self._objects)
+        handle = next(self._numbers)
         above = self._objects[self._handles[parent]] if parent else None
         self._objects[handle] = SceneObject((name, *also), alias or name, above, local, body)
         self._handles.update((known, handle) for known in (name, *also))
         return handle
 
-    def remove(self, root: int) -> None:
-        """Take an object and all below it out of the tree."""
-        gone = [root]
-        for handle in gone:
-            gone += [child for child, _ in self.children(self._objects[handle])]
-        for handle in gone:
-            one = self._objects.pop(handle)
-            for name in one.names:
-                self._handles.pop(name, None)
+    def remove(self, handles: Collection[int]) -> None:
+        """Take objects out of the tree; others that hang on them stay where they are, in the world."""
+        going = {id(self._objects[handle]) for handle in handles}
+        for handle, one in self._objects.items():
+            if handle not in handles and id(one.parent) in going:
+                matrix = one.matrix()
+                one.parent = None
+                one.put(matrix)
+        for handle in handles:
+            for name in self._objects.pop(handle).names:
+                del self._handles[name]
 
     def handle(self, name: str) -> int:
         """Return the handle of a name; raises ValueError that lists the near names."""

@@ -54,11 +54,8 @@ class Setting:
         return vehicle
 
     def remove(self, name: str) -> None:
-        """Take a vehicle out of the world, and its objects out of the tree; its script is gone already."""
-        vehicle = self.vehicles.pop(name)
-        vehicle.close()
-        self.shared.objects.remove(vehicle.handle)
-        self.world.remove(vehicle.body.number)
+        """Take a vehicle out of the world, and its objects out of the tree."""
+        self.vehicles.pop(name).leave()
 
     def _put(self, parameters: VehicleParameters) -> Vehicle:
         vehicle = Vehicle(parameters, self._free_suffix(), self.shared)

@@ -50,6 +50,7 @@ class QuadricopterObjects:
         """Take the tree, and '' or '#0' and so on."""
         self._objects = objects
         self._suffix = suffix
+        self._handles: list[int] = []
 
     def add(
         self,
@@ -57,12 +58,12 @@ class QuadricopterObjects:
         links: Mapping[str, Matrix],
         propellers: Sequence[Matrix],
         cameras: Mapping[str, CameraParameters],
-    ) -> int:
-        """Return the handle of the vehicle; `links` and `propellers` are poses in the root link's frame.
+    ) -> list[int]:
+        """Return the handles of all; `links` and `propellers` are poses in the root link's frame.
 
         Raises ParameterError for a camera that cannot be where it is said to be.
         """
-        root = self._add(DRONE, body=body, alias="Quadcopter", also=("Quadricopter", "Quadcopter"))
+        self._add(DRONE, body=body, alias="Quadcopter", also=("Quadricopter", "Quadcopter"))
         self._add("Quadricopter_base", DRONE, BASE, alias="base")
         self._add(TRACK_BASE, DRONE, BASE)
         for number, link in enumerate(propellers, start=1):
@@ -77,7 +78,7 @@ class QuadricopterObjects:
         self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
         for camera in cameras.values():
             self._add_camera(links, camera)
-        return root
+        return self._handles
 
     def _add(
         self,
@@ -88,10 +89,11 @@ class QuadricopterObjects:
         body: Body | None = None,
         alias: str = "",
         also: Sequence[str] = (),
-    ) -> int:
-        above = None if parent is None else f"{parent}{self._suffix}"
-        others = [f"{one}{self._suffix}" for one in also]
-        return self._objects.add(f"{name}{self._suffix}", above, local, body, alias=alias or name, also=others)
+    ) -> None:
+        own = None if parent is None else f"{parent}{self._suffix}"
+        above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
+        names = [f"{one}{self._suffix}" for one in (name, *also)]
+        self._handles.append(self._objects.add(names[0], above, local, body, alias=alias or name, also=names[1:]))
 
     def _add_camera(self, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
         if camera.mount is None:
@@ -100,12 +102,8 @@ class QuadricopterObjects:
             parent, optical = DRONE, links[camera.frame]
         else:
             parent, optical = camera.mount.parent, camera.mount.matrix
-        own = f"{parent}{self._suffix}"
-        above = own if own in self._objects else parent  # its own, or one of the scene, such as Floor
-        if above not in self._objects:
+        if not {f"{parent}{self._suffix}", parent} & {*self._objects.names}:
             raise ParameterError(f"camera frame {camera.frame}: no object is named {parent}")
-        name = f"{camera.object}{self._suffix}"
-        if name in self._objects:
+        if f"{camera.object}{self._suffix}" in self._objects:
             raise ParameterError(f"camera frame {camera.frame}: an object named '{camera.object}' is there already")
-        local = frames.multiply(optical, OPTICAL_FROM_SENSOR)
-        self._objects.add(name, above, local, alias=camera.object)
+        self._add(camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR))

@@ -74,6 +74,7 @@ class Vehicle:
             for name, link in [(DRONE, IDENTITY), *shapes]
         }
         self.script: load.Script = load.NoScript()
+        self._tree: ObjectTree | None = None  # the one that its objects are in
         self.cameras = {name: self._camera(one) for name, one in parameters.cameras.items()}
         self.reset()
 
@@ -99,11 +100,19 @@ class Vehicle:
         self._joint_angles: dict[str, float] = {}
         self.turned = False  # by its script, since the blades were shown
         self.drawings_made = 0
-        objects = QuadricopterObjects(self.objects, self.suffix)
-        self.handle = objects.add(self.body, self.body.rigid.links, self._rotors.links, self.parameters.cameras)
+        self._leave_tree()
+        self._tree = self.objects
+        objects = QuadricopterObjects(self._tree, self.suffix)
+        self._handles = objects.add(self.body, self.body.rigid.links, self._rotors.links, self.parameters.cameras)
         self._track = self.objects[self.objects.handle(TRACK_BASE + self.suffix)]
         self.script_parameters = self._script_parameters()
         self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in _NUMBERS]
+
+    def _leave_tree(self) -> None:
+        """Take its objects out of the tree that they are in, if that is still the simulation's."""
+        if self._tree is self.objects:
+            self._tree.remove(self._handles)
+            self._tree = None
 
     def _script_parameters(self) -> dict[str, dict[str, Any]]:
         """Return what V-REP's scripts have as simulation parameters, the gains of control, and the user's own."""
@@ -258,6 +267,12 @@ class Vehicle:
         """Raise ScriptError for a subscription since the last check whose function the script does not have."""
         for callback in self.bus.new_callbacks():
             self.script.check(callback)
+
+    def leave(self) -> None:
+        """Go out of the world, without a word to the script."""
+        self.close()
+        self._leave_tree()
+        self._shared.world.remove(self.body.number)
 
     def close(self) -> None:
         """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
