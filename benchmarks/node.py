@@ -142,13 +142,14 @@ def _listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
 PROBE = """
 import sys, time
 from drone_sim.run.guardian import Guardian
-from drone_sim.ros import inputs, node
+from drone_sim.ros.node import node
+from drone_sim.ros.vehicle import inputs
 delays = []
-heard = inputs.DroneInput._on_twist
+heard = inputs.VehicleInputs._twist
 def probe(self, message):
     delays.append((time.monotonic() % 10 - message.angular.x) % 10)
-    heard(self, message)
-inputs.DroneInput._on_twist = probe
+    return heard(self, message)
+inputs.VehicleInputs._twist = probe
 path, sys.argv[1:] = sys.argv[1], sys.argv[2:]
 node.main(Guardian("drone_sim"))
 open(path, "w").write("\\n".join(map(repr, delays)))

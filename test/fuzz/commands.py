@@ -10,8 +10,8 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, Wre
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
 from drone_sim.ros.node.inbox import Inbox
-from drone_sim.ros.rviz.markers import Handles
-from drone_sim.ros.vehicle.inputs import DroneInput
+from drone_sim.ros.rviz.handles import Handles
+from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.run.simulation import Simulation
 
 _CALLBACKS: dict[str, Callable[[Any], None]] = {}
@@ -43,7 +43,8 @@ rospy.rostime.set_rostime_initialized(True)
 def send(simulation: Simulation, messages: list[tuple[str, dict[str, Any]]]) -> None:
     """Call what the node has subscribed, and do what that left to be done."""
     inbox = Inbox()
-    Handles(simulation, DroneInput(simulation, inbox), inbox)
+    VehicleInputs(simulation, simulation.drone.parameters, inbox)
+    Handles(simulation, inbox)
     for topic, fields in messages:
         message = _KINDS[topic]()
         _fill(message, fields)

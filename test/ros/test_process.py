@@ -27,7 +27,7 @@ STUCK = """
 import sys, time
 from drone_sim.run.guardian import Guardian
 guardian = Guardian("drone_sim")
-from drone_sim.ros import node
+from drone_sim.ros.node import node
 from drone_sim.world import World
 def stuck(*_arguments):
     print("flying into it", flush=True)

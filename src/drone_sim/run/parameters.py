@@ -162,6 +162,8 @@ def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
     if config:
         given = merged(given, _config(config))
         _checked(given, "", {}, config)
+    if overrides.get("vehicles") == 0:  # roslaunch's arguments cannot be left out
+        overrides = {key: value for key, value in overrides.items() if key != "vehicles"}
     given = merged(given, overrides)
     return _in_scene(given, given["scene_file"])
 

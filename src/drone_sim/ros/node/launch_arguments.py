@@ -15,9 +15,9 @@ _SUFFIXES = (".launch", ".xml", ".test")
 
 
 def check_launch_arguments() -> None:
-    """Raise ParameterError for an argument on roslaunch's command line that drone.launch does not have.
+    """Raise ParameterError for an argument on roslaunch's command line that the launch file does not have.
 
-    Looks only where this process's parent is a roslaunch of drone.launch alone: what another launch file, that
+    Looks only where this process's parent is a roslaunch of one of ours alone: what another launch file, that
     includes it, does with its own arguments is not known here, and roslaunch itself refuses wrong ones of an include.
     """
     parent = Path(f"/proc/{os.getppid()}")
@@ -31,16 +31,19 @@ def check_launch_arguments() -> None:
 
 def check(command: Sequence[str], folder: Path) -> None:
     """Raise ParameterError for a wrong argument of a command that was given in a folder."""
-    launch = package_path() / "launch" / "drone.launch"
     arguments = _arguments(command)
     files = [number for number, one in enumerate(arguments) if one.endswith(_SUFFIXES) and ":=" not in one]
-    if len(files) != 1 or not _is(launch, arguments, files[0], folder):
-        return
+    for launch in sorted((package_path() / "launch").glob("*.launch")):
+        if len(files) == 1 and _is(launch, arguments, files[0], folder):
+            _check_names(launch, arguments)
+
+
+def _check_names(launch: Path, arguments: Sequence[str]) -> None:
     known = [str(one.get("name")) for one in ElementTree.parse(launch).getroot().findall("arg")]
     for argument in arguments:
         name, given, _ = argument.partition(":=")
         if given and not name.startswith("__") and name not in known:
-            raise ParameterError(f"{argument}: drone.launch has no argument {name}; {near_names(name, known)}")
+            raise ParameterError(f"{argument}: {launch.name} has no argument {name}; {near_names(name, known)}")
 
 
 def _arguments(command: Sequence[str]) -> list[str]:

@@ -40,14 +40,16 @@ class Transforms:
         """Publish all that moves under what `stamp` returns: tf2 takes but one for each stamp."""
         if not self._moving.pub_tf.get_num_connections():
             return
-        now, blades = stamp(), self._eyes.passes()
-        self._moving.sendTransform([one for vehicle in vehicles for one in _moving(now, vehicle, blades)])
+        now = stamp()
+        self._moving.sendTransform([one for vehicle in vehicles for one in _moving(now, vehicle)])
+        if self._eyes.passes():
+            self._moving.sendTransform([one for vehicle in vehicles for one in _turning(now, vehicle)])
 
 
-def _moving(now: rospy.Time, vehicle: Vehicle, blades: bool) -> list[TransformStamped]:
+def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
     own, world = vehicle.parameters, messages.WORLD
     prefix = own.frame_prefix
-    told = [
+    return [
         messages.transform(now, world, own.base_link, vehicle.matrix),
         messages.transform(now, world, own.track_base, vehicle.track),
         *(
@@ -56,10 +58,11 @@ def _moving(now: rospy.Time, vehicle: Vehicle, blades: bool) -> list[TransformSt
             if camera.mount is not None  # the URDF does not know them
         ),
     ]
-    if blades:
-        angles = vehicle.blade_angles
-        told += [_link(now, vehicle, link, angles.get(joint, 0.0)) for link, joint in vehicle.blade_joints.items()]
-    return told
+
+
+def _turning(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
+    angles = vehicle.blade_angles
+    return [_link(now, vehicle, link, angles.get(joint, 0.0)) for link, joint in vehicle.blade_joints.items()]
 
 
 def _link(now: rospy.Time, vehicle: Vehicle, name: str, angle: float = 0.0) -> TransformStamped:
