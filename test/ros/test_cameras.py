@@ -173,7 +173,7 @@ class Cameras(unittest.TestCase):
     def test_mounted_cameras_have_their_transform(self):
         transforms = self.listen("/tf", TFMessage)
         self.step_until(lambda: transforms.messages)
-        children = {t.child_frame_id for t in transforms.messages[-1].transforms}
+        children = {t.child_frame_id for t in transforms.messages[0].transforms}
         self.assertEqual(children, {"base_link", "Track_base", "track_optical", "floor_optical"})
 
 

@@ -58,7 +58,7 @@ def test_each_kind_reaches_the_drone_once_in_its_step(tmp_path):
     told = {}
     for step in range(20):
         drone = DroneLog()
-        commands.apply(step, drone)
+        commands.apply(step, {"drone": drone})
         if drone.calls:
             told[step] = drone.calls
     assert told == {
@@ -80,7 +80,7 @@ def test_entries_are_sorted_by_time_and_keep_the_files_order_within_one():
 
     numbered = [Entry(random.Random(number).choice([0.0, 0.5]), Twist(Vector3(number))) for number in range(100)]
     drone = DroneLog()
-    Timeline(numbered, 0.05).apply(10, drone)
+    Timeline(numbered, 0.05).apply(10, {"drone": drone})
     applied = [twist.linear.x for _, twist in drone.calls]
     assert applied == sorted(applied)
     assert len(applied) == sum(entry.at == 0.5 for entry in numbered)
@@ -103,7 +103,7 @@ def test_end_counts_the_longest_push():
         ("[{twist: {}}]", "entry 1: at: missing"),
         ("[{at: 1}]", "entry 1: must hold one of twist, pose, push; it holds none"),
         ("[{at: 1, twist: {}, pose: {}}]", "entry 1: must hold one of twist, pose, push; it holds twist and pose"),
-        ("[{at: 1, twsit: {}}]", "entry 1: twsit: unknown key; known are at, twist, pose, push"),
+        ("[{at: 1, twsit: {}}]", "entry 1: twsit: unknown key; known are at, vehicle, twist, pose, push"),
         ("[{at: 1, twist: }]", "entry 1: twist = None: must be a mapping of linear, angular"),
         ("[{at: -0.1, twist: {}}]", "entry 1: at = -0.1: input should be greater than or equal to 0"),
         ("[{at: .nan, twist: {}}]", "entry 1: at = nan: input should be a finite number"),
@@ -155,7 +155,7 @@ def test_every_wrong_key_is_named_with_its_line(tmp_path):
         "3: entry 2: at = 'soon': input should be a valid number",
         "4: entry 2: push.duration: missing; it is a number of seconds",
         "8: entry 4: pose.position.z = -1.0: must lie within 0.0 and 1000.0 m",
-        "9: entry 5: pusch: unknown key; known are at, twist, pose, push",
+        "9: entry 5: pusch: unknown key; known are at, vehicle, twist, pose, push",
     ]
 
 

@@ -33,7 +33,7 @@ def fly(simulation, seconds, commands=None):
     states, yaws, propellers = [], [], []
     for step in range(round(seconds / simulation.parameters.time_step)):
         if commands is not None:
-            commands.apply(step, simulation.drone)
+            commands.apply(step, simulation.vehicles)
         simulation.step()
         states.append([number for part in simulation.drone.state for number in part])
         yaws.append(math.atan2(simulation.drone.matrix[4], simulation.drone.matrix[0]))

@@ -25,11 +25,11 @@ from drone_sim.offline.recording import Recording, TableError
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
 from drone_sim.run import parameters as parameters_module
 from drone_sim.run.guardian import Guardian
-from drone_sim.run.parameters import ParameterError
+from drone_sim.run.parameters import ParameterError, Parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.scripts import LOG as SCRIPT_LOG
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.wording import shown
+from drone_sim.wording import near_names, shown
 
 _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
@@ -86,6 +86,7 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     _check_names(options)
     files = {"config": options.config, "scene_file": options.scene}
     parameters = parameters_module.load({**settings(options.set), **{key: name for key, name in files.items() if name}})
+    recorded = _vehicle(options.vehicle, parameters)
     timeline = Timeline((), parameters.time_step)
     if options.commands:
         timeline = timeline_module.read(options.commands, parameters)
@@ -98,7 +99,7 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     began = time.perf_counter()
     try:
         with _csv(options.csv) as file:
-            recording = Recording(file, keep=bool(options.plot))
+            recording = Recording(file, keep=bool(options.plot), vehicle=recorded)
             flown = _status_of(lambda: _fly(simulation, timeline, steps, recording, guardian))
             took = time.perf_counter() - began
     finally:
@@ -108,7 +109,7 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
         guardian.stand_down()  # no script runs any more, and a plot takes its time
     print(_summary(recording, took), flush=True)
     draw = options.plot and recording.rows
-    drawn = _status_of(lambda: _plot(options.plot, recording, timeline)) if draw else 0
+    drawn = _status_of(lambda: _plot(options.plot, recording, timeline.of(recorded))) if draw else 0
     return flown or closed or drawn
 
 
@@ -122,6 +123,14 @@ def _check_names(options: argparse.Namespace) -> None:
     for output, other in itertools.permutations(files, 2):
         if output in _OUTPUTS and files[output] == files[other]:
             raise ValueError(f"--{output} {_shown(getattr(options, output))}: is the file of --{other} as well")
+
+
+def _vehicle(name: str | None, parameters: Parameters) -> str:
+    """Return the vehicle whose flight is recorded; raises ValueError."""
+    names = [one.name for one in parameters.fleet]
+    if name is not None and name not in names:
+        raise ValueError(f"--vehicle {_shown(name)}: no such vehicle; {near_names(name, names)}")
+    return names[0] if name is None else name
 
 
 def _check_plot(path: str, steps: int) -> None:
@@ -162,7 +171,7 @@ def _fly(
         for step in range(steps):
             if guardian is not None and guardian.asked:
                 return _SIGNALLED + guardian.asked
-            timeline.apply(step, simulation.drone)
+            timeline.apply(step, simulation.vehicles)
             simulation.step()
             recording.add(simulation)
             bar.update()
@@ -229,6 +238,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="another value for a key of config/drone.yaml, such as control.thrust_limits=null",
     )
+    parser.add_argument("--vehicle", metavar="NAME", help="the one of several to record (default: the first)")
     parser.add_argument("--csv", metavar="OUT.csv", help="write a row per step: state, command, propellers")
     parser.add_argument("--plot", metavar="OUT.png", help="draw path, velocities, height, attitude and propellers")
     return parser

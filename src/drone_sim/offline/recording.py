@@ -31,19 +31,21 @@ class Recording:
     base_link in the world frame, the command is in the track frame, propellers are particle velocities.
     """
 
-    def __init__(self, file: TextIO | None = None, keep: bool = True):
+    def __init__(self, file: TextIO | None = None, keep: bool = True, vehicle: str = ""):
         """Take the CSV file, if there is to be one, and write its header. Raises TableError.
 
+        `vehicle` is the one whose flight it is; by default the first.
         Without `keep`, `rows` holds the last one alone: a long flight must not fill the memory.
         """
         self.rows: list[tuple[float, ...]] = []
         self._file = file
         self._keep = keep
+        self._vehicle = vehicle
         self._write(COLUMNS)
 
     def add(self, simulation: Simulation) -> None:
         """Add a row: now. Raises TableError where the disk is full."""
-        drone = simulation.drone
+        drone = simulation.vehicles.get(self._vehicle, simulation.drone)
         position, orientation, linear, angular = drone.state
         command = (*drone.command.linear, drone.command.angular.z)
         row = (simulation.time, *position, *orientation, *linear, *angular, *command, *drone.particle_velocities)

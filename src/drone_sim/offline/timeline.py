@@ -3,6 +3,7 @@
     - {at: 1.0, twist: {linear: [1, 0, 0], angular: [0, 0, 0]}}            # m/s, rad/s, track frame
     - {at: 5.0, pose: {position: [0, 0, 2], rpy: [0.3, 0, 0]}}             # m, rad; put there at rest
     - {at: 8.0, push: {force: [1, 0, 0], torque: [0, 0, 0], duration: 0.2}}  # N, N m, world frame; s
+    - {at: 9.0, vehicle: drone2, twist: {linear: [0, 1, 0]}}               # of several; the first one otherwise
 
 `at` is in seconds of simulated time, in any order; three numbers that are left out are zeros.
 """
@@ -10,7 +11,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
@@ -23,8 +24,9 @@ from drone_sim.mechanics.frames import Vector, from_rpy, to_quaternion
 from drone_sim.mechanics.state import Pose, Twist
 from drone_sim.run.parameters import Parameters
 from drone_sim.vehicles import checks
+from drone_sim.vehicles.parameters import EquipmentParameters, VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
-from drone_sim.wording import shown
+from drone_sim.wording import near_names, shown
 
 MAX_TIME = 1e6  # s, the longest flight
 _ZERO = (0.0, 0.0, 0.0)
@@ -36,18 +38,20 @@ class TimelineError(ValueError):
 
 
 class Entry(NamedTuple):
-    """What happens to the drone at `at` seconds of simulated time."""
+    """What happens to a vehicle ('' is the first) at `at` seconds of simulated time."""
 
     at: float
     action: Twist | Pose | Push
+    vehicle: str = ""
 
     @property
     def end(self) -> float:
         """The time (s) at which a push is over; of anything else `at`."""
         return self.at + (self.action.duration if isinstance(self.action, Push) else 0.0)
 
-    def apply(self, vehicle: Vehicle) -> None:
-        """Do it."""
+    def apply(self, vehicles: Mapping[str, Vehicle]) -> None:
+        """Do it to one of these."""
+        vehicle = vehicles[self.vehicle] if self.vehicle else next(iter(vehicles.values()))
         if isinstance(self.action, Twist):
             vehicle.receive(self.action)
         elif isinstance(self.action, Pose):
@@ -62,6 +66,7 @@ class Timeline:
     def __init__(self, entries: Iterable[Entry], time_step: float):
         """Sort the entries by time, those of one time in the order given; `time_step` in seconds."""
         self.entries = sorted(entries, key=lambda entry: entry.at)
+        self._time_step = time_step
         self._due: dict[int, list[Entry]] = {}
         for entry in self.entries:
             self._due.setdefault(first_step(entry.at, time_step), []).append(entry)
@@ -71,10 +76,14 @@ class Timeline:
         """The time (s) at which the last command is given and the last push is over; 0 without entries."""
         return max((entry.end for entry in self.entries), default=0.0)
 
-    def apply(self, step: int, vehicle: Vehicle) -> None:
+    def of(self, vehicle: str) -> Timeline:
+        """Return what happens to one vehicle, which is the first where an entry names none."""
+        return Timeline([one for one in self.entries if one.vehicle in ("", vehicle)], self._time_step)
+
+    def apply(self, step: int, vehicles: Mapping[str, Vehicle]) -> None:
         """Do what is due in a step (counted from 0), just before it runs."""
         for entry in self._due.get(step, ()):
-            entry.apply(vehicle)
+            entry.apply(vehicles)
 
 
 def first_step(time: float, time_step: float) -> int:
@@ -131,7 +140,7 @@ class _Twist(_Model):
     linear: _Vector = _ZERO
     angular: _Vector = _ZERO
 
-    def checked(self, parameters: Parameters) -> Twist:
+    def checked(self, parameters: EquipmentParameters) -> Twist:
         return checks.twist(self.linear, self.angular, parameters)
 
 
@@ -139,7 +148,7 @@ class _Pose(_Model):
     position: _Vector = _ZERO
     rpy: _Vector = _ZERO
 
-    def checked(self, parameters: Parameters) -> Pose:
+    def checked(self, parameters: EquipmentParameters) -> Pose:
         return checks.pose(self.position, to_quaternion(from_rpy(_ZERO, self.rpy)), parameters)
 
 
@@ -148,7 +157,7 @@ class _Push(_Model):
     torque: _Vector = _ZERO
     duration: Annotated[Finite, Within(1e-4, MAX_TIME)]
 
-    def checked(self, parameters: Parameters) -> Push:
+    def checked(self, parameters: EquipmentParameters) -> Push:
         return checks.push(self.force, self.torque, parameters)._replace(duration=self.duration)
 
 
@@ -168,7 +177,7 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
     here: Location = ()
     if not isinstance(row, dict):
         raise _WrongKeys((here, f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
-    known = ("at", *_KINDS)
+    known = ("at", "vehicle", *_KINDS)
     unknown: list[tuple[Location, str]] = [
         ((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}")
         for key in row
@@ -181,14 +190,25 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
     kind = kinds[0]
     times = {key: row[key] for key in row if key == "at"}
     (at, no_time), (action, no_action) = _checked(_Time, times, ()), _checked(_KINDS[kind], row[kind], (kind,))
-    wrong = [*unknown, *no_time, *no_action]
+    own, no_vehicle = _vehicle(row.get("vehicle", ""), parameters)
+    wrong = [*unknown, *no_time, *no_vehicle, *no_action]
     if wrong:
         raise _WrongKeys(*wrong)
     try:
-        return Entry(at.at, action.checked(parameters))
+        return Entry(at.at, action.checked(own), row.get("vehicle", ""))
     except checks.Refused as refused:
         key = str(refused).partition(".")[0].partition(" ")[0]
         raise _WrongKeys(((kind, key), f"{kind}.{refused}")) from None
+
+
+def _vehicle(name: Any, parameters: Parameters) -> tuple[VehicleParameters, list[tuple[Location, str]]]:
+    """Return what is allowed of a vehicle, and what is wrong with its name."""
+    fleet = {one.name: one for one in parameters.fleet}
+    if name == "" or (isinstance(name, str) and name in fleet):
+        return fleet.get(name, parameters.fleet[0]), []
+    return parameters.fleet[0], [
+        (("vehicle",), f"vehicle = {shown(name)}: no such vehicle; {near_names(str(name), fleet)}")
+    ]
 
 
 def _checked(model: type[Any], values: Any, above: Location) -> tuple[Any, list[tuple[Location, str]]]:
