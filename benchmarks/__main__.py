@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import loop, node, plot, render
+from benchmarks import fleet, loop, node, plot, render
 from benchmarks.cores import one_core
 from drone_sim.files import writing
 from drone_sim.render.renderer import Renderer
@@ -32,6 +32,7 @@ BENCHMARKS: dict[str, Callable[[], list[Row]]] = {
     "growth": _in_a_folder(render.growth),
     "loop": loop.compare,
     "node": node.measure,
+    "fleet": fleet.measure,
 }
 
 

@@ -48,9 +48,9 @@ def node(*arguments: str, program: str = "") -> AbstractContextManager[list[str]
     return _running("taskset", "-c", CORE, *what, *arguments)
 
 
-def launched(*arguments: str) -> AbstractContextManager[list[str]]:
-    """Run all of the launch file until the block ends; yield its lines of output."""
-    return _running("roslaunch", "drone_sim", "drone.launch", *arguments)
+def launched(*arguments: str, file: str = "drone.launch") -> AbstractContextManager[list[str]]:
+    """Run all of a launch file until the block ends; yield its lines of output."""
+    return _running("roslaunch", "drone_sim", file, *arguments)
 
 
 @contextlib.contextmanager
@@ -115,24 +115,25 @@ def _factor(run: Callable[[], AbstractContextManager[list[str]]], heard: bool, s
 
     with run() as lines:
         # Another process than the node's, as a user's program is.
-        listening = [_listen("/drone/front", Image), _listen("/drone/odom", Odometry)] if heard else []
+        listening = [listen("/drone/front", Image), listen("/drone/odom", Odometry)] if heard else []
         time.sleep(seconds)
         for subscriber in listening:
             subscriber.unregister()
         # The factor counts the whole run; ending at once keeps the unheard rest short.
-    return float(_flew(lines).group(2))
+    return float(flew(lines).group(2))
 
 
-def _flew(lines: list[str]) -> "re.Match[str]":
+def flew(lines: list[str]) -> "re.Match[str]":
     """Return what the node says at its end: seconds flown, factor, late steps, by how many ms."""
     said = r"flew ([\d.]+) s at ([\d.]+) times real time, (\d+) late steps, by (\d+) ms"
-    flew = re.search(said, "".join(lines))
-    if flew is None:
+    found = re.search(said, "".join(lines))
+    if found is None:
         raise RuntimeError("the node said nothing of its flight:\n" + "".join(lines))
-    return flew
+    return found
 
 
-def _listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
+def listen(topic: str, kind: Any, callback: Any = lambda message: None) -> Any:
+    """Subscribe; the latest message alone waits."""
     import rospy
 
     return rospy.Subscriber(topic, kind, callback, queue_size=1, buff_size=2**22, tcp_nodelay=True)
@@ -187,7 +188,7 @@ def latencies(seconds: float = 20.0) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "delays"
         with node(str(path), "_real_time_factor:=1", program=PROBE) as lines:
-            subscriber = _listen("/drone/front", Image, image)
+            subscriber = listen("/drone/front", Image, image)
             publisher = rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
             time.sleep(2.0)
             del came[:], ages[:]
@@ -203,7 +204,7 @@ def latencies(seconds: float = 20.0) -> list[Row]:
     return [
         _spread("cmd_vel published -> seen by the loop", delays),
         _spread("image stamped -> in the subscriber's callback", ages),
-        {**_spread("jitter of the 20 Hz images", jitter), "late_steps": int(_flew(lines).group(3))},
+        {**_spread("jitter of the 20 Hz images", jitter), "late_steps": int(flew(lines).group(3))},
     ]
 
 
@@ -229,12 +230,12 @@ def _recorded(argument: str, folder: str, seconds: float) -> "re.Match[str]":
         recorder = subprocess.Popen(
             ["rosbag", "record", "-q", "-O", f"{folder}/flight.bag", *RECORDED], stdout=subprocess.DEVNULL
         )
-        subscriber = _listen("/drone/front", Image)
+        subscriber = listen("/drone/front", Image)
         time.sleep(seconds)
         subscriber.unregister()
         recorder.send_signal(signal.SIGINT)
         recorder.wait()
-    return _flew(lines)
+    return flew(lines)
 
 
 @contextlib.contextmanager
