@@ -119,7 +119,7 @@ def _parameters(case: Case, folder: Path) -> None:
 
 def _with_small_pictures(given: dict[str, Any]) -> dict[str, Any]:
     small: dict[str, Any] = {"cameras": {name: dict(_SMALL) for name in ("front", "depth", "track", "floor")}}
-    return dict(parameters._merge(small, given))
+    return dict(parameters.merged(small, given))
 
 
 def _scene(case: Case, folder: Path) -> None:
