@@ -40,6 +40,22 @@ def draw(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
     return renderer.render(intrinsics, camera_pose, np.array(poses).reshape(-1, 4, 4))
 
 
+def pixel(camera, point):
+    """Pixel (u, v) of a point in front of the camera, in its optical frame (m)."""
+    x, y, z = point
+    return camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+
+
+def seen(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
+    """Index of the visual seen at each pixel, -1 for none: the nearest of them, each drawn alone."""
+    depths = []
+    for visual, pose in zip(visuals, poses):
+        renderer.set_visuals([visual])
+        depths.append(np.nan_to_num(renderer.render_depth(intrinsics, camera_pose, pose[None]), nan=np.inf))
+    renderer.set_visuals(visuals)
+    return np.where(np.isfinite(np.min(depths, axis=0)), np.argmin(depths, axis=0), -1)
+
+
 def reddish(picture):
     """Where a picture shows RED."""
     return (picture[:, :, 0] > 100) & (picture[:, :, 1] < 40)

@@ -5,7 +5,7 @@ import threading
 import cv2
 import numpy as np
 import pytest
-from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, looking, reddish
+from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, looking, pixel, reddish, seen
 
 from drone_sim.render import context
 from drone_sim.render.intrinsics import Intrinsics
@@ -17,11 +17,11 @@ def test_a_cube_covers_the_predicted_pixels(renderer):
     """Its front face, 4.8 m ahead, is a square of known edges; its middle is at no special pixel."""
     picture = draw(renderer, [box("cube", (0.4, 0.4, 0.4))], [at(5.0, 0.7, 1.5)])
     rows, columns = np.nonzero(reddish(picture))
-    left, top = CAMERA.pixel((-0.9, -0.7, 4.8))
-    right, bottom = CAMERA.pixel((-0.5, -0.3, 4.8))
+    left, top = pixel(CAMERA, (-0.9, -0.7, 4.8))
+    right, bottom = pixel(CAMERA, (-0.5, -0.3, 4.8))
     # Of the sides that face away from the axis nothing is seen, those towards it recede to 5.2 m.
     assert abs(columns.min() - 0.5 - left) < 0.5 + 1e-6 and abs(rows.min() - 0.5 - top) < 0.5 + 1e-6
-    right, bottom = (max(right, CAMERA.pixel((-0.5, -0.3, 5.2))[0]), max(bottom, CAMERA.pixel((-0.5, -0.3, 5.2))[1]))
+    right, bottom = (max(right, pixel(CAMERA, (-0.5, -0.3, 5.2))[0]), max(bottom, pixel(CAMERA, (-0.5, -0.3, 5.2))[1]))
     assert abs(columns.max() + 0.5 - right) < 0.5 + 1e-6 and abs(rows.max() + 0.5 - bottom) < 0.5 + 1e-6
 
 
@@ -29,7 +29,7 @@ def test_a_small_cubes_centroid_is_where_k_says(renderer):
     for y, z in ((0.0, 1.0), (1.1, 1.6), (-1.3, 0.3)):
         picture = draw(renderer, [Visual("ball", "sphere", (0.15,), RED)], [at(4.0, y, z)])
         rows, columns = np.nonzero(reddish(picture))
-        u, v = CAMERA.pixel((-y, 1.0 - z, 4.0))
+        u, v = pixel(CAMERA, (-y, 1.0 - z, 4.0))
         assert abs(columns.mean() - u) < 0.5 and abs(rows.mean() - v) < 0.5
 
 
@@ -82,11 +82,19 @@ def test_depth_is_as_good_far_from_the_origin(renderer):
     np.testing.assert_allclose(depth[120, 160], 5.0, atol=0.001)
 
 
-def test_labels_name_the_visual(renderer):
-    renderer.set_visuals([box("a", (0.5, 0.5, 0.5)), FLOOR, box("b", (0.5, 0.5, 0.5))])
-    labels = renderer.render_labels(CAMERA, AHEAD, np.array([at(4, 1, 1), at(0, 0, 0), at(4, -1, 1)]))
-    assert labels.dtype == np.int32
+def test_the_depth_of_a_pixel_is_that_of_the_nearest_visual_there(renderer):
+    visuals, poses = (
+        [box("a", (0.5, 0.5, 0.5)), FLOOR, box("b", (0.5, 0.5, 0.5))],
+        [at(4, 1, 1), at(0, 0, 0), at(4, -1, 1)],
+    )
+    labels = seen(renderer, visuals, poses)
     assert (labels[120, 80], labels[239, 160], labels[120, 239], labels[0, 0]) == (0, 1, 2, -1)
+    depth = renderer.render_depth(CAMERA, AHEAD, np.array(poses))
+    np.testing.assert_array_equal(np.isnan(depth), labels == -1)
+    for index, (visual, pose) in enumerate(zip(visuals, poses)):
+        renderer.set_visuals([visual])
+        alone = renderer.render_depth(CAMERA, AHEAD, pose[None])
+        np.testing.assert_array_equal(depth[labels == index], alone[labels == index])
 
 
 def test_glass_lets_through_what_is_behind_it(renderer):
@@ -112,7 +120,7 @@ def test_a_shadow_darkens_the_floor_under_a_thing_and_nothing_else(renderer):
     poses = [at(0, 0, 0), at(0, 0, 1.5)]
     bare = draw(renderer, [FLOOR], poses[:1], DOWN).astype(int)
     picture = draw(renderer, [FLOOR, box("a", (1.0, 1.0, 0.2))], poses, DOWN).astype(int)
-    labels = renderer.render_labels(CAMERA, DOWN, np.array(poses))
+    labels = seen(renderer, [FLOOR, box("a", (1.0, 1.0, 0.2))], poses, DOWN)
     darker = (labels == 0) & (picture.sum(axis=2) < bare.sum(axis=2) - 30)
     assert darker.sum() > 1000
     ratio = picture[darker].sum() / bare[darker].sum()
@@ -126,7 +134,7 @@ def test_shadows_do_not_add_up(renderer):
     visuals = [FLOOR, box("a", (1.0, 1.0, 0.1)), box("b", (1.0, 1.0, 0.1))]
     alone = draw(renderer, visuals[:2], [at(0, 0, 0), at(0, 0, 1.5)], DOWN)
     both = draw(renderer, visuals, [at(0, 0, 0), at(0, 0, 1.5), at(0, 0, 2.0)], DOWN)
-    labels = renderer.render_labels(CAMERA, DOWN, np.array([at(0, 0, 0), at(0, 0, 1.5), at(0, 0, 2.0)]))
+    labels = seen(renderer, visuals, [at(0, 0, 0), at(0, 0, 1.5), at(0, 0, 2.0)], DOWN)
     floor = both[labels == 0]
     assert len(np.unique(floor[:, 0])) == 2  # lit or not, nothing darker
     assert floor[:, 0].min() == alone[:, :, 0][renderer_floor(alone)].min()
@@ -140,9 +148,10 @@ def renderer_floor(picture):
 def test_shadows_end_where_the_floor_ends(renderer):
     small = box("floor", (1.0, 1.0, 0.2), GREY, floor=True)
     poses = np.array([at(0, 0, -0.1), at(0, 0, 1.5)])
-    picture = draw(renderer, [small, box("a", (3.0, 3.0, 0.1), RED)], poses, looking((-4, 0, 0.9), (0, 0, 0)))
-    labels = renderer.render_labels(CAMERA, looking((-4, 0, 0.9), (0, 0, 0)), poses)
-    sky = draw(renderer, [], [], looking((-4, 0, 0.9), (0, 0, 0)))
+    visuals, level = [small, box("a", (3.0, 3.0, 0.1), RED)], looking((-4, 0, 0.9), (0, 0, 0))
+    picture = draw(renderer, visuals, poses, level)
+    labels = seen(renderer, visuals, poses, level)
+    sky = draw(renderer, [], [], level)
     np.testing.assert_array_equal(picture[labels == -1], sky[labels == -1])
 
 
@@ -204,7 +213,7 @@ def test_the_same_again_is_the_same_to_the_last_bit_whatever_was_drawn_between(r
     renderer.render_depth(CAMERA, DOWN, poses)
     wide = Intrinsics(64, 48, 1.5, 0.1, 20.0)
     assert renderer.render(wide, DOWN, poses).shape == (48, 64, 3)
-    renderer.render_labels(wide, AHEAD, poses)
+    renderer.render_depth(wide, AHEAD, poses)
     out = np.zeros((240, 320, 3), np.uint8)
     assert renderer.render(CAMERA, AHEAD, poses, out=out) is out
     np.testing.assert_array_equal(out, first)

@@ -39,7 +39,7 @@ BIG = Intrinsics(640, 480, np.radians(60.0), 0.05, 50.0)
 
 def overlap(renderer, visual, pose, theirs, intrinsics):
     renderer.set_visuals([visual])
-    ours = renderer.render_labels(intrinsics, AHEAD, pose[None]) == 0
+    ours = np.isfinite(renderer.render_depth(intrinsics, AHEAD, pose[None]))
     assert ours.mean() > 0.08
     return (ours & theirs).sum() / (ours | theirs).sum()
 

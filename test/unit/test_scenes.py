@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from drawing import CAMERA, looking
+from drawing import CAMERA, looking, seen
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
@@ -65,19 +65,14 @@ def _simulate():
         simulation.close()
 
 
-def labels(renderer, world, eye=(-3, 0, 1.5), target=(1, 0, 0.3)):
-    """Return what is seen, as indices into the world's visuals."""
-    renderer.set_visuals(world.visuals())
-    return renderer.render_labels(CAMERA, looking(eye, target), world.visual_poses())
-
-
 @pytest.mark.parametrize("mass", [0, 2])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_every_shape_is_read_drawn_and_hit(write, simulate, renderer, shape, mass):
     simulation = simulate(write(f"drone: {{position: [1, 0, 3]}}\nobjects: [{SHAPES[shape] % (1, mass)}]"))
-    seen = labels(renderer, simulation.world)
+    view = looking((-3, 0, 1.5), (1, 0, 0.3))
+    labels = seen(renderer, simulation.world.visuals(), simulation.world.visual_poses(), view)
     things = [index for index, visual in enumerate(simulation.world.visuals()) if visual.key[0] == 1]
-    assert np.isin(seen, things).sum() > 500
+    assert np.isin(labels, things).sum() > 500
     ball = simulation.world.add_shape(Shape("sphere", (0.05,), (1.0, 0, 0.7), mass=0.1))
     simulation.world.advance({}, 100)
     assert simulation.world.state(ball).position[2] == pytest.approx(0.65, abs=0.03), "it lies on top of it"

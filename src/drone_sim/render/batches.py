@@ -15,7 +15,7 @@ from drone_sim.shapes.visual import Visual
 SHADE = 0.55  # what a shadow leaves of the floor's brightness
 VERTEX_LAYOUT = (("position", "3f", 12), ("normal", "3f", 12), ("uv", "2f", 8))
 MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
-FIXED_LAYOUT = (("paint", "4f", 16), ("label", "1f", 4))
+FIXED_LAYOUT = (("paint", "4f", 16),)
 ANISOTROPY = 8.0
 
 Programs = dict[str, Any]  # moderngl.Program by role
@@ -54,7 +54,7 @@ class Batch:
     arrays: dict[str, moderngl.VertexArray] = field(default_factory=dict)
 
     def draw(self, role: str) -> None:
-        """Draw with the program of this role: surface, shadow or data."""
+        """Draw with the program of this role: surface, shadow or depth."""
         if role == "surface" and self.part.texture is not None:
             self.part.texture.use(0)
         self.arrays[role].render(instances=len(self.members))
@@ -64,7 +64,7 @@ class Scene:
     """The visuals as batches; must be used with its context current."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, software: bool) -> None:
-        """Empty. programs: by name: plain, textured, floor, shadow, data; software: whether the CPU draws."""
+        """Empty. programs: by name: plain, textured, floor, shadow, depth; software: whether the CPU draws."""
         self._context = context
         self._programs = programs
         self._software = software
@@ -202,13 +202,13 @@ class Scene:
         """Make the record buffers and the vertex arrays that read them."""
         if not self.batches:
             return
-        records = [(*self._paint(batch, index), float(index)) for batch in self.batches for index in batch.members]
+        records = [self._paint(batch, index) for batch in self.batches for index in batch.members]
         moving = self._context.buffer(reserve=48 * len(records), dynamic=True)
         fixed = self._context.buffer(np.array(records, dtype=np.float32))
         self._buffers = [moving, fixed]
         for batch in self.batches:
             surface = "plain" if batch.part.texture is None else "floor" if batch.floor else "textured"
-            for role, name in (("surface", surface), ("shadow", "shadow"), ("data", "data")):
+            for role, name in (("surface", surface), ("shadow", "shadow"), ("depth", "depth")):
                 batch.arrays[role] = self._array(batch, self._programs[name])
 
     def _paint(self, batch: Batch, index: int) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""Pictures, depth images and labels of a list of visuals, drawn by OpenGL without a display.
+"""Pictures and depth images of a list of visuals, drawn by OpenGL without a display.
 
 The shadow costs no pass over a shadow map: floor and ground leave their darkening in the picture's alpha, everything
 else leaves 1; the things are then drawn once more, flattened onto the floor along the light, each multiplying
@@ -64,7 +64,7 @@ class Renderer:
                 [(gl.buffer(sky.dome()), "3f 3f", "direction", "tint")],
             )
             self._targets: dict[tuple[int, int], _Target] = {}
-            self._data_targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
+            self._depth_targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
 
     def set_visuals(self, visuals: Sequence[Visual]) -> None:
         """Draw these from now on; only meshes not known yet are read, those no longer used are freed.
@@ -104,18 +104,21 @@ class Renderer:
 
         Transparent things count as solid. Arguments as for `render`.
         """
-        out = self._data(intrinsics, camera_pose, poses, out, depth=True)
+        size = (intrinsics.width, intrinsics.height)
+        out = _output(out, (size[1], size[0]), np.float32)
+        poses = np.asarray(poses, dtype=np.float64)
+        with self._current() as gl:
+            target = self._depth_targets.get(size)
+            if target is None:
+                target = gl.framebuffer([gl.renderbuffer(size, 1, dtype="f4")], gl.depth_renderbuffer(size))
+                self._depth_targets[size] = target
+            self._prepare(intrinsics, camera_pose, poses)
+            target.use()
+            target.clear(red=-1.0)
+            gl.enable_only(gl.DEPTH_TEST)
+            _draw(gl, self._scene.batches, "depth")
+            target.read_into(out, components=1, dtype="f4")
         out[out < 0.0] = np.nan
-        return out
-
-    def render_labels(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Index of the visual seen at each pixel, (height, width) int32, -1 for none. As for `render`."""
-        labels = self._data(intrinsics, camera_pose, poses, None, depth=False)
-        if out is None:
-            return labels.astype(np.int32)
-        _output(out, labels.shape, np.int32)[:] = labels
         return out
 
     def close(self) -> None:
@@ -164,27 +167,6 @@ class Renderer:
             gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
             _draw(gl, scene.glass_from_far(camera_pose[:3, 2], poses), "surface")
 
-    def _data(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None, depth: bool
-    ) -> np.ndarray:
-        """Depth or label of every pixel, float32, -1 where nothing is."""
-        size = (intrinsics.width, intrinsics.height)
-        out = _output(out, (size[1], size[0]), np.float32)
-        poses = np.asarray(poses, dtype=np.float64)
-        with self._current() as gl:
-            target = self._data_targets.get(size)
-            if target is None:
-                target = gl.framebuffer([gl.renderbuffer(size, 1, dtype="f4")], gl.depth_renderbuffer(size))
-                self._data_targets[size] = target
-            self._prepare(intrinsics, camera_pose, poses)
-            target.use()
-            target.clear(red=-1.0)
-            gl.enable_only(gl.DEPTH_TEST)
-            self._programs["data"]["depth"] = depth
-            _draw(gl, self._scene.batches, "data")
-            target.read_into(out, components=1, dtype="f4")
-        return out
-
 
 def _draw(gl: moderngl.Context, batches: Sequence[Batch], role: str) -> None:
     """Draw the batches; the far sides of closed meshes, which nobody can see, are left out."""
@@ -208,7 +190,7 @@ def _programs(gl: moderngl.Context) -> Programs:
         "floor": surface("TEXTURED", "FLAT"),
         "shadow": (shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT),
         "sky": (shaders.SKY_VERTEX, shaders.SKY_FRAGMENT),
-        "data": (shaders.DATA_VERTEX, shaders.DATA_FRAGMENT),
+        "depth": (shaders.DEPTH_VERTEX, shaders.DEPTH_FRAGMENT),
     }
     programs = {
         name: gl.program(vertex_shader=vertex.lstrip(), fragment_shader=fragment.lstrip())
