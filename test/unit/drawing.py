@@ -3,11 +3,13 @@
 import numpy as np
 
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.plane import Plane
 from drone_sim.shapes.visual import Visual
 
 CAMERA = Intrinsics(320, 240, np.radians(60.0), 0.02, 100.0)
 RED, BLUE, GREY = (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (0.6, 0.6, 0.6, 1.0)
-FLOOR = Visual("floor", "plane", (), GREY, floor=True)
+FLOOR = Visual("floor", Plane(), GREY, floor=True)
 
 
 def at(x, y, z):
@@ -32,7 +34,7 @@ AHEAD = looking((0, 0, 1), (1, 0, 1))
 
 
 def box(key, size, rgba=RED, **kwargs):
-    return Visual(key, "box", size, rgba, **kwargs)
+    return Visual(key, Box(size), rgba, **kwargs)
 
 
 def draw(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):

@@ -10,6 +10,11 @@ from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, lookin
 from drone_sim.render import context
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Renderer, RendererUnavailable
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.cylinder import Cylinder
+from drone_sim.shapes.mesh import Mesh
+from drone_sim.shapes.plane import Plane
+from drone_sim.shapes.sphere import Sphere
 from drone_sim.shapes.visual import Visual
 
 
@@ -27,7 +32,7 @@ def test_a_cube_covers_the_predicted_pixels(renderer):
 
 def test_a_small_cubes_centroid_is_where_k_says(renderer):
     for y, z in ((0.0, 1.0), (1.1, 1.6), (-1.3, 0.3)):
-        picture = draw(renderer, [Visual("ball", "sphere", (0.15,), RED)], [at(4.0, y, z)])
+        picture = draw(renderer, [Visual("ball", Sphere((0.15,)), RED)], [at(4.0, y, z)])
         rows, columns = np.nonzero(reddish(picture))
         u, v = pixel(CAMERA, (-y, 1.0 - z, 4.0))
         assert abs(columns.mean() - u) < 0.5 and abs(rows.mean() - v) < 0.5
@@ -59,7 +64,7 @@ def test_visuals_come_change_and_go(renderer):
 def test_an_unreadable_mesh_leaves_the_scene_as_it_was(renderer):
     before = draw(renderer, [box("a", (0.5, 0.5, 0.5))], [at(4, 0, 1)])
     with pytest.raises(ValueError, match=r"missing\.obj"):
-        renderer.set_visuals([Visual("b", "mesh", (1, 1, 1), RED, file="missing.obj")])
+        renderer.set_visuals([Visual("b", Mesh("missing.obj"), RED)])
     np.testing.assert_array_equal(renderer.render(CAMERA, AHEAD, at(4, 0, 1)[None]), before)
 
 
@@ -156,7 +161,7 @@ def test_shadows_end_where_the_floor_ends(renderer):
 
 
 def test_multisampling_smooths_edges_and_only_edges():
-    scene = [Visual("disc", "cylinder", (0.5, 0.1), RED)], [at(3, 0, 1) @ looking((0, 0, 0), (1, 0, 0.001))]
+    scene = [Visual("disc", Cylinder((0.5, 0.1)), RED)], [at(3, 0, 1) @ looking((0, 0, 0), (1, 0, 0.001))]
     rough, smooth = Renderer(), Renderer(samples=4)
     try:
         pictures = [draw(renderer, *scene) for renderer in (rough, smooth, rough)]
@@ -180,16 +185,16 @@ def quarters(path):
 
 @pytest.mark.parametrize("shape", ["box", "mesh"])
 def test_textures_are_the_right_way_up(renderer, tmp_path, shape):
-    image, file = quarters(tmp_path / "quarters.png"), ""
+    image, wall = quarters(tmp_path / "quarters.png"), Box((1.0, 1.0, 1.0))
     if shape == "mesh":
-        file = str(tmp_path / "wall.obj")
+        wall = Mesh(str(tmp_path / "wall.obj"))
         (tmp_path / "wall.mtl").write_text("newmtl picture\nKd 1 1 1\nmap_Kd quarters.png\n")
         (tmp_path / "wall.obj").write_text(
             "mtllib wall.mtl\nv 0 .5 -.5\nv 0 -.5 -.5\nv 0 -.5 .5\nv 0 .5 .5\n"
             "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl picture\nf 1/1 2/2 3/3 4/4\n"
         )
         image = ""
-    visual = Visual("wall", shape, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0), file=file, texture=image)
+    visual = Visual("wall", wall, (1.0, 1.0, 1.0, 1.0), texture=image)
     picture = draw(renderer, [visual], [at(2, 0, 1)])
     top_left, top_right, low_left, low_right = (picture[v, u].astype(int) for v in (90, 150) for u in (130, 190))
     assert np.argmax(top_left) == 0 and np.argmax(top_right) == 2 and np.argmax(low_left) == 1
@@ -197,7 +202,7 @@ def test_textures_are_the_right_way_up(renderer, tmp_path, shape):
 
 
 def test_textures_repeat(renderer, tmp_path):
-    floor = Visual("floor", "plane", (), (1.0, 1.0, 1.0, 1.0), texture=quarters(tmp_path / "q.png"), floor=True)
+    floor = Visual("floor", Plane(), (1.0, 1.0, 1.0, 1.0), texture=quarters(tmp_path / "q.png"), floor=True)
     above = np.array([[0.0, -1, 0, 0.5], [-1, 0, 0, 0.5], [0, 0, -1, 2.0], [0, 0, 0, 1]])
     picture = draw(renderer, [floor], [at(0, 0, 0)], above)
     shift = above.copy()
@@ -207,7 +212,7 @@ def test_textures_repeat(renderer, tmp_path):
 
 
 def test_the_same_again_is_the_same_to_the_last_bit_whatever_was_drawn_between(renderer):
-    visuals = [FLOOR, box("a", (1, 1, 1)), Visual("g", "sphere", (0.4,), (0, 1, 0, 0.4))]
+    visuals = [FLOOR, box("a", (1, 1, 1)), Visual("g", Sphere((0.4,)), (0, 1, 0, 0.4))]
     poses = np.array([at(0, 0, 0), at(5, 1, 0.5), at(3, 0, 1)])
     first = draw(renderer, visuals, poses)
     renderer.render_depth(CAMERA, DOWN, poses)
