@@ -18,10 +18,16 @@ import trimesh
 
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Renderer
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.cylinder import Cylinder
+from drone_sim.shapes.mesh import Mesh
+from drone_sim.shapes.shape import DrawnShape
+from drone_sim.shapes.sphere import Sphere
+from drone_sim.shapes.triangles import Rgba
 from drone_sim.shapes.visual import Visual
 
 Row = dict[str, Any]
-Scene = tuple[list[Visual], np.ndarray]
+Drawn = tuple[list[Visual], np.ndarray]  # and their poses, world from visual (N, 4, 4)
 
 CAMERA = Intrinsics(640, 480, np.radians(60.0), 0.02, 100.0)
 AHEAD = np.array([[0.0, 0.0, 1.0, 0.2], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.8], [0.0, 0.0, 0.0, 1.0]])
@@ -57,31 +63,28 @@ def pose(x: float, y: float, z: float, yaw: float = 0.0) -> np.ndarray:
     return matrix
 
 
-def build(folder: Path, things: int = 10, triangles: int = 0) -> Scene:
+def build(folder: Path, things: int = 10, triangles: int = 0) -> Drawn:
     """A textured floor of 10 x 10 m, a quadrotor at 0.8 m, boxes and cylinders, perhaps a ball of triangles."""
-    parts: list[tuple[str, tuple[float, ...], tuple[float, ...], np.ndarray, str]] = [
-        ("mesh", (1.0, 1.0, 1.0), WHITE, np.eye(4), _floor(folder)),
-        ("box", (0.1, 0.1, 0.05), DARK, pose(0, 0, 0.8), ""),
-        ("sphere", (0.04,), COLOURS[0], pose(0.05, 0, 0.8), ""),
+    parts: list[tuple[DrawnShape, Rgba, np.ndarray]] = [
+        (Mesh(_floor(folder)), WHITE, np.eye(4)),
+        (Box((0.1, 0.1, 0.05)), DARK, pose(0, 0, 0.8)),
+        (Sphere((0.04,)), COLOURS[0], pose(0.05, 0, 0.8)),
     ]
     for angle in np.pi * np.array([0.25, 0.75, 1.25, 1.75]):
         x, y = ARM * np.cos(angle), ARM * np.sin(angle)
-        parts.append(("box", (0.26, 0.02, 0.012), DARK, pose(x / 2, y / 2, 0.8, angle), ""))
-        parts.append(("cylinder", (0.014, 0.03), DARK, pose(x, y, 0.81), ""))
-        parts.append(("cylinder", (0.08, 0.004), COLOURS[0], pose(x, y, 0.83), ""))
+        parts.append((Box((0.26, 0.02, 0.012)), DARK, pose(x / 2, y / 2, 0.8, angle)))
+        parts.append((Cylinder((0.014, 0.03)), DARK, pose(x, y, 0.81)))
+        parts.append((Cylinder((0.08, 0.004)), COLOURS[0], pose(x, y, 0.83)))
     random = np.random.RandomState(3)
     for index in range(things):
         x, y, yaw = random.uniform((1.2, -3.2, 0.0), (4.5, 3.2, 3.0))
         width, height = random.uniform((0.3, 0.4), (0.7, 1.3)) * min(1.0, np.sqrt(10.0 / things))
-        shape, size = ("box", (width, width, height)) if index % 2 else ("cylinder", (width / 2, height))
-        parts.append((shape, size, COLOURS[index % 4], pose(x, y, height / 2, yaw), ""))
+        shape = Box((width, width, height)) if index % 2 else Cylinder((width / 2, height))
+        parts.append((shape, COLOURS[index % 4], pose(x, y, height / 2, yaw)))
     if triangles:
-        parts.append(("mesh", (1.0, 1.0, 1.0), COLOURS[1], pose(3, 0, 0.8), _ball(folder, triangles)))
-    visuals = [
-        Visual((index, 0), shape, size, rgba, file=file, floor=index == 0)
-        for index, (shape, size, rgba, _, file) in enumerate(parts)
-    ]
-    return visuals, np.array([part[3] for part in parts])
+        parts.append((Mesh(_ball(folder, triangles)), COLOURS[1], pose(3, 0, 0.8)))
+    visuals = [Visual((index, 0), shape, rgba, floor=index == 0) for index, (shape, rgba, _) in enumerate(parts)]
+    return visuals, np.array([matrix for _, _, matrix in parts])
 
 
 def _floor(folder: Path) -> str:
@@ -102,18 +105,20 @@ def _ball(folder: Path, triangles: int) -> str:
     return str(path)
 
 
-def populate(client: int, scene: Scene) -> None:
+class _GivenFiles:
+    """Lets PyBullet read meshes as they are, with their materials."""
+
+    def mesh(self, path: str, hull: bool = False) -> str:
+        """Return the mesh file itself."""
+        return path
+
+
+def populate(client: int, scene: Drawn) -> None:
     """The same things as PyBullet bodies that only look."""
-    kinds = {"box": pybullet.GEOM_BOX, "sphere": pybullet.GEOM_SPHERE, "cylinder": pybullet.GEOM_CYLINDER}
     for visual, matrix in zip(*scene):
-        form: dict[str, Any] = {"shapeType": kinds.get(visual.shape, pybullet.GEOM_MESH), "rgbaColor": visual.rgba}
-        if visual.shape == "mesh":
-            form["fileName"] = visual.file
-        elif visual.shape == "box":
-            form["halfExtents"] = [length / 2 for length in visual.size]
-        else:
-            form.update(zip(("radius", "length"), visual.size))
-        shape = pybullet.createVisualShape(physicsClientId=client, **form)
+        told = visual.shape.for_bullet(_GivenFiles(), moves=False)
+        kind = getattr(pybullet, told.type)
+        shape = pybullet.createVisualShape(kind, rgbaColor=visual.rgba, physicsClientId=client, **told.visual)
         yaw = np.arctan2(matrix[1, 0], matrix[0, 0])
         turn = pybullet.getQuaternionFromEuler((0.0, 0.0, yaw))
         pybullet.createMultiBody(0, -1, shape, matrix[:3, 3].tolist(), turn, physicsClientId=client)
@@ -160,7 +165,7 @@ def _load_plugin(client: int) -> bool:
 
 def ours(
     name: str,
-    scene: Scene,
+    scene: Drawn,
     seconds: float,
     camera: Intrinsics = CAMERA,
     view: np.ndarray = AHEAD,

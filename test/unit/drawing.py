@@ -3,11 +3,13 @@
 import numpy as np
 
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.plane import Plane
 from drone_sim.shapes.visual import Visual
 
 CAMERA = Intrinsics(320, 240, np.radians(60.0), 0.02, 100.0)
 RED, BLUE, GREY = (1.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (0.6, 0.6, 0.6, 1.0)
-FLOOR = Visual("floor", "plane", (), GREY, floor=True)
+FLOOR = Visual("floor", Plane(), GREY, floor=True)
 
 
 def at(x, y, z):
@@ -32,12 +34,28 @@ AHEAD = looking((0, 0, 1), (1, 0, 1))
 
 
 def box(key, size, rgba=RED, **kwargs):
-    return Visual(key, "box", size, rgba, **kwargs)
+    return Visual(key, Box(size), rgba, **kwargs)
 
 
 def draw(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
     renderer.set_visuals(visuals)
     return renderer.render(intrinsics, camera_pose, np.array(poses).reshape(-1, 4, 4))
+
+
+def pixel(camera, point):
+    """Pixel (u, v) of a point in front of the camera, in its optical frame (m)."""
+    x, y, z = point
+    return camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy
+
+
+def seen(renderer, visuals, poses, camera_pose=AHEAD, intrinsics=CAMERA):
+    """Index of the visual seen at each pixel, -1 for none: the nearest of them, each drawn alone."""
+    depths = []
+    for visual, pose in zip(visuals, poses):
+        renderer.set_visuals([visual])
+        depths.append(np.nan_to_num(renderer.render_depth(intrinsics, camera_pose, pose[None]), nan=np.inf))
+    renderer.set_visuals(visuals)
+    return np.where(np.isfinite(np.min(depths, axis=0)), np.argmin(depths, axis=0), -1)
 
 
 def reddish(picture):

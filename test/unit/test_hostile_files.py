@@ -18,9 +18,10 @@ import pytest
 import trimesh
 
 from drone_sim.files import mesh_files
-from drone_sim.render.mesh import load
+from drone_sim.render.surfaces import load
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.shapes.mesh import Mesh
 from drone_sim.shapes.visual import Visual
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
@@ -279,5 +280,5 @@ def test_a_disc_of_20000_triangles_is_flat_to_the_eye(tmp_path):
     trimesh.Trimesh(corners.reshape(-1, 3), np.arange(60_000).reshape(-1, 3), process=False).export(
         str(tmp_path / "disc.stl")
     )
-    (disc,) = load(Visual("disc", "mesh", (1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0), file=str(tmp_path / "disc.stl")))
+    (disc,) = load(Visual("disc", Mesh(str(tmp_path / "disc.stl")), (1.0, 1.0, 1.0, 1.0)))
     np.testing.assert_allclose(disc.normals, [[0, 0, 1]] * len(disc.normals), atol=1e-6)

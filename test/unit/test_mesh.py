@@ -5,14 +5,24 @@ import numpy as np
 import pytest
 import trimesh
 
-from drone_sim.render.mesh import load
+from drone_sim.render.surfaces import load
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.capsule import Capsule
+from drone_sim.shapes.cylinder import Cylinder
+from drone_sim.shapes.mesh import Mesh
+from drone_sim.shapes.plane import Plane
+from drone_sim.shapes.sphere import Sphere
 from drone_sim.shapes.visual import Visual
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 
 
-def visual(shape, size=(1.0, 1.0, 1.0), file="", texture=""):
-    return Visual("it", shape, size, WHITE, file=str(file), texture=str(texture))
+def visual(shape, texture=""):
+    return Visual("it", shape, WHITE, texture=str(texture))
+
+
+def mesh_visual(file, scale=(1.0, 1.0, 1.0), texture=""):
+    return visual(Mesh(str(file), scale), texture)
 
 
 def extents(mesh):
@@ -20,16 +30,17 @@ def extents(mesh):
 
 
 @pytest.mark.parametrize(
-    ("shape", "size", "expected"),
+    ("shape", "expected"),
     [
-        ("box", (0.2, 0.4, 0.6), (0.2, 0.4, 0.6)),
-        ("cylinder", (0.3, 0.5), (0.6, 0.6, 0.5)),
-        ("sphere", (0.3,), (0.6, 0.6, 0.6)),
-        ("capsule", (0.1, 0.5), (0.2, 0.2, 0.7)),
+        (Box((0.2, 0.4, 0.6)), (0.2, 0.4, 0.6)),
+        (Cylinder((0.3, 0.5)), (0.6, 0.6, 0.5)),
+        (Sphere((0.3,)), (0.6, 0.6, 0.6)),
+        (Capsule((0.1, 0.5)), (0.2, 0.2, 0.7)),
     ],
+    ids=["box", "cylinder", "sphere", "capsule"],
 )
-def test_primitives_have_their_size_are_centred_and_face_outwards(shape, size, expected):
-    (mesh,) = load(visual(shape, size))
+def test_primitives_have_their_size_are_centred_and_face_outwards(shape, expected):
+    (mesh,) = load(visual(shape))
     np.testing.assert_allclose(extents(mesh), expected, rtol=0.02)
     np.testing.assert_allclose(mesh.vertices.min(axis=0), -mesh.vertices.max(axis=0), atol=1e-6)
     assert mesh.closed
@@ -39,11 +50,11 @@ def test_primitives_have_their_size_are_centred_and_face_outwards(shape, size, e
 
 
 def test_a_box_is_flat_a_sphere_smooth_and_a_cylinder_both():
-    (box,) = load(visual("box"))
+    (box,) = load(visual(Box((1.0, 1.0, 1.0))))
     assert len(box.vertices) == 24 and (np.abs(box.normals).max(axis=1) == 1.0).all()
-    (sphere,) = load(visual("sphere", (1.0,)))
+    (sphere,) = load(visual(Sphere((1.0,))))
     np.testing.assert_allclose(sphere.normals, sphere.vertices, atol=0.02)
-    (cylinder,) = load(visual("cylinder", (1.0, 2.0)))
+    (cylinder,) = load(visual(Cylinder((1.0, 2.0))))
     caps = np.abs(cylinder.normals[:, 2]) > 0.5
     np.testing.assert_allclose(np.abs(cylinder.normals[caps, 2]), 1.0, atol=1e-6)
     radial = cylinder.vertices[~caps] * [1, 1, 0]
@@ -52,7 +63,7 @@ def test_a_box_is_flat_a_sphere_smooth_and_a_cylinder_both():
 
 def test_a_plane_is_level_and_has_one_texture_to_the_metre(tmp_path):
     cv2.imwrite(str(tmp_path / "tile.png"), np.zeros((4, 4, 3), np.uint8))
-    (plane,) = load(visual("plane", (), texture=tmp_path / "tile.png"))
+    (plane,) = load(visual(Plane(), tmp_path / "tile.png"))
     assert (plane.vertices[:, 2] == 0).all() and (plane.normals == [0, 0, 1]).all() and not plane.closed
     np.testing.assert_array_equal(plane.uv, plane.vertices[:, :2])
 
@@ -68,7 +79,7 @@ def write_two_materials(folder):
 
 
 def test_an_obj_file_with_two_materials_gives_two_parts(tmp_path):
-    parts = load(visual("mesh", (2.0, 3.0, 1.0), write_two_materials(tmp_path)))
+    parts = load(mesh_visual(write_two_materials(tmp_path), (2.0, 3.0, 1.0)))
     red = next(part for part in parts if part.texture is None)
     picture = next(part for part in parts if part.texture is not None)
     assert red.rgba == (1.0, 0.0, 0.0, 0.5) and red.transparent and not red.closed
@@ -80,7 +91,7 @@ def test_an_obj_file_with_two_materials_gives_two_parts(tmp_path):
 
 def test_a_texture_given_replaces_that_of_the_file(tmp_path):
     cv2.imwrite(str(tmp_path / "other.png"), np.full((2, 2, 4), (1, 2, 3, 128), np.uint8))
-    parts = load(visual("mesh", file=write_two_materials(tmp_path), texture=tmp_path / "other.png"))
+    parts = load(mesh_visual(write_two_materials(tmp_path), texture=tmp_path / "other.png"))
     (picture,) = [part for part in parts if part.texture is not None]
     np.testing.assert_array_equal(picture.texture[0, 0], (3, 2, 1, 128))
     assert picture.transparent
@@ -89,7 +100,7 @@ def test_a_texture_given_replaces_that_of_the_file(tmp_path):
 def test_an_stl_file_is_white_keeps_its_edges_and_mirrors_inside_in(tmp_path):
     trimesh.creation.box().export(str(tmp_path / "box.stl"))
     for scale in ((1.0, 1.0, 1.0), (-1.0, 2.0, 1.0)):
-        (mesh,) = load(visual("mesh", scale, tmp_path / "box.stl"))
+        (mesh,) = load(mesh_visual(tmp_path / "box.stl", scale))
         assert mesh.rgba == WHITE and len(mesh.vertices) == 24 and mesh.closed
         assert np.einsum("ij,ij->i", mesh.vertices, mesh.normals).min() > 0
         np.testing.assert_allclose(extents(mesh), np.abs(scale), atol=1e-6)
@@ -102,7 +113,7 @@ def test_a_collada_file_has_its_own_unit_and_colour(tmp_path):
     box.vertex_normals = np.zeros_like(box.vertices)  # what is not asked for: trimesh would want scipy for them
     text = trimesh.exchange.dae.export_collada(box).decode()
     (tmp_path / "box.dae").write_text(text.replace("<up_axis>", '<unit name="centimeter" meter="0.01"/><up_axis>'))
-    (mesh,) = load(visual("mesh", file=tmp_path / "box.dae"))
+    (mesh,) = load(mesh_visual(tmp_path / "box.dae"))
     np.testing.assert_allclose(extents(mesh), (0.1, 0.2, 0.3), atol=1e-6)
     assert mesh.rgba == (1.0, 0.0, 0.0, 1.0) and mesh.closed
 
@@ -112,12 +123,10 @@ def test_a_file_that_cannot_be_read_is_named_in_one_line(tmp_path, name):
     if name != "missing.obj":
         (tmp_path / name).write_text("" if name == "empty.obj" else "this is no mesh\n" * 20)
     with pytest.raises(ValueError, match=name) as caught:
-        load(visual("mesh", file=tmp_path / name))
+        load(mesh_visual(tmp_path / name))
     assert "\n" not in str(caught.value)
 
 
-def test_an_unreadable_texture_and_an_unknown_shape_are_refused(tmp_path):
+def test_an_unreadable_texture_is_refused(tmp_path):
     with pytest.raises(ValueError, match="nowhere"):
-        load(visual("box", texture=tmp_path / "nowhere.png"))
-    with pytest.raises(ValueError, match="teapot"):
-        load(visual("teapot"))
+        load(visual(Box((1.0, 1.0, 1.0)), tmp_path / "nowhere.png"))

@@ -5,11 +5,16 @@ import threading
 import cv2
 import numpy as np
 import pytest
-from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, looking, reddish
+from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, looking, pixel, reddish, seen
 
 from drone_sim.render import context
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Renderer, RendererUnavailable
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.cylinder import Cylinder
+from drone_sim.shapes.mesh import Mesh
+from drone_sim.shapes.plane import Plane
+from drone_sim.shapes.sphere import Sphere
 from drone_sim.shapes.visual import Visual
 
 
@@ -17,19 +22,19 @@ def test_a_cube_covers_the_predicted_pixels(renderer):
     """Its front face, 4.8 m ahead, is a square of known edges; its middle is at no special pixel."""
     picture = draw(renderer, [box("cube", (0.4, 0.4, 0.4))], [at(5.0, 0.7, 1.5)])
     rows, columns = np.nonzero(reddish(picture))
-    left, top = CAMERA.pixel((-0.9, -0.7, 4.8))
-    right, bottom = CAMERA.pixel((-0.5, -0.3, 4.8))
+    left, top = pixel(CAMERA, (-0.9, -0.7, 4.8))
+    right, bottom = pixel(CAMERA, (-0.5, -0.3, 4.8))
     # Of the sides that face away from the axis nothing is seen, those towards it recede to 5.2 m.
     assert abs(columns.min() - 0.5 - left) < 0.5 + 1e-6 and abs(rows.min() - 0.5 - top) < 0.5 + 1e-6
-    right, bottom = (max(right, CAMERA.pixel((-0.5, -0.3, 5.2))[0]), max(bottom, CAMERA.pixel((-0.5, -0.3, 5.2))[1]))
+    right, bottom = (max(right, pixel(CAMERA, (-0.5, -0.3, 5.2))[0]), max(bottom, pixel(CAMERA, (-0.5, -0.3, 5.2))[1]))
     assert abs(columns.max() + 0.5 - right) < 0.5 + 1e-6 and abs(rows.max() + 0.5 - bottom) < 0.5 + 1e-6
 
 
 def test_a_small_cubes_centroid_is_where_k_says(renderer):
     for y, z in ((0.0, 1.0), (1.1, 1.6), (-1.3, 0.3)):
-        picture = draw(renderer, [Visual("ball", "sphere", (0.15,), RED)], [at(4.0, y, z)])
+        picture = draw(renderer, [Visual("ball", Sphere((0.15,)), RED)], [at(4.0, y, z)])
         rows, columns = np.nonzero(reddish(picture))
-        u, v = CAMERA.pixel((-y, 1.0 - z, 4.0))
+        u, v = pixel(CAMERA, (-y, 1.0 - z, 4.0))
         assert abs(columns.mean() - u) < 0.5 and abs(rows.mean() - v) < 0.5
 
 
@@ -59,7 +64,7 @@ def test_visuals_come_change_and_go(renderer):
 def test_an_unreadable_mesh_leaves_the_scene_as_it_was(renderer):
     before = draw(renderer, [box("a", (0.5, 0.5, 0.5))], [at(4, 0, 1)])
     with pytest.raises(ValueError, match=r"missing\.obj"):
-        renderer.set_visuals([Visual("b", "mesh", (1, 1, 1), RED, file="missing.obj")])
+        renderer.set_visuals([Visual("b", Mesh("missing.obj"), RED)])
     np.testing.assert_array_equal(renderer.render(CAMERA, AHEAD, at(4, 0, 1)[None]), before)
 
 
@@ -82,11 +87,19 @@ def test_depth_is_as_good_far_from_the_origin(renderer):
     np.testing.assert_allclose(depth[120, 160], 5.0, atol=0.001)
 
 
-def test_labels_name_the_visual(renderer):
-    renderer.set_visuals([box("a", (0.5, 0.5, 0.5)), FLOOR, box("b", (0.5, 0.5, 0.5))])
-    labels = renderer.render_labels(CAMERA, AHEAD, np.array([at(4, 1, 1), at(0, 0, 0), at(4, -1, 1)]))
-    assert labels.dtype == np.int32
+def test_the_depth_of_a_pixel_is_that_of_the_nearest_visual_there(renderer):
+    visuals, poses = (
+        [box("a", (0.5, 0.5, 0.5)), FLOOR, box("b", (0.5, 0.5, 0.5))],
+        [at(4, 1, 1), at(0, 0, 0), at(4, -1, 1)],
+    )
+    labels = seen(renderer, visuals, poses)
     assert (labels[120, 80], labels[239, 160], labels[120, 239], labels[0, 0]) == (0, 1, 2, -1)
+    depth = renderer.render_depth(CAMERA, AHEAD, np.array(poses))
+    np.testing.assert_array_equal(np.isnan(depth), labels == -1)
+    for index, (visual, pose) in enumerate(zip(visuals, poses)):
+        renderer.set_visuals([visual])
+        alone = renderer.render_depth(CAMERA, AHEAD, pose[None])
+        np.testing.assert_array_equal(depth[labels == index], alone[labels == index])
 
 
 def test_glass_lets_through_what_is_behind_it(renderer):
@@ -112,7 +125,7 @@ def test_a_shadow_darkens_the_floor_under_a_thing_and_nothing_else(renderer):
     poses = [at(0, 0, 0), at(0, 0, 1.5)]
     bare = draw(renderer, [FLOOR], poses[:1], DOWN).astype(int)
     picture = draw(renderer, [FLOOR, box("a", (1.0, 1.0, 0.2))], poses, DOWN).astype(int)
-    labels = renderer.render_labels(CAMERA, DOWN, np.array(poses))
+    labels = seen(renderer, [FLOOR, box("a", (1.0, 1.0, 0.2))], poses, DOWN)
     darker = (labels == 0) & (picture.sum(axis=2) < bare.sum(axis=2) - 30)
     assert darker.sum() > 1000
     ratio = picture[darker].sum() / bare[darker].sum()
@@ -126,7 +139,7 @@ def test_shadows_do_not_add_up(renderer):
     visuals = [FLOOR, box("a", (1.0, 1.0, 0.1)), box("b", (1.0, 1.0, 0.1))]
     alone = draw(renderer, visuals[:2], [at(0, 0, 0), at(0, 0, 1.5)], DOWN)
     both = draw(renderer, visuals, [at(0, 0, 0), at(0, 0, 1.5), at(0, 0, 2.0)], DOWN)
-    labels = renderer.render_labels(CAMERA, DOWN, np.array([at(0, 0, 0), at(0, 0, 1.5), at(0, 0, 2.0)]))
+    labels = seen(renderer, visuals, [at(0, 0, 0), at(0, 0, 1.5), at(0, 0, 2.0)], DOWN)
     floor = both[labels == 0]
     assert len(np.unique(floor[:, 0])) == 2  # lit or not, nothing darker
     assert floor[:, 0].min() == alone[:, :, 0][renderer_floor(alone)].min()
@@ -140,14 +153,15 @@ def renderer_floor(picture):
 def test_shadows_end_where_the_floor_ends(renderer):
     small = box("floor", (1.0, 1.0, 0.2), GREY, floor=True)
     poses = np.array([at(0, 0, -0.1), at(0, 0, 1.5)])
-    picture = draw(renderer, [small, box("a", (3.0, 3.0, 0.1), RED)], poses, looking((-4, 0, 0.9), (0, 0, 0)))
-    labels = renderer.render_labels(CAMERA, looking((-4, 0, 0.9), (0, 0, 0)), poses)
-    sky = draw(renderer, [], [], looking((-4, 0, 0.9), (0, 0, 0)))
+    visuals, level = [small, box("a", (3.0, 3.0, 0.1), RED)], looking((-4, 0, 0.9), (0, 0, 0))
+    picture = draw(renderer, visuals, poses, level)
+    labels = seen(renderer, visuals, poses, level)
+    sky = draw(renderer, [], [], level)
     np.testing.assert_array_equal(picture[labels == -1], sky[labels == -1])
 
 
 def test_multisampling_smooths_edges_and_only_edges():
-    scene = [Visual("disc", "cylinder", (0.5, 0.1), RED)], [at(3, 0, 1) @ looking((0, 0, 0), (1, 0, 0.001))]
+    scene = [Visual("disc", Cylinder((0.5, 0.1)), RED)], [at(3, 0, 1) @ looking((0, 0, 0), (1, 0, 0.001))]
     rough, smooth = Renderer(), Renderer(samples=4)
     try:
         pictures = [draw(renderer, *scene) for renderer in (rough, smooth, rough)]
@@ -171,16 +185,16 @@ def quarters(path):
 
 @pytest.mark.parametrize("shape", ["box", "mesh"])
 def test_textures_are_the_right_way_up(renderer, tmp_path, shape):
-    image, file = quarters(tmp_path / "quarters.png"), ""
+    image, wall = quarters(tmp_path / "quarters.png"), Box((1.0, 1.0, 1.0))
     if shape == "mesh":
-        file = str(tmp_path / "wall.obj")
+        wall = Mesh(str(tmp_path / "wall.obj"))
         (tmp_path / "wall.mtl").write_text("newmtl picture\nKd 1 1 1\nmap_Kd quarters.png\n")
         (tmp_path / "wall.obj").write_text(
             "mtllib wall.mtl\nv 0 .5 -.5\nv 0 -.5 -.5\nv 0 -.5 .5\nv 0 .5 .5\n"
             "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl picture\nf 1/1 2/2 3/3 4/4\n"
         )
         image = ""
-    visual = Visual("wall", shape, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0, 1.0), file=file, texture=image)
+    visual = Visual("wall", wall, (1.0, 1.0, 1.0, 1.0), texture=image)
     picture = draw(renderer, [visual], [at(2, 0, 1)])
     top_left, top_right, low_left, low_right = (picture[v, u].astype(int) for v in (90, 150) for u in (130, 190))
     assert np.argmax(top_left) == 0 and np.argmax(top_right) == 2 and np.argmax(low_left) == 1
@@ -188,7 +202,7 @@ def test_textures_are_the_right_way_up(renderer, tmp_path, shape):
 
 
 def test_textures_repeat(renderer, tmp_path):
-    floor = Visual("floor", "plane", (), (1.0, 1.0, 1.0, 1.0), texture=quarters(tmp_path / "q.png"), floor=True)
+    floor = Visual("floor", Plane(), (1.0, 1.0, 1.0, 1.0), texture=quarters(tmp_path / "q.png"), floor=True)
     above = np.array([[0.0, -1, 0, 0.5], [-1, 0, 0, 0.5], [0, 0, -1, 2.0], [0, 0, 0, 1]])
     picture = draw(renderer, [floor], [at(0, 0, 0)], above)
     shift = above.copy()
@@ -198,13 +212,13 @@ def test_textures_repeat(renderer, tmp_path):
 
 
 def test_the_same_again_is_the_same_to_the_last_bit_whatever_was_drawn_between(renderer):
-    visuals = [FLOOR, box("a", (1, 1, 1)), Visual("g", "sphere", (0.4,), (0, 1, 0, 0.4))]
+    visuals = [FLOOR, box("a", (1, 1, 1)), Visual("g", Sphere((0.4,)), (0, 1, 0, 0.4))]
     poses = np.array([at(0, 0, 0), at(5, 1, 0.5), at(3, 0, 1)])
     first = draw(renderer, visuals, poses)
     renderer.render_depth(CAMERA, DOWN, poses)
     wide = Intrinsics(64, 48, 1.5, 0.1, 20.0)
     assert renderer.render(wide, DOWN, poses).shape == (48, 64, 3)
-    renderer.render_labels(wide, AHEAD, poses)
+    renderer.render_depth(wide, AHEAD, poses)
     out = np.zeros((240, 320, 3), np.uint8)
     assert renderer.render(CAMERA, AHEAD, poses, out=out) is out
     np.testing.assert_array_equal(out, first)

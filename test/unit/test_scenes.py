@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 import trimesh
-from drawing import CAMERA, looking
+from drawing import CAMERA, looking, seen
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 from drone_sim.run.simulation import Simulation
-from drone_sim.world import Shape, World
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.sphere import Sphere
+from drone_sim.world import World
 
 URDF = """<robot name="barrel"><link name="barrel">
   <inertial><mass value="2"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -65,20 +67,15 @@ def _simulate():
         simulation.close()
 
 
-def labels(renderer, world, eye=(-3, 0, 1.5), target=(1, 0, 0.3)):
-    """Return what is seen, as indices into the world's visuals."""
-    renderer.set_visuals(world.visuals())
-    return renderer.render_labels(CAMERA, looking(eye, target), world.visual_poses())
-
-
 @pytest.mark.parametrize("mass", [0, 2])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_every_shape_is_read_drawn_and_hit(write, simulate, renderer, shape, mass):
     simulation = simulate(write(f"drone: {{position: [1, 0, 3]}}\nobjects: [{SHAPES[shape] % (1, mass)}]"))
-    seen = labels(renderer, simulation.world)
+    view = looking((-3, 0, 1.5), (1, 0, 0.3))
+    labels = seen(renderer, simulation.world.visuals(), simulation.world.visual_poses(), view)
     things = [index for index, visual in enumerate(simulation.world.visuals()) if visual.key[0] == 1]
-    assert np.isin(seen, things).sum() > 500
-    ball = simulation.world.add_shape(Shape("sphere", (0.05,), (1.0, 0, 0.7), mass=0.1))
+    assert np.isin(labels, things).sum() > 500
+    ball = simulation.world.add_object(Sphere((0.05,)), Pose((1.0, 0, 0.7)), mass=0.1)
     simulation.world.advance({}, 100)
     assert simulation.world.state(ball).position[2] == pytest.approx(0.65, abs=0.03), "it lies on top of it"
 
@@ -101,8 +98,8 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     np.testing.assert_allclose(
         loaded.world.visual_poses()[:10], simulation.world.visual_poses()[:10], rtol=0, atol=1e-9
     )
-    looks = [[visual.shape, visual.size, visual.rgba, visual.texture] for visual in simulation.world.visuals()[1:10]]
-    assert [[v.shape, v.size, v.rgba, v.texture] for v in loaded.world.visuals()[1:10]] == looks
+    looks = [[visual.shape, visual.rgba, visual.texture] for visual in simulation.scene.visuals()[0]]
+    assert [[v.shape, v.rgba, v.texture] for v in loaded.scene.visuals()[0]] == looks
 
 
 @pytest.mark.parametrize(
@@ -275,7 +272,6 @@ def test_the_drone_flies_through_the_first_gate(simulate):
 
 def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
     world = World(0.005, -9.81)
-    red, green = Shape("sphere", (0.5,), (1, 1, 1), color=(1, 0, 0, 1)), Shape("box", (1, 1, 1), (1, -1, 1))
     view = looking((-3, 0, 1), (1, 0, 1))
 
     def picture():
@@ -283,7 +279,8 @@ def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
         return renderer.render(CAMERA, view, world.visual_poses()).astype(int)
 
     empty = picture()
-    first, second = world.add_shape(red), world.add_shape(green)
+    first = world.add_object(Sphere((0.5,)), Pose((1, 1, 1)), color=(1, 0, 0, 1))
+    second = world.add_object(Box((1, 1, 1)), Pose((1, -1, 1)))
     both = picture()
     assert (both != empty).any(axis=2)[:, :160].sum() > 500 and (both != empty).any(axis=2)[:, 160:].sum() > 500
     assert np.argmax(both[120, 100]) == 0

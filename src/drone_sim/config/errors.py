@@ -75,9 +75,9 @@ def _place(model: Any, loc: Location) -> _Place:
     for part in loc:
         if part == "[key]":
             break
-        union = _tagged(annotation)
-        if union and part in union:
-            annotation = union[str(part)]
+        choice = _choice(annotation)
+        if part in choice.models:
+            annotation = choice.models[str(part)]
             continue
         location.append(part)
         if get_origin(_bare(annotation)) is tuple:
@@ -105,12 +105,29 @@ def _bare(annotation: Any) -> Any:
             return annotation
 
 
-def _tagged(annotation: Any) -> dict[str, Any]:
-    """Return the models of a union by the word that chooses one of them."""
-    bare = _bare(annotation)
-    if get_origin(bare) not in _UNIONS:
-        return {}
-    return {get_args(one.model_fields["shape"].annotation)[0]: one for one in get_args(bare)}
+class _Choice(NamedTuple):
+    """Models, of which the word under one key chooses one: pydantic's discriminated union."""
+
+    key: str
+    models: dict[str, Any]  # by that word
+
+
+def _choice(annotation: Any) -> _Choice:
+    """Return what a type lets choose among; nothing where it is no such union."""
+    first, *others = [one for one in get_args(annotation) if one is not type(None)] or [None]
+    if get_origin(annotation) is Annotated:
+        for key in (getattr(one, "discriminator", None) for one in others):
+            if isinstance(key, str):
+                models = get_args(_bare(first))
+                return _Choice(key, {word: one for one in models for word in _words(one, key)})
+        return _choice(first)
+    if get_origin(annotation) in _UNIONS and not others:
+        return _choice(first)
+    return _Choice("", {})
+
+
+def _words(model: Any, key: str) -> tuple[str, ...]:
+    return get_args(model.model_fields[key].annotation)
 
 
 def _description(annotation: Any) -> str:
@@ -148,12 +165,12 @@ def _problem(error: Any, place: _Place) -> Problem:
     location, value = place.location, error["input"]
     if error["type"] == "missing":  # a number of a list
         location = location[:-1]
+    choice = _choice(place.annotation)
     if error["type"] == "union_tag_not_found":
-        return Problem(
-            (*location, "shape"), f"parameter {readable_key((*location, 'shape'))}: missing{_shapes(place)}", True
-        )
+        location = (*location, choice.key)
+        return Problem(location, f"parameter {readable_key(location)}: missing; {_must_be_one_of(choice)}", True)
     if error["type"] == "union_tag_invalid":
-        location, value = (*location, "shape"), value["shape"]
+        location, value = (*location, choice.key), value[choice.key]
     key = f"parameter {readable_key(location)}"
     if error["type"] == "extra_forbidden":
         return Problem(location, f"{key}: unknown key{_near(str(location[-1]), place.known)}")
@@ -165,10 +182,11 @@ def _reason(error: Any, place: _Place) -> str:
     if (place.is_in_list and kind == "missing") or kind in ("tuple_type", "too_long"):
         return _must(place, "must be") or message
     fields = getattr(_bare(place.annotation), "model_fields", None) or {}
+    choice = _choice(place.annotation)
     plain = {
         "model_type": f"must hold `key: value` lines with {', '.join(fields)}",
-        "model_attributes_type": "must hold `key: value` lines, of which one is `shape`",
-        "union_tag_invalid": _shapes(place)[2:],
+        "model_attributes_type": f"must hold `key: value` lines, of which one is `{choice.key}`",
+        "union_tag_invalid": _must_be_one_of(choice),
         "bool_type": "must be true or false",
         "string_pattern_mismatch": PATTERNS.get(error.get("ctx", {}).get("pattern"), message),
     }
@@ -180,8 +198,8 @@ def _must(place: _Place, verb: str) -> str:
     return f"{verb} {what}" if what else ""
 
 
-def _shapes(place: _Place) -> str:
-    return f"; must be one of {', '.join(map(repr, _tagged(place.annotation)))}"
+def _must_be_one_of(choice: _Choice) -> str:
+    return f"must be one of {', '.join(map(repr, choice.models))}"
 
 
 def _near(key: str, known: Sequence[str]) -> str:

@@ -217,11 +217,11 @@ class Checked(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def one_of(*models: type[Checked]) -> Any:
-    """Return the type of a value that is one of these, which the key `kind` tells apart."""
+def one_of(*models: type[Checked], key: str = "kind") -> Any:
+    """Return the type of a value that is one of these, which the word under `key` tells apart."""
     if len(models) == 1:
         return models[0]
-    return Annotated[Union[models], Field(discriminator="kind")]  # noqa: UP007 -- of a tuple
+    return Annotated[Union[models], Field(discriminator=key)]  # noqa: UP007 -- of a tuple
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:

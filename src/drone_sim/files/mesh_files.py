@@ -75,8 +75,11 @@ def as_stl(path: str, hull: bool = False) -> bytes:
     Raises what `read` raises.
     """
     corners = np.concatenate([part.vertices[part.faces] for part in read(path)])
-    if hull:
-        corners = _hull(corners)
+    return stl(_hull(corners) if hull else corners)
+
+
+def stl(corners: np.ndarray) -> bytes:
+    """Return triangles (m, 3, 3), m, as a binary STL."""
     records = np.zeros(len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     records["normal"] = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-30)

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import moderngl
 import numpy as np
 
-from drone_sim.render import mesh
+from drone_sim.files.mesh_files import WHITE
+from drone_sim.render import surfaces
+from drone_sim.render.surfaces import Surface
 from drone_sim.shapes.visual import Visual
 
 SHADE = 0.55  # what a shadow leaves of the floor's brightness
 VERTEX_LAYOUT = (("position", "3f", 12), ("normal", "3f", 12), ("uv", "2f", 8))
 MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
-FIXED_LAYOUT = (("paint", "4f", 16), ("label", "1f", 4))
+FIXED_LAYOUT = (("paint", "4f", 16),)
 ANISOTROPY = 8.0
 
 Programs = dict[str, Any]  # moderngl.Program by role
 
 
 @dataclass
-class Part:
-    """One material's triangles on the card."""
+class CardSurface:
+    """A surface on the card."""
 
     vertices: moderngl.Buffer
     indices: moderngl.Buffer
@@ -43,9 +45,9 @@ class Part:
 
 @dataclass
 class Batch:
-    """Instances of one part that are drawn by one call."""
+    """Instances of one surface that are drawn by one call."""
 
-    part: Part
+    surface: CardSurface
     members: list[int]  # indices into the visuals
     floor: bool = False
     transparent: bool = False
@@ -54,51 +56,51 @@ class Batch:
     arrays: dict[str, moderngl.VertexArray] = field(default_factory=dict)
 
     def draw(self, role: str) -> None:
-        """Draw with the program of this role: surface, shadow or data."""
-        if role == "surface" and self.part.texture is not None:
-            self.part.texture.use(0)
+        """Draw with the program of this role: surface, shadow or depth."""
+        if role == "surface" and self.surface.texture is not None:
+            self.surface.texture.use(0)
         self.arrays[role].render(instances=len(self.members))
 
 
-class Scene:
+class Batches:
     """The visuals as batches; must be used with its context current."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, software: bool) -> None:
-        """Empty. programs: by name: plain, textured, floor, shadow, data; software: whether the CPU draws."""
+        """Empty. programs: by name: plain, textured, floor, shadow, depth; software: whether the CPU draws."""
         self._context = context
         self._programs = programs
         self._software = software
-        self._parts: dict[Visual, tuple[Part, ...]] = {}
+        self._surfaces: dict[Visual, tuple[CardSurface, ...]] = {}
         self._buffers: list[moderngl.Buffer] = []
         self._members: np.ndarray = np.zeros(0, dtype=np.intp)
         self._scales = np.zeros((0, 1, 3))
         self.visuals: tuple[Visual, ...] = ()
-        self.batches: list[Batch] = []
+        self.all: list[Batch] = []
         self.solids: list[Batch] = []
         self.floors: list[Batch] = []
         self.has_ground = False  # which the picture is cleared to; it has a depth, too
         self.glass: list[Batch] = []
 
     def update(self, visuals: Sequence[Visual]) -> None:
-        """Follow the list; on ValueError (an unreadable mesh) the scene stays as it was."""
+        """Follow the list; on ValueError (an unreadable mesh) all stays as it was."""
         visuals = tuple(visuals)
         if visuals == self.visuals:
             return
         shared = [_shared(visual) for visual in visuals]
-        loaded = {form: mesh.load(form) for form, _ in shared if form not in self._parts}
+        loaded = {form: surfaces.load(form) for form, _ in shared if form not in self._surfaces}
         self._release_batches()
-        for form in set(self._parts) - {form for form, _ in shared}:
-            for part in self._parts.pop(form):
-                part.release()
-        for form, meshes in loaded.items():
-            self._parts[form] = tuple(self._upload(one) for one in meshes)
+        for form in set(self._surfaces) - {form for form, _ in shared}:
+            for surface in self._surfaces.pop(form):
+                surface.release()
+        for form, made in loaded.items():
+            self._surfaces[form] = tuple(self._upload(one) for one in made)
         self.visuals = visuals
-        self.batches = self._sort(visuals, [form for form, _ in shared])
-        self.solids = [batch for batch in self.batches if not (batch.floor or batch.transparent or batch.ground)]
-        self.floors = [batch for batch in self.batches if batch.floor]
-        self.has_ground = any(batch.ground for batch in self.batches)
-        self.glass = [batch for batch in self.batches if batch.transparent]
-        self._members = np.array([i for batch in self.batches for i in batch.members], dtype=np.intp)
+        self.all = self._sort(visuals, [form for form, _ in shared])
+        self.solids = [batch for batch in self.all if not (batch.floor or batch.transparent or batch.ground)]
+        self.floors = [batch for batch in self.all if batch.floor]
+        self.has_ground = any(batch.ground for batch in self.all)
+        self.glass = [batch for batch in self.all if batch.transparent]
+        self._members = np.array([i for batch in self.all for i in batch.members], dtype=np.intp)
         self._scales = np.array([shared[i][1] for i in self._members]).reshape(-1, 1, 3)
         self._link()
 
@@ -121,38 +123,38 @@ class Scene:
         if not self.floors:
             return None
         floor = self.floors[0]
-        return float(poses[floor.members[0], 2, 3] + floor.part.top * self._scales[floor.first, 0, 2])
+        return float(poses[floor.members[0], 2, 3] + floor.surface.top * self._scales[floor.first, 0, 2])
 
     def glass_from_far(self, axis: np.ndarray, poses: np.ndarray) -> list[Batch]:
         """The transparent batches, the farthest along `axis` (3,) first."""
 
         def depth(batch: Batch) -> float:
             pose = poses[batch.members[0]]
-            return float(axis @ (pose[:3, :3] @ (batch.part.centre * self._scales[batch.first, 0]) + pose[:3, 3]))
+            return float(axis @ (pose[:3, :3] @ (batch.surface.centre * self._scales[batch.first, 0]) + pose[:3, 3]))
 
         return sorted(self.glass, key=depth, reverse=True) if len(self.glass) > 1 else self.glass
 
     def release(self) -> None:
         """Free everything on the card."""
         self._release_batches()
-        for parts in self._parts.values():
-            for part in parts:
-                part.release()
-        self._parts = {}
+        for shared in self._surfaces.values():
+            for surface in shared:
+                surface.release()
+        self._surfaces = {}
 
     def _release_batches(self) -> None:
-        for batch in self.batches:
+        for batch in self.all:
             for array in batch.arrays.values():
                 array.release()
         for buffer in self._buffers:
             buffer.release()
-        self._buffers, self.batches, self.visuals = [], [], ()
+        self._buffers, self.all, self.visuals = [], [], ()
         self.solids, self.floors, self.glass = [], [], []
 
-    def _upload(self, one: mesh.Mesh) -> Part:
+    def _upload(self, one: Surface) -> CardSurface:
         uv = np.zeros((len(one.vertices), 2), dtype=np.float32) if one.uv is None else one.uv
         low, high = one.vertices.min(axis=0), one.vertices.max(axis=0)
-        return Part(
+        return CardSurface(
             vertices=self._context.buffer(np.hstack([one.vertices, one.normals, uv]).astype(np.float32)),
             indices=self._context.buffer(np.ascontiguousarray(one.faces, dtype=np.uint32)),
             texture=None if one.texture is None else self._upload_texture(one.texture),
@@ -175,22 +177,22 @@ class Scene:
         return texture
 
     def _sort(self, visuals: Sequence[Visual], forms: Sequence[Visual]) -> list[Batch]:
-        """Solid instances of a part share a batch; transparent ones are drawn singly, in the order of depth."""
+        """Solid instances of a surface share a batch; transparent ones are drawn singly, in the order of depth."""
         solids: dict[int, Batch] = {}
         singles: list[Batch] = []
         for index, (visual, form) in enumerate(zip(visuals, forms)):
-            for part in self._parts[form]:
+            for surface in self._surfaces[form]:
                 if visual.ground:
-                    singles.append(Batch(part, [index], ground=True))
+                    singles.append(Batch(surface, [index], ground=True))
                 elif visual.floor:
-                    singles.append(Batch(part, [index], floor=True))
-                elif part.transparent or visual.rgba[3] < 1.0:
-                    singles.append(Batch(part, [index], transparent=True))
-                elif id(part) in solids:
-                    solids[id(part)].members.append(index)
+                    singles.append(Batch(surface, [index], floor=True))
+                elif surface.transparent or visual.rgba[3] < 1.0:
+                    singles.append(Batch(surface, [index], transparent=True))
+                elif id(surface) in solids:
+                    solids[id(surface)].members.append(index)
                 else:
-                    solids[id(part)] = Batch(part, [index])
-        alike = sorted(solids.values(), key=lambda batch: (batch.part.texture is not None, batch.part.closed))
+                    solids[id(surface)] = Batch(surface, [index])
+        alike = sorted(solids.values(), key=lambda batch: (batch.surface.texture is not None, batch.surface.closed))
         batches = alike + singles
         first = 0
         for batch in batches:
@@ -200,26 +202,26 @@ class Scene:
 
     def _link(self) -> None:
         """Make the record buffers and the vertex arrays that read them."""
-        if not self.batches:
+        if not self.all:
             return
-        records = [(*self._paint(batch, index), float(index)) for batch in self.batches for index in batch.members]
+        records = [self._paint(batch, index) for batch in self.all for index in batch.members]
         moving = self._context.buffer(reserve=48 * len(records), dynamic=True)
         fixed = self._context.buffer(np.array(records, dtype=np.float32))
         self._buffers = [moving, fixed]
-        for batch in self.batches:
-            surface = "plain" if batch.part.texture is None else "floor" if batch.floor else "textured"
-            for role, name in (("surface", surface), ("shadow", "shadow"), ("data", "data")):
+        for batch in self.all:
+            look = "plain" if batch.surface.texture is None else "floor" if batch.floor else "textured"
+            for role, name in (("surface", look), ("shadow", "shadow"), ("depth", "depth")):
                 batch.arrays[role] = self._array(batch, self._programs[name])
 
     def _paint(self, batch: Batch, index: int) -> tuple[float, ...]:
-        red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.part.rgba)
+        red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.surface.rgba)
         return (red, green, blue, SHADE if batch.floor else alpha if batch.transparent else 1.0)
 
     def _array(self, batch: Batch, program: Any) -> moderngl.VertexArray:
-        array = self._context.vertex_array(program, [], index_buffer=batch.part.indices, index_element_size=4)
+        array = self._context.vertex_array(program, [], index_buffer=batch.surface.indices, index_element_size=4)
         moving, fixed = self._buffers
         for layout, buffer, first, divisor in (
-            (VERTEX_LAYOUT, batch.part.vertices, 0, 0),
+            (VERTEX_LAYOUT, batch.surface.vertices, 0, 0),
             (MOVING_LAYOUT, moving, batch.first, 1),
             (FIXED_LAYOUT, fixed, batch.first, 1),
         ):
@@ -233,14 +235,7 @@ class Scene:
         return array
 
 
-def _shared(visual: Visual) -> tuple[Visual, tuple[float, ...]]:
+def _shared(visual: Visual) -> tuple[Visual, tuple[float, float, float]]:
     """The geometry to upload, one for all that share it, and the scale that makes it this visual's."""
-    form = Visual(None, visual.shape, (), mesh.WHITE, texture=visual.texture, edition=visual.edition)
-    if visual.shape == "box":
-        return replace(form, size=(1.0, 1.0, 1.0)), visual.size
-    if visual.shape == "sphere":
-        return replace(form, size=(1.0,)), visual.size * 3
-    if visual.shape == "cylinder":
-        radius, length = visual.size
-        return replace(form, size=(1.0, 1.0)), (radius, radius, length)
-    return replace(form, size=visual.size, file=visual.file), (1.0, 1.0, 1.0)
+    shape, scale = visual.shape.shared()
+    return Visual(None, shape, WHITE, texture=visual.texture, edition=visual.edition), scale

@@ -8,7 +8,6 @@ centres, as in OpenCV and image_geometry: the top left pixel's centre is (0, 0),
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,13 +65,6 @@ class Intrinsics:
     def P(self) -> tuple[float, ...]:
         """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo."""
         return (self.fx, 0.0, self.cx, 0.0, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
-
-    def pixel(self, point_optical: Sequence[float]) -> tuple[float, float]:
-        """Pixel (u, v) of a point (x, y, z) in the optical frame, in metres; z must be positive."""
-        x, y, z = point_optical
-        if not z > 0.0:
-            raise ValueError(f"a point at z = {z} is not in front of the camera")
-        return self.fx * x / z + self.cx, self.fy * y / z + self.cy
 
     def projection(self) -> np.ndarray:
         """OpenGL clip matrix (4, 4) float64 of the optical frame, acting on column vectors.

@@ -1,4 +1,4 @@
-"""Pictures, depth images and labels of a list of visuals, drawn by OpenGL without a display.
+"""Pictures and depth images of a list of visuals, drawn by OpenGL without a display.
 
 The shadow costs no pass over a shadow map: floor and ground leave their darkening in the picture's alpha, everything
 else leaves 1; the things are then drawn once more, flattened onto the floor along the light, each multiplying
@@ -17,7 +17,7 @@ import moderngl
 import numpy as np
 
 from drone_sim.render import context, shaders, sky
-from drone_sim.render.batches import SHADE, Batch, Programs, Scene
+from drone_sim.render.batches import SHADE, Batch, Batches, Programs
 from drone_sim.render.context import RendererUnavailable
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.shapes.visual import Visual
@@ -58,13 +58,13 @@ class Renderer:
             self._samples = samples
             self.description: str = gl.info["GL_RENDERER"]
             self._programs = _programs(gl)
-            self._scene = Scene(gl, self._programs, context.is_software(gl))
+            self._batches = Batches(gl, self._programs, context.is_software(gl))
             self._sky = gl.vertex_array(
                 self._programs["sky"],
                 [(gl.buffer(sky.dome()), "3f 3f", "direction", "tint")],
             )
             self._targets: dict[tuple[int, int], _Target] = {}
-            self._data_targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
+            self._depth_targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
 
     def set_visuals(self, visuals: Sequence[Visual]) -> None:
         """Draw these from now on; only meshes not known yet are read, those no longer used are freed.
@@ -72,7 +72,7 @@ class Renderer:
         Raises ValueError naming the file when a mesh or texture cannot be read; the old list then stays.
         """
         with self._current():
-            self._scene.update(visuals)
+            self._batches.update(visuals)
 
     def render(
         self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
@@ -90,7 +90,7 @@ class Renderer:
                 target = self._targets[size] = _Target(gl, size, self._samples)
             self._prepare(intrinsics, camera_pose, poses)
             target.framebuffer.use()
-            target.framebuffer.clear(*sky.HAZE, SHADE if self._scene.has_ground else 1.0)
+            target.framebuffer.clear(*sky.HAZE, SHADE if self._batches.has_ground else 1.0)
             self._paint(gl, camera_pose, poses)
             if self._samples:
                 gl.copy_framebuffer(target.resolved, target.framebuffer)
@@ -104,18 +104,21 @@ class Renderer:
 
         Transparent things count as solid. Arguments as for `render`.
         """
-        out = self._data(intrinsics, camera_pose, poses, out, depth=True)
+        size = (intrinsics.width, intrinsics.height)
+        out = _output(out, (size[1], size[0]), np.float32)
+        poses = np.asarray(poses, dtype=np.float64)
+        with self._current() as gl:
+            target = self._depth_targets.get(size)
+            if target is None:
+                target = gl.framebuffer([gl.renderbuffer(size, 1, dtype="f4")], gl.depth_renderbuffer(size))
+                self._depth_targets[size] = target
+            self._prepare(intrinsics, camera_pose, poses)
+            target.use()
+            target.clear(red=-1.0)
+            gl.enable_only(gl.DEPTH_TEST)
+            _draw(gl, self._batches.all, "depth")
+            target.read_into(out, components=1, dtype="f4")
         out[out < 0.0] = np.nan
-        return out
-
-    def render_labels(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Index of the visual seen at each pixel, (height, width) int32, -1 for none. As for `render`."""
-        labels = self._data(intrinsics, camera_pose, poses, None, depth=False)
-        if out is None:
-            return labels.astype(np.int32)
-        _output(out, labels.shape, np.int32)[:] = labels
         return out
 
     def close(self) -> None:
@@ -123,7 +126,7 @@ class Renderer:
         if self._gl is None:
             return
         with self._current():
-            self._scene.release()
+            self._batches.release()
         self._gl.release()
         self._gl = None
 
@@ -138,7 +141,7 @@ class Renderer:
     def _prepare(self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray) -> None:
         """Send the poses and what depends on the camera alone."""
         origin = camera_pose[:3, 3]
-        self._scene.move(origin, poses)
+        self._batches.move(origin, poses)
         turn = np.eye(4)
         turn[:3, :3] = camera_pose[:3, :3].T
         clip_from_world = (intrinsics.projection() @ turn).T.astype(np.float32).tobytes()
@@ -147,49 +150,28 @@ class Renderer:
 
     def _paint(self, gl: Any, camera_pose: np.ndarray, poses: np.ndarray) -> None:
         """Solid things, floor, sky, shadows, then what can be seen through, into the bound framebuffer."""
-        scene = self._scene
+        batches = self._batches
         gl.enable_only(gl.DEPTH_TEST)
-        _draw(gl, scene.solids, "surface")
-        _draw(gl, scene.floors, "surface")
+        _draw(gl, batches.solids, "surface")
+        _draw(gl, batches.floors, "surface")
         gl.disable(gl.CULL_FACE)
         self._sky.render()
-        height = scene.floor_height(poses)
+        height = batches.floor_height(poses)
         if height is not None:
             self._programs["shadow"]["floor_height"] = height - camera_pose[2, 3]
             gl.enable_only(gl.BLEND)
             gl.blend_func = gl.ZERO, gl.DST_ALPHA, gl.ONE, gl.ZERO
-            _draw(gl, scene.solids, "shadow")
-        if scene.glass:
+            _draw(gl, batches.solids, "shadow")
+        if batches.glass:
             gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
             gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
-            _draw(gl, scene.glass_from_far(camera_pose[:3, 2], poses), "surface")
-
-    def _data(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None, depth: bool
-    ) -> np.ndarray:
-        """Depth or label of every pixel, float32, -1 where nothing is."""
-        size = (intrinsics.width, intrinsics.height)
-        out = _output(out, (size[1], size[0]), np.float32)
-        poses = np.asarray(poses, dtype=np.float64)
-        with self._current() as gl:
-            target = self._data_targets.get(size)
-            if target is None:
-                target = gl.framebuffer([gl.renderbuffer(size, 1, dtype="f4")], gl.depth_renderbuffer(size))
-                self._data_targets[size] = target
-            self._prepare(intrinsics, camera_pose, poses)
-            target.use()
-            target.clear(red=-1.0)
-            gl.enable_only(gl.DEPTH_TEST)
-            self._programs["data"]["depth"] = depth
-            _draw(gl, self._scene.batches, "data")
-            target.read_into(out, components=1, dtype="f4")
-        return out
+            _draw(gl, batches.glass_from_far(camera_pose[:3, 2], poses), "surface")
 
 
 def _draw(gl: moderngl.Context, batches: Sequence[Batch], role: str) -> None:
     """Draw the batches; the far sides of closed meshes, which nobody can see, are left out."""
     for batch in batches:
-        if batch.part.closed:
+        if batch.surface.closed:
             gl.enable(gl.CULL_FACE)
         else:
             gl.disable(gl.CULL_FACE)
@@ -208,7 +190,7 @@ def _programs(gl: moderngl.Context) -> Programs:
         "floor": surface("TEXTURED", "FLAT"),
         "shadow": (shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT),
         "sky": (shaders.SKY_VERTEX, shaders.SKY_FRAGMENT),
-        "data": (shaders.DATA_VERTEX, shaders.DATA_FRAGMENT),
+        "depth": (shaders.DEPTH_VERTEX, shaders.DEPTH_FRAGMENT),
     }
     programs = {
         name: gl.program(vertex_shader=vertex.lstrip(), fragment_shader=fragment.lstrip())

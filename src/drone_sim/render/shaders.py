@@ -104,22 +104,15 @@ void main() { pixel = vec4(colour, 1.0); }
 """
 
 # Depth along the optical axis is the clip w, which the projection makes equal to the optical z.
-DATA_VERTEX = (
+DEPTH_VERTEX = (
     _INPUTS
     + """
-in float label;
-flat out float visual;
-void main() {
-    visual = label;
-    gl_Position = clip_from_world * vec4(world_point(), 1.0);
-}
+void main() { gl_Position = clip_from_world * vec4(world_point(), 1.0); }
 """
 )
 
-DATA_FRAGMENT = """
+DEPTH_FRAGMENT = """
 #version 330 core
-flat in float visual;
-uniform bool depth;
-out float value;
-void main() { value = depth ? 1.0 / gl_FragCoord.w : visual; }
+out float depth;
+void main() { depth = 1.0 / gl_FragCoord.w; }
 """

@@ -11,7 +11,7 @@ from drone_sim.mechanics.state import Pose, State
 from drone_sim.scene import scene_files
 from drone_sim.scene.scene_parameters import ObjectParameters, SceneParameters
 from drone_sim.shapes.visual import Visual
-from drone_sim.world import Shape, World
+from drone_sim.world import World
 
 
 class SceneBody:
@@ -48,7 +48,7 @@ class Scene:
         floor = parameters.floor
         world.add_floor(floor.size, floor.texture, ground=not floor.edge)
         try:
-            self._numbers = [world.add_shape(_shape(one)) for one in parameters.objects]
+            self._numbers = [_add(world, one) for one in parameters.objects]
         except ValueError as error:
             raise ParameterError(str(error)) from None
         self.bodies = [SceneBody(world, number) for number in self._numbers]  # in the order of the parameters
@@ -66,5 +66,5 @@ class Scene:
         return self._world.visuals(self._numbers), self._world.visual_poses(self._numbers)
 
 
-def _shape(one: ObjectParameters) -> Shape:
-    return Shape(one.shape, one.size, one.position, one.rpy, one.color, one.mass, getattr(one, "file", ""), one.texture)
+def _add(world: World, one: ObjectParameters) -> int:
+    return world.add_object(one.to_shape(), one.pose, mass=one.mass, color=one.color, texture=one.texture)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from xml.etree import ElementTree as Xml
-
 import numpy as np
 
 from drone_sim.config.types import ParameterError
-from drone_sim.files import images, mesh_files, urdf_files
-from drone_sim.scene.scene_parameters import MeshParameters, SceneParameters, UrdfParameters
+from drone_sim.files import images, mesh_files
+from drone_sim.scene.scene_parameters import SceneParameters
 
 MAX_TRIANGLES = 500_000  # of all meshes of a scene, each counted as often as it stands there
 MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all its textures
@@ -36,29 +33,10 @@ def _check_textures(paths: set[str]) -> None:
 
 def _check_meshes(scene: SceneParameters) -> None:
     count = 0
-    for path, scale in _meshes(scene):
+    for path, scale in (mesh for one in scene.objects for mesh in one.to_shape().meshes()):
         count += mesh_files.triangles(path)
         if count > MAX_TRIANGLES:
             raise ValueError(f"mesh {path}: with it, the scene's meshes have more than {MAX_TRIANGLES} triangles")
         reach = float(np.max(mesh_files.reach(path) * np.abs(scale)))
         if reach > MAX_REACH:
             raise ValueError(f"mesh {path}: reaches {reach:g} m from its origin; at most {MAX_REACH:g} m are allowed")
-
-
-def _meshes(scene: SceneParameters) -> Iterator[tuple[str, Sequence[float]]]:
-    """Yield path and scale of each mesh that stands in the scene."""
-    for one in scene.objects:
-        if isinstance(one, MeshParameters):
-            yield one.file, one.size
-        elif isinstance(one, UrdfParameters):
-            for mesh in _urdf(one.file).iter("mesh"):
-                yield mesh.attrib["filename"], [float(word) for word in mesh.attrib["scale"].split()]
-
-
-def _urdf(path: str) -> Xml.Element:
-    try:
-        return urdf_files.read(path)
-    except OSError as error:
-        raise ValueError(f"urdf {path}: {error.strerror or error}") from None
-    except ValueError as error:
-        raise ValueError(f"urdf {path}: {error}") from None

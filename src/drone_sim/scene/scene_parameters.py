@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from drone_sim.config.errors import Problem
 from drone_sim.config.types import (
@@ -16,7 +17,6 @@ from drone_sim.config.types import (
     File,
     Finite,
     Label,
-    Length,
     Mass,
     OptionalFile,
     ParameterError,
@@ -24,15 +24,19 @@ from drone_sim.config.types import (
     Switch,
     Within,
     named_in,
+    one_of,
     read_yaml,
     readable_key,
 )
 from drone_sim.files.resources import resolve
+from drone_sim.mechanics.frames import from_rpy, to_quaternion
+from drone_sim.mechanics.state import Pose
+from drone_sim.shapes import SCENE_SHAPES
+from drone_sim.shapes.shape import SceneShape
 from drone_sim.wording import shown
 
 MAX_OBJECTS = 1000
 _BESIDE = ("drone", "vehicles")  # what a scene file holds besides the scene
-_Scale = Annotated[Finite, Within(1e-6, 1e6)]
 
 
 class FloorParameters(Checked):
@@ -43,70 +47,49 @@ class FloorParameters(Checked):
     edge: Switch
 
 
-class _ObjectParameters(Checked):
-    """What the objects of a scene have in common; a mass of 0 stands still."""
+class ObjectParameters(Checked):
+    """An object of the scene: what all have in common; each shape brings its own keys. A mass of 0 stands still."""
 
     name: Label = ""
     position: Point
     rpy: Angles = (0.0, 0.0, 0.0)
     mass: Mass = 0.0
-    color: Color = (0.7, 0.7, 0.7, 1.0)
+    color: Color
     texture: OptionalFile = ""
+    shape: str
+
+    @property
+    def pose(self) -> Pose:
+        """Where it stands."""
+        x, y, z = self.position
+        return Pose((x, y, z), to_quaternion(from_rpy((0, 0, 0), self.rpy)))
+
+    def to_shape(self) -> SceneShape:
+        """Return its shape, of the keys that this brings."""
+        shape = SCENE_SHAPES[self.shape]
+        return shape(**{field.name: getattr(self, field.name) for field in fields(shape)})
 
 
-class BoxParameters(_ObjectParameters):
-    """A box; `size` is its full length, width and height."""
-
-    shape: Literal["box"]
-    size: Annotated[tuple[Length, Length, Length], Field(description="3 numbers, [length, width, height] in m")]
-
-
-class CylinderParameters(_ObjectParameters):
-    """A cylinder along its z axis; `size` is radius and length."""
-
-    shape: Literal["cylinder"]
-    size: Annotated[tuple[Length, Length], Field(description="2 numbers, [radius, length] in m")]
+def _with_keys_of(shape: type[SceneShape]) -> type[ObjectParameters]:
+    """Return what a scene file may say of an object of this shape."""
+    keys: dict[str, Any] = {"color": (Color, shape.default_color), "shape": (Literal[shape.word], ...)}
+    types = get_type_hints(shape, include_extras=True)
+    for field in fields(shape):
+        keys[field.name] = (types[field.name], ... if field.default is MISSING else field.default)
+    return create_model(f"{shape.__name__}Parameters", __base__=ObjectParameters, **keys)
 
 
-class SphereParameters(_ObjectParameters):
-    """A sphere; `size` is its radius."""
-
-    shape: Literal["sphere"]
-    size: Annotated[tuple[Length], Field(description="a list of 1 number, [radius] in m")]
-
-
-class MeshParameters(_ObjectParameters):
-    """A mesh file (OBJ, STL, COLLADA); `size` is its scale along x, y and z."""
-
-    shape: Literal["mesh"]
-    file: File
-    size: Annotated[tuple[_Scale, _Scale, _Scale], Field(description="3 numbers, its scale along [x, y, z]")] = (
-        1,
-        1,
-        1,
-    )
-    color: Color = (1.0, 1.0, 1.0, 1.0)
-
-
-class UrdfParameters(_ObjectParameters):
-    """A URDF, which says itself how it looks; a mass of 0 nails its root link to the world."""
-
-    shape: Literal["urdf"]
-    file: File
-    size: tuple[()] = ()
-
-
-ObjectParameters = Annotated[
-    BoxParameters | CylinderParameters | SphereParameters | MeshParameters | UrdfParameters,
-    Field(discriminator="shape"),
-]
+if TYPE_CHECKING:
+    _Object = ObjectParameters
+else:
+    _Object = one_of(*map(_with_keys_of, SCENE_SHAPES.values()), key="shape")
 
 
 class SceneParameters(Checked):
     """The world without the drone."""
 
     floor: FloorParameters
-    objects: Annotated[list[ObjectParameters], Field(max_length=MAX_OBJECTS)]
+    objects: Annotated[list[_Object], Field(max_length=MAX_OBJECTS)]
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several objects at once."""

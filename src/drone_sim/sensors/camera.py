@@ -17,7 +17,7 @@ from drone_sim.shapes.visual import Visual
 _LOG = logging.getLogger(__name__)
 
 
-class Scene(Protocol):
+class Subject(Protocol):
     """What a picture is taken of."""
 
     @property
@@ -37,21 +37,21 @@ class Scene(Protocol):
 
 
 class Vision:
-    """Takes pictures of a scene: with OpenGL where EGL is to be had, with the scene's own renderer elsewhere."""
+    """Takes pictures of a subject: with OpenGL where EGL is to be had, with the subject's own renderer elsewhere."""
 
-    def __init__(self, scene: Scene, samples: int = 0):
+    def __init__(self, subject: Subject, samples: int = 0):
         """Make the renderer when the first picture is asked for: not every run needs one.
 
         `samples` per pixel smooth the edges, as far as the renderer can.
         """
-        self._scene = scene
+        self._subject = subject
         self._samples = samples
         self._renderer: Renderer | None = None
         self._fallback = False
 
-    def look_at(self, scene: Scene) -> None:
-        """Take the pictures of another scene from now on."""
-        self._scene = scene
+    def look_at(self, subject: Subject) -> None:
+        """Take the pictures of another subject from now on."""
+        self._subject = subject
 
     def picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
         """Return the picture from `pose` (4, 4), world from optical frame.
@@ -63,13 +63,13 @@ class Vision:
             self._open()
         if self._renderer is None:
             return self._tiny_picture(kind, intrinsics, pose)
-        self._renderer.set_visuals(self._scene.visuals())
+        self._renderer.set_visuals(self._subject.visuals())
         render = self._renderer.render if kind == "color" else self._renderer.render_depth
-        return render(intrinsics, pose, self._scene.visual_poses())
+        return render(intrinsics, pose, self._subject.visual_poses())
 
     def _tiny_picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
         vertical_fov = 2 * np.arctan(intrinsics.height / 2 / intrinsics.fy)
-        color, depth = self._scene.tiny_picture(
+        color, depth = self._subject.tiny_picture(
             pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far
         )
         return color if kind == "color" else depth
@@ -84,7 +84,7 @@ class Vision:
     @property
     def changes(self) -> int:
         """Return another number than before whenever a picture may look different."""
-        return self._scene.changes
+        return self._subject.changes
 
     def close(self) -> None:
         """Free the renderer; may be called twice."""

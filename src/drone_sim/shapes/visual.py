@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
+from drone_sim.shapes.shape import DrawnShape
+from drone_sim.shapes.triangles import Rgba
+
 GROUND = (0.47, 0.50, 0.44)  # colour of the bare ground around the floor
-SHAPES = ("box", "cylinder", "sphere", "capsule", "plane", "mesh")
 
 
 @dataclass(frozen=True)
@@ -14,22 +16,16 @@ class Visual:
     """One shape with its look, in its own frame; where it stands is given per frame, as a pose.
 
     key: identity, for example ``(body, index)``; a different Visual under a known key replaces it.
-    shape: one of `SHAPES`.
-    size: metres. box: full x, y, z; cylinder and capsule: radius, length along z (a capsule's without its
-        caps), centred; sphere: radius; mesh: scale x, y, z (no unit); plane: ignored.
-    rgba: 0..1, multiplied with what the mesh's own material says; white leaves the material as it is.
-    file: path of the mesh.
-    texture: path of an image that replaces the mesh's own texture.
+    rgba: 0..1, multiplied with what a mesh's own material says; white leaves the material as it is.
+    texture: path of an image that replaces a mesh's own texture.
     edition: another one after these files have been written anew.
     floor: receives the shadows; a horizontal surface whose top is the top of its geometry.
     ground: what is around the floor, as far as one sees; receives the shadows, too.
     """
 
     key: Hashable
-    shape: str
-    size: tuple[float, ...]
-    rgba: tuple[float, float, float, float]
-    file: str = ""
+    shape: DrawnShape
+    rgba: Rgba
     texture: str = ""
     edition: Hashable = None
     floor: bool = False

@@ -17,7 +17,6 @@ def _load_pybullet_quietly() -> None:
 
 _load_pybullet_quietly()
 
-from drone_sim.world.bodies import Shape  # noqa: E402
 from drone_sim.world.world import World  # noqa: E402
 
-__all__ = ["Shape", "World"]
+__all__ = ["World"]

@@ -11,10 +11,14 @@ import pybullet
 from drone_sim.files.file_cache import identity_of
 from drone_sim.mechanics.frames import Matrix, from_quaternion, multiply
 from drone_sim.mechanics.state import Pose, compose
+from drone_sim.shapes import REPORTED_SHAPES
+from drone_sim.shapes.shape import DrawnShape
 from drone_sim.shapes.visual import Visual
 
+_TYPES = {getattr(pybullet, name): shape for name, shape in REPORTED_SHAPES.items()}
 
-class _Part(NamedTuple):
+
+class _Placed(NamedTuple):
     visual: Visual
     link: int  # -1: the root link
     local: Matrix  # the link's frame from the visual
@@ -28,14 +32,19 @@ class Pictures:
         self._client = client
         self._origin = origin
         self._floor = -1
+        self._shapes: dict[int, DrawnShape] = {}
         self._textures: dict[int, str] = {}
-        self._parts: dict[int, list[_Part]] = {}
+        self._parts: dict[int, list[_Placed]] = {}
         self._standing: dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
 
     def set_floor(self, body: int, texture: str) -> None:
         """Say which body is the floor, which receives the shadows, and its texture; its second visual is the ground."""
         self._floor = body
         self.set_texture(body, texture)
+
+    def set_shape(self, body: int, shape: DrawnShape) -> None:
+        """Say of what shape a body is: PyBullet tells only of those that it has a word for."""
+        self._shapes[body] = shape
 
     def set_texture(self, body: int, texture: str) -> None:
         """Say which image covers a body: PyBullet does not tell."""
@@ -57,6 +66,7 @@ class Pictures:
     def remove(self, body: int) -> None:
         """Forget all about a body: it is gone, and PyBullet may give its number to another."""
         self.forget(body)
+        self._shapes.pop(body, None)
         self._textures.pop(body, None)
         if body == self._floor:
             self._floor = -1
@@ -105,30 +115,29 @@ class Pictures:
         state = pybullet.getLinkState(body, link, 0, 1, self._client)
         return from_quaternion(state[4], state[5])
 
-    def _of(self, body: int) -> list[_Part]:
+    def _of(self, body: int) -> list[_Placed]:
         if body not in self._parts:
             rows = pybullet.getVisualShapeData(body, physicsClientId=self._client)
             self._parts[body] = [self._part((body, index), row) for index, row in enumerate(rows)]
         return self._parts[body]
 
-    def _part(self, key: tuple[int, int], row: Sequence[Any]) -> _Part:
+    def _part(self, key: tuple[int, int], row: Sequence[Any]) -> _Placed:
         _, link, kind, dimensions, file, position, orientation, rgba = row[:8]
-        shape, size = _shape_and_size(kind, dimensions)
-        source = self._origin(file.decode()) if shape == "mesh" else ""
+        shape = self._shapes.get(key[0])
+        if shape is None:
+            shape = _TYPES[kind].from_bullet(dimensions, self._origin(file.decode()))
         floor, ground = key == (self._floor, 0), key == (self._floor, 1)
         texture = "" if ground else self._textures.get(key[0], "")
         visual = Visual(
             key=key,
             shape=shape,
-            size=size,
             rgba=tuple(rgba),
-            file=source,
             texture=texture,
-            edition=tuple(identity_of(one) if one else None for one in (source, texture)),
+            edition=tuple(identity_of(one) for one in (*shape.files, texture) if one),
             floor=floor,
             ground=ground,
         )
-        return _Part(visual, link, from_quaternion(position, orientation))
+        return _Placed(visual, link, from_quaternion(position, orientation))
 
     def tiny(
         self, camera: np.ndarray, size: tuple[int, int], vertical_fov: float, depths: tuple[float, float]
@@ -159,14 +168,3 @@ class Pictures:
         buffer = np.reshape(picture[3], (height, width))
         depth = np.where(buffer < 1, far * near / (far - (far - near) * buffer), np.nan)
         return color, depth.astype(np.float32)
-
-
-def _shape_and_size(kind: int, dimensions: Sequence[float]) -> tuple[str, tuple[float, ...]]:
-    if kind in (pybullet.GEOM_CYLINDER, pybullet.GEOM_CAPSULE):
-        length, radius = dimensions[:2]  # PyBullet's order
-        return ("cylinder" if kind == pybullet.GEOM_CYLINDER else "capsule"), (radius, length)
-    if kind == pybullet.GEOM_SPHERE:
-        return "sphere", (dimensions[0],)
-    if kind == pybullet.GEOM_PLANE:
-        return "plane", ()
-    return ("box" if kind == pybullet.GEOM_BOX else "mesh"), tuple(dimensions)

@@ -16,8 +16,9 @@ from drone_sim.mechanics.frames import Matrix, Quaternion, Vector, cross, multip
 from drone_sim.mechanics.state import Pose, State, compose, inverse
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
+from drone_sim.shapes.shape import DrawnShape, SceneShape
 from drone_sim.shapes.visual import Visual
-from drone_sim.world import bodies as shapes
+from drone_sim.world import bodies, floor
 from drone_sim.world.own_files import OwnFiles
 from drone_sim.world.pictures import Pictures
 
@@ -75,20 +76,34 @@ class World:
 
         Returns its body id.
         """
-        body = shapes.create_floor(self._client, self._files, size, ground)
+        body = floor.create(self._client, self._files, size, ground)
         self._cover(body, texture, visual=0)
         self._set_material(body)
         self._pictures.set_floor(body, texture)
         return body
 
-    def add_shape(self, shape: shapes.Shape) -> int:
-        """Add an object; return its body id. Raises ValueError, in one line, for a file that cannot be read."""
-        body = shapes.create(self._client, shape, self._files)
-        self._cover(body, shape.texture)
+    def add_object(
+        self,
+        shape: SceneShape,
+        pose: Pose,
+        *,
+        mass: float = 0.0,
+        color: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
+        texture: str = "",
+    ) -> int:
+        """Add an object of a scene; return its body id.
+
+        mass: kg, 0 stands still; color: rgba, 0..1; texture: path of an image.
+        Raises ValueError, in one line, for a file that cannot be read.
+        """
+        body = bodies.create(self._client, self._files, shape, pose, mass=mass, color=color)
+        self._cover(body, texture)
         self._set_material(body)
-        self.set_pose(body, shape.pose)  # again, for PyBullet reads a URDF's pose in single precision
-        if shape.texture:
-            self._pictures.set_texture(body, shape.texture)
+        self.set_pose(body, pose)  # again, for PyBullet reads a URDF's pose in single precision
+        if isinstance(shape, DrawnShape):
+            self._pictures.set_shape(body, shape)
+        if texture:
+            self._pictures.set_texture(body, texture)
         return body
 
     def add_rigid_body(self, body: RigidBody, pose: Pose) -> int:
@@ -111,7 +126,7 @@ class World:
         """Give PyBullet the textures, which only its window and its own renderer show."""
         while self._undressed:
             body, (texture, visual) = self._undressed.popitem()
-            shapes.dress(self._client, body, visual, self._files.texture(texture))
+            bodies.dress(self._client, body, visual, self._files.texture(texture))
 
     def remove(self, body: int) -> None:
         """Take a body out of the world."""

@@ -14,7 +14,7 @@ from visualization_msgs.msg import Marker
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.state import State, Twist
-from drone_sim.ros.rviz.marker_topic import EYES, WORDS, MarkerTopic, beside, namespace, shape
+from drone_sim.ros.rviz.marker_topic import EYES, WORDS, MarkerTopic, beside, namespace, new_marker
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
@@ -106,7 +106,7 @@ class StateText:
 
 
 def _text(vehicle: Vehicle, text: str) -> Marker:
-    marker = shape(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
+    marker = new_marker(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
     marker.text, marker.pose.position.z = text, _TEXT_ABOVE
     return beside(vehicle, marker)
 
@@ -131,7 +131,7 @@ def _shadow(state: State) -> Marker:
     points: list[Sequence[float]] = []
     for one, other in zip(rim, [*rim[1:], rim[0]]):
         points += [(0.0, 0.0, 0.0), one, other]
-    marker = shape(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), points)
+    marker = new_marker(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), points)
     dark = _DARK * (_SHADOW[0] / radius) ** 0.5
     marker.colors = [ColorRGBA(0, 0, 0, dark), ColorRGBA(0, 0, 0, 0), ColorRGBA(0, 0, 0, 0)] * _RIM
     marker.pose.position = Point(x, y, _ABOVE_FLOOR)
@@ -145,7 +145,7 @@ def _plumb_line(height: float) -> Marker:
     for number in range(1, min(_TICKS, math.ceil(height / _TICK))):
         half, z = (0.05 if number % 2 else 0.1), number * _TICK - height
         points += [(-half, 0.0, z), (half, 0.0, z), (0.0, -half, z), (0.0, half, z)]
-    marker = shape(Marker.LINE_LIST, _INK, (_THIN, 0, 0), points)
+    marker = new_marker(Marker.LINE_LIST, _INK, (_THIN, 0, 0), points)
     marker.ns = "plumb line"
     return marker
 
@@ -187,6 +187,6 @@ def _flat(middle: np.ndarray, aside: np.ndarray, tip: np.ndarray) -> Marker:
         points += [one, other, next_other, one, next_other, next_one]
     head: Any = np.array([middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]).tolist()
     points += head
-    marker = shape(Marker.TRIANGLE_LIST, _BLUE, (1, 1, 1), points)
+    marker = new_marker(Marker.TRIANGLE_LIST, _BLUE, (1, 1, 1), points)
     marker.colors = [marker.color] * len(points)  # lights it from everywhere
     return marker

@@ -56,7 +56,9 @@ class MarkerTopic:
         self._publisher.publish(MarkerArray(shown))
 
 
-def shape(kind: int, rgba: Sequence[float], scale: Sequence[float], points: Sequence[Sequence[float]] = ()) -> Marker:
+def new_marker(
+    kind: int, rgba: Sequence[float], scale: Sequence[float], points: Sequence[Sequence[float]] = ()
+) -> Marker:
     """Return a marker at the world's origin, of points in m where its kind has some."""
     marker = Marker(type=kind, color=ColorRGBA(*rgba), scale=Vector3(*scale), points=[Point(*one) for one in points])
     marker.pose.orientation.w = 1.0

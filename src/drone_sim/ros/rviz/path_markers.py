@@ -7,7 +7,7 @@ import math
 from visualization_msgs.msg import Marker
 
 from drone_sim.mechanics.frames import Vector
-from drone_sim.ros.rviz.marker_topic import MarkerTopic, namespace, shape
+from drone_sim.ros.rviz.marker_topic import MarkerTopic, namespace, new_marker
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -90,4 +90,4 @@ class _Path:
 
 
 def _line(points: list[Vector]) -> Marker:
-    return shape(Marker.LINE_STRIP, _ORANGE, (_WIDTH, 0, 0), points)
+    return new_marker(Marker.LINE_STRIP, _ORANGE, (_WIDTH, 0, 0), points)

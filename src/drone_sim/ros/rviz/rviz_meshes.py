@@ -12,8 +12,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from drone_sim.render import mesh
-from drone_sim.render.mesh import Mesh
+from drone_sim.render import surfaces
+from drone_sim.render.surfaces import Surface
 from drone_sim.shapes.visual import Visual
 
 _SEEN_THROUGH = 0.98  # opacity below which rviz looks at a texture's own alpha
@@ -33,7 +33,7 @@ class RvizMeshes:
         `glow` is the share of its light (0..1) that does not depend on where it is seen from: rviz's only lamp is
         carried by who looks. Raises ValueError for what cannot be read, OSError for what cannot be written.
         """
-        key = (replace(visual, key=None), glow, _age(visual.file), _age(visual.texture))
+        key = (replace(visual, key=None), glow, *map(_age, (*visual.shape.files, visual.texture)))
         if key not in self._written:
             self._written[key] = self._write(visual, glow)
         return self._written[key]
@@ -50,13 +50,13 @@ class RvizMeshes:
             self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_rviz_")
         stem = Path(self._folder.name) / f"{len(self._written)}"
         lines, materials, first = [f"mtllib {stem.name}.mtl"], [], 1
-        for number, part in enumerate(mesh.load(visual)):
-            image = "" if part.texture is None else f"{stem.name}_{number}.png"
-            if part.texture is not None:
-                _write_image(stem.with_name(image), part.texture)
-            materials += _material(number, part, visual.rgba, glow, image)
-            lines += [f"usemtl {number}", *_triangles(part, first)]
-            first += len(part.vertices)
+        for number, surface in enumerate(surfaces.load(visual)):
+            image = "" if surface.texture is None else f"{stem.name}_{number}.png"
+            if surface.texture is not None:
+                _write_image(stem.with_name(image), surface.texture)
+            materials += _material(number, surface, visual.rgba, glow, image)
+            lines += [f"usemtl {number}", *_triangles(surface, first)]
+            first += len(surface.vertices)
         stem.with_suffix(".mtl").write_text("\n".join([*materials, ""]), encoding="utf-8")
         stem.with_suffix(".obj").write_text("\n".join([*lines, ""]), encoding="utf-8")
         return f"file://{stem}.obj"
@@ -76,9 +76,9 @@ def _write_image(path: Path, image: np.ndarray) -> None:
         raise OSError(f"{path}: cannot be written")
 
 
-def _material(number: int, part: Mesh, tint: tuple[float, ...], glow: float, image: str) -> list[str]:
-    red, green, blue, alpha = np.multiply(tint, part.rgba)
-    if part.transparent:
+def _material(number: int, surface: Surface, tint: tuple[float, ...], glow: float, image: str) -> list[str]:
+    red, green, blue, alpha = np.multiply(tint, surface.rgba)
+    if surface.transparent:
         alpha = min(alpha, _SEEN_THROUGH)
     lines = [f"newmtl {number}", "Ka 0 0 0", "Ks 0 0 0", f"d {alpha:g}", "illum 1"]
     for name, share in (("Kd", 1 - glow), ("Ke", glow)):
@@ -90,11 +90,11 @@ def _rows(array: np.ndarray) -> Any:
     return array.tolist()
 
 
-def _triangles(part: Mesh, first: int) -> list[str]:
-    """Return the lines of a part whose vertices count from `first`."""
-    uv = np.zeros((len(part.vertices), 2)) if part.uv is None else part.uv
-    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in _rows(part.vertices)]
+def _triangles(surface: Surface, first: int) -> list[str]:
+    """Return the lines of a surface whose vertices count from `first`."""
+    uv = np.zeros((len(surface.vertices), 2)) if surface.uv is None else surface.uv
+    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in _rows(surface.vertices)]
     lines += [f"vt {u:.7g} {v:.7g}" for u, v in _rows(uv)]
-    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in _rows(part.normals)]
-    lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in _rows(part.faces.astype(int) + first)]
+    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in _rows(surface.normals)]
+    lines += [f"f {a}/{a}/{a} {b}/{b}/{b} {c}/{c}/{c}" for a, b, c in _rows(surface.faces.astype(int) + first)]
     return lines

@@ -10,21 +10,27 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from drone_sim.files.mesh_files import WHITE
 from drone_sim.mechanics import frames
-from drone_sim.render.mesh import WHITE
-from drone_sim.ros.rviz import boxes
+from drone_sim.ros.rviz import lit_triangles
 from drone_sim.ros.rviz.marker_topic import namespace
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.ros.vehicle.messages import WORLD
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
+from drone_sim.shapes.primitive import Primitive
+from drone_sim.shapes.triangles import Rgba
 from drone_sim.shapes.visual import Visual
 
 _PERIOD = 0.19  # s of real time, between two looks at what has moved
-_FLAT = 1e-3  # m, thickness of a plane
-_WIDE = 200.0  # m, its side
 _GLOW = 0.6  # of what is seen from behind the lamp
-_TEXTURED = ("box", "mesh")
+_KINDS = {
+    "cube": Marker.CUBE,
+    "sphere": Marker.SPHERE,
+    "cylinder": Marker.CYLINDER,
+    "mesh": Marker.MESH_RESOURCE,
+    "triangles": Marker.TRIANGLE_LIST,
+}
 _FROM_ITS_FILE = (0.0, 0.0, 0.0, 0.0)  # the color by which rviz keeps a mesh's own
 
 
@@ -59,38 +65,27 @@ class SceneMarkers:
 
 def markers_of(visual: Visual, matrix: frames.Matrix, files: RvizMeshes) -> Sequence[Marker]:
     """Return what rviz makes of one visual at `matrix`, with its texture where the cameras show one, too."""
-    if visual.texture and visual.shape in _TEXTURED:
+    if visual.texture and visual.shape.has_uv:
         try:
             marker = _marker(Marker.MESH_RESOURCE, matrix, (1, 1, 1), _FROM_ITS_FILE)
             marker.mesh_resource, marker.mesh_use_embedded_materials = files.resource(visual, _GLOW), True
             return [marker]
         except (ValueError, OSError) as error:
             rospy.logwarn_throttle(5, f"rviz gets an object without texture: {error}")
-    return _markers(visual, matrix)
+    return [_marker_of(one, matrix, visual.rgba) for one in visual.shape.for_rviz()]
 
 
-def _markers(visual: Visual, matrix: frames.Matrix) -> Sequence[Marker]:
-    """Return what rviz makes of one visual: one marker, three for a capsule."""
-    size, rgba = visual.size, visual.rgba
-    if visual.shape == "box":
-        box = _marker(Marker.TRIANGLE_LIST, matrix, size, rgba)
-        boxes.paint(box, matrix, rgba)
-        return [box]
-    if visual.shape == "plane":
-        return [_marker(Marker.CUBE, matrix, (_WIDE, _WIDE, _FLAT), rgba)]
-    if visual.shape == "mesh":
+def _marker_of(primitive: Primitive, matrix: frames.Matrix, rgba: Rgba) -> Marker:
+    """Return a primitive of a shape that stands at `matrix`, world from shape."""
+    place = frames.multiply(matrix, primitive.local)
+    marker = _marker(_KINDS[primitive.kind], place, primitive.scale, rgba)
+    if primitive.kind == "triangles":
+        lit_triangles.paint(marker, primitive.corners, place, rgba)
+    if primitive.kind == "mesh":
         own = rgba == WHITE
-        mesh = _marker(Marker.MESH_RESOURCE, matrix, size, _FROM_ITS_FILE if own else rgba)
-        mesh.mesh_resource, mesh.mesh_use_embedded_materials = f"file://{visual.file}", own
-        return [mesh]
-    wide = 2 * size[0]
-    if visual.shape == "sphere":
-        return [_marker(Marker.SPHERE, matrix, (wide, wide, wide), rgba)]
-    tube = _marker(Marker.CYLINDER, matrix, (wide, wide, size[1]), rgba)
-    if visual.shape == "cylinder":
-        return [tube]
-    ends = [frames.multiply(matrix, frames.from_rpy((0, 0, sign * size[1] / 2), (0, 0, 0))) for sign in (-1, 1)]
-    return [tube, *(_marker(Marker.SPHERE, end, (wide, wide, wide), rgba) for end in ends)]
+        marker.mesh_resource, marker.mesh_use_embedded_materials = f"file://{primitive.file}", own
+        marker.color = ColorRGBA(*(_FROM_ITS_FILE if own else rgba))
+    return marker
 
 
 def _marker(kind: int, matrix: frames.Matrix, size: Sequence[float], rgba: Sequence[float]) -> Marker:

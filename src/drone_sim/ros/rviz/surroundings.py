@@ -13,7 +13,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from drone_sim.render import sky
-from drone_sim.ros.rviz.marker_topic import WORDS, MarkerTopic, namespace, shape
+from drone_sim.ros.rviz.marker_topic import WORDS, MarkerTopic, namespace, new_marker
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.scene import Scene
@@ -55,7 +55,7 @@ class Surroundings:
         self._topic.show(markers)
 
     def _floor(self, visual: Visual) -> Marker:
-        marker = shape(Marker.MESH_RESOURCE, (0, 0, 0, 0), (1, 1, 1))
+        marker = new_marker(Marker.MESH_RESOURCE, (0, 0, 0, 0), (1, 1, 1))
         marker.ns = "floor"
         try:
             marker.mesh_resource, marker.mesh_use_embedded_materials = self._files.resource(visual, glow=1.0), True
@@ -67,7 +67,7 @@ class Surroundings:
 
 
 def _sky() -> Marker:
-    marker = shape(Marker.TRIANGLE_LIST, _OPAQUE, (_SKY, _SKY, _SKY))
+    marker = new_marker(Marker.TRIANGLE_LIST, _OPAQUE, (_SKY, _SKY, _SKY))
     marker.ns = "sky"
     corners: Any = sky.dome().reshape(-1, 6).tolist()
     _paint(marker, corners)
@@ -85,7 +85,7 @@ def _ground(half: float) -> Marker:
     for near, far in itertools.pairwise(rings):
         for low, right, high, left in zip(near, far, far[1:], near[1:]):
             corners += [low, right, high, low, high, left]
-    marker = shape(Marker.TRIANGLE_LIST, _OPAQUE, (1, 1, 1))
+    marker = new_marker(Marker.TRIANGLE_LIST, _OPAQUE, (1, 1, 1))
     marker.ns = "ground"
     _paint(marker, corners)
     return marker

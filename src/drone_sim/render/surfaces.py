@@ -1,26 +1,23 @@
-"""Triangles with normals and materials for every shape a Visual can have."""
+"""Triangles with normals and materials: what the renderer makes of a shape."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 
-from drone_sim.files import images, mesh_files
+from drone_sim.files import images
 from drone_sim.files.mesh_files import WHITE
+from drone_sim.shapes.triangles import Rgba, Triangles
 from drone_sim.shapes.visual import Visual
 
-SECTIONS = 24  # of a cylinder or capsule around its axis
-PLANE_HALF_SIZE = 200.0  # metres; a plane is infinite, a camera sees 100 m
 CREASE = np.radians(40.0)  # faces that meet more sharply than this keep an edge
 MOST_FACES = 32  # at a point; where more meet, as in the middle of a disc, each keeps its own normal
-_SPHERE = 1.0029  # radius of the polyhedron of 1280 faces that has the volume of the unit sphere
 
 
 @dataclass(frozen=True)
-class Mesh:
+class Surface:
     """One material's triangles, in the visual's frame, metres.
 
     vertices, normals: (n, 3) float32; uv: (n, 2) float32, v upwards, or None; faces: (m, 3) uint32;
@@ -32,7 +29,7 @@ class Mesh:
     normals: np.ndarray
     faces: np.ndarray
     uv: np.ndarray | None = None
-    rgba: tuple[float, float, float, float] = WHITE
+    rgba: Rgba = WHITE
     texture: np.ndarray | None = None
     closed: bool = False
 
@@ -44,70 +41,22 @@ class Mesh:
         )
 
 
-def load(visual: Visual) -> tuple[Mesh, ...]:
-    """The visual's meshes, one per material; its own rgba is not applied.
+def load(visual: Visual) -> tuple[Surface, ...]:
+    """The visual's surfaces, one per material; its own rgba is not applied.
 
-    A texture shows on boxes (once per face), planes (once per metre) and meshes that bring uv coordinates;
-    on other shapes there is nothing to lay it by and it is left out.
-    Raises ValueError, in one line that names the file, for a mesh or texture that cannot be read, and for an
-    unknown shape.
+    A texture shows on shapes that bring uv coordinates: elsewhere there is nothing to lay it by and it is left out.
+    Raises ValueError, in one line that names the file, for a mesh or texture that cannot be read.
     """
-    if visual.shape == "mesh":
-        return tuple(_read_file(visual))
-    uv = None
-    if visual.shape == "box":
-        corners, uv = _box(visual.size)
-    elif visual.shape == "plane":
-        corners, uv = _plane()
-    elif visual.shape == "cylinder":
-        radius, length = visual.size
-        corners = _triangles(trimesh.creation.cylinder(_outer(radius), length, sections=SECTIONS))
-    elif visual.shape == "sphere":
-        corners = _triangles(trimesh.creation.icosphere(subdivisions=3, radius=_SPHERE * visual.size[0]))
-    elif visual.shape == "capsule":
-        radius, length = visual.size
-        corners = _triangles(trimesh.creation.capsule(length, _outer(radius), count=[SECTIONS, SECTIONS]))
-    else:
-        raise ValueError(f"visual {visual.key}: unknown shape {visual.shape!r}")
-    return (_assemble(corners, uv, WHITE, images.read(visual.texture) if visual.texture else None),)
+    texture = images.read(visual.texture) if visual.texture else None
+    return tuple(
+        _assemble(part if texture is None else part._replace(rgba=WHITE, texture=texture))
+        for part in visual.shape.triangles()
+    )
 
 
-def _outer(radius: float) -> float:
-    """Circumradius of the polygon that has the area of the circle, so that silhouettes agree on average."""
-    angle = 2.0 * np.pi / SECTIONS
-    return float(radius * np.sqrt(angle / np.sin(angle)))
-
-
-def _triangles(mesh: trimesh.Trimesh) -> np.ndarray:
-    return np.asarray(mesh.vertices, dtype=np.float64)[np.asarray(mesh.faces)]
-
-
-def _box(size: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (12, 3, 3) and uv (12, 3, 2); each side shows the picture upright (z up) from outside."""
-    corners = _triangles(trimesh.creation.box(extents=(1.0, 1.0, 1.0)))
-    normals = _areas(corners)
-    axis = np.abs(normals).argmax(axis=1)
-    sign = np.sign(normals[np.arange(len(normals)), axis])
-    x, y, z = np.moveaxis(corners, 2, 0)
-    side = sign[:, None]
-    right = np.choose(axis[:, None], [side * y, -side * x, x])
-    up = np.choose(axis[:, None], [z, z, side * y])
-    return corners * np.asarray(size), np.stack([right, up], axis=2) + 0.5
-
-
-def _plane() -> tuple[np.ndarray, np.ndarray]:
-    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * PLANE_HALF_SIZE
-    corners = square[np.array([[0, 1, 2], [0, 2, 3]])]
-    return corners, corners[:, :, :2]
-
-
-def _assemble(
-    corners: np.ndarray,
-    uv: np.ndarray | None,
-    rgba: tuple[float, float, float, float],
-    texture: np.ndarray | None,
-) -> Mesh:
-    """Index the corners (m, 3, 3) of loose triangles, with normals, merging those that are alike."""
+def _assemble(part: Triangles) -> Surface:
+    """Index the corners of loose triangles, with normals, merging those that are alike."""
+    corners, uv, rgba, texture = part
     normals = crease_normals(corners).reshape(-1, 3)
     table, alike = [corners.reshape(-1, 3), normals], [_points(corners).ravel(), _numbered(normals)]
     if uv is None or texture is None:
@@ -117,7 +66,7 @@ def _assemble(
         alike.append(_numbered(uv.reshape(-1, 2)))
     first, inverse = trimesh.grouping.unique_rows(np.column_stack(alike))
     merged = [np.ascontiguousarray(column[first], dtype=np.float32) for column in table]
-    return Mesh(
+    return Surface(
         vertices=merged[0],
         normals=merged[1],
         faces=inverse.reshape(-1, 3).astype(np.uint32),
@@ -190,16 +139,3 @@ def is_closed(corners: np.ndarray) -> bool:
     watertight, alike = trimesh.graph.is_watertight(trimesh.geometry.faces_to_edges(point)) if len(point) else (0, 0)
     volume = np.einsum("ij,ij->", corners[:, 0] - corners[0, 0], _areas(corners))
     return bool(watertight and alike and volume > 0)
-
-
-def _read_file(visual: Visual) -> Iterator[Mesh]:
-    texture = images.read(visual.texture) if visual.texture else None
-    for part in mesh_files.read(visual.file):
-        faces = part.faces
-        if np.prod(visual.size) < 0:
-            faces = faces[:, ::-1]  # a mirror image turns the faces inside out
-        corners = (part.vertices * np.asarray(visual.size))[faces]
-        uv = None if part.uv is None else part.uv[faces]
-        yield _assemble(
-            corners, uv, part.rgba if texture is None else WHITE, part.texture if texture is None else texture
-        )

@@ -1,0 +1,69 @@
+"""A box."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import trimesh
+from pydantic import Field
+
+from drone_sim.config.types import Length
+from drone_sim.shapes.bullet import Files, Geometry
+from drone_sim.shapes.primitive import Primitive
+from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.triangles import Triangles, corners_of
+
+
+def _unit_box() -> tuple[np.ndarray, np.ndarray]:
+    """Return corners (12, 3, 3) and uv (12, 3, 2); each side shows the picture upright (z up) from outside."""
+    corners = corners_of(trimesh.creation.box(extents=(1.0, 1.0, 1.0)))
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    axis = np.abs(normals).argmax(axis=1)
+    sign = np.sign(normals[np.arange(len(normals)), axis])
+    x, y, z = np.moveaxis(corners, 2, 0)
+    side = sign[:, None]
+    right = np.choose(axis[:, None], [side * y, -side * x, x])
+    up = np.choose(axis[:, None], [z, z, side * y])
+    return corners, np.stack([right, up], axis=2) + 0.5
+
+
+_CORNERS, _UV = _unit_box()
+# rviz's only lamp is carried by who looks, and leaves sides black: the colours of triangles are ours to choose.
+_FOR_RVIZ = tuple((float(x), float(y), float(z)) for x, y, z in _CORNERS.reshape(-1, 3))
+
+
+@dataclass(frozen=True)
+class Box(SceneShape, ReportedShape):
+    """A box; `size` is its full length, width and height."""
+
+    word = "box"
+    bullet_type = "GEOM_BOX"
+    has_uv = True  # the whole texture on each side
+
+    size: Annotated[tuple[Length, Length, Length], Field(description="3 numbers, [length, width, height] in m")]
+
+    def for_bullet(self, files: Files, moves: bool) -> Geometry:
+        """Return a box by its half lengths."""
+        half = {"halfExtents": [length / 2 for length in self.size]}
+        return Geometry(self.bullet_type, half, half)
+
+    @classmethod
+    def from_bullet(cls, dimensions: Sequence[float], file: str) -> Box:
+        """Return the box of these full lengths."""
+        length, width, height = dimensions
+        return cls((length, width, height))
+
+    def triangles(self) -> tuple[Triangles]:
+        """Return two triangles for each side."""
+        return (Triangles(_CORNERS * np.asarray(self.size), _UV),)
+
+    def shared(self) -> tuple[Box, tuple[float, float, float]]:
+        """Return the unit box, and its own size."""
+        return Box((1.0, 1.0, 1.0)), self.size
+
+    def for_rviz(self) -> tuple[Primitive]:
+        """Return its triangles."""
+        return (Primitive("triangles", self.size, corners=_FOR_RVIZ),)

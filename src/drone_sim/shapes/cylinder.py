@@ -1,0 +1,52 @@
+"""A cylinder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import trimesh
+from pydantic import Field
+
+from drone_sim.config.types import Length
+from drone_sim.shapes.bullet import Files, Geometry
+from drone_sim.shapes.primitive import Primitive
+from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.triangles import SECTIONS, Triangles, corners_of, outer
+
+
+@dataclass(frozen=True)
+class Cylinder(SceneShape, ReportedShape):
+    """A cylinder along its z axis; `size` is radius and length."""
+
+    word = "cylinder"
+    bullet_type = "GEOM_CYLINDER"
+
+    size: Annotated[tuple[Length, Length], Field(description="2 numbers, [radius, length] in m")]
+
+    def for_bullet(self, files: Files, moves: bool) -> Geometry:
+        """Return a cylinder, whose length PyBullet names in two ways."""
+        radius, length = self.size
+        return Geometry(self.bullet_type, {"radius": radius, "height": length}, {"radius": radius, "length": length})
+
+    @classmethod
+    def from_bullet(cls, dimensions: Sequence[float], file: str) -> Cylinder:
+        """Return the cylinder of this length and radius, which is PyBullet's order."""
+        length, radius = dimensions[:2]
+        return cls((radius, length))
+
+    def triangles(self) -> tuple[Triangles]:
+        """Return a prism."""
+        radius, length = self.size
+        return (Triangles(corners_of(trimesh.creation.cylinder(outer(radius), length, sections=SECTIONS))),)
+
+    def shared(self) -> tuple[Cylinder, tuple[float, float, float]]:
+        """Return the cylinder of 1 m radius and 1 m length, and its own."""
+        radius, length = self.size
+        return Cylinder((1.0, 1.0)), (radius, radius, length)
+
+    def for_rviz(self) -> tuple[Primitive]:
+        """Return a cylinder by its diameters."""
+        radius, length = self.size
+        return (Primitive("cylinder", (2 * radius, 2 * radius, length)),)

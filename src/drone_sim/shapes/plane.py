@@ -1,0 +1,40 @@
+"""A plane without end, as URDFs may hold one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drone_sim.shapes.primitive import Primitive
+from drone_sim.shapes.shape import ReportedShape
+from drone_sim.shapes.triangles import Triangles
+
+_HALF_SIZE = 200.0  # m; a camera sees 100 m
+_SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * _HALF_SIZE
+_IN_RVIZ = 200.0  # m, its side
+_FLAT = 1e-3  # m, its thickness there
+
+
+@dataclass(frozen=True)
+class Plane(ReportedShape):
+    """The xy plane, seen from above."""
+
+    word = "plane"
+    bullet_type = "GEOM_PLANE"
+    has_uv = True  # the whole texture on each metre
+
+    @classmethod
+    def from_bullet(cls, dimensions: Sequence[float], file: str) -> Plane:
+        """Return the plane: it has no size."""
+        return cls()
+
+    def triangles(self) -> tuple[Triangles]:
+        """Return two triangles, larger than one can see."""
+        corners = _SQUARE[np.array([[0, 1, 2], [0, 2, 3]])]
+        return (Triangles(corners, corners[:, :, :2]),)
+
+    def for_rviz(self) -> tuple[Primitive]:
+        """Return a thin slab."""
+        return (Primitive("cube", (_IN_RVIZ, _IN_RVIZ, _FLAT)),)

@@ -1,0 +1,52 @@
+"""A sphere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import trimesh
+from pydantic import Field
+
+from drone_sim.config.types import Length
+from drone_sim.shapes.bullet import Files, Geometry
+from drone_sim.shapes.primitive import Primitive
+from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.triangles import Triangles, corners_of
+
+_OUTER = 1.0029  # radius of the polyhedron of 1280 faces that has the volume of the unit sphere
+
+
+@dataclass(frozen=True)
+class Sphere(SceneShape, ReportedShape):
+    """A sphere; `size` is its radius."""
+
+    word = "sphere"
+    bullet_type = "GEOM_SPHERE"
+
+    size: Annotated[tuple[Length], Field(description="a list of 1 number, [radius] in m")]
+
+    def for_bullet(self, files: Files, moves: bool) -> Geometry:
+        """Return a sphere by its radius."""
+        radius = {"radius": self.size[0]}
+        return Geometry(self.bullet_type, radius, radius)
+
+    @classmethod
+    def from_bullet(cls, dimensions: Sequence[float], file: str) -> Sphere:
+        """Return the sphere with the first of these as its radius."""
+        return cls((dimensions[0],))
+
+    def triangles(self) -> tuple[Triangles]:
+        """Return an icosahedron, three times refined."""
+        return (Triangles(corners_of(trimesh.creation.icosphere(subdivisions=3, radius=_OUTER * self.size[0]))),)
+
+    def shared(self) -> tuple[Sphere, tuple[float, float, float]]:
+        """Return the sphere of 1 m radius, and its own radius."""
+        (radius,) = self.size
+        return Sphere((1.0,)), (radius, radius, radius)
+
+    def for_rviz(self) -> tuple[Primitive]:
+        """Return a sphere by its diameters."""
+        wide = 2 * self.size[0]
+        return (Primitive("sphere", (wide, wide, wide)),)

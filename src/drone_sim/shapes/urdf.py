@@ -1,0 +1,43 @@
+"""A URDF as an object of a scene: links and joints, each with shapes of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from xml.etree import ElementTree as Xml
+
+from drone_sim.config.types import File
+from drone_sim.files import urdf_files
+from drone_sim.shapes.bullet import Files, UrdfFile
+from drone_sim.shapes.shape import SceneShape
+
+
+@dataclass(frozen=True)
+class Urdf(SceneShape):
+    """A URDF, which says itself how it looks; a mass of 0 nails its root link to the world."""
+
+    word = "urdf"
+
+    file: File
+    size: tuple[()] = ()
+
+    def __str__(self) -> str:
+        """Return its name for a message."""
+        return f"{self.word} {self.file}"
+
+    def for_bullet(self, files: Files, moves: bool) -> UrdfFile:
+        """Return the file, checked and cleaned."""
+        return UrdfFile(files.urdf(self._robot()))
+
+    def meshes(self) -> Iterator[tuple[str, Sequence[float]]]:
+        """Yield what its visuals and collisions name."""
+        for mesh in self._robot().iter("mesh"):
+            yield mesh.attrib["filename"], [float(word) for word in mesh.attrib["scale"].split()]
+
+    def _robot(self) -> Xml.Element:
+        try:
+            return urdf_files.read(self.file)
+        except OSError as error:
+            raise ValueError(f"{self}: {error.strerror or error}") from None
+        except ValueError as error:
+            raise ValueError(f"{self}: {error}") from None
