@@ -1,0 +1,239 @@
+"""Several vehicles in one world: each is its own, and who comes or goes disturbs nobody."""
+
+import math
+import os
+
+import numpy as np
+import pytest
+import yaml
+
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+THREE = {"drone1": {"position": [0, 0, 0.8]}, "drone2": {"position": [0, 3, 1.2]}, "drone3": {"position": [2, -3, 2]}}
+
+
+@pytest.fixture(name="fly")
+def _fly():
+    """Return a function that opens a simulation; all are closed at the end."""
+    opened = []
+
+    def fly(**overrides):
+        opened.append(Simulation(parameters.load(overrides)))
+        return opened[-1]
+
+    yield fly
+    for simulation in opened:
+        simulation.close()
+
+
+def path(simulation, name, steps):
+    """Step, and return where a vehicle went, to the last bit."""
+    states = []
+    for _ in range(steps):
+        simulation.step()
+        states.append(simulation.vehicles[name].state)
+    return states
+
+
+def forward(speed):
+    return Twist(Vector3(speed, 0.0, 0.0))
+
+
+def test_a_number_of_vehicles_stands_in_a_row(fly):
+    simulation = fly(vehicles=3)
+    places = {name: vehicle.state.position for name, vehicle in simulation.vehicles.items()}
+    assert places == {"drone1": (0, 1, 0.8), "drone2": (0, 0, 0.8), "drone3": (0, -1, 0.8)}
+
+
+def test_each_obeys_its_own_commands(fly):
+    simulation = fly(vehicles=THREE)
+    simulation.vehicles["drone1"].receive(forward(1.0))
+    simulation.vehicles["drone3"].receive(Twist(Vector3(0.0, 0.0, 0.5)))
+    for _ in range(100):
+        simulation.step()
+    one, two, three = (vehicle.state.position for vehicle in simulation.vehicles.values())
+    assert one[0] > 3 and one[1:] == pytest.approx((0, 0.8), abs=0.05)
+    assert two == pytest.approx((0, 3, 1.2), abs=0.005)
+    assert three[2] > 3.5 and three[:2] == pytest.approx((2, -3), abs=0.01)
+
+
+def test_who_flies_in_company_flies_as_alone(fly):
+    company, alone = fly(vehicles=THREE), fly(drone={"position": [0, 3, 1.2]})
+    for simulation, name in ((company, "drone2"), (alone, "drone")):
+        simulation.vehicles[name].receive(Twist(Vector3(0.7, -0.2, 0.1), Vector3(0.0, 0.0, 0.4)))
+    assert path(company, "drone2", 200) == path(alone, "drone", 200)
+
+
+def test_entries_change_what_they_name_alone(fly):
+    simulation = fly(
+        vehicles={"slow": {"control": {"angle_max": 0.1}, "script_parameters": {"MyGain": 3}}, "fast": {"yaw": 1.0}},
+        control={"angle_max": 0.4},
+    )
+    slow, fast = simulation.vehicles.values()
+    assert slow.script_parameters["Drone"]["angle_max"] == 0.1 and slow.script_parameters["Drone"]["Kzref"] == 5.0
+    assert fast.script_parameters["Drone#0"]["angle_max"] == 0.4
+    assert slow.script_parameters["Drone"]["MyGain"] == 3.0 and "MyGain" not in fast.script_parameters["Drone#0"]
+
+
+@pytest.mark.parametrize(
+    "vehicles, said",
+    [
+        ({"a": {"controll": {}}}, r"parameter vehicles/a/controll: unknown key; known are control"),
+        ({"a": {"control": {"Kzref": -1}}}, r"parameter vehicles/a/control/Kzref = -1: .*greater than or equal to 0"),
+        ({"a b": {}}, r"parameter vehicles/a b.*: must be a letter and then letters, digits or _"),
+        ({"a": {"name": "b"}}, r"parameter vehicles/a/name: unknown key; the entry's own key is its name"),
+        ({"a": 3}, r"parameter vehicles/a = 3: must hold `key: value` lines"),
+        (2.5, r"parameter vehicles = 2\.5: must be a whole number from 0 to 256"),
+        (257, r"parameter vehicles = 257: must be a whole number from 0 to 256"),
+        ([1], r"parameter vehicles = \[1\]: "),
+        ({"a": {"cameras": {"front": {"width": 0}}}}, r"parameter vehicles/a/cameras/front/width = 0: "),
+    ],
+)
+def test_a_wrong_entry_is_named(vehicles, said):
+    with pytest.raises(parameters.ParameterError, match=said) as refused:
+        parameters.load({"vehicles": vehicles})
+    assert "\n" not in str(refused.value)
+
+
+def test_a_wrong_key_at_the_top_is_named_once():
+    with pytest.raises(parameters.ParameterError) as refused:
+        parameters.load({"vehicles": 5, "control": {"Kzref": "much"}})
+    assert str(refused.value).count("Kzref") == 1
+
+
+def test_they_collide(fly):
+    simulation = fly(vehicles={"left": {"position": [0, 0, 1]}, "right": {"position": [1.5, 0, 1], "yaw": math.pi}})
+    for vehicle in simulation.vehicles.values():
+        vehicle.receive(forward(0.6))
+    nearest = min(
+        math.dist(*(vehicle.state.position for vehicle in simulation.vehicles.values()))
+        for _ in range(120)
+        if simulation.step() is None
+    )
+    assert nearest > 0.15, "neither is inside the other"
+    left, right = (vehicle.state.position[0] for vehicle in simulation.vehicles.values())
+    assert left < right, "nor has one gone through the other"
+
+
+def test_they_see_one_another(fly):
+    simulation = fly(vehicles={"one": {}, "two": {"position": [1.5, 0, 0.9]}})
+    camera = simulation.drone.cameras["front"]
+    with_two = camera.take().astype(int)
+    simulation.vehicles["two"].move(Pose((-3.0, 0.0, 0.9)))
+    without = camera.take().astype(int)
+    changed = np.abs(with_two - without).max(axis=2) > 20
+    rows, columns = np.nonzero(changed)
+    assert changed.sum() > 500 and abs(columns.mean() - 320) < 40, "a drone, straight ahead"
+    assert rows.min() < 240 < rows.max() or rows.mean() < 300
+
+
+def test_scripts_share_signals_and_find_their_own(fly, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "def sysCall_init():\n"
+        "    self.own = sim.getObjectHandle('Quadricopter_base')\n"
+        "    seen = sim.getInt32Signal('seen') or 0\n"
+        "    sim.setInt32Signal('seen', seen + 1)\n"
+        "    self.number = seen + 1\n"
+        "def sysCall_sensing():\n"
+        "    sim.setFloatSignal(f'y{self.number}', sim.getObjectPosition(self.own, -1)[1])\n",
+        encoding="utf-8",
+    )
+    simulation = fly(vehicles=3, script=str(script))
+    simulation.step()
+    signals = simulation.drone.signals
+    assert signals.getInt32Signal("seen") == 3
+    assert [signals.getFloatSignal(f"y{number}") for number in (1, 2, 3)] == pytest.approx([1, 0, -1], abs=1e-6)
+
+
+def test_who_comes_and_goes_disturbs_nobody(fly):
+    quiet, busy = fly(vehicles=THREE), fly(vehicles=THREE)
+    for simulation in (quiet, busy):
+        simulation.vehicles["drone2"].receive(Twist(Vector3(0.5, 0.1, 0.0), Vector3(0.0, 0.0, 0.3)))
+    expected = path(quiet, "drone2", 90)
+    flown = path(busy, "drone2", 30)
+    assert busy.set_vehicles({**THREE, "guest": {"position": [-2, 0, 1]}}) == (["guest"], [])
+    flown += path(busy, "drone2", 30)
+    assert busy.vehicles["guest"].state.position == pytest.approx((-2, 0, 1), abs=0.02), "it hovers"
+    assert busy.set_vehicles({name: THREE[name] for name in ("drone2", "drone3")}) == ([], ["drone1", "guest"])
+    flown += path(busy, "drone2", 30)
+    assert flown == expected
+    assert list(busy.vehicles) == ["drone2", "drone3"]
+
+
+def test_fifty_times_leave_nothing_behind(fly):
+    simulation = fly(vehicles=2)
+    files, names, visuals = open_files(), set(simulation.drone.objects.names), len(simulation.world.visuals())
+    for _ in range(50):
+        simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {"position": [-2, 0, 1]}})
+        simulation.step()
+        simulation.set_vehicles({"drone1": {}, "drone2": {}})
+        simulation.step()
+    assert open_files() == files
+    assert set(simulation.drone.objects.names) == names
+    assert len(simulation.world.visuals()) == visuals
+    simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {}})
+    assert simulation.vehicles["guest"].own_script == "Drone#1", "the suffix that is free"
+
+
+def open_files():
+    return len(os.listdir("/proc/self/fd"))
+
+
+def test_a_new_one_whose_script_fails_goes_again(fly, tmp_path):
+    script = tmp_path / "broken.py"
+    script.write_text("def sysCall_init():\n    no_such_name\n", encoding="utf-8")
+    simulation = fly(vehicles=2)
+    simulation.step()
+    with pytest.raises(Exception, match="no_such_name"):
+        simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {"script": str(script), "position": [3, 3, 1]}})
+    assert list(simulation.vehicles) == ["drone1", "drone2"] and simulation.running
+    simulation.step()
+
+
+def test_start_brings_back_those_that_were_set(fly):
+    simulation = fly(vehicles=2)
+    simulation.set_vehicles({"drone1": {"position": [1, 1, 1]}})
+    assert list(simulation.vehicles) == ["drone1"]
+    simulation.start()
+    assert simulation.drone.state.position == (1, 1, 1)
+
+
+def test_snapshots_bring_all_back_until_one_comes(fly):
+    simulation = fly(vehicles=3)
+    for vehicle in simulation.vehicles.values():
+        vehicle.receive(forward(0.3))
+    path(simulation, "drone1", 20)
+    snapshot = simulation.snapshot()
+    flown = [path(simulation, "drone1", 20), [vehicle.state for vehicle in simulation.vehicles.values()]]
+    simulation.restore(snapshot)
+    assert [path(simulation, "drone1", 20), [vehicle.state for vehicle in simulation.vehicles.values()]] == flown
+    simulation.set_vehicles(4)
+    with pytest.raises(ValueError, match="a vehicle that comes or goes"):
+        simulation.restore(snapshot)
+
+
+def test_a_scene_says_who_flies_and_is_saved(fly, tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(
+        "objects: []\nvehicles:\n  red: {position: [1, 0, 1], script: target}\n  blue: {position: [-1, 0, 1]}\n"
+    )
+    simulation = fly(scene_file=str(scene), vehicles=7)
+    assert list(simulation.vehicles) == ["red", "blue"]
+    simulation.vehicles["blue"].move(Pose((-1.5, 2.0, 1.0)))
+    simulation.save_scene(tmp_path / "saved.yaml")
+    saved = yaml.safe_load((tmp_path / "saved.yaml").read_text())["vehicles"]
+    assert saved["red"]["script"] == "target" and saved["blue"]["position"] == [-1.5, 2.0, 1.0]
+    again = fly(scene_file=str(tmp_path / "saved.yaml"))
+    assert again.vehicles["blue"].state.position == (-1.5, 2.0, 1.0)
+
+
+def test_a_wrong_vehicle_of_a_scene_is_named_with_its_line(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("vehicles:\n  red:\n    position: [1, 0]\n")
+    with pytest.raises(
+        parameters.ParameterError, match=r"scene\.yaml: line 3: parameter vehicles/red/position = \[1, 0\]"
+    ):
+        parameters.load({"scene_file": str(scene)})
