@@ -10,8 +10,8 @@ from drone_sim.files.resources import resolve
 from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.messages import Callback
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.python.python_modules import LARGEST
-from drone_sim.scripting.python.python_script import PythonScript
+from drone_sim.scripting.python.modules import LARGEST
+from drone_sim.scripting.python.script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.wording import near_names
 
@@ -83,7 +83,7 @@ def load(script: str, modules: Mapping[str, Api], limit: TimeLimit) -> Script:
     try:
         source = _read(path)
         if path.endswith(".lua"):
-            from drone_sim.scripting.lua.lua_script import LuaScript  # whoever flies Python needs no lupa
+            from drone_sim.scripting.lua.script import LuaScript  # whoever flies Python needs no lupa
 
             return LuaScript(path, source, modules, limit)
         return PythonScript(path, source, modules, limit)

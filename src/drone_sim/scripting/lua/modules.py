@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from drone_sim.files.resources import read_bytes
-from drone_sim.scripting.lua.lua_source import LuaSource
+from drone_sim.scripting.lua.source import LuaSource
 from drone_sim.wording import near_names
 
 LARGEST = 1024 * 1024  # bytes of a script or helper
