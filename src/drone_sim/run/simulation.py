@@ -20,8 +20,8 @@ from drone_sim.run.setting import Setting
 from drone_sim.run.whereabouts import Whereabouts
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting import load
+from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.messages import Backend
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
 from drone_sim.sensors.camera import Vision
@@ -60,7 +60,7 @@ class Simulation:
         """Build the scene and, if `started`, run the init of the child scripts.
 
         `script` flies the vehicles that name none of their own; '' is the parameters', or the tutorial's. `backend`
-        carries what scripts subscribe to and publish; without it the messages stay in the vehicles' `bus`.
+        carries what scripts subscribe to and publish; without it the messages go nowhere.
         `drawings` takes what scripts draw; without it that is ignored.
 
         Raises ParameterError, UrdfError, ScriptError, and RuntimeError where `gui` finds no display.

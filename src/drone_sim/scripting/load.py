@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from drone_sim.files.resources import resolve
 from drone_sim.scripting.api.calls import Api
-from drone_sim.scripting.api.messages import Callback
+from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.python.modules import LARGEST
 from drone_sim.scripting.python.script import PythonScript

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.messages import Backend
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.sensors.camera import Vision
 from drone_sim.world import World

@@ -6,19 +6,14 @@ log says once for each function.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import Function, numbers
 from drone_sim.scripting.api.drawings import MOST
 from drone_sim.scripting.api.host import Host
+from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers
 from drone_sim.scripting.script_log import LOG
-
-Handle = int
-Number = float
-ThreeNumbers = Sequence[float]
-Numbers = Sequence[float]
 
 _MAKERS = ("addParticleObject", "floatingViewAdd", "auxiliaryConsoleOpen", "displayDialog")
 _OTHERS = (

@@ -13,7 +13,7 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.signals import Signals
 
-Parameters = dict[str, Any]
+ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
 
 
 def _call(function: Callable[[], Any]) -> Any:
@@ -28,7 +28,7 @@ class Host(Protocol):
         """The objects of the scene."""
 
     @property
-    def script_parameters(self) -> Mapping[str, Parameters]:
+    def script_parameters(self) -> Mapping[str, ScriptParameters]:
         """Simulation parameters of the script that is attached to each object, by the object's name."""
 
     @property

@@ -23,10 +23,9 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
     parts = (
         Objects(host),
         Scripts(host, surroundings),
-        host.signals,
         VisionSensors(host, surroundings),
     )
-    functions = {**public_functions(parts), **Drawing(host).functions()}
+    functions = {**public_functions(parts), **host.signals.functions(), **Drawing(host).functions()}
     return Api("sim", functions, CONSTANTS)
 
 

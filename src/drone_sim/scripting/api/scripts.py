@@ -11,16 +11,13 @@ from typing import Any
 from drone_sim.scripting.api import object_paths
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Host, Parameters, Surroundings
+from drone_sim.scripting.api.host import Host, ScriptParameters, Surroundings
 from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.script_log import LOG, say
+from drone_sim.scripting.api.types import Handle, Name
+from drone_sim.scripting.script_log import say
 from drone_sim.wording import near_names
 
-__all__ = ["LOG", "Scripts"]
-
 _LOG = logging.getLogger(__name__)  # not the script's own words
-Handle = int
-Name = str
 
 _VERSION = 40600  # the CoppeliaSim whose API this is nearest to
 _MOST = 1000  # parameters of one script
@@ -36,7 +33,7 @@ class Scripts:
         """Take the drone whose scripts they are, and the clock."""
         self._host = host
         self._names = list(host.script_parameters)
-        self._parameters: dict[int, Parameters] = dict(enumerate(host.script_parameters.values()))
+        self._parameters: dict[int, ScriptParameters] = dict(enumerate(host.script_parameters.values()))
         self._own = self._names.index(host.own_script)
         self._read = [set(parameters) for parameters in self._parameters.values()]  # names that something reads
         self._clock = surroundings.clock
@@ -147,7 +144,7 @@ class Scripts:
         say(message)
 
 
-def _set(parameters: Parameters, name: Any, value: Any) -> None:
+def _set(parameters: ScriptParameters, name: Any, value: Any) -> None:
     """Keep a value; raises WrongValue, ValueError."""
     value = _stored(value, parameters.get(name))
     refuse_if_too_large([name, value])

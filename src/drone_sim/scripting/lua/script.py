@@ -17,7 +17,7 @@ from typing import Any
 from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.constants import CONSTANTS, PHASES
-from drone_sim.scripting.api.messages import Callback
+from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.modules import LuaModules

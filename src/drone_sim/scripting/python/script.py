@@ -13,7 +13,7 @@ from typing import Any
 
 from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api, mistake
-from drone_sim.scripting.api.messages import Callback
+from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError, UnknownName, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS
 from drone_sim.scripting.python.modules import Helpers
