@@ -68,7 +68,8 @@ class Simulation:
         self.parameters = parameters
         self.script = script
         self.running = False
-        self._backend, self._drawings, self._gui = backend, drawings, gui
+        self._backend, self._gui = backend, gui
+        self._drawings = drawings if drawings is not None else Drawings(shown=False)
         self._runs = 0
         self._era = 0  # another one whenever what is in the world has become something else
         for one in parameters.fleet:  # a script that is not there needs no world
@@ -126,8 +127,7 @@ class Simulation:
         self.steps = 0
         self._runs += 1
         self._changed_vehicles()
-        if self._drawings is not None:
-            self._drawings.clear()
+        self._drawings.clear()
 
     def _changed_vehicles(self) -> None:
         self._era += 1
@@ -288,9 +288,7 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        parts: list[Any] = [shared.objects, shared.signals, *self._flying]
-        if self._drawings is not None:
-            parts.append(self._drawings)
+        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

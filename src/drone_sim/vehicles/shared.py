@@ -25,8 +25,8 @@ class Shared:
     time: Callable[[], float]
     time_step: float
     script_time_limit: float
+    drawings: Drawings
     backend: Backend | None = None
-    drawings: Drawings | None = None
     objects: ObjectTree = field(default_factory=ObjectTree)
     signals: Signals = field(default_factory=Signals)
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are
