@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from drone_sim.scripting import phase_names, script_log
-from drone_sim.scripting.api.calls import Api
+from drone_sim.scripting.api.calls import Api, remember
 from drone_sim.scripting.api.constants import CONSTANTS, PHASES
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError, no_function
@@ -42,6 +42,7 @@ class LuaScript:
         """Compile the file's text; run its top level unless it is to run in every phase. Raises ScriptError."""
         self._path = path
         self._limit = limit
+        self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0
         self._helpers = LuaModules(path)
@@ -52,7 +53,7 @@ class LuaScript:
         self._thread: Door = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
             dialect = state.OLDEST if text.per_phase or text.flat else state.newest()
-            self._lua = self._thread.run(self._build, dialect, modules)
+            self._lua = self._thread.run(self._build, dialect)
             self._run("load", self._lua["open"], text.text, text.per_phase)
             if not text.per_phase:
                 self._check_names()
@@ -60,13 +61,13 @@ class LuaScript:
             self._thread.close()
             raise
 
-    def _build(self, dialect: str, modules: Mapping[str, Api]) -> dict[str, Any]:
+    def _build(self, dialect: str) -> dict[str, Any]:
         """Return what can be called of a new Lua state, with the API in it."""
         runtime = state.new_runtime(dialect)
         self._values = Values(runtime)
         self._finalizer = weakref.finalize(self, _free, self._thread, self._values)
         sandbox = state.make_sandbox(runtime, self._thread, self._limit, self._values, self._helpers)
-        self._known = functions.define(runtime, sandbox, modules, self._values, self._thread)
+        self._known = functions.define(runtime, sandbox, self._modules, self._values, self._thread)
         _LOG.debug("%s runs in %s", self._path, dialect)
         return {name: sandbox[name.encode()] for name in _CALLS}
 
@@ -121,7 +122,14 @@ class LuaScript:
     def remember(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now. Raises ScriptError."""
         snapshot = self._run("snapshot", self._lua.get("remember"))
-        return lambda: self._run("restore", self._lua.get("recall"), snapshot)
+        recalls = remember(self._modules.values())
+
+        def recall() -> None:
+            self._run("restore", self._lua.get("recall"), snapshot)
+            for one in recalls:
+                one()
+
+        return recall
 
     def close(self) -> None:
         """Free the Lua state; the script cannot be called after that."""
