@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recorder import Recorder
 from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
@@ -141,13 +142,13 @@ def test_the_last_stages_fly_as_the_built_in_script_to_the_last_bit(stage):
 
 
 def test_the_camera_stage_publishes_every_step_s_picture():
-    with flying("7_camera", "cameras.front.width=64", f"scene_file={DOCS / 'tutorial' / '7_scene.yaml'}") as simulation:
+    scene, backend = f"scene_file={DOCS / 'tutorial' / '7_scene.yaml'}", Recorder()
+    with flying("7_camera", "cameras.front.width=64", scene, backend=backend) as simulation:
         fly(simulation, 0.15)
-        published = list(simulation.drone.bus.published)
         seen = simulation.drone.cameras["front"].take()
-    assert [one.topic for one in published] == ["/drone/my_front"] * 3
-    assert published[-1].kind == "sensor_msgs/Image"
-    picture = published[-1].message
+    assert [one.topic for one in backend.published] == ["/drone/my_front"] * 3
+    assert backend.published[-1].kind == "sensor_msgs/Image"
+    picture = backend.published[-1].message
     assert (picture.width, picture.height, picture.frame_id) == (64, 480, "front_optical")
     assert np.array_equal(np.frombuffer(picture.data, np.uint8).reshape(seen.shape), seen)
     assert seen.reshape(-1, 3).std(axis=0).min() > 10  # there is something to see

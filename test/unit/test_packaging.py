@@ -1,4 +1,4 @@
-"""What is imported is declared: in package.xml for rosdep, in requirements.txt for pip."""
+"""What is imported is declared: in package.xml for rosdep, in requirements.txt for pip; what is there is installed."""
 
 import ast
 import re
@@ -10,6 +10,7 @@ import yaml
 from drone_sim.files.resources import package_path
 
 ROOT = package_path()
+SOURCE = ROOT / "src"
 # Where the key of rosdep, or the name that pip knows, is not that of the module.
 KEYS = {
     "PIL": "python3-pil",
@@ -52,3 +53,18 @@ def test_rosdep_and_pip_take_the_same_versions():
     for key, systems in rosdep.items():
         name = key.removeprefix("python3-").removesuffix("-pip")
         assert {one["pip"]["packages"][0] for one in systems.values()} == {versions[name]}
+
+
+def test_every_file_of_the_package_is_installed():
+    """Modules are found by themselves; whatever else lies among them is named in setup.py."""
+    (data,) = (
+        ast.literal_eval(one.value)
+        for node in ast.walk(ast.parse((ROOT / "setup.py").read_text(encoding="utf-8")))
+        for one in getattr(node, "keywords", ())
+        if one.arg == "package_data"
+    )
+    named = {
+        path for name, globs in data.items() for one in globs for path in (SOURCE / name.replace(".", "/")).glob(one)
+    }
+    there = {path for path in SOURCE.rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
+    assert there and there == named

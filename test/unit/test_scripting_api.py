@@ -80,7 +80,8 @@ def test_names(sim, base):
     )
     assert sim.getObjectParent(base) == sim.getObject("/Quadcopter")
     assert sim.getObject("/nothing", {"noError": True}) == -1
-    assert [sim.getNameSuffix(name) for name in ("Drone", "Drone#", "Drone#2", None)] == [-1, -1, 2, -1]
+    found = [sim.getNameSuffix(name) for name in ("Drone", "Drone#", "Drone#2", None)]
+    assert found == [(-1, "Drone"), (-1, "Drone"), (2, "Drone"), -1]
     assert sim.getObjectSizeFactor(base) == 1
 
 

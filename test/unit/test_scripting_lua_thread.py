@@ -5,9 +5,9 @@ import time
 
 import pytest
 
-from drone_sim.scripting.lua import lua_thread
-from drone_sim.scripting.lua.lua_script import _lua_function
-from drone_sim.scripting.lua.lua_thread import LeftBehind, LuaThread
+from drone_sim.scripting.lua import thread as lua_thread
+from drone_sim.scripting.lua.functions import lua_function
+from drone_sim.scripting.lua.thread import LeftBehind, LuaThread
 from drone_sim.scripting.time_limit import TimeLimit
 
 
@@ -55,7 +55,7 @@ def test_who_hangs_is_left_behind_and_finds_the_api_closed(thread):
             return lambda value: (1, value)
 
     called, outcomes, wake = [], [], threading.Event()
-    api = _lua_function("sim.x", lambda: called.append(1), Values(), thread)
+    api = lua_function("sim.x", lambda: called.append(1), Values(), thread)
 
     def script():
         outcomes.append(api(0))

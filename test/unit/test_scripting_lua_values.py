@@ -8,8 +8,8 @@ from drone_sim.mechanics import frames
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.calls import Api
-from drone_sim.scripting.lua import lua_script
-from drone_sim.scripting.lua.lua_script import LuaScript
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.lua.script import LuaScript
 from drone_sim.scripting.time_limit import TimeLimit
 
 PROLOGUE = {
@@ -96,7 +96,7 @@ def test_results(call, result, check):
 @pytest.mark.parametrize("result, words", [({None: 1}, "cannot be a key"), ({float("nan"): 1}, "cannot be a key"),
                                            (b"x" * 2**27, "too many"), ([0] * 2**21, "too many")])  # fmt: skip
 def test_what_lua_cannot_take_is_an_error(call, result, words):
-    with pytest.raises(lua_script.ScriptError, match=words):
+    with pytest.raises(ScriptError, match=words):
         call("", lambda: result)
 
 

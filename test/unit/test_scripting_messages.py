@@ -4,6 +4,7 @@ import threading
 from types import SimpleNamespace
 
 import pytest
+from recorder import Recorder
 
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
@@ -66,13 +67,15 @@ def test_the_last_messages_are_kept(queue, kept):
         bus.shutdownSubscriber(handle)
 
 
-def test_without_a_backend_what_is_published_is_kept():
+@pytest.mark.parametrize("backend", [None, Recorder()])
+def test_what_is_published(backend):
     bus = MessageBus("drone")
+    bus.backend = backend
     handle = bus.advertise("said", "std_msgs/String")
     bus.publish(handle, {"data": "x"})
     image = bus.imageTransportAdvertise("/drone/front")
     bus.imageTransportPublish(image, bytes(range(12)), 2, 2, "here")
-    assert list(bus.published) == [
+    assert backend is None or backend.published == [
         ("/drone/said", "std_msgs/String", {"data": "x"}),
         ("/drone/front", "sensor_msgs/Image", Image(bytes([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5]), 2, 2, "here")),
     ]

@@ -60,7 +60,7 @@ def _objects(simulation):
     ],
 )
 def test_paths(objects, path, name):
-    assert objects[object_paths.find(objects, path, "Drone")].name == name
+    assert objects[object_paths.find(objects, path, "Drone", -1)].name == name
 
 
 @pytest.mark.parametrize(
@@ -78,13 +78,13 @@ def test_paths(objects, path, name):
 )
 def test_unknown_names_list_the_near_ones(objects, path, near):
     with pytest.raises(ValueError, match="no object") as raised:
-        object_paths.find(objects, path, "Drone")
+        object_paths.find(objects, path, "Drone", -1)
     assert near in str(raised.value)
 
 
 def test_paths_are_found_again(objects):
     for handle in objects:
-        assert object_paths.find(objects, objects.path(handle), "Drone") == handle
+        assert object_paths.find(objects, objects.path(handle), "Drone", -1) == handle
 
 
 def test_parents(objects):

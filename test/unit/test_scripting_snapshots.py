@@ -3,6 +3,7 @@
 import struct
 
 import pytest
+from recorder import Recorder
 
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
@@ -35,18 +36,19 @@ end
 
 
 def flight(simulation, steps=4):
-    path = []
+    path, backend = [], simulation.drone.bus.backend
+    backend.published.clear()
     for _ in range(steps):
         simulation.step()
         path.append(struct.pack("3d", *simulation.drone.state.position))
     drawn = {handle: list(one.items) for handle, one in simulation.drone.drawings.objects.items()}
-    return path, list(simulation.drone.bus.published), drawn
+    return path, list(backend.published), drawn
 
 
 def test_commands_on_their_way_are_delivered_again(tmp_path):
     path = tmp_path / "script.lua"
     path.write_text(LUA, encoding="utf-8")
-    simulation = Simulation(parameters.load(), script=str(path), drawings=Drawings())
+    simulation = Simulation(parameters.load(), script=str(path), drawings=Drawings(), backend=Recorder())
     flights = []
     for x in (1, 2):
         simulation.drone.receive(Twist(Vector3(x)))
@@ -54,7 +56,6 @@ def test_commands_on_their_way_are_delivered_again(tmp_path):
     simulation.drone.receive(Twist(Vector3(3)))
     snapshot = simulation.snapshot()
     for _ in range(3):
-        simulation.drone.bus.published.clear()
         flights.append(flight(simulation))
         simulation.restore(snapshot)
     assert flights[0] == flights[1] == flights[2]
@@ -65,7 +66,7 @@ def test_commands_on_their_way_are_delivered_again(tmp_path):
 
 @pytest.mark.parametrize("script", ["", "target"])
 def test_flights_go_on_to_the_bit(script):
-    simulation = Simulation(parameters.load(), script=script, drawings=Drawings())
+    simulation = Simulation(parameters.load(), script=script, drawings=Drawings(), backend=Recorder())
     simulation.step()
     simulation.drone.receive(Twist(Vector3(1, 0.5, 0.2), Vector3(0, 0, 0.3)))
     snapshot = simulation.snapshot()

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from recorder import Recorder
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
@@ -29,8 +30,9 @@ EVENTS = {
 }
 
 
-def fly(script, steps=STEPS):
-    simulation = Simulation(parameters.load({"control": {"thrust_limits": None}, "cameras": SMALL}), script=script)
+def fly(script, steps=STEPS, backend=None):
+    values = parameters.load({"control": {"thrust_limits": None}, "cameras": SMALL})
+    simulation = Simulation(values, script=script, backend=backend)
     path = []
     try:
         for step in range(steps):
@@ -38,29 +40,30 @@ def fly(script, steps=STEPS):
                 EVENTS[step](simulation.drone)
             simulation.step()
             path.append(simulation.drone.state.position)
-        return path, list(simulation.drone.bus.published)
+        return path
     finally:
         simulation.close()
 
 
 @pytest.fixture(name="built_in", scope="module")
 def _built_in():
-    path, _ = fly("")
+    path = fly("")
     assert max(abs(value) for position in path for value in position) < 50, "the reference flight itself is lost"
     return path
 
 
 @pytest.mark.parametrize("script", ["tutorial_v3.lua", "tutorial_v4.lua"])
 def test_lua_flies_as_the_python_script(script, built_in):
-    path, _ = fly(str(SCRIPTS / script))
+    path = fly(str(SCRIPTS / script))
     worst = max(abs(a - b) for ours, theirs in zip(path, built_in) for a, b in zip(ours, theirs))
     assert len(path) == STEPS and worst < 1e-9
 
 
 def test_the_tutorials_lua_publishes_its_camera():
-    _, published = fly(str(SCRIPTS / "tutorial_v3.lua"), steps=3)
-    topic, kind, image = published[-1]
-    assert (topic, kind, len(published)) == ("/drone/front", "sensor_msgs/Image", 3)
+    backend = Recorder()
+    fly(str(SCRIPTS / "tutorial_v3.lua"), steps=3, backend=backend)
+    topic, kind, image = backend.published[-1]
+    assert (topic, kind, len(backend.published)) == ("/drone/front", "sensor_msgs/Image", 3)
     assert (image.width, image.height, len(image.data), image.frame_id) == (16, 12, 16 * 12 * 3, "drone front")
     top, bottom = image.data[: 16 * 3], image.data[-16 * 3 :]
     assert sum(top) > sum(bottom), "the sky is brighter than the floor: the top row comes first"

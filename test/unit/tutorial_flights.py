@@ -19,9 +19,9 @@ STAGES = {path.stem: path for path in sorted((DOCS / "tutorial").glob("[0-9]_*.p
 
 
 @contextlib.contextmanager
-def flying(stage, *assignments):
+def flying(stage, *assignments, backend=None):
     values = parameters.load(settings(assignments))
-    simulation = Simulation(values, script=str(STAGES[stage]) if stage in STAGES else stage)
+    simulation = Simulation(values, script=str(STAGES[stage]) if stage in STAGES else stage, backend=backend)
     try:
         yield simulation
     finally:

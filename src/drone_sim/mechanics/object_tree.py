@@ -1,4 +1,7 @@
-"""The objects of the scene, under their V-REP names: a tree of frames that scripts reach by handle."""
+"""The objects of the scene, under their V-REP names: a tree of frames that scripts reach by handle.
+
+Several models may stand in it, each under names with a suffix of its own (object_names.py).
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from typing import Protocol
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector
+from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.wording import near_names
 
@@ -48,6 +52,7 @@ class SceneObject:
         self.names = names
         self.alias = alias
         self.parent = parent
+        self._added_below = parent
         self.local = local
         self.body = body
         self._above: Matrix | None = None
@@ -60,8 +65,15 @@ class SceneObject:
         return self.names[0]
 
     def is_called(self, name: str) -> bool:
-        """Tell whether that is its alias or one of its names."""
-        return name == self.alias or name in self.names
+        """Tell whether that is its alias or one of its names, with or without their suffix."""
+        return name == self.alias or any(name in (one, plain(one)) for one in self.names)
+
+    def is_part_of(self, whole: SceneObject) -> bool:
+        """Tell whether it is that object or was added below it, whatever it hangs on now."""
+        part: SceneObject | None = self
+        while part is not None and part is not whole:
+            part = part._added_below
+        return part is whole
 
     def matrix(self) -> Matrix:
         """Return the transform world from this frame."""
@@ -98,13 +110,14 @@ class SceneObject:
 
 
 class ObjectTree:
-    """All objects, by handle (a small integer, stable for the run) and by name."""
+    """All objects, by handle (a small integer that no other object of the run has had) and by name."""
 
     def __init__(self) -> None:
         """Start empty."""
         self._objects: dict[int, SceneObject] = {}
         self._handles: dict[str, int] = {}
         self._numbers = itertools.count()  # none is given twice
+        self._copied: set[str] = set()  # names that some object has, or had, with a suffix
 
     def add(
         self,
@@ -118,12 +131,18 @@ class ObjectTree:
     ) -> int:
         """Add an object at `local` in the frame of the object named `parent`; return its handle.
 
-        `alias` is what it is called in 4.x paths (its name by default), `also` are further names of it.
+        `alias` is what it is called in 4.x paths (its name by default), `also` are further names of it. Raises
+        ValueError for a name that is taken.
         """
+        names = (name, *also)
+        for one in names:
+            if one in self._handles:
+                raise ValueError(f"an object named '{one}' is there already")
         handle = next(self._numbers)
         above = self._objects[self._handles[parent]] if parent else None
-        self._objects[handle] = SceneObject((name, *also), alias or name, above, local, body)
-        self._handles.update((known, handle) for known in (name, *also))
+        self._objects[handle] = SceneObject(names, alias or name, above, local, body)
+        self._handles.update((one, handle) for one in names)
+        self._copied.update(plain(one) for one in names if plain(one) != one)
         return handle
 
     def remove(self, handles: Collection[int]) -> None:
@@ -131,12 +150,14 @@ class ObjectTree:
         going = {id(self._objects[handle]) for handle in handles}
         for handle, one in self._objects.items():
             if handle not in handles and id(one.parent) in going:
-                matrix = one.matrix()
-                one.parent = None
-                one.put(matrix)
+                one.local, one.parent = one.matrix(), None
         for handle in handles:
             for name in self._objects.pop(handle).names:
                 del self._handles[name]
+
+    def is_copied(self, name: str) -> bool:
+        """Tell whether any object has, or had, that name with a suffix."""
+        return name in self._copied
 
     def handle(self, name: str) -> int:
         """Return the handle of a name; raises ValueError that lists the near names."""
@@ -185,12 +206,17 @@ class ObjectTree:
             raise TypeError("a handle is a whole number") from None
 
     def remember(self) -> Callable[[], None]:
-        """Return a function that puts every object back where it is now, under its present parent."""
+        """Return a function that puts every object back where it is now, under its present parent.
+
+        An object that was removed since, or whose parent was, is left as it is.
+        """
         kept = [(one, one.parent, one.local) for one in self._objects.values()]
 
         def recall() -> None:
+            there = {None, *self._objects.values()}
             for one, parent, local in kept:
-                one.parent, one.local = parent, local
+                if one in there and parent in there:
+                    one.parent, one.local = parent, local
 
         return recall
 

@@ -27,8 +27,8 @@ from drone_sim.run import parameters as parameters_module
 from drone_sim.run.guardian import Guardian
 from drone_sim.run.parameters import ParameterError, Parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.scripts import LOG as SCRIPT_LOG
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
 from drone_sim.wording import near_names, shown
 
 _AFTER = 5.0  # s flown on after the last command

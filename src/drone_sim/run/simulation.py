@@ -20,8 +20,8 @@ from drone_sim.run.setting import Setting
 from drone_sim.run.whereabouts import Whereabouts
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting import load
+from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.messages import Backend
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
 from drone_sim.sensors.camera import Vision
@@ -60,7 +60,7 @@ class Simulation:
         """Build the scene and, if `started`, run the init of the child scripts.
 
         `script` flies the vehicles that name none of their own; '' is the parameters', or the tutorial's. `backend`
-        carries what scripts subscribe to and publish; without it the messages stay in the vehicles' `bus`.
+        carries what scripts subscribe to and publish; without it the messages go nowhere.
         `drawings` takes what scripts draw; without it that is ignored.
 
         Raises ParameterError, UrdfError, ScriptError, and RuntimeError where `gui` finds no display.
@@ -68,7 +68,8 @@ class Simulation:
         self.parameters = parameters
         self.script = script
         self.running = False
-        self._backend, self._drawings, self._gui = backend, drawings, gui
+        self._backend, self._gui = backend, gui
+        self._drawings = drawings if drawings is not None else Drawings(shown=False)
         self._runs = 0
         self._era = 0  # another one whenever what is in the world has become something else
         for one in parameters.fleet:  # a script that is not there needs no world
@@ -126,8 +127,7 @@ class Simulation:
         self.steps = 0
         self._runs += 1
         self._changed_vehicles()
-        if self._drawings is not None:
-            self._drawings.clear()
+        self._drawings.clear()
 
     def _changed_vehicles(self) -> None:
         self._era += 1
@@ -288,9 +288,7 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        parts: list[Any] = [shared.objects, shared.signals, *self._flying]
-        if self._drawings is not None:
-            parts.append(self._drawings)
+        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

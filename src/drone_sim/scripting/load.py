@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from drone_sim.files.resources import resolve
+from drone_sim.scripting import source_files
 from drone_sim.scripting.api.calls import Api
-from drone_sim.scripting.api.messages import Callback
+from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.python.python_modules import LARGEST
-from drone_sim.scripting.python.python_script import PythonScript
+from drone_sim.scripting.python.script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.wording import near_names
 
@@ -81,25 +81,14 @@ def load(script: str, modules: Mapping[str, Api], limit: TimeLimit) -> Script:
     """Load a child script; raises ScriptError."""
     path = script_path(script)
     try:
-        source = _read(path)
-        if path.endswith(".lua"):
-            from drone_sim.scripting.lua.lua_script import LuaScript  # whoever flies Python needs no lupa
-
-            return LuaScript(path, source, modules, limit)
+        source = source_files.read(path)
+    except (OSError, ValueError) as error:
+        raise ScriptError("load", path, 0, getattr(error, "strerror", None) or str(error)) from None
+    if path.endswith(".py"):
         return PythonScript(path, source, modules, limit)
-    except OSError as error:
-        raise ScriptError("load", path, 0, error.strerror or str(error)) from None
+    try:
+        from drone_sim.scripting.lua.script import LuaScript  # whoever flies Python needs no lupa
+
+        return LuaScript(path, source, modules, limit)
     except ImportError as error:
         raise ScriptError("load", path, 0, f"Lua scripts need lupa (pip install lupa): {error}") from None
-
-
-def _read(path: str) -> bytes:
-    """Return a script's text; raises ScriptError, OSError."""
-    file = Path(path)
-    if file.exists() and not file.is_file():
-        raise ScriptError("load", path, 0, "is not a file")
-    with file.open("rb") as opened:
-        source = opened.read(LARGEST + 1)
-    if len(source) > LARGEST:
-        raise ScriptError("load", path, 0, f"is too large: a script has at most {LARGEST} bytes")
-    return source

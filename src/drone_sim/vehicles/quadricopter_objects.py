@@ -93,7 +93,11 @@ class QuadricopterObjects:
         own = None if parent is None else f"{parent}{self._suffix}"
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
         names = [f"{one}{self._suffix}" for one in (name, *also)]
-        self._handles.append(self._objects.add(names[0], above, local, body, alias=alias or name, also=names[1:]))
+        try:
+            handle = self._objects.add(names[0], above, local, body, alias=alias or name, also=names[1:])
+        except ValueError as error:  # one of the scene has that name
+            raise ParameterError(str(error)) from None
+        self._handles.append(handle)
 
     def _add_camera(self, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
         if camera.mount is None:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.messages import Backend
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.sensors.camera import Vision
 from drone_sim.world import World
@@ -25,8 +25,8 @@ class Shared:
     time: Callable[[], float]
     time_step: float
     script_time_limit: float
+    drawings: Drawings
     backend: Backend | None = None
-    drawings: Drawings | None = None
     objects: ObjectTree = field(default_factory=ObjectTree)
     signals: Signals = field(default_factory=Signals)
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are

@@ -99,7 +99,6 @@ class Vehicle:
         self._command_age = 0.0
         self._joint_angles: dict[str, float] = {}
         self.turned = False  # by its script, since the blades were shown
-        self.drawings_made = 0
         self._leave_tree()
         self._tree = self.objects
         objects = QuadricopterObjects(self._tree, self.suffix)
@@ -148,8 +147,8 @@ class Vehicle:
         return self._shared.signals
 
     @property
-    def drawings(self) -> Drawings | None:
-        """Where scripts draw, if anywhere."""
+    def drawings(self) -> Drawings:
+        """What scripts draw."""
         return self._shared.drawings
 
     @property
@@ -319,12 +318,12 @@ class Vehicle:
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back what the body is not: forces, script, messages, parameters."""
-        own = (self.command, self._command_age, self.drawings_made, dict(self._joint_angles))
+        own = (self.command, self._command_age, dict(self._joint_angles))
         parameters = copy.deepcopy(self.script_parameters)
         others = [one.remember() for one in (*self._forces, *self.sub_step_forces, self.bus, self.script)]
 
         def recall() -> None:
-            self.command, self._command_age, self.drawings_made, angles = own
+            self.command, self._command_age, angles = own
             self._joint_angles, self.turned = dict(angles), True
             _set_all(self.script_parameters, parameters)
             for one in others:

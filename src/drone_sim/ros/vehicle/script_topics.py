@@ -1,4 +1,4 @@
-"""Topics of a child script through rospy: the backend of scripting/messages.py."""
+"""Topics of a child script through rospy: a Backend (scripting/api/backend.py)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import rospkg
 import rospy
 from sensor_msgs.msg import Image as ImageMessage
 
-from drone_sim.scripting.api.messages import Image
+from drone_sim.scripting.api.backend import Image
 
 
 class RosBackend:

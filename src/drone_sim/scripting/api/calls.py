@@ -22,23 +22,38 @@ _LONGEST = 1000  # characters of an error's message
 class Api:
     """The functions and constants of one module, such as `sim`, as the attributes that a Python script uses."""
 
-    def __init__(self, name: str, functions: Mapping[str, Function], constants: Mapping[str, Any]):
-        """Take what it is called, and what it has."""
+    def __init__(
+        self,
+        name: str,
+        functions: Mapping[str, Function],
+        constants: Mapping[str, Any],
+        remember: Callable[[], Callable[[], None]] | None = None,
+    ):
+        """Take what it is called, and what it has.
+
+        `remember` returns what brings back what a script has set in it, and that is nowhere else.
+        """
         self.__dict__.update(constants)
         self.__dict__.update(functions)
         # Kept out of sight: whatever else is an attribute is the script's to use.
-        self.__dict__["_api"] = (name, dict(functions), dict(constants))
+        self.__dict__["_api"] = (name, dict(functions), dict(constants), remember)
 
     def __getattr__(self, name: str) -> Any:
         """Raise UnknownName, with the near names; called for what is not there."""
-        own, functions, constants = self.__dict__["_api"]
+        own, functions, constants, _ = self.__dict__["_api"]
         raise UnknownName(f"{own} has no '{name}'; {near_names(name, [*functions, *constants])}")
 
 
 def contents(api: Api) -> tuple[str, dict[str, Function], dict[str, Any]]:
     """Return name, functions and constants of an API."""
-    name, functions, constants = api.__dict__["_api"]
+    name, functions, constants, _ = api.__dict__["_api"]
     return name, functions, constants
+
+
+def remember(apis: Iterable[Api]) -> list[Callable[[], None]]:
+    """Return functions that bring back what a script has set in its APIs."""
+    remembering = (api.__dict__["_api"][3] for api in apis)
+    return [one() for one in remembering if one is not None]
 
 
 def public_functions(parts: Iterable[object]) -> dict[str, Function]:

@@ -1,24 +1,19 @@
 """`sim`: what only changes what one sees: drawing objects, particles, floating views, dialogs.
 
-Drawing objects are shown where the drone has Drawings; everything else is accepted and ignored, which the
-log says once for each function.
+Drawing objects are shown where somebody shows them; everything else is accepted and ignored, which the log says
+once for each function.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import Function, numbers
 from drone_sim.scripting.api.drawings import MOST
 from drone_sim.scripting.api.host import Host
+from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers
 from drone_sim.scripting.script_log import LOG
-
-Handle = int
-Number = float
-ThreeNumbers = Sequence[float]
-Numbers = Sequence[float]
 
 _MAKERS = ("addParticleObject", "floatingViewAdd", "auxiliaryConsoleOpen", "displayDialog")
 _OTHERS = (
@@ -35,6 +30,7 @@ _OTHERS = (
     "setThreadSwitchTiming",
     "setThreadAutomaticSwitch",
 )
+_IGNORED = "there is nothing to draw on; accepted and ignored"
 _GREY = (0.5, 0.5, 0.5)
 
 
@@ -42,8 +38,7 @@ class Drawing:
     """The functions that draw."""
 
     def __init__(self, host: Host):
-        """Take the drone, and whether its drawings are shown."""
-        self._host = host
+        """Take where to draw."""
         self._drawings = host.drawings
         self._said: set[str] = set()
 
@@ -70,37 +65,33 @@ class Drawing:
         carry them.
         """
         rgb = numbers(color, 3) if color else _GREY
-        self._host.drawings_made += 1
-        if self._drawings is None:
-            self._say("addDrawingObject", "there is nothing to draw on; accepted and ignored")
-        else:
-            if parent != WORLD:
-                self._say("addDrawingObject", "the parent is ignored: items stay where they are drawn")
-            if maxItemCount > MOST:
-                self._say("addDrawingObject", f"{maxItemCount} items are too many: {MOST} are kept")
-            extent, tolerance = numbers((size, duplicateTolerance), 2)
-            self._drawings.make(self._host.drawings_made, int(objectType), extent, tolerance, int(maxItemCount), rgb)
-        return self._host.drawings_made
+        if not self._drawings.shown:
+            self._say("addDrawingObject", _IGNORED)
+            return self._drawings.new_handle()
+        if parent != WORLD:
+            self._say("addDrawingObject", "the parent is ignored: items stay where they are drawn")
+        if maxItemCount > MOST:
+            self._say("addDrawingObject", f"{maxItemCount} items are too many: {MOST} are kept")
+        extent, tolerance = numbers((size, duplicateTolerance), 2)
+        return self._drawings.make(int(objectType), extent, tolerance, int(maxItemCount), rgb)
 
     def addDrawingObjectItem(self, handle: Handle, item: Numbers | None = None) -> None:
         """Draw one more item, its points one after the other (m, world); without an item, remove all of them."""
         values = None if item is None else numbers(item, len(item))
-        if self._drawings is None:
-            self._say("addDrawingObjectItem", "there is nothing to draw on; accepted and ignored")
-        else:
+        if self._drawings.shown:
             self._drawings.add(handle, values)
+        else:
+            self._say("addDrawingObjectItem", _IGNORED)
 
     def removeDrawingObject(self, handle: Handle) -> None:
         """Remove a drawing object."""
-        if self._drawings is not None:
+        if self._drawings.shown:
             self._drawings.remove(handle)
 
     def _ignored(self, name: str, makes: bool) -> Function:
         def call(*_arguments: Any) -> int | None:
-            if makes:
-                self._host.drawings_made += 1
-            self._say(name, "there is nothing to draw on; accepted and ignored")
-            return self._host.drawings_made if makes else None
+            self._say(name, _IGNORED)
+            return self._drawings.new_handle() if makes else None
 
         call.__doc__ = "Do nothing."
         return call

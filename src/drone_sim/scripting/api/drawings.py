@@ -48,13 +48,23 @@ class DrawingObject:
 class Drawings:
     """The drawing objects of a run, by handle. `changes` counts, so that whoever shows them sees that they changed."""
 
-    def __init__(self) -> None:
-        """Start with none."""
+    def __init__(self, shown: bool = True) -> None:
+        """Start with none; `shown` says whether anybody shows them, or whether there are handles alone."""
+        self.shown = shown
         self.objects: dict[int, DrawingObject] = {}
         self.changes = 0
+        self._last_handle = 0
 
-    def make(self, handle: int, kind: int, size: float, tolerance: float, most: int, color: Item) -> None:
-        """Add an object that holds up to `most` items; raises ValueError for a kind that there is not, or too many."""
+    def new_handle(self) -> int:
+        """Return a handle that nothing else has that is drawn in this run."""
+        self._last_handle += 1
+        return self._last_handle
+
+    def make(self, kind: int, size: float, tolerance: float, most: int, color: Item) -> int:
+        """Add an object that holds up to `most` items, and return its handle.
+
+        Raises ValueError for a kind that there is not, or too many.
+        """
         if len(self.objects) >= _MOST_OBJECTS:
             raise ValueError(f"{_MOST_OBJECTS} drawing objects are there already: remove some")
         if kind & _KIND not in _KINDS:
@@ -62,10 +72,12 @@ class Drawings:
         alpha = math.prod(part for flag, part in _SEEN_THROUGH.items() if kind & flag)
         rgba = (color[0], color[1], color[2], alpha)
         items: deque[Item] = deque(maxlen=min(max(1, most), MOST))
+        handle = self.new_handle()
         self.objects[handle] = DrawingObject(
             _KINDS[kind & _KIND], size, rgba, items, bool(kind & _CYCLIC), max(0.0, tolerance)
         )
         self.changes += 1
+        return handle
 
     def add(self, handle: int, item: Item | None) -> None:
         """Add an item, unless the object is full and not cyclic, or has one so near; None removes all items.
@@ -92,9 +104,10 @@ class Drawings:
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back what is drawn now."""
-        kept = _copied(self.objects)
+        kept, last = _copied(self.objects), self._last_handle
 
         def recall() -> None:
+            self._last_handle = last
             self.objects.clear()
             self.objects.update(_copied(kept))
             self.changes += 1
@@ -102,7 +115,8 @@ class Drawings:
         return recall
 
     def clear(self) -> None:
-        """Remove every object."""
+        """Remove every object, as at the beginning of a run."""
+        self._last_handle = 0
         self.objects.clear()
         self.changes += 1
 

@@ -13,7 +13,7 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.signals import Signals
 
-Parameters = dict[str, Any]
+ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
 
 
 def _call(function: Callable[[], Any]) -> Any:
@@ -25,28 +25,29 @@ class Host(Protocol):
 
     @property
     def objects(self) -> ObjectTree:
-        """The objects of the scene."""
+        """The objects of the scene, which several drones share."""
 
     @property
-    def script_parameters(self) -> Mapping[str, Parameters]:
-        """Simulation parameters of the script that is attached to each object, by the object's name."""
+    def script_parameters(self) -> Mapping[str, ScriptParameters]:
+        """Simulation parameters of the script that is attached to each object of the drone, by the object's name."""
 
     @property
     def signals(self) -> Signals:
-        """The signals that scripts leave."""
+        """The signals that scripts leave, for those of other drones, too."""
 
     @property
     def own_script(self) -> str:
-        """Name of the object that this script is attached to."""
+        """Name of the object that this script is attached to, with its suffix: 'Drone', 'Drone#0'."""
 
     @property
-    def drawings(self) -> Drawings | None:
-        """Where to draw, if anywhere."""
-
-    drawings_made: int  # the last handle that was given away
+    def drawings(self) -> Drawings:
+        """What is drawn, by all drones together."""
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
-        """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m)."""
+        """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m).
+
+        Raises ValueError for what is none of the drone's.
+        """
 
     def turn_joint(self, joint: str, angle: float | None) -> float:
         """Turn a joint to an angle (rad), unless None; return the angle. Raises ValueError for what is none."""

@@ -12,7 +12,9 @@ from drone_sim.scripting.api.calls import Api, public_functions
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.drawing import Drawing
 from drone_sim.scripting.api.host import Host, Surroundings
+from drone_sim.scripting.api.matrices import Matrices
 from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.names import Names
 from drone_sim.scripting.api.objects import Objects
 from drone_sim.scripting.api.scripts import Scripts
 from drone_sim.scripting.api.vision import VisionSensors
@@ -20,14 +22,11 @@ from drone_sim.scripting.api.vision import VisionSensors
 
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
     """Return `sim` for the script that flies a drone."""
-    parts = (
-        Objects(host),
-        Scripts(host, surroundings),
-        host.signals,
-        VisionSensors(host, surroundings),
-    )
-    functions = {**public_functions(parts), **Drawing(host).functions()}
-    return Api("sim", functions, CONSTANTS)
+    names = Names(host)
+    parts = (Objects(host), Matrices(), Scripts(host, surroundings, names), VisionSensors(host, surroundings))
+    others = (names, host.signals, Drawing(host))
+    functions = {**public_functions(parts), **{name: f for one in others for name, f in one.functions().items()}}
+    return Api("sim", functions, CONSTANTS, names.remember)
 
 
 def make_sim_ros(bus: MessageBus) -> Api:

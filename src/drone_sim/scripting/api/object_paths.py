@@ -1,28 +1,33 @@
 """Objects by V-REP 3.x name or by CoppeliaSim 4.x path.
 
-    Quadricopter_base  Quadricopter_base#  Quadricopter_base#0     3.x; the suffix numbers copies of a model
-    /Quadcopter/base   /target                                     4.x, from the root of the scene
+    Quadricopter_base  Quadricopter_base#  Quadricopter_base#0     3.x; the suffix tells copies of a model apart
+    /Quadcopter/base   /Quadcopter[1]/base   /target               4.x, from the root of the scene
     .  ./base  :/base  ..  ../propeller[0]/respondable             4.x, from the model that the script belongs to
 
 In newer 4.x models the script is an object of its own below the model (`..` is the model), in older
 ones it belongs to the model itself (`.` is): both mean the drone here. An element of a path names any
 descendant, the nearest first; [i] takes the i-th of several.
+
+A name without a suffix means the object of the script's own model, as in V-REP: in the script of Drone#0,
+Quadricopter_base is Quadricopter_base#0. Where there is none, it is an object of the scene, such as Floor, but not one
+of the model that Drone#0 is a copy of. `name#` is always the one without a suffix.
 """
 
 from __future__ import annotations
 
 import re
 
+from drone_sim.mechanics.object_names import plain, suffixed
 from drone_sim.mechanics.object_tree import ObjectTree, SceneObject
 from drone_sim.wording import near_names
 
-_SUFFIX = re.compile(r"#\d*$")
+_SUFFIXED = re.compile(r"(.+)#(\d*)", re.DOTALL)
 _ELEMENT = re.compile(r"^([^\[\]]+)(?:\[(\d+)\])?$")
 _OWN = (".", "..", ":")
 
 
-def find(objects: ObjectTree, path: str, own: str) -> int:
-    """Return the handle that a name or path means in a script of the object `own`.
+def find(objects: ObjectTree, path: str, own: str, suffix: int) -> int:
+    """Return the handle that a name or path means in a script of the object `own`, whose names have that suffix.
 
     Raises ValueError with the near names.
     """
@@ -30,7 +35,7 @@ def find(objects: ObjectTree, path: str, own: str) -> int:
         raise TypeError("a name is a string")
     first, slash, rest = path.partition("/")
     if not slash and first not in _OWN:
-        return objects.handle(_SUFFIX.sub("", path))
+        return objects.handle(_full_name(objects, path, own, suffix))
     here: SceneObject | None = None
     if first in _OWN:
         here = objects[objects.handle(own)]
@@ -44,6 +49,25 @@ def find(objects: ObjectTree, path: str, own: str) -> int:
     if here is None:
         raise ValueError(f"no object '{path}': it names none")
     return objects.handle_of(here)
+
+
+def _full_name(objects: ObjectTree, name: str, own: str, suffix: int) -> str:
+    """Return what a name in a script stands for, whether there is such an object or not."""
+    match = _SUFFIXED.fullmatch(name)
+    if match is None:
+        full = suffixed(name, suffix)
+        return full if full in objects or not _is_of_the_scene(objects, name, own) else name
+    # A script that is copied out of a scene with several models names its own with a suffix.
+    is_meant = name in objects or (match.group(2) and objects.is_copied(match.group(1)))
+    return name if is_meant else match.group(1)
+
+
+def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
+    """Tell whether a name is not one of the model that `own` has copies of, or is a copy of."""
+    original = plain(own)
+    if name not in objects or original not in objects or not objects.is_copied(original):
+        return True
+    return not objects[objects.handle(name)].is_part_of(objects[objects.handle(original)])
 
 
 def _step(objects: ObjectTree, here: SceneObject | None, element: str) -> SceneObject | None:

@@ -1,24 +1,15 @@
-"""`sim`: the objects of the scene, where they are, how they move, the forces on them; matrices."""
+"""`sim`: the objects of the scene, where they are, how they move, the forces on them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import WORLD
-from drone_sim.scripting.api import object_paths
 from drone_sim.scripting.api.calls import WrongValue, numbers
 from drone_sim.scripting.api.host import Host
-
-# The names by which messages say what is expected.
-Handle = int
-Name = str
-ThreeNumbers = Sequence[float]
-FourNumbers = Sequence[float]
-SevenNumbers = Sequence[float]
-TwelveNumbers = Sequence[float]
-Number = float
+from drone_sim.scripting.api.types import FourNumbers, Handle, Number, SevenNumbers, ThreeNumbers, TwelveNumbers
 
 
 class Objects:
@@ -28,34 +19,6 @@ class Objects:
         """Take the drone whose objects they are."""
         self._host = host
         self._objects = host.objects
-
-    # ---- names
-
-    def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
-        """Return the handle of an object by path or name; -1 for none with the option noError."""
-        try:
-            return object_paths.find(self._objects, path, self._host.own_script)
-        except ValueError:
-            if options and options.get("noError"):
-                return -1
-            raise
-
-    def getObjectHandle(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
-        """Return the handle of an object by name (3.x) or path."""
-        return self.getObject(path, options)
-
-    def getObjectName(self, handle: Handle) -> str:
-        """Return the 3.x name of an object."""
-        return self._objects[handle].name
-
-    def getObjectAlias(self, handle: Handle, options: int = -1) -> str:
-        """Return the 4.x alias of an object; its path from the root where options is 1 or more."""
-        return self._objects.path(handle) if options > 0 else self._objects[handle].alias
-
-    def getNameSuffix(self, name: Name | None = None) -> int:
-        """Return the number of the model's copy in a name such as 'Quadricopter#0'; -1 for the first."""
-        digits = (name or "").rpartition("#")[2]
-        return int(digits) if "#" in (name or "") and digits.isdigit() else -1
 
     def getObjectParent(self, handle: Handle) -> int:
         """Return the handle of an object's parent, -1 for none."""
@@ -157,33 +120,6 @@ class Objects:
     def getJointPosition(self, handle: Handle) -> float:
         """Return the angle of a propeller's blades (rad)."""
         return self._host.turn_joint(self._objects[handle].name, None)
-
-    # ---- matrices
-
-    def multiplyVector(self, matrix: TwelveNumbers, vector: ThreeNumbers) -> list[float]:
-        """Return matrix · vector."""
-        m, v = numbers(matrix, 12), numbers(vector, 3)
-        return list(frames.transform(m, v))
-
-    def multiplyMatrices(self, first: TwelveNumbers, second: TwelveNumbers) -> list[float]:
-        """Return first · second."""
-        return list(frames.multiply(numbers(first, 12), numbers(second, 12)))
-
-    def buildMatrix(self, position: ThreeNumbers, angles: ThreeNumbers) -> list[float]:
-        """Return the transform of a position and Euler angles."""
-        return list(frames.from_euler(numbers(position, 3), numbers(angles, 3)))
-
-    def getEulerAnglesFromMatrix(self, matrix: TwelveNumbers) -> list[float]:
-        """Return the Euler angles of a transform."""
-        return list(frames.to_euler(numbers(matrix, 12)))
-
-    def getMatrixInverse(self, matrix: TwelveNumbers) -> list[float]:
-        """Return the inverse of a transform."""
-        return list(frames.invert(numbers(matrix, 12)))
-
-    def getInvertedMatrix(self, matrix: TwelveNumbers) -> list[float]:
-        """Return the inverse of a transform (3.x)."""
-        return list(frames.invert(numbers(matrix, 12)))
 
 
 def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[float, ...]]:

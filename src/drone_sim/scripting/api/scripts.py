@@ -8,19 +8,16 @@ from collections.abc import Iterable
 from math import isfinite
 from typing import Any
 
-from drone_sim.scripting.api import object_paths
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Host, Parameters, Surroundings
+from drone_sim.scripting.api.host import Host, ScriptParameters, Surroundings
+from drone_sim.scripting.api.names import Names
 from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.script_log import LOG, say
+from drone_sim.scripting.api.types import Handle, Name
+from drone_sim.scripting.script_log import say
 from drone_sim.wording import near_names
 
-__all__ = ["LOG", "Scripts"]
-
 _LOG = logging.getLogger(__name__)  # not the script's own words
-Handle = int
-Name = str
 
 _VERSION = 40600  # the CoppeliaSim whose API this is nearest to
 _MOST = 1000  # parameters of one script
@@ -32,11 +29,12 @@ _SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
 class Scripts:
     """The functions on scripts and time."""
 
-    def __init__(self, host: Host, surroundings: Surroundings):
-        """Take the drone whose scripts they are, and the clock."""
-        self._host = host
+    def __init__(self, host: Host, surroundings: Surroundings, names: Names):
+        """Take the drone whose scripts they are, the clock, and how a name is understood."""
+        self._objects = host.objects
+        self._find = names.getObject
         self._names = list(host.script_parameters)
-        self._parameters: dict[int, Parameters] = dict(enumerate(host.script_parameters.values()))
+        self._parameters: dict[int, ScriptParameters] = dict(enumerate(host.script_parameters.values()))
         self._own = self._names.index(host.own_script)
         self._read = [set(parameters) for parameters in self._parameters.values()]  # names that something reads
         self._clock = surroundings.clock
@@ -68,20 +66,15 @@ class Scripts:
         """Return the handle of the script that is attached to an object; of this one without a name."""
         if name is None:
             return self._own
-        if name in self._names:
-            return self._names.index(name)
-        objects = self._host.objects
         try:
-            attached = objects[object_paths.find(objects, name, self._host.own_script)].name
+            found = self._objects[self._find(name)].name
         except ValueError:
-            attached = ""
-        if attached not in self._names:
-            raise ValueError(f"no script is attached to '{name}'; {near_names(name, self._names)}")
-        return self._names.index(attached)
+            found = name
+        return self._attached(found)
 
     def getObjectAssociatedWithScript(self, script: Handle) -> int:
         """Return the handle of the object that a script is attached to."""
-        return self._host.objects.handle(self._names[self._index(script)])
+        return self._objects.handle(self._names[self._index(script)])
 
     def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
         """Return a simulation parameter of a script."""
@@ -89,7 +82,7 @@ class Scripts:
         if name not in parameters:
             raise ValueError(f"no script parameter '{name}'; {near_names(name, parameters)}")
         value = parameters[name]
-        return list(value) if isinstance(value, tuple) else value
+        return list(value) if isinstance(value, (list, tuple)) else value
 
     def setScriptSimulationParameter(self, script: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of a script: `particleVelocity` (m/s) drives a propeller.
@@ -106,6 +99,22 @@ class Scripts:
             self._check_name(scripts, name)
         for one in scripts:
             _set(self._parameters[one], name, value)
+
+    def getUserParameter(self, handle: Handle, name: Name, _options: Any = None) -> Any:
+        """Return a simulation parameter of the script that is attached to an object (4.x)."""
+        return self.getScriptSimulationParameter(self._script_of(handle), name)
+
+    def setUserParameter(self, handle: Handle, name: Name, value: Any) -> None:
+        """Set a simulation parameter of the script that is attached to an object (4.x)."""
+        self.setScriptSimulationParameter(self._script_of(handle), name, value)
+
+    def _script_of(self, handle: int) -> int:
+        return self._own if handle == _SELF else self._attached(self._objects[handle].name)
+
+    def _attached(self, name: str) -> int:
+        if name not in self._names:
+            raise ValueError(f"no script is attached to '{name}'; {near_names(name, self._names)}")
+        return self._names.index(name)
 
     def _check_name(self, scripts: Iterable[int], name: Any) -> None:
         """Raise ValueError for a misspelt parameter of a propeller; say of one that nothing reads that it is so."""
@@ -147,7 +156,7 @@ class Scripts:
         say(message)
 
 
-def _set(parameters: Parameters, name: Any, value: Any) -> None:
+def _set(parameters: ScriptParameters, name: Any, value: Any) -> None:
     """Keep a value; raises WrongValue, ValueError."""
     value = _stored(value, parameters.get(name))
     refuse_if_too_large([name, value])
@@ -163,6 +172,8 @@ def _stored(value: Any, before: Any) -> Any:
     """
     if isinstance(value, str):
         value = _from_text(value)
+    elif isinstance(value, list):
+        value = list(value)  # the script's own may change
     if type(value) is float or type(value) is int:
         if not isfinite(value):
             raise WrongValue("a finite number is expected")

@@ -6,12 +6,9 @@ import copy
 from collections.abc import Callable
 from typing import Any
 
-from drone_sim.scripting.api.calls import WrongValue
+from drone_sim.scripting.api.calls import Function, WrongValue
 from drone_sim.scripting.api.script_values import MOST_BYTES
-
-Name = str
-Number = float
-Text = str
+from drone_sim.scripting.api.types import Name, Number, Text
 
 _MOST = 10_000  # signals of a kind
 _LONGEST_NAME = 200  # characters
@@ -33,6 +30,10 @@ class Signals:
             self._values = copy.deepcopy(kept)
 
         return recall
+
+    def functions(self) -> dict[str, Function]:
+        """Return what a script may call, by name."""
+        return {name: getattr(self, name) for name in dir(self) if name.endswith("Signal")}
 
     def setFloatSignal(self, name: Name, value: Number) -> None:
         """Set a number."""

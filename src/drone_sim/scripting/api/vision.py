@@ -13,8 +13,7 @@ import numpy as np
 
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.host import Host, Surroundings
-
-Handle = int
+from drone_sim.scripting.api.types import Handle
 
 
 class VisionSensors:

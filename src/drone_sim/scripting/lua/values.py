@@ -16,7 +16,10 @@ _NUMBERS = frozenset((float, int, bool))
 _ALL_NUMBERS = _NUMBERS.issuperset
 _LARGEST = 2**63  # whole numbers beyond are floats in Lua
 
-# How the values of an answer to Lua are read there (lua_crossing.py).
+MIB = 1024 * 1024
+MEMORY = 256 * MIB  # bytes that a script may use
+
+# How the values of an answer to Lua are read there (values.lua).
 FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM, TOO_MUCH = range(6)
 
 
@@ -40,10 +43,9 @@ _OPEN_LIST, _OPEN_FIELDS, _CLOSE = _Mark(), _Mark(), _Mark()
 class Values:
     """Converts for one Lua state. `close` lets go of it: Python cannot see a cycle that leads through Lua."""
 
-    def __init__(self, runtime: Any, memory: int):
-        """Take lupa's runtime, and how much memory (bytes) the script may use."""
+    def __init__(self, runtime: Any):
+        """Take lupa's runtime."""
         self._runtime = runtime
-        self._memory = memory
         self.used: Callable[[], int] = runtime.get_memory_used  # Lua's own count leaves out 5.5's long strings
         self._stream: list[Any] = []
 
@@ -54,10 +56,10 @@ class Values:
 
     def too_much(self) -> bool:
         """Tell whether the script uses more memory than it may, without what it does not need any more."""
-        if self.used() <= self._memory:
+        if self.used() <= MEMORY:
             return False
         self._runtime.gccollect()
-        return self.used() > self._memory
+        return self.used() > MEMORY
 
     def bridge(self) -> dict[str, Any]:
         """Return what the Lua side needs for handing values over."""

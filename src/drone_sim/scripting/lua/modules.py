@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from drone_sim.files.resources import read_bytes
-from drone_sim.scripting.lua.lua_source import LuaSource
+from drone_sim.scripting import source_files
+from drone_sim.scripting.lua.source import LuaSource
 from drone_sim.wording import near_names
 
-LARGEST = 1024 * 1024  # bytes of a script or helper
 _CHUNK_LENGTH = 50  # Lua cuts longer chunk names
 _NAME = re.compile(r"[\w-]+(?:[./][\w-]+)*")
 _LONGEST, _MOST = 200, 1000  # characters of a name; helpers
@@ -60,7 +59,7 @@ class LuaModules:
     def _text(self, path: Path) -> bytes:
         if not path.resolve().is_relative_to(self._folder.resolve()):
             raise ValueError("leads out of the script's folder")
-        return LuaSource(read_bytes(path, LARGEST)).text
+        return LuaSource(source_files.read(path)).text
 
     def _known(self, file: str, path: Path) -> str:
         if len(self._paths) > _MOST:

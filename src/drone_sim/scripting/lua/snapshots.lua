@@ -1,11 +1,14 @@
-"""The Lua side of snapshots of a Lua child script."""
+-- Snapshots of a script's variables.
+local _, sandbox = ...
 
-SNAPSHOTS = r"""
----- snapshots
+local type, next, rawset = type, next, rawset
+local getinfo, getupvalue, setupvalue = sandbox.debug.getinfo, sandbox.debug.getupvalue, sandbox.debug.setupvalue
+local getmeta, setmeta = sandbox.debug.getmetatable, sandbox.debug.setmetatable
+local env, loaded, callbacks = sandbox.globals, sandbox.loaded, sandbox.callbacks
 
 -- Return a function that gives every variable that the script can reach the value that it has now: contents of
 -- tables, their metatables, and locals that functions share. Coroutines are left as they are.
-local function take_snapshot()
+function sandbox.take_snapshot()
   local tables, metatables, locals = {}, {}, {}
   local seen, waiting, count = {}, {}, 0
 
@@ -42,7 +45,7 @@ local function take_snapshot()
   visit(loaded)
   visit(getmeta(''))
   for _, f in next, callbacks do visit(f) end
-  if chunk then visit(chunk) end
+  visit(sandbox.chunk)
   while count > 0 do
     local value = waiting[count]
     waiting[count] = nil
@@ -60,12 +63,3 @@ local function take_snapshot()
     for _, kept in next, locals do setupvalue(kept[1], kept[2], kept[3]) end
   end
 end
-
-local function remember()
-  return run(take_snapshot)
-end
-
-local function recall(snapshot)
-  return run(snapshot)
-end
-"""

@@ -18,10 +18,9 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any, cast
 
-from drone_sim.files.resources import read_bytes
+from drone_sim.scripting import source_files
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
-LARGEST = 1024 * 1024  # bytes of a script or helper
 _FIRST = frozenset((*sys.stdlib_module_names, "drone_sim"))
 _numbers = itertools.count(1)
 
@@ -128,7 +127,7 @@ class Helpers:
         namespace = vars(module)
         namespace["__builtins__"] = self.builtins
         try:
-            source = read_bytes(path, LARGEST)
+            source = source_files.read(path)
         except (OSError, ValueError) as error:
             raise ImportError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
         exec(self._compiled(source, path), namespace)

@@ -218,3 +218,6 @@ class LuaThread:
         if error is not None:
             raise error
         return value
+
+
+Door = LuaThread | SameThread

@@ -1,11 +1,8 @@
-"""The products that controllers make in every step, in Lua: crossing over to Python takes five times as long.
+-- The products that controllers make in every step, in Lua: crossing over to Python takes five times as long.
+-- They do what frames.py does, in the same order, so that flights are the same to the last bit.
+local _, sandbox = ...
 
-They do what frames.py does, in the same order, so that flights are the same to the last bit.
-"""
-
-MATRICES = r"""
----- matrices
-
+local type = type
 local kind_of, FLOAT = math.type or type, math.type and 'float' or 'number'
 
 local function are_numbers(t, count)
@@ -40,9 +37,8 @@ local function inverted(m, more)
 end
 
 -- What returns a function's result, or nil where Python has to look at the values.
-local shortcuts = {
+sandbox.shortcuts = {
   ['sim.multiplyVector'] = transformed, simMultiplyVector = transformed,
   ['sim.getMatrixInverse'] = inverted, simGetMatrixInverse = inverted,
   ['sim.getInvertedMatrix'] = inverted, simGetInvertedMatrix = inverted,
 }
-"""

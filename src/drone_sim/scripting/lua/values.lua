@@ -1,13 +1,14 @@
-"""The Lua side of what passes between a Lua child script and Python.
+-- What passes between a script and Python, on Lua's side; values.py is the other one.
+--
+-- Values pass as plain numbers, strings, booleans and nil: no Lua table is touched from Python, since lupa does that
+-- outside of any protected call. The commonest calls, with at most one or two short lists of numbers, have a form of
+-- their own; everything else passes as a stream of values and marks.
+local bridge, sandbox = ...
 
-Values pass as plain numbers, strings, booleans and nil: no Lua table is touched from Python, since lupa does that
-outside of any protected call. The commonest calls, with at most one or two short lists of numbers, have a form of
-their own; everything else passes as a stream of values and marks.
-"""
-
-CROSSING = r"""
----- to Python and back
-
+local error, type, select, next, rawget, rawset = error, type, select, next, rawget, rawset
+local rawlen = rawlen or function(t) return #t end -- which knows no __len in 5.1
+local unpack = table.unpack or unpack
+local place_in_script, stop, shortcuts = sandbox.place_in_script, sandbox.stop, sandbox.shortcuts
 local fresh, put = bridge.fresh, bridge.put
 local OPEN_LIST, OPEN_FIELDS, CLOSE = bridge.open_list, bridge.open_fields, bridge.close
 local DEEPEST, MOST_VALUES, MOST_BYTES = bridge.deepest, bridge.most_values, bridge.most_bytes
@@ -15,7 +16,8 @@ local AT_ONCE = 200 -- values that one call hands over
 local SHORT = 12 -- values of a list that has a form of its own
 local LONG = 1000 -- bytes of a string that is counted
 
-local callbacks, numbers_of = {}, {}
+local callbacks, numbers_of = {}, {} -- functions that were handed over, and their numbers
+sandbox.callbacks = callbacks
 
 -- Return by what number to call a function back.
 local function callback_number(f)
@@ -132,7 +134,8 @@ local function with_lists(f, name, kind_a, kind_b, kind_c, a, b, c)
   return hand_over(f, name, a, b, c)
 end
 
-local function define(place, key, name, f)
+-- Put a function of the API into a table; `name` is what messages call it.
+function sandbox.define(place, key, name, f)
   local shortcut = shortcuts[name]
   rawset(place, key, function(a, b, c, ...)
     if shortcut and c == nil then
@@ -156,8 +159,3 @@ local function define(place, key, name, f)
     return results(f(0))
   end)
 end
-
-local function list(...)
-  return {...}
-end
-"""

@@ -12,12 +12,12 @@ from types import CodeType
 from typing import Any
 
 from drone_sim.scripting import phase_names, script_log
-from drone_sim.scripting.api.calls import Api, mistake
-from drone_sim.scripting.api.messages import Callback
+from drone_sim.scripting.api.calls import Api, mistake, remember
+from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError, UnknownName, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS
+from drone_sim.scripting.python.modules import Helpers
 from drone_sim.scripting.python.process import process_kept
-from drone_sim.scripting.python.python_modules import Helpers
 from drone_sim.scripting.script_log import say, shown
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
 from drone_sim.wording import near_names
@@ -114,7 +114,7 @@ class PythonScript:
         objects) stay as they are.
         """
         modules = self._helpers.modules()
-        kept = _copied(self._globals, *map(vars, modules.values()))
+        kept, recalls = _copied(self._globals, *map(vars, modules.values())), remember(self._modules.values())
 
         def recall() -> None:
             for name in set(self._helpers.modules()) - set(modules):
@@ -123,6 +123,8 @@ class PythonScript:
                 for name in set(variables) - set(fresh) - set(_NOT_COPIED):
                     del variables[name]
                 variables.update(fresh)
+            for one in recalls:
+                one()
 
         return recall
 

@@ -1,0 +1,24 @@
+"""Names of objects with V-REP's suffix: the copies of a model's `base` are `base`, `base#0`, `base#1`, ..."""
+
+from __future__ import annotations
+
+import re
+
+NO_SUFFIX = -1  # what has no suffix
+_SUFFIXED = re.compile(r"(.+)#(\d+)", re.DOTALL)
+
+
+def suffixed(name: str, suffix: int) -> str:
+    """Return a name with a suffix, as it is for NO_SUFFIX."""
+    return name if suffix == NO_SUFFIX else f"{name}#{suffix}"
+
+
+def split(name: str) -> tuple[str, int]:
+    """Return a name without its suffix, and the suffix; NO_SUFFIX where it has none."""
+    match = _SUFFIXED.fullmatch(name)
+    return (match.group(1), int(match.group(2))) if match else (name, NO_SUFFIX)
+
+
+def plain(name: str) -> str:
+    """Return a name without its suffix."""
+    return split(name)[0]

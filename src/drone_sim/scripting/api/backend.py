@@ -1,0 +1,51 @@
+"""The seam to ROS: what carries a script's messages to others and back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+
+class Image(NamedTuple):
+    """A picture that a script publishes: rgb8, the top row first, as sensor_msgs/Image has it."""
+
+    data: bytes
+    width: int
+    height: int
+    frame_id: str
+
+
+class Sender(Protocol):
+    """One advertised topic of a backend."""
+
+    def publish(self, message: Any) -> None:
+        """Send a message; the simulation's thread calls it.
+
+        It is what the script gave: a mapping of field names (nested; arrays are sequences, strings are
+        str, or bytes where they are no UTF-8; times are numbers of seconds), or an object with the fields
+        as attributes. A field left out keeps its default. An image (Backend.advertise_image) is an Image.
+        Raises ValueError, in one line, for a field that does not exist or does not fit.
+        """
+
+    def shutdown(self) -> None:
+        """Stop advertising."""
+
+
+class Backend(Protocol):
+    """What carries messages to and from others, such as rospy. Topics come resolved: '/drone/front'.
+
+    Types are written as ROS does: 'geometry_msgs/Twist'. Every function is called in the simulation's
+    thread, and raises ValueError, in one line, for a type that is not installed.
+    """
+
+    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
+        """Call `take` with every message, from any thread; return what ends that.
+
+        A message is an object with the fields as attributes (rospy's own will do), or a mapping.
+        """
+
+    def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> Sender:
+        """Advertise a topic of any installed type."""
+
+    def advertise_image(self, topic: str, queue: int) -> Sender:
+        """Advertise a sensor_msgs/Image; its Sender takes Image tuples."""

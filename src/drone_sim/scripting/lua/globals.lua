@@ -1,0 +1,141 @@
+-- The script's globals: what of Lua it finds, and what it may not reach.
+--
+-- They are the script's own; the real ones, which lupa looks at, stay as they are. Nothing of Python is in reach: API
+-- functions are Lua closures over Python functions, and an error that is a Python object passes through every pcall.
+-- Finalizers run with hooks switched off, and so do the handlers of Lua's own xpcall: neither is to be had.
+local bridge, sandbox = ...
+
+local error, type, tostring, select, pairs = error, type, tostring, select, pairs
+local rawget, setmetatable = rawget, setmetatable
+local unpack = table.unpack or unpack
+local concat, byte, sub = table.concat, string.byte, string.sub
+local load, loadstring, setfenv = load, loadstring, setfenv
+local create, resume, close = coroutine.create, coroutine.resume, coroutine.close
+local getmeta = sandbox.debug.getmetatable
+local log, caught, protected, limit = bridge.log, sandbox.caught, sandbox.protected, sandbox.limit
+local env, modules = sandbox.globals, sandbox.modules
+local newer = _VERSION ~= 'Lua 5.1'
+
+local function pack(...)
+  return {n = select('#', ...), ...}
+end
+
+for _, name in pairs{'_VERSION', 'assert', 'collectgarbage', 'error', 'getmetatable', 'ipairs', 'math', 'next', 'pairs',
+    'rawequal', 'rawget', 'rawlen', 'rawset', 'select', 'string', 'table', 'tonumber', 'tostring', 'type', 'utf8',
+    'coroutine', 'bit32'} do
+  env[name] = _G[name]
+end
+env._G = env
+env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.difftime}
+for _, name in pairs{'math', 'string', 'table', 'coroutine', 'os', 'utf8'} do modules[name] = env[name] end
+string.dump = nil
+
+function env.print(...)
+  local words = {}
+  for i = 1, select('#', ...) do words[i] = tostring((select(i, ...))) end
+  local line = sub(concat(words, '\t'), 1, bridge.longest_line)
+  log(line)
+end
+
+env.pcall = protected
+
+function env.xpcall(f, handler, ...)
+  local results = pack(protected(f, ...))
+  if results[1] then return unpack(results, 1, results.n) end
+  return false, handler(results[2])
+end
+
+function coroutine.create(f)
+  local thread = create(f)
+  limit(thread)
+  return thread
+end
+
+function coroutine.resume(thread, ...)
+  return caught(resume(thread, ...))
+end
+
+if close then
+  function coroutine.close(thread) return caught(close(thread)) end
+end
+
+local function unwrapped(ok, ...)
+  if ok then return ... end
+  error((...), 0)
+end
+
+local new_thread = coroutine.create
+function coroutine.wrap(f)
+  local thread = new_thread(f)
+  return function(...) return unwrapped(resume(thread, ...)) end
+end
+
+function env.setmetatable(t, meta)
+  if type(meta) == 'table' and rawget(meta, '__gc') ~= nil then
+    error('a child script has no finalizers (__gc)', 2)
+  end
+  return setmetatable(t, meta)
+end
+
+local function read_all(reader)
+  if type(reader) == 'string' then return reader end
+  local pieces = {}
+  for piece in reader do
+    if piece == '' then break end
+    pieces[#pieces + 1] = piece
+  end
+  return concat(pieces)
+end
+
+function env.load(text, name, mode, ...)
+  text = read_all(text)
+  if byte(text) == 27 or mode == 'b' then return nil, 'only text can be loaded' end
+  if newer then
+    local its = env
+    if select('#', ...) > 0 then its = ... end
+    return load(text, name or '=(load)', 't', its)
+  end
+  local f, message = loadstring(text, name or '=(load)')
+  if f then setfenv(f, env) end
+  return f, message
+end
+env.loadstring = env.load
+
+---- what Lua 5.1 and newer call differently
+
+if not newer then -- whose matcher takes a piece of the C stack for each item of a pattern
+  for _, name in pairs{'find', 'match', 'gmatch', 'gsub'} do
+    local f = string[name]
+    string[name] = function(text, pattern, third, plain, ...)
+      if type(pattern) == 'string' and #pattern > 10000 and not (name == 'find' and plain) then
+        error('pattern too long: more than 10000 bytes', 2)
+      end
+      return f(text, pattern, third, plain, ...)
+    end
+  end
+end
+for _, name in pairs{'insert', 'remove', 'concat'} do
+  local f = table[name]
+  table[name] = function(t, ...)
+    local meta = type(t) == 'table' and getmeta(t)
+    if meta and rawget(meta, '__len') ~= nil then error('table.' .. name .. ': not with a table that has __len', 2) end
+    return f(t, ...)
+  end
+end
+local rep = string.rep
+function string.rep(text, count, separator)
+  if text == '' and (separator or '') == '' then return '' end -- which would be joined one by one
+  return rep(text, count, separator)
+end
+if bridge.direct then -- see source.py
+  for _, name in pairs{'find', 'match', 'gmatch', 'gfind', 'gsub'} do string[name] = nil end
+  table.sort, table.move = nil, nil
+  env.os.date, env.load, env.loadstring, env.collectgarbage, env.utf8, modules.utf8 = nil, nil, nil, nil, nil, nil
+end
+env.unpack, table.unpack = unpack, unpack
+math.mod = math.mod or math.fmod
+math.fmod = math.fmod or math.mod
+math.pow = math.pow or function(x, y) return x ^ y end
+table.getn = table.getn or function(t) return #t end
+string.gfind = string.gmatch and (string.gfind or string.gmatch)
+math.randomseed(1) -- the same flight every time

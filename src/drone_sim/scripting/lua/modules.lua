@@ -1,0 +1,47 @@
+-- The script's code: how its files are compiled, and what it requires.
+local bridge, sandbox = ...
+
+local error, type, tostring = error, type, tostring
+local byte = string.byte
+local load, loadstring, setfenv = load, loadstring, setfenv
+local newer = _VERSION ~= 'Lua 5.1'
+local sources, protected = sandbox.sources, sandbox.protected
+
+local env = {} -- the script's globals
+local modules, loaded = {}, {} -- the API's and Lua's own; what the script required, by name
+local LOADING = {}
+sandbox.globals, sandbox.modules, sandbox.loaded = env, modules, loaded
+
+local function compile(text, name)
+  if byte(text) == 27 then return nil, 'precompiled code' end
+  if newer then return load(text, name, 't', env) end
+  local f, message = loadstring(text, name)
+  if f then setfenv(f, env) end
+  return f, message
+end
+sandbox.compile = compile
+
+local function load_module(name)
+  if type(name) ~= 'string' then error("no module '" .. tostring(name) .. "'", 3) end
+  local found, text, chunk_name = bridge.module(name)
+  if not found then error(text, 3) end
+  if byte(text) == 27 then error('precompiled code: ' .. chunk_name, 3) end
+  local f, message = compile(text, '=' .. chunk_name)
+  if not f then error(message, 0) end
+  sources['=' .. chunk_name] = chunk_name
+  loaded[name] = LOADING
+  local ok, value = protected(f, name)
+  loaded[name] = nil
+  if not ok then error(value, 0) end
+  if value == nil then value = true end
+  loaded[name] = value
+  return value
+end
+
+function env.require(name)
+  local module = modules[name]
+  if module == nil then module = loaded[name] end
+  if module == LOADING then error("module '" .. tostring(name) .. "' requires itself", 2) end
+  if module == nil then module = load_module(name) end
+  return module
+end

@@ -1,0 +1,199 @@
+"""Load a Lua child script and call its phases, in a state of its own that reaches nothing else.
+
+V-REP 3.x scripts run in Lua 5.1, with flat names (simGetObjectPosition, simExtRosInterface_subscribe,
+sim_handle_self); the file's text is run once for each phase with `sim_call_type` set, where it asks for
+that. CoppeliaSim 4.x scripts run in the newest Lua that lupa has, with `sim` and `simROS` and functions
+sysCall_init, ... Both forms of the API are there in either.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import weakref
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from drone_sim.scripting import phase_names, script_log
+from drone_sim.scripting.api.calls import Api, remember
+from drone_sim.scripting.api.constants import CONSTANTS, PHASES
+from drone_sim.scripting.api.types import Callback
+from drone_sim.scripting.errors import ScriptError, no_function
+from drone_sim.scripting.lua import functions, state
+from drone_sim.scripting.lua.modules import LuaModules
+from drone_sim.scripting.lua.source import LuaSource
+from drone_sim.scripting.lua.thread import MOST_LEFT, Door, LeftBehind, LuaThread, SameThread, left_behind
+from drone_sim.scripting.lua.values import MEMORY, MIB, Values
+from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.wording import near_names
+
+_LOG = logging.getLogger(__name__)  # not the script's own words
+_NIL = re.compile(r"(?:field|global|method) '(\w+)'")
+_NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
+_EVERY_STEP = ("actuation", "sensing")
+_CALLS = ("open", "phase", "called_back", "has", "functions", "remember", "recall")  # in calls.lua
+_ABOUT_MEMORY = f"not enough memory: the script uses more than {MEMORY // MIB} MiB"
+
+
+class LuaScript:
+    """A file that defines sysCall_init, ... as it needs them, or looks at sim_call_type."""
+
+    def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
+        """Compile the file's text; run its top level unless it is to run in every phase. Raises ScriptError."""
+        self._path = path
+        self._limit = limit
+        self._modules = modules
+        self._end = ""  # why nothing can be called any more
+        self._phases = 0
+        self._helpers = LuaModules(path)
+        text = LuaSource(source)
+        self._check_call_types(text)
+        if text.loops_in_c and left_behind() >= MOST_LEFT:
+            raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
+        self._thread: Door = LuaThread(limit) if text.loops_in_c else SameThread(limit)
+        try:
+            dialect = state.OLDEST if text.per_phase or text.flat else state.newest()
+            self._lua = self._thread.run(self._build, dialect)
+            self._run("load", self._lua["open"], text.text, text.per_phase)
+            if not text.per_phase:
+                self._check_names()
+        except BaseException:
+            self._thread.close()
+            raise
+
+    def _build(self, dialect: str) -> dict[str, Any]:
+        """Return what can be called of a new Lua state, with the API in it."""
+        runtime = state.new_runtime(dialect)
+        self._values = Values(runtime)
+        self._finalizer = weakref.finalize(self, _free, self._thread, self._values)
+        sandbox = state.make_sandbox(runtime, self._thread, self._limit, self._values, self._helpers)
+        self._known = functions.define(runtime, sandbox, self._modules, self._values, self._thread)
+        _LOG.debug("%s runs in %s", self._path, dialect)
+        return {name: sandbox[name.encode()] for name in _CALLS}
+
+    # ---- the script
+
+    def _check_call_types(self, text: LuaSource) -> None:
+        """Raise ScriptError for a phase that does not exist: Lua would compare sim_call_type with nil."""
+        known = [name for name in CONSTANTS if name.startswith("childscriptcall_")]
+        for name in text.call_types:
+            if name not in known:
+                line = text.line(name)
+                raise self._error("load", f"there is no sim_{name}; {near_names(name, known)}", line)
+
+    def _check_names(self) -> None:
+        """Raise ScriptError for a function that was meant to be a phase, but would not be called as one."""
+        places = self._named_functions()
+        for name, meant in phase_names.misspelt(places):
+            raise ScriptError("load", *places[name], phase_names.never_called(name, meant))
+        phase_names.warn(self._path, places)
+
+    def _named_functions(self) -> dict[str, tuple[str, int]]:
+        """Return file and line of the script's global functions, by name."""
+        words = self._run("load", self._lua.get("functions")).decode("utf-8", "replace").split("\n")
+        return {
+            name: (self._helpers.path(chunk), int(line))
+            for name, line, chunk in zip(words[::3], words[1::3], words[2::3])
+        }
+
+    def check(self, callback: Callback) -> None:
+        """Raise ScriptError where there is no function to call back."""
+        name = callback.encode() if isinstance(callback, str) else callback
+        if not self._run(str(callback), self._lua.get("has"), name):
+            raise self._error(str(callback), no_function(callback, self._named_functions()))
+
+    def call(self, phase: str) -> None:
+        """Run a phase; raises ScriptError."""
+        number = _NUMBERS[phase]
+        if self._phases & 1 << number - 1:
+            if self._end and phase == "cleanup":  # said when it happened
+                return
+            self._run(phase, self._lua.get("phase"), number, near=phase in _EVERY_STEP)
+
+    def callback(self, callback: Callback, message: Any) -> None:
+        """Call the script's function of that name with a message; raises ScriptError."""
+        name = callback if isinstance(callback, str) else "callback"
+        called = callback.encode() if isinstance(callback, str) else callback
+        self._run(name, self._call_back, called, message, near=True)
+
+    def _call_back(self, callback: Any, message: Any) -> Any:
+        return self._lua["called_back"](callback, self._values.to_lua(message))
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that gives the script's variables the values that they have now. Raises ScriptError."""
+        snapshot = self._run("snapshot", self._lua.get("remember"))
+        recalls = remember(self._modules.values())
+
+        def recall() -> None:
+            self._run("restore", self._lua.get("recall"), snapshot)
+            for one in recalls:
+                one()
+
+        return recall
+
+    def close(self) -> None:
+        """Free the Lua state; the script cannot be called after that."""
+        self._finalizer()
+        self._end = self._end or "the script is closed"
+        self._phases = 0
+        self._lua.clear()
+
+    def _run(self, phase: str, function: Any, *arguments: Any, near: bool = False) -> Any:
+        """Call a function in Lua's thread (`near`: see there); return what it returns."""
+        if self._end:
+            raise self._error(phase, self._end)
+        try:
+            outcome = self._thread.run(function, *arguments, near=near)
+        except LeftBehind:
+            self._end = str(self._limit)
+            raise self._error(phase, self._end) from None
+        except Exception as error:  # lupa's own, or a message that cannot be handed over
+            said = str(error) or type(error).__name__
+            if said == "stopped":  # by a hook just before the script's beginning, or behind its end
+                said = _ABOUT_MEMORY if self._values.used() > MEMORY else str(self._limit)
+            raise self._error(phase, said) from None
+        finally:
+            script_log.end_call()
+            if not self._end and self._values.used() > MEMORY and self._values.too_much():
+                self._end = _ABOUT_MEMORY  # entered once more, lupa itself might find no room
+        self._phases, how, *found = outcome if isinstance(outcome, tuple) else (outcome, True, None)
+        if how is True:
+            if not self._end:
+                return found[0]
+            how, found = state.OVER_MEMORY, []
+        raise self._failure(phase, how, found)
+
+    def _failure(self, phase: str, how: Any, found: Sequence[Any]) -> ScriptError:
+        """Return the error that Lua tells of: `found` holds a message, or line and file where it was stopped."""
+        if how is False:
+            return self._error_with_line(phase, found[0])
+        if how == state.TIME:
+            return self._error(phase, str(self._limit), *found)
+        if how == state.OVER_MEMORY:
+            self._end = _ABOUT_MEMORY
+            return self._error(phase, self._end, *found)
+        return self._error(phase, no_function(phase, ()))
+
+    def _error(self, phase: str, message: str, line: int = 0, chunk: bytes = b"") -> ScriptError:
+        return ScriptError(phase, self._helpers.path(chunk.decode("utf-8", "replace")), int(line), message)
+
+    def _error_with_line(self, phase: str, message: bytes) -> ScriptError:
+        text = message.decode("utf-8", "replace")
+        if text == "not enough memory":
+            return self._error(phase, _ABOUT_MEMORY)
+        path, line, text = self._helpers.placed(text)
+        return ScriptError(phase, path, line, text + self._hint(text))
+
+    def _hint(self, text: str) -> str:
+        """Return what a name that is nil may have been meant to be."""
+        match = _NIL.search(text) if "nil value" in text else None
+        if match is None:
+            return ""
+        name = match.group(1)
+        near = near_names(name, [known for known in self._known if known.startswith("sim") == name.startswith("sim")])
+        return f"; {near}" if near.startswith("near") else ""
+
+
+def _free(thread: Door, values: Values) -> None:
+    thread.close()
+    values.close()

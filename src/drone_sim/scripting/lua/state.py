@@ -1,0 +1,106 @@
+"""A Lua state for one script: Lua itself, and what the .lua files here put into it.
+
+The files run once in a fresh state (5.1 or newer), before the script is read. What one of them has for the others, and
+for Python, it leaves in a table that is called `sandbox` there.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import importlib.util
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from drone_sim.scripting import script_log
+from drone_sim.scripting.errors import LONGEST_MESSAGE
+from drone_sim.scripting.lua.modules import LuaModules
+from drone_sim.scripting.lua.thread import Door, SameThread
+from drone_sim.scripting.lua.values import MEMORY, MIB, Values
+from drone_sim.scripting.phase_names import FUNCTIONS
+from drone_sim.scripting.time_limit import TimeLimit
+
+OLDEST = "lua51"  # V-REP 3.x's
+_NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", OLDEST)
+_FILES = ("limits", "matrices", "values", "modules", "snapshots", "calls", "globals")  # each uses those before it
+_CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
+
+TIME, OVER_MEMORY = 1, 2  # why Lua stops a script (limits.lua)
+
+
+def newest() -> str:
+    """Return the newest Lua that lupa has; raises ImportError."""
+    for dialect in _NEWEST_FIRST:
+        if importlib.util.find_spec(f"lupa.{dialect}"):
+            return dialect
+    raise ImportError("lupa has no Lua")
+
+
+def new_runtime(dialect: str) -> Any:
+    """Return lupa's runtime of a new state, out of which nothing leads to Python. Raises ImportError."""
+    return importlib.import_module(f"lupa.{dialect}").LuaRuntime(
+        encoding=None,
+        register_eval=False,
+        register_builtins=False,
+        attribute_filter=_nothing_of_python,
+        unpack_returned_tuples=True,
+        max_memory=_CAP,
+    )
+
+
+def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaModules) -> Any:
+    """Run the .lua files in a new state; return their `sandbox`.
+
+    What Lua gets of Python must not lead back to the script's object, or neither is ever freed.
+    """
+    bridge = {
+        **values.bridge(),
+        "look": _look(door, limit, values),
+        "log": _log(door),
+        "direct": isinstance(door, SameThread),
+        "longest_message": 4 * LONGEST_MESSAGE,
+        "longest_line": 4 * script_log.LONGEST,
+        "phases": _phase_functions,
+        "module": _reader(door, helpers),
+    }
+    table, sandbox = runtime.table_from({key.encode(): value for key, value in bridge.items()}), runtime.table()
+    for name, text in _texts().items():
+        runtime.execute(text, table, sandbox, f"={helpers.chunk}".encode(), name=f"=({name}.lua)".encode())
+    return sandbox
+
+
+@functools.cache
+def _texts() -> dict[str, bytes]:
+    return {name: Path(__file__).with_name(f"{name}.lua").read_bytes() for name in _FILES}
+
+
+def _look(door: Door, limit: TimeLimit, values: Values) -> Callable[[], int]:
+    """Return what Lua's hook asks whether the script is to be stopped, and for what."""
+
+    def look() -> int:
+        if values.used() > MEMORY and values.too_much():
+            return OVER_MEMORY
+        return TIME if door.closed or limit.exceeded() else 0
+
+    return look
+
+
+def _log(door: Door) -> Callable[[bytes], None]:
+    def log(line: bytes) -> None:
+        if not door.closed:
+            script_log.say(line)
+
+    return log
+
+
+def _reader(door: Door, modules: LuaModules) -> Callable[[bytes], tuple[bool, bytes, bytes]]:
+    return lambda name: (False, b"stopped", b"") if door.closed else modules.read(name)
+
+
+def _phase_functions() -> tuple[bytes, ...]:
+    return tuple(name.encode() for name in FUNCTIONS.values())
+
+
+def _nothing_of_python(_object: Any, name: Any, _is_setting: bool) -> Any:
+    raise AttributeError(f"no access to {name!r}")

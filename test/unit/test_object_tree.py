@@ -1,0 +1,107 @@
+"""The tree of objects when models come and go."""
+
+import pytest
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.object_names import NO_SUFFIX, plain, split, suffixed
+from drone_sim.mechanics.object_tree import WORLD, ObjectTree
+
+
+def at(x, y, z):
+    return frames.from_euler((x, y, z), (0, 0, 0))
+
+
+def add_model(objects, suffix=""):
+    drone, also, base, target = (f"{name}{suffix}" for name in ("Drone", "Quadricopter", "base", "target"))
+    return [
+        objects.add(drone, None, at(1, 0, 0), alias="Quadcopter", also=(also,)),
+        objects.add(base, drone, at(0, 0, 1), alias="base"),
+        objects.add(target, base, alias="target"),
+    ]
+
+
+@pytest.fixture(name="objects")
+def _objects():
+    objects = ObjectTree()
+    objects.add("Floor")
+    return objects
+
+
+def names(objects):
+    return [objects[handle].name for handle in objects]
+
+
+@pytest.mark.parametrize("name, suffix, shown", [("a", NO_SUFFIX, "a"), ("a", 0, "a#0"), ("a b#c", 12, "a b#c#12")])
+def test_suffixes(name, suffix, shown):
+    assert (suffixed(name, suffix), split(shown), plain(shown)) == (shown, (name, suffix), name)
+
+
+def test_copies_share_aliases(objects):
+    roots = [add_model(objects, suffix)[0] for suffix in ("", "#0", "#1")]
+    assert objects[roots[1]].names == ("Drone#0", "Quadricopter#0")
+    assert [objects.path(root) for root in roots] == [f"/Quadcopter[{index}]" for index in range(3)]
+    assert all(objects[root].is_called("Quadricopter") for root in roots)
+    assert [objects.is_copied(name) for name in ("Drone", "base", "Floor", "Drone#0")] == [True, True, False, False]
+
+
+def test_a_name_is_given_once(objects):
+    with pytest.raises(ValueError, match="an object named 'Floor' is there already"):
+        objects.add("Ceiling", also=("Floor",))
+    assert names(objects) == ["Floor"] and "Ceiling" not in objects
+
+
+def test_a_name_is_free_again_but_no_handle(objects):
+    first, second, third = (add_model(objects, suffix) for suffix in ("", "#0", "#1"))
+    objects.remove(second)
+    assert names(objects) == ["Floor", "Drone", "base", "target", "Drone#1", "base#1", "target#1"]
+    with pytest.raises(ValueError, match=f"no object has the handle {second[0]}"):
+        objects[second[0]]
+    with pytest.raises(ValueError, match="no object named 'base#0'; near names are"):
+        objects.handle("base#0")
+    assert min(add_model(objects, "#0")) > max(first + third)
+    assert objects.is_copied("base")
+
+
+def test_what_hangs_on_what_goes_stays_where_it_is(objects):
+    model, stone = add_model(objects), objects.add("stone", None, at(5, 0, 0))
+    objects.set_parent(model[2], WORLD, True)
+    objects.set_parent(stone, model[1], True)
+    objects[model[0]].local = at(1, 2, 0)
+    objects.remove(model)
+    assert names(objects) == ["Floor", "stone"]
+    assert objects[stone].parent is None and frames.position(objects.matrix(stone)) == (5, 2, 0)
+
+
+def test_a_body_that_hangs_on_what_goes_flies_on(objects):
+    class Flying:
+        matrix = at(1, 2, 3)
+
+        def move(self, pose):
+            raise AssertionError("it was stopped")
+
+    model, ball = add_model(objects), objects.add("ball", body=Flying())
+    objects.set_parent(ball, model[0], True)
+    objects.remove(model)
+    assert frames.position(objects.matrix(ball)) == (1, 2, 3)
+
+
+def test_a_part_stays_a_part_whatever_it_hangs_on(objects):
+    root, base, target = add_model(objects)
+    objects.set_parent(target, WORLD, True)
+    objects.set_parent(objects.handle("Floor"), root, True)
+    assert [objects[one].is_part_of(objects[root]) for one in (root, base, target, 0)] == [True, True, True, False]
+
+
+def test_what_came_or_went_since_is_no_part_of_what_is_remembered(objects):
+    (first, *_), second = add_model(objects), add_model(objects, "#0")
+    stone = objects.add("stone", None, at(5, 0, 0))
+    objects.set_parent(stone, second[0], True)
+    recall = objects.remember()
+    objects.set_parent(stone, WORLD, True)
+    objects.remove(second)
+    third, *_ = add_model(objects, "#0")
+    for root, x in ((first, 7), (third, 8)):
+        objects[root].local = at(x, 0, 0)
+    objects[stone].local = at(9, 0, 0)
+    recall()
+    assert [frames.position(objects.matrix(one))[0] for one in (first, third, stone)] == [1, 8, 9]
