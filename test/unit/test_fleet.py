@@ -103,18 +103,23 @@ def test_a_wrong_key_at_the_top_is_named_once():
     assert str(refused.value).count("Kzref") == 1
 
 
-def test_they_collide(fly):
+def test_they_collide_and_come_free(fly):
     simulation = fly(vehicles={"left": {"position": [0, 0, 1]}, "right": {"position": [1.5, 0, 1], "yaw": math.pi}})
-    for vehicle in simulation.vehicles.values():
+    vehicles = simulation.vehicles.values()
+    for vehicle in vehicles:
         vehicle.receive(forward(0.6))
-    nearest = min(
-        math.dist(*(vehicle.state.position for vehicle in simulation.vehicles.values()))
-        for _ in range(120)
-        if simulation.step() is None
-    )
-    assert nearest > 0.15, "neither is inside the other"
-    left, right = (vehicle.state.position[0] for vehicle in simulation.vehicles.values())
-    assert left < right, "nor has one gone through the other"
+    apart = []
+    for _ in range(45):
+        simulation.step()
+        apart.append(math.dist(*(vehicle.state.position for vehicle in vehicles)))
+    assert 0.3 < min(apart) < 0.4, "wing tip to wing tip: each is some 0.17 m long from its middle"
+    assert max(apart[-10:]) - min(apart) < 0.02, "there they stay"
+    for vehicle in vehicles:
+        vehicle.receive(forward(-0.6))
+    for _ in range(60):
+        simulation.step()
+    left, right = (vehicle.state.position for vehicle in vehicles)
+    assert right[0] - left[0] > 2 and left[2] == pytest.approx(right[2], abs=0.05) and left[2] > 0.5
 
 
 def test_they_see_one_another(fly):
