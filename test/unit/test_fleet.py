@@ -109,14 +109,13 @@ def test_they_collide_and_come_free(fly):
     for vehicle in vehicles:
         vehicle.receive(forward(0.6))
     apart = []
-    for _ in range(45):
+    for _ in range(36):
         simulation.step()
         apart.append(math.dist(*(vehicle.state.position for vehicle in vehicles)))
     assert 0.3 < min(apart) < 0.4, "wing tip to wing tip: each is some 0.17 m long from its middle"
-    assert max(apart[-10:]) < 0.4, "there they stay"
     for vehicle in vehicles:
         vehicle.receive(forward(-0.6))
-    for _ in range(60):
+    for _ in range(80):
         simulation.step()
     left, right = (vehicle.state.position for vehicle in vehicles)
     assert right[0] - left[0] > 2 and left[2] == pytest.approx(right[2], abs=0.05) and left[2] > 0.5
