@@ -1,41 +1,52 @@
 #!/usr/bin/env python3
-"""Keep drone2 and drone3 behind drone1, left and right of it: their green spheres go where the leader's frame says."""
+"""Keep drone2 and drone3 behind drone1, left and right of it: their green spheres go where two frames of its are."""
 
 import rospy
 import tf2_ros
-from geometry_msgs.msg import PoseStamped
-from tf2_geometry_msgs import do_transform_pose
+from geometry_msgs.msg import PoseStamped, TransformStamped
 
 LEADER = "drone1/Track_base"  # level, so that the wings do not tilt with the leader
-PLACES = {"drone2": (-1.0, 1.0, 0.0), "drone3": (-1.0, -1.0, 0.0)}  # m, seen from the leader
+WINGS = {"drone2": (-1.0, 1.0, 0.0), "drone3": (-1.0, -1.0, 0.0)}  # m, seen from the leader
 RATE = 20  # Hz
 
 
 def main():
-    """Send each follower its place until the node is told to end."""
+    """Send each follower to its wing until the node is told to end."""
     rospy.init_node("follow")
-    buffer = tf2_ros.Buffer()
-    listener = tf2_ros.TransformListener(buffer)  # noqa: F841 -- fills the buffer
-    publishers = {name: rospy.Publisher(f"{name}/target_pose", PoseStamped, queue_size=1) for name in PLACES}
+    wings = tf2_ros.StaticTransformBroadcaster()
+    wings.sendTransform([wing(follower, *place) for follower, place in WINGS.items()])
+    frames = tf2_ros.Buffer()
+    listener = tf2_ros.TransformListener(frames)  # noqa: F841 -- fills the buffer
+    targets = {name: rospy.Publisher(f"{name}/target_pose", PoseStamped, queue_size=1) for name in WINGS}
     rate = rospy.Rate(RATE)
     while not rospy.is_shutdown():
         try:
-            leader = buffer.lookup_transform("world", LEADER, rospy.Time(0), rospy.Duration(1))
-            for name, place in PLACES.items():
-                publishers[name].publish(do_transform_pose(seen_from_leader(place), leader))
+            for follower, target in targets.items():
+                target.publish(pose(frames.lookup_transform("world", f"wing_of_{follower}", rospy.Time(0))))
             rate.sleep()
-        except (tf2_ros.LookupException, tf2_ros.ExtrapolationException, tf2_ros.ConnectivityException):
+        except tf2_ros.TransformException:
             rospy.logwarn_throttle(5, f"no frame {LEADER} yet: does fleet.launch run?")
+            rospy.rostime.wallsleep(0.1)
         except rospy.ROSInterruptException:
-            pass
+            return
 
 
-def seen_from_leader(place):
-    """Return a place as a pose that looks where the leader looks."""
-    pose = PoseStamped()
-    pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = place
-    pose.pose.orientation.w = 1.0
-    return pose
+def wing(follower, x, y, z):
+    """Return a frame that hangs on the leader's, where a follower is to be."""
+    frame = TransformStamped(child_frame_id=f"wing_of_{follower}")
+    frame.header.frame_id = LEADER
+    frame.transform.translation.x, frame.transform.translation.y, frame.transform.translation.z = x, y, z
+    frame.transform.rotation.w = 1.0
+    return frame
+
+
+def pose(transform):
+    """Return the pose of a frame that was looked up."""
+    message = PoseStamped(header=transform.header)
+    place = transform.transform.translation
+    message.pose.position.x, message.pose.position.y, message.pose.position.z = place.x, place.y, place.z
+    message.pose.orientation = transform.transform.rotation
+    return message
 
 
 if __name__ == "__main__":

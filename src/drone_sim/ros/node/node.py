@@ -66,10 +66,10 @@ class Node:
         self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
         self.player = Player(self.simulation, self._step_and_show, self._state.publish, self._time.simulated)
         self._inbox = Inbox()
-        self._services = Services(self.player, self._inbox)
         factor = parameters.real_time_factor
         self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
         self._topics = FleetTopics(self.simulation, self._inbox)
+        self._services = Services(self.player, self._inbox, self._topics.follow)
         self._handles = Handles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
         self._beat = Beat(_SOON, _SELDOM)

@@ -26,10 +26,11 @@ class Services:
     are those of the private parameter `vehicles`.
     """
 
-    def __init__(self, player: Player, inbox: Inbox):
-        """Advertise."""
+    def __init__(self, player: Player, inbox: Inbox, follow: Callable[[], None]):
+        """Advertise. `follow` lets the topics follow vehicles that have come or gone."""
         self._player = player
         self._inbox = inbox
+        self._follow = follow
         self._snapshot: Snapshot | None = None
         jobs = ("start", "stop", "restart", "step", "save_scene", "load_scene", "set_vehicles", "snapshot", "restore")
         for name in jobs:
@@ -86,6 +87,7 @@ class Services:
     def set_vehicles(self) -> str:
         """Let those fly that the parameter `vehicles` says; who was there and still is flies on."""
         came, went = self._player.simulation.set_vehicles(rospy.get_param("~vehicles", {}))
+        self._follow()
         told = [f"{', '.join(names)} {verb}" for names, verb in ((came, "came"), (went, "went")) if names]
         return "; ".join(told) or "all are as they were"
 
