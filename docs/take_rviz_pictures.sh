@@ -38,13 +38,15 @@ until [ -s "$work/display" ]; do sleep 0.1; done
 DISPLAY=:$(cat "$work/display")
 export DISPLAY QT_X11_NO_MITSHM=1
 
+file=drone.launch drone=drone # what `start` launches, and whose odometry it waits for
+
 start() { # start CONFIG [ROSLAUNCH ARGUMENT...]: the simulation, then rviz with a view
   local port
   port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])')
   export ROS_MASTER_URI=http://localhost:$port
-  roslaunch -p "$port" drone_sim drone.launch rviz:=false "${@:2}" >"$work/launch.log" 2>&1 &
+  roslaunch -p "$port" drone_sim "$file" rviz:=false "${@:2}" >"$work/launch.log" 2>&1 &
   pids+=($!)
-  until timeout 20 rostopic echo -n1 /drone/odom >/dev/null 2>&1; do
+  until timeout 20 rostopic echo -n1 "/$drone/odom" >/dev/null 2>&1; do
     kill -0 "${pids[0]}" 2>/dev/null || { cat "$work/launch.log" >&2; exit 1; }
     sleep 0.5
   done
@@ -117,5 +119,29 @@ PYTHON
   end
 }
 
+# Three drones: two follow the first one, on its wings, through a turn.
+fleet() {
+  local file=fleet.launch drone=drone1
+  start rviz/fleet.rviz scene:="$PWD/config/scenes/formation.yaml" $slow_motion
+  .venv/bin/python docs/fleet/follow.py &
+  pids+=($!)
+  python3 - <<'PYTHON'
+import rospy
+from geometry_msgs.msg import Twist, Vector3
+from nav_msgs.msg import Odometry
+
+rospy.init_node("pilot")
+places = []
+rospy.Subscriber("/drone1/odom", Odometry, lambda odometry: places.append(odometry.pose.pose.position))
+publisher = rospy.Publisher("/drone1/cmd_vel", Twist, queue_size=1, latch=True)
+publisher.publish(Twist(Vector3(0.4, 0, 0.03), Vector3(0, 0, 0.12)))
+while not (places and places[-1].x > 3.2):
+    rospy.sleep(0.02)
+PYTHON
+  import -window root "$folder/rviz_fleet.png"
+  end
+}
+
 flight
 target
+fleet
