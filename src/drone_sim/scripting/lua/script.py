@@ -20,7 +20,7 @@ from drone_sim.scripting.api.constants import CONSTANTS, PHASES
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
-from drone_sim.scripting.lua.modules import LuaModules
+from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.source import LuaSource
 from drone_sim.scripting.lua.thread import MOST_LEFT, Door, LeftBehind, LuaThread, SameThread, left_behind
 from drone_sim.scripting.lua.values import MEMORY, MIB, Values
@@ -45,7 +45,7 @@ class LuaScript:
         self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0
-        self._helpers = LuaModules(path)
+        self._helpers = LuaHelpers(path)
         text = LuaSource(source)
         self._check_call_types(text)
         if text.loops_in_c and left_behind() >= MOST_LEFT:

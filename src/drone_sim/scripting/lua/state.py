@@ -15,7 +15,7 @@ from typing import Any
 
 from drone_sim.scripting import script_log
 from drone_sim.scripting.errors import LONGEST_MESSAGE
-from drone_sim.scripting.lua.modules import LuaModules
+from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.thread import Door, SameThread
 from drone_sim.scripting.lua.values import MEMORY, MIB, Values
 from drone_sim.scripting.phase_names import FUNCTIONS
@@ -23,7 +23,7 @@ from drone_sim.scripting.time_limit import TimeLimit
 
 OLDEST = "lua51"  # V-REP 3.x's
 _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", OLDEST)
-_FILES = ("limits", "matrices", "values", "modules", "snapshots", "calls", "globals")  # each uses those before it
+_FILES = ("limits", "matrices", "values", "code", "snapshots", "calls", "globals")  # each uses those before it
 _CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
 
 TIME, OVER_MEMORY = 1, 2  # why Lua stops a script (limits.lua)
@@ -49,7 +49,7 @@ def new_runtime(dialect: str) -> Any:
     )
 
 
-def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaModules) -> Any:
+def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaHelpers) -> Any:
     """Run the .lua files in a new state; return their `sandbox`.
 
     What Lua gets of Python must not lead back to the script's object, or neither is ever freed.
@@ -94,8 +94,8 @@ def _log(door: Door) -> Callable[[bytes], None]:
     return log
 
 
-def _reader(door: Door, modules: LuaModules) -> Callable[[bytes], tuple[bool, bytes, bytes]]:
-    return lambda name: (False, b"stopped", b"") if door.closed else modules.read(name)
+def _reader(door: Door, helpers: LuaHelpers) -> Callable[[bytes], tuple[bool, bytes, bytes]]:
+    return lambda name: (False, b"stopped", b"") if door.closed else helpers.read(name)
 
 
 def _phase_functions() -> tuple[bytes, ...]:

@@ -16,7 +16,7 @@ from drone_sim.scripting.api.calls import Api, mistake, remember
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError, UnknownName, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS
-from drone_sim.scripting.python.modules import Helpers
+from drone_sim.scripting.python.helpers import Helpers
 from drone_sim.scripting.python.process import process_kept
 from drone_sim.scripting.script_log import say, shown
 from drone_sim.scripting.time_limit import Stopped, TimeLimit

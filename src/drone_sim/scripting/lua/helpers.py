@@ -14,7 +14,7 @@ _NAME = re.compile(r"[\w-]+(?:[./][\w-]+)*")
 _LONGEST, _MOST = 200, 1000  # characters of a name; helpers
 
 
-class LuaModules:
+class LuaHelpers:
     """Reads the files that a script requires: regular ones of limited size in its own folder, or below that."""
 
     def __init__(self, script: str):
