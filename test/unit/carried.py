@@ -8,12 +8,13 @@ from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.frames import IDENTITY
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.mechanics.wrench import Wrench
-from drone_sim.sensors import Contact, Fitting, Hit, create
+from drone_sim.sensors.sensor import Contact, Fitting, Hit
 from drone_sim.world import World
 
 SUB_STEP = 0.005
 GRAVITY = -9.81
 BODY = urdf.read(str(package_path() / "urdf" / "drone.urdf"))
+ABOVE = Pose((0, 0, 1))
 FLOOR = str(package_path() / "urdf" / "floor.png")
 ZURICH = DatumParameters(latitude=47.397742, longitude=8.545594, altitude=488.0)
 FIELD = (1.334e-6, 21.523e-6, -43.290e-6)
@@ -36,7 +37,8 @@ class Carried:
         def pose():
             return frames.multiply(self.state.matrix, mount)
 
-        sensor = create(parameters, Fitting(name, self, pose, SUB_STEP))
+        sensor = parameters.make(Fitting(name, self, pose, SUB_STEP))
+        sensor.reset()
         self.sensors.append(sensor)
         return sensor
 
@@ -79,7 +81,7 @@ class Circling(Carried):
 class Flown(Carried):
     """The drone in a world."""
 
-    def __init__(self, pose=Pose((0, 0, 1)), gravity=GRAVITY, floor=True):
+    def __init__(self, pose=ABOVE, gravity=GRAVITY, floor=True):
         self.world = World(SUB_STEP, gravity)
         self.floor = self.world.add_floor(20.0, FLOOR) if floor else -1
         self.body = self.world.add_rigid_body(BODY, pose)

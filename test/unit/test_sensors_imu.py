@@ -75,9 +75,10 @@ def test_a_mounted_imu_has_axes_of_its_own():
 
 
 def test_the_samples_add_up_to_the_motion_however_seldom_they_are_taken():
-    """A flight with turns, pushes and a crash, integrated: what every IMU's samples should give back."""
+    """A flight with turns and a crash, integrated; the slow ones do not tell where in their period it crashed."""
     drone = Flown(Pose((0, 0, 1.0)))
-    imus = {rate: drone.fit(ImuParameters(kind="imu", rate=rate)) for rate in (200, 40, 20)}
+    within = {200: 1e-3, 40: 0.1, 20: 0.1}  # m/s
+    imus = {rate: drone.fit(ImuParameters(kind="imu", rate=rate)) for rate in within}
     began = drone.state
     for force, torque in [((1, 0, 5), (0, 2e-3, 0)), ((0, 1, 5), (1e-3, 0, 2e-3)), ((0.5, 0, 2), (0, 0, 0))] * 4:
         drone.step(20, force, torque)
@@ -89,10 +90,10 @@ def test_the_samples_add_up_to_the_motion_however_seldom_they_are_taken():
             middle = frames.multiply_quaternions(turn, _rotation(half))
             turn = frames.multiply_quaternions(middle, _rotation(half))
             felt = frames.turned(middle, value.specific_force)
-            velocity += (np.array(felt) + [0, 0, GRAVITY]) / rate
-        assert velocity == pytest.approx(drone.state.linear_velocity, abs=0.03)
+            velocity += np.add(felt, (0, 0, GRAVITY)) / rate
+        assert velocity == pytest.approx(drone.state.linear_velocity, abs=within[rate])
         same = abs(np.dot(turn, drone.state.orientation))
-        assert 2 * math.acos(min(1.0, same)) < 0.02
+        assert 2 * math.acos(min(1.0, same)) < 0.002
 
 
 def _rotation(vector):

@@ -83,7 +83,7 @@ def test_friction_is_in_the_force_whichever_body_came_first(world, first):
 def test_what_is_near_and_does_not_push_is_no_contact(world):
     ball = world.add_shape(BALL)
     world.add_shape(GROUND)
-    world.set_pose(ball, Pose((0, 0, 0.21)))
+    world.set_pose(ball, Pose((0, 0, 0.203)))
     world.advance({}, 1)
     assert pybullet.getContactPoints(ball, physicsClientId=world._client)
     assert world.contacts(ball) == []

@@ -22,10 +22,12 @@ def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Ve
     Raises ParameterError where that would be no scene that can be loaded, such as with the drone below the
     floor, and OSError; what was in the file is then still there.
     """
-    content: dict[str, Any] = {"floor": _plain(scene.parameters.floor, path.parent)}
+    own = scene.parameters
+    content: dict[str, Any] = {"datum": own.datum.model_dump(), "magnetic_field": list(own.magnetic_field)}
+    content["floor"] = _plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))
     content["objects"] = _objects(scene, path.parent)
-    text = "# metres, radians\n" + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    text = "# metres, radians; of the datum degrees, of the magnetic field tesla\n" + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     try:
         parameters.check_scene(yaml_files.parse(text), path)
     except ValueError as error:

@@ -42,6 +42,10 @@ class BatteryParameters(SensorParameters):
     charge: Fraction = 1.0  # at the start, of the capacity
     noise: NoiseParameters = NoiseParameters()  # V
 
+    def make(self, fitting: Fitting) -> Battery:
+        """Return the instrument; `reset` comes before its first look."""
+        return Battery(self, fitting)
+
     def check(self, sub_step: float) -> None:
         """Raise ParameterError for periods that sub_step does not divide, or values that contradict each other."""
         super().check(sub_step)

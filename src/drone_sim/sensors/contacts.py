@@ -33,6 +33,10 @@ class ContactsParameters(SensorParameters):
 
     suffixes = ("", "/wrench")
 
+    def make(self, fitting: Fitting) -> Contacts:
+        """Return the instrument; `reset` comes before its first look."""
+        return Contacts(self, fitting)
+
 
 class ContactsSample(NamedTuple):
     """The contacts of a sub-step, and their sum (N, N m) in the sensor's frame as it was then."""

@@ -31,6 +31,10 @@ class FixParameters(SensorParameters):
     frame: Name = "gps_link"
     noise: FixNoise = FixNoise()
 
+    def make(self, fitting: Fitting) -> Fix:
+        """Return the instrument; `reset` comes before its first look."""
+        return Fix(self, fitting)
+
 
 class Fix(Instrument):
     """Measures latitude, longitude (degrees) and height above the ellipsoid of WGS 84 (m)."""

@@ -18,6 +18,7 @@ from typing import Any, Literal, NamedTuple
 
 from drone_sim.config.types import Checked, Name
 from drone_sim.mechanics.frames import (
+    IDENTITY,
     Matrix,
     Quaternion,
     Vector,
@@ -53,6 +54,10 @@ class ImuParameters(SensorParameters):
 
     suffixes = ("/data", "/data_raw")
 
+    def make(self, fitting: Fitting) -> Imu:
+        """Return the instrument; `reset` comes before its first look."""
+        return Imu(self, fitting)
+
 
 class ImuSample(NamedTuple):
     """What an IMU measures, in its own frame."""
@@ -78,8 +83,8 @@ class Imu(Instrument):
             Output("/data", "sensor_msgs/Imu", self._data),
             Output("/data_raw", "sensor_msgs/Imu", self._raw),
         )
-        self._velocity, self._axes, self._jumps = _ZERO, fitting.pose(), 0
-        self._gained = self._turned = _ZERO
+        self._velocity, self._axes, self._jumps = _ZERO, IDENTITY, 0
+        self._gained, self._turned, self._passed = _ZERO, _ZERO, 0.0
 
     # ---- measuring
 
@@ -89,7 +94,7 @@ class Imu(Instrument):
         self._axes = self.fitting.pose()
         self._velocity = self._point_velocity(self._axes)
         self._jumps = self.carrier.jumps
-        self._gained = self._turned = _ZERO  # m/s and rad since the last sample, in the sensor's axes
+        self._gained, self._turned, self._passed = _ZERO, _ZERO, 0.0  # m/s, rad and s since the last sample
 
     def look(self, count: int) -> None:
         """Integrate over the sub-step that has just been, then sample if it is time."""
@@ -104,12 +109,13 @@ class Imu(Instrument):
         # Bullet turns the body by the new angular velocity, and about it: its components are the same before and after.
         self._turned = _sum(self._turned, rotate_back(axes, self.carrier.state.angular_velocity), step)
         self._axes, self._velocity = axes, velocity
+        self._passed += step
         super().look(count)
 
     def sample(self) -> ImuSample:
         """Return the means since the last sample, and the present orientation."""
-        force, rate = (_sum(_ZERO, one, 1 / self.interval) for one in (self._gained, self._turned))
-        self._gained = self._turned = _ZERO
+        force, rate = (_sum(_ZERO, one, 1 / self._passed) for one in (self._gained, self._turned))
+        self._gained, self._turned, self._passed = _ZERO, _ZERO, 0.0
         turn = multiply_quaternions(to_quaternion(self._axes), _rotation(self._leaning.add(_ZERO)))
         return ImuSample(turn, _vector(self._turning.add(rate)), _vector(self._feeling.add(force)))
 
@@ -122,11 +128,11 @@ class Imu(Instrument):
     def remember(self) -> Callable[[], None]:
         """Return a function that brings it back, in the middle of a sample."""
         base = super().remember()
-        own = self._velocity, self._axes, self._gained, self._turned
+        own = self._velocity, self._axes, self._gained, self._turned, self._passed
 
         def recall() -> None:
             base()
-            self._velocity, self._axes, self._gained, self._turned = own
+            self._velocity, self._axes, self._gained, self._turned, self._passed = own
             self._jumps = self.carrier.jumps
 
         return recall

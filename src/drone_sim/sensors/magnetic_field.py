@@ -20,6 +20,10 @@ class MagneticFieldParameters(SensorParameters):
     frame: Name = "imu_link"
     noise: NoiseParameters = NoiseParameters()  # T
 
+    def make(self, fitting: Fitting) -> MagneticField:
+        """Return the instrument; `reset` comes before its first look."""
+        return MagneticField(self, fitting)
+
 
 class MagneticField(Instrument):
     """Measures B = Rᵀ B_world, in T."""

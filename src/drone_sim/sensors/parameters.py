@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
 from drone_sim.config.types import TOPIC, Checked, Finite, Name, ParameterError, Within
 from drone_sim.mechanics.frames import IDENTITY, Matrix, invert, multiply
 from drone_sim.sensors.mount import MountParameters
+
+if TYPE_CHECKING:
+    from drone_sim.sensors.sensor import Fitting, Instrument
 
 Topic = Annotated[str, Field(pattern=TOPIC, max_length=128)]
 
@@ -29,6 +32,10 @@ class SensorParameters(Checked):
     suffixes: ClassVar[tuple[str, ...]] = ("",)  # of the topics that it publishes, after `topic`
     default_mount: ClassVar[Matrix] = IDENTITY  # the root from the sensor's frame, where nothing says anything else
     from_object: ClassVar[Matrix] = IDENTITY  # the sensor's frame from that of the object that scripts find
+
+    def make(self, fitting: Fitting) -> Instrument:
+        """Return the instrument; `reset` comes before its first look."""
+        raise NotImplementedError
 
     def period(self, sub_step: float) -> int:
         """Return the sub-steps (of `sub_step` seconds) between two samples."""
@@ -50,6 +57,11 @@ class SensorParameters(Checked):
             raise ParameterError(
                 f"latency = {self.latency:g}: must be a whole multiple of sub_step = {sub_step:g} s", ("latency",)
             )
+
+    def topics(self) -> Iterator[tuple[str, str]]:
+        """Yield what it publishes, and what each topic is."""
+        for suffix in self.suffixes:
+            yield f"{self.topic}{suffix}", suffix[1:] or self.kind
 
     def placed(self, links: Mapping[str, Matrix]) -> tuple[str, Matrix]:
         """Return the object that it hangs on ('' is the vehicle's root), and that from the sensor's frame.

@@ -53,6 +53,10 @@ class PressureParameters(SensorParameters):
 
     suffixes = ("", "/height")
 
+    def make(self, fitting: Fitting) -> Pressure:
+        """Return the instrument; `reset` comes before its first look."""
+        return Pressure(self, fitting)
+
 
 class PressureSample(NamedTuple):
     """Pressure (Pa), and the height above the scene's origin (m) that it means."""

@@ -35,6 +35,10 @@ class RangeParameters(SensorParameters):
     default_mount = from_rpy((0.0, 0.0, 0.0), (0.0, math.pi / 2, 0.0))
     from_object = _OBJECT
 
+    def make(self, fitting: Fitting) -> Range:
+        """Return the instrument; `reset` comes before its first look."""
+        return Range(self, fitting)
+
     def check(self, sub_step: float) -> None:
         """Raise ParameterError for periods that sub_step does not divide, or a range without extent."""
         super().check(sub_step)

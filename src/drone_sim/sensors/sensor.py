@@ -1,7 +1,8 @@
 """What a sensor is: how often it looks, what it last measured, a snapshot of its own; what carries it.
 
-A `Sensor` has a period in sub-steps. An `Instrument` is one that measures numbers: after every sub-step it is told how
-many there have been (`look`); when its period is over it takes a sample, which becomes a `Reading` after the latency.
+A `Sensor` has a period, a latest sample, and can be brought back. An `Instrument` is one that measures numbers: after every
+sub-step it is told how many there have been (`look`); when its period is over it takes a sample, which becomes a `Reading`
+after the latency. A camera is the other sort: it looks when somebody asks, after whole steps.
 An instrument says itself which messages its readings make (`outputs`), as neutral data: who publishes them knows none
 of the kinds.
 """
@@ -93,7 +94,7 @@ class Fitting:
 class Reading(NamedTuple):
     """A sample as it was measured, noise included."""
 
-    count: int  # sub-steps since the start of the run when it was measured
+    count: int  # (sub-)steps since the start of the run when it was measured
     value: Any  # what the sensor's kind makes of it
 
 
@@ -106,15 +107,15 @@ class Output(NamedTuple):
 
 
 class Sensor(ABC):
-    """Something that looks every so many sub-steps."""
+    """Something that samples when its period is over: instruments count sub-steps, cameras steps."""
 
     def __init__(self, period: int):
-        """Take the number of sub-steps between two samples."""
+        """Take the number of (sub-)steps between two samples."""
         self.period = period
         self.latest: Reading | None = None  # None before the first
 
     def is_due(self, count: int) -> bool:
-        """Tell whether a sample is due after `count` sub-steps since the start of the run."""
+        """Tell whether a sample is due after `count` (sub-)steps since the start of the run."""
         return count % self.period == 0
 
     @abstractmethod

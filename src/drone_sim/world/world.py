@@ -216,10 +216,17 @@ class World:
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
 
-    def advance(self, wrenches: Mapping[int, Wrench], sub_steps: int, before: Callable[[], None] | None = None) -> None:
+    def advance(
+        self,
+        wrenches: Mapping[int, Wrench],
+        sub_steps: int,
+        before: Callable[[], None] | None = None,
+        after: Callable[[int], None] | None = None,
+    ) -> None:
         """Step `sub_steps` times, re-applying each body's wrench every time (PyBullet forgets it).
 
-        `before` is called before each of these sub-steps, with everything where it is by then.
+        `before` is called before each of these sub-steps, with everything where it is by then; `after` after each,
+        with how many there have been.
         """
         # Local names and positional arguments: this loop is most of a step.
         client, in_world = self._client, pybullet.WORLD_FRAME
@@ -231,7 +238,7 @@ class World:
         )
         known = self._centres  # in the first sub-step
         loads = [(body, wrench.force, wrench.torque_under) for body, wrench in wrenches.items()]
-        for _ in range(sub_steps):
+        for count in range(1, sub_steps + 1):
             if before is not None:
                 before()
             for body, force, torque_under in loads:
@@ -240,6 +247,8 @@ class World:
                 turn(body, -1, torque_under(orientation), in_world, client)
             step(client)
             known = {}
+            if after is not None:
+                after(count)
         self._centres.clear()
         self.changes = next(_changes)
 
