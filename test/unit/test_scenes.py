@@ -107,7 +107,10 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     [
         ("", "must hold `key: value` lines"),
         ("objects: [", "scene.yaml: while parsing"),
-        ("boxes: []", "scene.yaml: line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, vehicles"),
+        (
+            "boxes: []",
+            "scene.yaml: line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, vehicles",
+        ),
         ("1: 2", "key '1' must be a text (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
         (

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-
 from carried import GRAVITY, SUB_STEP, Carried, Circling, Flown
+
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.sensors.imu import ImuParameters

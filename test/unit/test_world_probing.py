@@ -3,8 +3,8 @@
 import numpy as np
 import pybullet
 import pytest
-
 from carried import BODY, FLOOR, SUB_STEP
+
 from drone_sim.mechanics.state import Pose
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.world import Shape, World

@@ -54,5 +54,5 @@ def earth_from_local(latitude: float, longitude: float, height: float) -> Matrix
 
 
 def geodetic(local: Sequence[float], datum: Sequence[float]) -> Vector:
-    """Return latitude and longitude (degrees) and height (m) of a place (m, local frame) at a datum of the same three."""
+    """Return latitude, longitude (degrees) and height (m) of a local place (m); of the datum those are given, too."""
     return from_earth(transform(earth_from_local(*datum), local))

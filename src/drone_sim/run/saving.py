@@ -15,6 +15,8 @@ from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
 from drone_sim.vehicles.vehicle import Vehicle
 
+_UNITS = "# metres, radians; the datum in degrees, the magnetic field in tesla\n"
+
 
 def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Vehicle]) -> None:
     """Write floor, objects and vehicles as they stand now. The scene's own files keep their names.
@@ -27,7 +29,7 @@ def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Ve
     content["floor"] = _plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))
     content["objects"] = _objects(scene, path.parent)
-    text = "# metres, radians; of the datum degrees, of the magnetic field tesla\n" + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    text = _UNITS + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     try:
         parameters.check_scene(yaml_files.parse(text), path)
     except ValueError as error:

@@ -1,11 +1,14 @@
 """A battery that the propellers drain: sensor_msgs/BatteryState. It does not act on the flight, not even empty.
 
-Momentum theory (Leishman, Principles of Helicopter Aerodynamics, 2006, section 2.5): a hovering propeller of thrust T and
-disk area A needs the power T^1.5 / sqrt(2 ρ A). So, from the power that hovering takes,
+Momentum theory (Leishman, Principles of Helicopter Aerodynamics, 2006, section 2.5): a hovering propeller of thrust T
+and disk area A needs the power T^1.5 / sqrt(2 ρ A). So, from the power that hovering takes,
 
     P = idle_power + (hover_power - idle_power) · mean_i (T_i / T_hover)^1.5,   T_hover = weight / propellers
 
-The cells are a source U0 behind a resistance R (Rint model): U = U0 - R I and U I = P, so I = (U0 - sqrt(U0² - 4 R P)) / 2R;
+The cells are a source U0 behind a resistance R (the Rint model): with U = U0 - R I and U I = P,
+
+    I = (U0 - sqrt(U0² - 4 R P)) / 2R
+
 U0 falls in a straight line with the charge, from `full` to `empty` volts a cell.
 """
 

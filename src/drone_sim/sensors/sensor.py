@@ -1,8 +1,8 @@
 """What a sensor is: how often it looks, what it last measured, a snapshot of its own; what carries it.
 
-A `Sensor` has a period, a latest sample, and can be brought back. An `Instrument` is one that measures numbers: after every
-sub-step it is told how many there have been (`look`); when its period is over it takes a sample, which becomes a `Reading`
-after the latency. A camera is the other sort: it looks when somebody asks, after whole steps.
+A `Sensor` has a period, a latest sample, and can be brought back. An `Instrument` is one that measures numbers: after
+every sub-step it is told how many there have been (`look`); when its period is over it takes a sample, which becomes a
+`Reading` after the latency. A camera is the other sort: it looks when somebody asks, after whole steps.
 An instrument says itself which messages its readings make (`outputs`), as neutral data: who publishes them knows none
 of the kinds.
 """
@@ -94,7 +94,7 @@ class Fitting:
 class Reading(NamedTuple):
     """A sample as it was measured, noise included."""
 
-    count: int  # (sub-)steps since the start of the run when it was measured
+    at: int  # (sub-)steps since the start of the run when it was measured
     value: Any  # what the sensor's kind makes of it
 
 
@@ -199,7 +199,7 @@ class Instrument(Sensor):
 
     def header(self, reading: Reading) -> dict[str, Any]:
         """Return the header of a reading's message: when it was measured (s of simulated time), and in which frame."""
-        return {"stamp": reading.count * self.fitting.sub_step, "frame_id": self.frame}
+        return {"stamp": reading.at * self.fitting.sub_step, "frame_id": self.frame}
 
     def read(self) -> Fields | None:
         """Return the last reading as the fields of its first message; None before there is one."""

@@ -38,9 +38,7 @@ def check_rates(sensors: Mapping[str, SensorParameters], sub_step: float, above:
             one.check(sub_step)
         except ParameterError as error:
             place = (*above, "sensors", name)
-            raise ParameterError(
-                f"parameter {'/'.join(map(str, place))}/{error}", (*place, *error.location)
-            ) from None
+            raise ParameterError(f"parameter {'/'.join(map(str, place))}/{error}", (*place, *error.location)) from None
 
 
 def _check_cameras(cameras: Mapping[str, CameraParameters]) -> None:

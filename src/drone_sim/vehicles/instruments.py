@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from drone_sim.config.place import DatumParameters
-from drone_sim.config.types import ParameterError
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.state import State
 from drone_sim.sensors.parameters import SensorParameters
-from drone_sim.sensors.sensor import Contact, Fitting, Hit, Instrument
+from drone_sim.sensors.sensor import Carrier, Contact, Fitting, Hit, Instrument
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.parameters import VehicleParameters
+from drone_sim.vehicles.quadricopter_objects import DRONE
 from drone_sim.vehicles.shared import Shared
 
 _NOBODY = ("", "")
@@ -59,15 +59,22 @@ class Carrying:
 class Instruments:
     """The instruments of a vehicle: made once, reset with every run."""
 
-    def __init__(self, vehicle: VehicleParameters, suffix: str, carrying: Carrying, shared: Shared):
-        """Make them; they hang on objects whose names have the suffix. Raises ParameterError."""
+    def __init__(self, vehicle: VehicleParameters, suffix: str, body: Body, carrying: Carrier, shared: Shared):
+        """Make them; they hang on objects whose names have the suffix."""
         self.by_name: dict[str, Instrument] = {}
         self.by_object: dict[str, Instrument] = {}  # by the name that scripts find
+        self.fixed_frames: dict[str, Matrix] = {}  # root from those that the URDF has not, on the root
+        self.moving_frames: dict[str, Callable[[], Matrix]] = {}  # world from those that hang on something else
         for name, one in vehicle.sensors.items():
             seen_as = f"{one.object or name}{suffix}"
             pose = partial(_pose, shared, one, seen_as)
             made = one.make(Fitting(f"{vehicle.name}/{name}", carrying, pose, shared.sub_step))
             self.by_name[name] = self.by_object[seen_as] = made
+            parent, matrix = one.placed(body.rigid.links)
+            if parent not in ("", DRONE):
+                self.moving_frames[one.frame] = pose
+            elif one.frame not in body.rigid.links:
+                self.fixed_frames[one.frame] = matrix
         self._all = tuple(self.by_name.values())
 
     def __bool__(self) -> bool:

@@ -80,7 +80,7 @@ class Vehicle:
         self.cameras = {name: self._camera(one) for name, one in parameters.cameras.items()}
         shared.names[self.body.number] = (parameters.name, self.own_script)
         carrying = Carrying(self.body, lambda: self._propellers.thrusts, shared)
-        self.instruments = Instruments(parameters, suffix, carrying, shared)
+        self.instruments = Instruments(parameters, suffix, self.body, carrying, shared)
         self.reset()
 
     def _camera(self, parameters: CameraParameters) -> Camera:
@@ -112,8 +112,9 @@ class Vehicle:
         self._track = self.objects[self.objects.handle(TRACK_BASE + self.suffix)]
         self.script_parameters = self._script_parameters()
         self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in _NUMBERS]
-        for one in (*self.cameras.values(), self.instruments):
-            one.reset()
+        for camera in self.cameras.values():
+            camera.reset()
+        self.instruments.reset()
 
     def _leave_tree(self) -> None:
         """Take its objects out of the tree that they are in, if that is still the simulation's."""
