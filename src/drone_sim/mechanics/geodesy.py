@@ -1,6 +1,6 @@
 """Places on the Earth: latitude and longitude (degrees) and height (m) on the ellipsoid of WGS 84.
 
-Constants: NGA.STND.0036, World Geodetic System 1984, version 1.0.0 (2014), table 3.1. The local frame is the plane that
+Constants: NGA.STND.0036, World Geodetic System 1984, version 1.0.0 (2014). The local frame is the plane that
 touches the ellipsoid at the datum: x east, y north, z up.
 """
 
@@ -31,7 +31,7 @@ def to_earth(latitude: float, longitude: float, height: float) -> Vector:
 def from_earth(place: Sequence[float]) -> Vector:
     """Return latitude and longitude (degrees) and height (m) of a place in the Earth's frame (m).
 
-    The fixed point of tan φ = (z + e² N sin φ) / p: Torge and Müller, Geodesy (2012), section 4.1.3.
+    The fixed point of tan φ = (z + e² N sin φ) / p: Torge and Müller, Geodesy (2012), chapter 4.
     """
     x, y, z = place
     p = hypot(x, y)

@@ -1,6 +1,6 @@
 """A battery that the propellers drain: sensor_msgs/BatteryState. It does not act on the flight, not even empty.
 
-Momentum theory (Leishman, Principles of Helicopter Aerodynamics, 2006, section 2.5): a hovering propeller of thrust T
+Momentum theory (Leishman, Principles of Helicopter Aerodynamics, 2006, chapter 2): a hovering propeller of thrust T
 and disk area A needs the power T^1.5 / sqrt(2 ρ A). So, from the power that hovering takes,
 
     P = idle_power + (hover_power - idle_power) · mean_i (T_i / T_hover)^1.5,   T_hover = weight / propellers

@@ -6,8 +6,9 @@ Integration Algorithm Design, J. Guidance 21(1) and 21(2), 1998):
 
     f = 1/T sum R_k^T (dv_k - g dt)        w = 1/T sum R_k^T w_k dt
 
-with dv_k the change of the mounted point's velocity in sub-step k, and R_k the sensor's axes in the middle of it. What
-the samples add up to is thus how the velocity has changed, with every contact, however seldom they are taken.
+with dv_k the change of the mounted point's velocity in sub-step k, and R_k the sensor's axes at the end of it: Bullet's
+forces keep their direction in the world until then. What the samples add up to is thus how the velocity has changed,
+with every contact, however seldom they are taken; with a sample in every sub-step, (R f + g) dt is exactly that.
 """
 
 from __future__ import annotations
@@ -98,14 +99,12 @@ class Imu(Instrument):
 
     def look(self, count: int) -> None:
         """Integrate over the sub-step that has just been, then sample if it is time."""
-        axes, before = self.fitting.pose(), self._axes
+        axes, step = self.fitting.pose(), self.fitting.sub_step
+        velocity, last, fallen = self._point_velocity(axes), self._velocity, self.carrier.gravity * step
         if self._jumps != self.carrier.jumps:  # put there at rest: that was no acceleration
-            self._jumps, self._velocity, before = self.carrier.jumps, _ZERO, axes
-        velocity, last, step = self._point_velocity(axes), self._velocity, self.fitting.sub_step
-        fallen = self.carrier.gravity * step
+            self._jumps, last = self.carrier.jumps, _ZERO
         change = velocity[0] - last[0], velocity[1] - last[1], velocity[2] - last[2] - fallen
-        middle = [(a + b) / 2 for a, b in zip(axes, before)]
-        self._gained = _sum(self._gained, rotate_back(middle, change), 1.0)
+        self._gained = _sum(self._gained, rotate_back(axes, change), 1.0)
         # Bullet turns the body by the new angular velocity, and about it: its components are the same before and after.
         self._turned = _sum(self._turned, rotate_back(axes, self.carrier.state.angular_velocity), step)
         self._axes, self._velocity = axes, velocity
