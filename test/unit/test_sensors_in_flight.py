@@ -10,6 +10,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.run.whereabouts import Diverged
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.modules import make_sim
 
@@ -167,6 +168,14 @@ def test_a_snapshot_in_the_middle_of_a_picture_s_period(simulate):
     assert front.latest is latest
     simulation.stop()
     assert front.latest is None and front.image is None
+
+
+def test_where_nothing_can_be_measured_the_flight_ends_as_without_sensors(simulate):
+    simulation = simulate()
+    fly(simulation, 3)
+    simulation.drone.push((0.0, 0.0, float("nan")), (0.0, 0.0, 0.0), 1.0)
+    with pytest.raises(Diverged, match="the simulation has diverged"):
+        fly(simulation, 3)
 
 
 # ---- scripts

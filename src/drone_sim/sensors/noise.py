@@ -19,7 +19,6 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Annotated
 
-import numpy as np
 from numpy.random import Generator
 
 from drone_sim.config.types import Checked, Finite, Within
@@ -53,7 +52,7 @@ class Noise:
         else:
             self._keep, self._walk = 1.0, own.bias_walk * math.sqrt(interval)
         self._random: Generator | None = None
-        self._bias = np.zeros(axes)
+        self._bias = [0.0] * axes
 
     @property
     def variance(self) -> float:
@@ -71,28 +70,30 @@ class Noise:
         """Begin anew, drawing from `random`."""
         self._random = random
         spread = self._parameters.bias
-        self._bias = spread * random.standard_normal(self._axes) if spread else np.zeros(self._axes)
+        self._bias = (
+            [spread * one for one in random.standard_normal(self._axes).tolist()] if spread else [0.0] * self._axes
+        )
 
     def add(self, truth: Sequence[float]) -> list[float]:
         """Return the next sample of a truth, one number for each axis."""
         if self._random is None:
             raise RuntimeError("noise that has not been started")
-        measured = np.add(truth, self._bias)
+        # Lists of floats: of so few axes numpy takes longer for a sum than Python does.
+        measured = [true + bias for true, bias in zip(truth, self._bias)]
         if self._white:
-            measured += self._white * self._random.standard_normal(self._axes)
+            white, drawn = self._white, self._random.standard_normal(self._axes).tolist()
+            measured = [one + white * by for one, by in zip(measured, drawn)]
         if self._walk or self._keep != 1.0:
-            self._bias = self._keep * self._bias + self._walk * self._random.standard_normal(self._axes)
+            keep, walk, drawn = self._keep, self._walk, self._random.standard_normal(self._axes).tolist()
+            self._bias = [keep * one + walk * by for one, by in zip(self._bias, drawn)]
         step = self._parameters.quantisation
-        if step:
-            measured = np.round(measured / step) * step
-        found: list[float] = measured.tolist()
-        return found
+        return [round(one / step) * step for one in measured] if step else measured
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings the present bias back; the random generator is the sensor's to restore."""
-        bias = self._bias.copy()
+        bias = self._bias  # never changed, only replaced
 
         def recall() -> None:
-            self._bias = bias.copy()
+            self._bias = bias
 
         return recall

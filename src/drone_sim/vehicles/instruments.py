@@ -16,6 +16,7 @@ from drone_sim.vehicles.quadricopter_objects import DRONE
 from drone_sim.vehicles.shared import Shared
 
 _NOBODY = ("", "")
+_NOWHERE = 1e9  # m, m/s and rad/s, summed: there is nothing to measure, and the step ends the flight
 
 
 class Carrying:
@@ -75,6 +76,7 @@ class Instruments:
                 self.moving_frames[one.frame] = pose
             elif one.frame not in body.rigid.links:
                 self.fixed_frames[one.frame] = matrix
+        self._body = body
         self._all = tuple(self.by_name.values())
 
     def __bool__(self) -> bool:
@@ -93,6 +95,9 @@ class Instruments:
 
     def look(self, count: int) -> None:
         """Let them take part in a sub-step, `count` of which there have been since the start of the run."""
+        place, _, linear, angular = self._body.state
+        if not -_NOWHERE < sum(place) + sum(linear) + sum(angular) < _NOWHERE:  # nor a NaN, with which nothing is known
+            return
         for one in self._all:
             one.look(count)
 
