@@ -89,8 +89,8 @@ class Flown(Carried):
         self.gravity = gravity
         super().__init__(self.world.state(self.body))
 
-    def add(self, name, shape):
-        self.names[self.world.add_shape(shape)] = name
+    def add(self, name, shape, position):
+        self.names[self.world.add_object(shape, Pose(position))] = name
 
     def ray(self, start, end):
         hit = self.world.ray(start, end, self.body)

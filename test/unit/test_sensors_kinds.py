@@ -14,7 +14,7 @@ from drone_sim.sensors.fix import FixParameters
 from drone_sim.sensors.magnetic_field import MagneticFieldParameters
 from drone_sim.sensors.pressure import PressureParameters, height_of, pressure_at
 from drone_sim.sensors.range import RangeParameters
-from drone_sim.world import Shape
+from drone_sim.shapes.box import Box
 
 STILL = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
@@ -53,7 +53,7 @@ def test_beyond_and_below_its_range():
 
 def test_range_sees_what_is_under_it_and_says_what():
     drone = Flown(gravity=0.0)
-    drone.add("Box", Shape("box", (1, 1, 0.4), (0, 0, 0.2)))
+    drone.add("Box", Box((1.0, 1.0, 0.4)), (0, 0, 0.2))
     sensor = drone.fit(RANGE, RANGE.placed({})[1])
     assert sensor.detected() is None
     drone.step()
@@ -177,7 +177,7 @@ def test_the_covariance_of_a_fix():
 
 def test_contacts_name_what_carries_the_drone_and_how_hard():
     drone = Flown(Pose((0, 0, 0.41)))
-    drone.add("Table", Shape("box", (2, 2, 0.4), (0, 0, 0.2)))
+    drone.add("Table", Box((2.0, 2.0, 0.4)), (0, 0, 0.2))
     sensor = drone.fit(ContactsParameters(kind="contacts", rate=20))
     drone.step(500)
     sample = drone.values(sensor)[-1]

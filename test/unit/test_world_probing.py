@@ -7,11 +7,20 @@ from carried import BODY, FLOOR, SUB_STEP
 
 from drone_sim.mechanics.state import Pose
 from drone_sim.mechanics.wrench import Wrench
-from drone_sim.world import Shape, World
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.sphere import Sphere
+from drone_sim.world import World
 
-GROUND = Shape("box", (20, 20, 0.2), (0, 0, -0.1))
-BOX = Shape("box", (1, 1, 0.2), (0, 0, 0.1), mass=5.0)
-BALL = Shape("sphere", (0.2,), (0.1, 0, 0.4), mass=1.0)
+THINGS = {  # shape, position, mass
+    "ground": (Box((20.0, 20.0, 0.2)), (0, 0, -0.1), 0.0),
+    "box": (Box((1.0, 1.0, 0.2)), (0, 0, 0.1), 5.0),
+    "ball": (Sphere((0.2,)), (0.1, 0, 0.4), 1.0),
+}
+
+
+def add(world, name):
+    shape, position, mass = THINGS[name]
+    return world.add_object(shape, Pose(position), mass=mass)
 
 
 @pytest.fixture(name="world")
@@ -22,7 +31,7 @@ def _world():
 
 
 def test_a_ray_meets_the_nearest_of_many_in_whatever_order_they_came(world):
-    balls = {x: world.add_shape(Shape("sphere", (0.2,), (x, 0, 0))) for x in (5, 2, 4, 1, 3)}
+    balls = {x: world.add_object(Sphere((0.2,)), Pose((x, 0, 0))) for x in (5, 2, 4, 1, 3)}
     hit = world.ray((0, 0, 0), (10, 0, 0))
     assert (hit.body, hit.distance, hit.normal) == (balls[1], pytest.approx(0.8, abs=1e-9), (-1, 0, 0))
     hit = world.ray((0, 0, 0), (10, 0, 0), ignoring=balls[1])
@@ -42,13 +51,13 @@ def test_a_ray_goes_through_the_body_that_is_ignored(world):
 
 
 def test_a_ray_meets_what_has_been_moved_where_it_is_now(world):
-    ball = world.add_shape(BALL)
+    ball = add(world, "ball")
     world.set_pose(ball, Pose((3, 0, 0)))
     assert world.ray((0, 0, 0), (10, 0, 0)).distance == pytest.approx(2.8, abs=1e-9)
 
 
 def test_contacts_carry_the_weight(world):
-    box, ball, floor = world.add_shape(BOX), world.add_shape(BALL), world.add_floor(10.0, FLOOR)
+    box, ball, floor = add(world, "box"), add(world, "ball"), world.add_floor(10.0, FLOOR)
     world.advance({}, 300)
     by_body = {floor: np.zeros(3), ball: np.zeros(3)}
     for touch in world.contacts(box):
@@ -62,10 +71,7 @@ def test_contacts_carry_the_weight(world):
 
 @pytest.mark.parametrize("first", ["box", "ground"])
 def test_friction_is_in_the_force_whichever_body_came_first(world, first):
-    made = {name: world.add_shape({"box": BOX, "ground": GROUND}[name]) for name in sorted(["box", "ground"])}
-    if first == "ground":
-        world.clear()
-        made = {name: world.add_shape({"box": BOX, "ground": GROUND}[name]) for name in ("ground", "box")}
+    made = {name: add(world, name) for name in sorted(["box", "ground"], reverse=first == "ground")}
     world.advance({}, 100)
     pushed = Wrench()
     pushed.add((80.0, 40.0, 0.0), (0, 0, 0), (0, 0, 0))
@@ -81,8 +87,8 @@ def test_friction_is_in_the_force_whichever_body_came_first(world, first):
 
 
 def test_what_is_near_and_does_not_push_is_no_contact(world):
-    ball = world.add_shape(BALL)
-    world.add_shape(GROUND)
+    ball = add(world, "ball")
+    add(world, "ground")
     world.set_pose(ball, Pose((0, 0, 0.203)))
     world.advance({}, 1)
     assert pybullet.getContactPoints(ball, physicsClientId=world._client)

@@ -11,8 +11,7 @@ from typing import Any
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.host import Host, Readable
-
-Handle = int
+from drone_sim.scripting.api.types import Handle
 
 _NOT_YET, _NOTHING, _DETECTED = -1, 0, 1  # detection states of CoppeliaSim
 _Detection = tuple[int, float, list[float], int, list[float]]
