@@ -1,5 +1,7 @@
 """Drones without a world, several on one tree, for tests of the script API."""
 
+from typing import ClassVar
+
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting import load
@@ -23,6 +25,8 @@ class Scene:
 
 class Drone:
     """A Host."""
+
+    sensors: ClassVar[dict] = {}
 
     def __init__(self, scene, suffix="", own=None, also=()):
         self.objects, self.signals, self.drawings = scene.objects, scene.signals, scene.drawings

@@ -159,6 +159,16 @@ def rotate(m: Sequence[float], vector: Sequence[float]) -> Vector:
     )
 
 
+def rotate_back(m: Sequence[float], vector: Sequence[float]) -> Vector:
+    """Return the vector turned by the inverse rotation of m: a world's vector in the axes of m."""
+    x, y, z = vector
+    return (
+        m[0] * x + m[4] * y + m[8] * z,
+        m[1] * x + m[5] * y + m[9] * z,
+        m[2] * x + m[6] * y + m[10] * z,
+    )
+
+
 def turned(quaternion: Sequence[float], vector: Sequence[float]) -> Vector:
     """Return the vector turned by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
     x, y, z, w = quaternion

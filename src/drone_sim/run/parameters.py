@@ -30,6 +30,7 @@ from drone_sim.files.resources import package_path, resolve
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.sensors.together import check_rates
 from drone_sim.vehicles.parameters import DroneParameters, EquipmentParameters, VehicleParameters, laid_over
 from drone_sim.wording import shown
 
@@ -124,6 +125,9 @@ class Parameters(EquipmentParameters):
                 ("sub_step",),
             )
         super().model_post_init(_context)
+        check_rates(self.sensors, self.sub_step)
+        for name, vehicle in self.vehicles.items():
+            check_rates(vehicle.sensors, self.sub_step, ("vehicles", name))
         self._fleet = tuple(self.vehicles.values()) or (VehicleParameters.only(self.drone, self),)
 
 

@@ -15,6 +15,8 @@ from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
 from drone_sim.vehicles.vehicle import Vehicle
 
+_UNITS = "# metres, radians; the datum in degrees, the magnetic field in tesla\n"
+
 
 def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Vehicle]) -> None:
     """Write floor, objects and vehicles as they stand now. The scene's own files keep their names.
@@ -22,10 +24,12 @@ def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Ve
     Raises ParameterError where that would be no scene that can be loaded, such as with the drone below the
     floor, and OSError; what was in the file is then still there.
     """
-    content: dict[str, Any] = {"floor": _plain(scene.parameters.floor, path.parent)}
+    own = scene.parameters
+    content: dict[str, Any] = {"datum": own.datum.model_dump(), "magnetic_field": list(own.magnetic_field)}
+    content["floor"] = _plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))
     content["objects"] = _objects(scene, path.parent)
-    text = "# metres, radians\n" + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    text = _UNITS + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     try:
         parameters.check_scene(yaml_files.parse(text), path)
     except ValueError as error:

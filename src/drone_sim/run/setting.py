@@ -30,6 +30,7 @@ class Setting:
         try:
             self._empty_tree()
             self.scene = Scene(parameters.scene, self.world)
+            shared.names.update(self.scene.names())
             for one in parameters.fleet:
                 self._put(one)
             self._name_objects()

@@ -94,6 +94,10 @@ class Simulation:
             vision=self.vision,
             time=lambda: self.time,
             time_step=parameters.time_step,
+            sub_step=parameters.sub_step,
+            gravity=parameters.gravity,
+            datum=parameters.scene.datum,
+            magnetic_field=parameters.scene.magnetic_field,
             script_time_limit=parameters.script_time_limit,
             backend=self._backend,
             drawings=self._drawings,
@@ -133,6 +137,7 @@ class Simulation:
         self._era += 1
         self._flying = tuple(self.vehicles.values())
         self._any_in_sub_steps = any(vehicle.sub_step_forces for vehicle in self._flying)
+        self._sensing = tuple(vehicle for vehicle in self._flying if vehicle.instruments)
 
     # ---- what flies
 
@@ -264,7 +269,8 @@ class Simulation:
             vehicle.actuation()
         before = self._before_sub_step if self._any_in_sub_steps else None
         wrenches = {vehicle.body.number: vehicle.wrench() for vehicle in vehicles}
-        self.world.advance(wrenches, self._sub_steps, before)
+        after = self._after_sub_step if self._sensing else None
+        self.world.advance(wrenches, self._sub_steps, before, after)
         for vehicle in vehicles:
             vehicle.body.refresh()
         self.steps += 1
@@ -278,10 +284,14 @@ class Simulation:
         for vehicle in self._flying:
             vehicle.before_sub_step()
 
+    def _after_sub_step(self, count: int) -> None:
+        for vehicle in self._sensing:
+            vehicle.after_sub_step(self.steps * self._sub_steps + count)
+
     def look(self) -> None:
         """Let cameras that are watched show what is there now, between two steps."""
         for vehicle in self._flying:
-            vehicle.take_pictures(0)
+            vehicle.take_pictures(self.steps, now=True)
 
     # ---- snapshots and files
 

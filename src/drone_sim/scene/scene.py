@@ -46,7 +46,7 @@ class Scene:
         scene_files.check(parameters)
         self._world = world
         floor = parameters.floor
-        world.add_floor(floor.size, floor.texture, ground=not floor.edge)
+        self.floor = world.add_floor(floor.size, floor.texture, ground=not floor.edge)
         try:
             self._numbers = [_add(world, one) for one in parameters.objects]
         except ValueError as error:
@@ -60,6 +60,13 @@ class Scene:
                 raise ParameterError(f"an object named '{one.name}' is there already", ("objects", index, "name"))
             if one.name:
                 objects.add(one.name, body=body)
+
+    def names(self) -> dict[int, tuple[str, str]]:
+        """Return, by body in the world, what a person calls it, and its name among the objects of scripts, or ''."""
+        named = {self.floor: ("Floor", "Floor")}
+        for index, (one, number) in enumerate(zip(self.parameters.objects, self._numbers)):
+            named[number] = (one.name or f"objects/{index}", one.name)
+        return named
 
     def visuals(self) -> tuple[list[Visual], np.ndarray]:
         """Return how the objects look, the floor aside, and the poses world from visual, (N, 4, 4)."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 from pydantic import Field, create_model
 
 from drone_sim.config.errors import Problem
+from drone_sim.config.place import DatumParameters, MagneticField
 from drone_sim.config.types import (
     Angles,
     Checked,
@@ -88,6 +89,8 @@ else:
 class SceneParameters(Checked):
     """The world without the drone."""
 
+    datum: DatumParameters
+    magnetic_field: MagneticField
     floor: FloorParameters
     objects: Annotated[list[_Object], Field(max_length=MAX_OBJECTS)]
 
@@ -134,14 +137,15 @@ def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
 
 
 def problem_in_file(problem: Problem) -> Problem | None:
-    """Return a problem as the scene file has it, where floor and objects stand beside the drone; None for any other."""
+    """Return a problem as the scene file has it, where they stand beside the drone; None for any other."""
     if problem.location[:1] in (("drone",), ("vehicles",)):
         return problem
     if problem.location[:1] != ("scene",):
         return None
     location, text = problem.location[1:], problem.text.replace("parameter scene/", "parameter ", 1)
     if len(location) == 1 and "unknown key" in text:
-        text = f"unknown key {readable_key(location)}; known are drone, floor, objects, vehicles"
+        known = ", ".join(sorted([*SceneParameters.model_fields, *_BESIDE]))
+        text = f"unknown key {readable_key(location)}; known are {known}"
     return problem._replace(location=location, text=text)
 
 

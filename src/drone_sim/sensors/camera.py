@@ -12,6 +12,7 @@ from drone_sim.mechanics.frames import Matrix
 from drone_sim.render.context import RendererUnavailable
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Renderer
+from drone_sim.sensors.sensor import Reading, Sensor
 from drone_sim.shapes.visual import Visual
 
 _LOG = logging.getLogger(__name__)
@@ -93,14 +94,21 @@ class Vision:
             self._renderer = None
 
 
-class Camera:
-    """One vision sensor: where it is, what it sees, and who looks."""
+class Camera(Sensor):
+    """One vision sensor: where it is, what it sees, and who looks.
 
-    def __init__(self, kind: str, intrinsics: Intrinsics, pose: Callable[[], Matrix], vision: Vision):
-        """Take what it measures ("color" or "depth"), how, from where (world from optical frame), and by what."""
+    Its period counts simulation steps, for only after those is there anything to see; and it looks only where
+    somebody wants to know.
+    """
+
+    def __init__(self, kind: str, intrinsics: Intrinsics, pose: Callable[[], Matrix], vision: Vision, period: int = 1):
+        """Take what it measures ("color" or "depth"), how, from where (world from optical frame), by what, how often.
+
+        `period` is the number of simulation steps between two pictures.
+        """
+        super().__init__(period)
         self.kind = kind
         self.intrinsics = intrinsics
-        self.every = 1  # steps between two pictures
         self.watched: Callable[[], bool] = lambda: False
         self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
         self.pose = pose
@@ -117,3 +125,22 @@ class Camera:
         if self._last is None or self._last[:2] != (changes, pose):
             self._last = changes, pose, self.take()
         return self._last[2]
+
+    def show(self, steps: int, image: np.ndarray | None) -> None:
+        """Let those who look see a picture, taken after so many steps; None is none."""
+        self.image = image
+        if image is not None:
+            self.latest = Reading(steps, image)
+
+    def reset(self) -> None:
+        """Forget the pictures that were taken."""
+        self.image = self.latest = self._last = None
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back the last picture that was shown."""
+        image, latest = self.image, self.latest
+
+        def recall() -> None:
+            self.image, self.latest = image, latest
+
+        return recall

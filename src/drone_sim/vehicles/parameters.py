@@ -1,4 +1,4 @@
-"""What a vehicle may be: name, body, place, script, propellers, gains, cameras, and the limits of its commands."""
+"""What a vehicle may be: name, body, place, script, propellers, gains, sensors, and the limits of its commands."""
 
 from __future__ import annotations
 
@@ -26,9 +26,12 @@ from drone_sim.config.types import (
 )
 from drone_sim.forces import ForceParameters
 from drone_sim.forces.propellers import PropellerParameters
-from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters, check_together
+from drone_sim.sensors import AnySensor
+from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters
+from drone_sim.sensors.together import check_together
 
 MAX_FORCES = 16
+MAX_SENSORS = 64
 MAX_SCRIPT_PARAMETERS = 256
 
 
@@ -93,11 +96,12 @@ class EquipmentParameters(Checked):
     control: ControlParameters
     script_parameters: Annotated[dict[Label, ScriptValue], Field(max_length=MAX_SCRIPT_PARAMETERS)]
     cameras: Annotated[dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
+    sensors: Annotated[dict[Name, AnySensor], Field(max_length=MAX_SENSORS)]
     forces: Annotated[dict[Name, ForceParameters], Field(max_length=MAX_FORCES)]
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several keys at once."""
-        check_together(self.cameras)
+        check_together(self.cameras, self.sensors)
 
 
 class VehicleParameters(EquipmentParameters, PlaceParameters):

@@ -7,6 +7,7 @@
         Quadricopter_propeller_respondable<i>    .../respondable
         Quadricopter_propeller_joint<i>          .../joint
       FrontVision, TrackCam, one for every camera  /FrontVision
+      one for every sensor                       /range and so on
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
       DronePosition                              /target                 the green sphere
 
@@ -24,6 +25,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_tree import Body, ObjectTree
 from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.sensors.parameters import SensorParameters
 
 DRONE = "Drone"
 TARGET = "DronePosition"  # the green sphere
@@ -58,10 +60,11 @@ class QuadricopterObjects:
         links: Mapping[str, Matrix],
         propellers: Sequence[Matrix],
         cameras: Mapping[str, CameraParameters],
+        sensors: Mapping[str, SensorParameters],
     ) -> list[int]:
         """Return the handles of all; `links` and `propellers` are poses in the root link's frame.
 
-        Raises ParameterError for a camera that cannot be where it is said to be.
+        Raises ParameterError for a camera or sensor that cannot be where it is said to be.
         """
         self._add(DRONE, body=body, alias="Quadcopter", also=("Quadricopter", "Quadcopter"))
         self._add("Quadricopter_base", DRONE, BASE, alias="base")
@@ -78,6 +81,8 @@ class QuadricopterObjects:
         self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
         for camera in cameras.values():
             self._add_camera(links, camera)
+        for name, sensor in sensors.items():
+            self._add_sensor(links, name, sensor)
         return self._handles
 
     def _add(
@@ -99,15 +104,26 @@ class QuadricopterObjects:
             raise ParameterError(str(error)) from None
         self._handles.append(handle)
 
+    def _add_sensor(self, links: Mapping[str, Matrix], name: str, sensor: SensorParameters) -> None:
+        """Add the object of a sensor. Raises ParameterError for one that cannot be where it is said to be."""
+        if sensor.mount is not None and sensor.frame in links:
+            raise ParameterError(f"sensor {name}: the URDF says where {sensor.frame} is; `mount` needs another frame")
+        parent, matrix = sensor.placed(links)
+        self._mount(f"sensor {name}", sensor.object or name, parent or DRONE, sensor.object_in(matrix))
+
     def _add_camera(self, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
+        said = f"camera frame {camera.frame}"
         if camera.mount is None:
             if camera.frame not in links:
-                raise ParameterError(f"camera frame {camera.frame}: neither a link of the URDF, nor a `mount` given")
+                raise ParameterError(f"{said}: neither a link of the URDF, nor a `mount` given")
             parent, optical = DRONE, links[camera.frame]
         else:
-            parent, optical = camera.mount.parent, camera.mount.matrix
-        if not {f"{parent}{self._suffix}", parent} & {*self._objects.names}:
-            raise ParameterError(f"camera frame {camera.frame}: no object is named {parent}")
-        if f"{camera.object}{self._suffix}" in self._objects:
-            raise ParameterError(f"camera frame {camera.frame}: an object named '{camera.object}' is there already")
-        self._add(camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR))
+            parent, optical = camera.mount.parent or DRONE, camera.mount.optical
+        self._mount(said, camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR))
+
+    def _mount(self, said: str, name: str, parent: str, local: Matrix) -> None:
+        if f"{parent}{self._suffix}" not in self._objects and parent not in self._objects:
+            raise ParameterError(f"{said}: no object is named {parent}")
+        if f"{name}{self._suffix}" in self._objects:
+            raise ParameterError(f"{said}: an object named '{name}' is there already")
+        self._add(name, parent, local)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from drone_sim.config.place import DatumParameters
+from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.drawings import Drawings
@@ -17,16 +19,23 @@ from drone_sim.world import World
 class Shared:
     """World, objects, signals, drawings, messages, eyes and clock.
 
-    `time` returns the simulated time in s; `time_step` is the step in s; `script_time_limit` in s of real time.
+    `time` returns the simulated time in s; `time_step` and `sub_step` in s; `script_time_limit` in s of real time;
+    `gravity` in m/s² along z; `magnetic_field` in T. `names` has for each body in the world what a person calls it,
+    and its name among the objects of scripts, or ''.
     """
 
     world: World
     vision: Vision
     time: Callable[[], float]
     time_step: float
+    sub_step: float
+    gravity: float
+    datum: DatumParameters
+    magnetic_field: Vector
     script_time_limit: float
     drawings: Drawings
     backend: Backend | None = None
     objects: ObjectTree = field(default_factory=ObjectTree)
     signals: Signals = field(default_factory=Signals)
+    names: dict[int, tuple[str, str]] = field(default_factory=dict)
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are

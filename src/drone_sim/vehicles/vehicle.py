@@ -26,7 +26,9 @@ from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.sensors.sensor import Instrument
 from drone_sim.vehicles.body import Body
+from drone_sim.vehicles.instruments import Carrying, Instruments
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.quadricopter_objects import (
     DRONE,
@@ -76,14 +78,17 @@ class Vehicle:
         self.script: load.Script = load.NoScript()
         self._tree: ObjectTree | None = None  # the one that its objects are in
         self.cameras = {name: self._camera(one) for name, one in parameters.cameras.items()}
+        shared.names[self.body.number] = (parameters.name, self.own_script)
+        carrying = Carrying(self.body, lambda: self._propellers.thrusts, shared)
+        self.instruments = Instruments(parameters, suffix, self.body, carrying, shared)
         self.reset()
 
     def _camera(self, parameters: CameraParameters) -> Camera:
         size = (parameters.width, parameters.height)
         intrinsics = Intrinsics(*size, parameters.horizontal_fov, parameters.near, parameters.far)
-        camera = Camera(parameters.kind, intrinsics, lambda: self.optical(parameters), self._shared.vision)
-        camera.every = parameters.every
-        return camera
+        return Camera(
+            parameters.kind, intrinsics, lambda: self.optical(parameters), self._shared.vision, parameters.every
+        )
 
     def reset(self) -> None:
         """Return to the starting place, at rest, with no script loaded, and its objects anew in the shared tree."""
@@ -102,10 +107,14 @@ class Vehicle:
         self._leave_tree()
         self._tree = self.objects
         objects = QuadricopterObjects(self._tree, self.suffix)
-        self._handles = objects.add(self.body, self.body.rigid.links, self._rotors.links, self.parameters.cameras)
+        own, links = self.parameters, self.body.rigid.links
+        self._handles = objects.add(self.body, links, self._rotors.links, own.cameras, own.sensors)
         self._track = self.objects[self.objects.handle(TRACK_BASE + self.suffix)]
         self.script_parameters = self._script_parameters()
         self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in _NUMBERS]
+        for camera in self.cameras.values():
+            camera.reset()
+        self.instruments.reset()
 
     def _leave_tree(self) -> None:
         """Take its objects out of the tree that they are in, if that is still the simulation's."""
@@ -150,6 +159,11 @@ class Vehicle:
     def drawings(self) -> Drawings:
         """What scripts draw."""
         return self._shared.drawings
+
+    @property
+    def sensors(self) -> Mapping[str, Instrument]:
+        """The instruments, by the name of the object that scripts find."""
+        return self.instruments.by_object
 
     @property
     def state(self) -> State:
@@ -272,6 +286,7 @@ class Vehicle:
         self.close()
         self._leave_tree()
         self._shared.world.remove(self.body.number)
+        del self._shared.names[self.body.number]
 
     def close(self) -> None:
         """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
@@ -283,6 +298,7 @@ class Vehicle:
 
     def actuation(self) -> None:
         """Hand waiting messages to the script, then let it command the propellers."""
+        self.instruments.clear()
         timeout = self._timeout
         if timeout and self._command_age > timeout - self._time_step / 2 and self.command != Twist():
             self.receive(Twist())
@@ -304,10 +320,16 @@ class Vehicle:
         for force in self.sub_step_forces:
             self.body.push(force)
 
-    def take_pictures(self, steps: int) -> None:
-        """Let the cameras that are watched, and due after so many steps, take a picture."""
+    def after_sub_step(self, count: int) -> None:
+        """Let the instruments look, after so many sub-steps of the run."""
+        self.body.refresh()
+        self.instruments.look(count)
+
+    def take_pictures(self, steps: int, now: bool = False) -> None:
+        """Let the cameras that are watched take a picture: those that are due after so many steps, or all `now`."""
         for camera in self.cameras.values():
-            camera.image = self.look(camera) if camera.watched() and steps % camera.every == 0 else None
+            looks = camera.watched() and (now or camera.is_due(steps))
+            camera.show(steps, self.look(camera) if looks else None)
 
     def look(self, camera: Camera) -> np.ndarray:
         """Return what a camera sees now."""
@@ -320,7 +342,9 @@ class Vehicle:
         """Return a function that brings back what the body is not: forces, script, messages, parameters."""
         own = (self.command, self._command_age, dict(self._joint_angles))
         parameters = copy.deepcopy(self.script_parameters)
-        others = [one.remember() for one in (*self._forces, *self.sub_step_forces, self.bus, self.script)]
+        parts = (*self._forces, *self.sub_step_forces, self.bus, self.script, *self.cameras.values())
+        others = [one.remember() for one in parts]
+        instruments = self.instruments.remember()
 
         def recall() -> None:
             self.command, self._command_age, angles = own
@@ -329,6 +353,7 @@ class Vehicle:
             for one in others:
                 one()
             self.body.restored()
+            instruments()  # which ask the body how often it was put somewhere
 
         return recall
 

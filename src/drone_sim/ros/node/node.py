@@ -124,6 +124,7 @@ class Node:
         self._time.begin()
         self.simulation.step()
         self._show()
+        self._topics.publish_readings(self._time.stamp)
         self._time.end(at_once=self.player.paused)  # who asks for single steps is told of each
 
     def _stand(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import rospy
 from rosgraph_msgs.msg import Clock
 
@@ -11,11 +13,19 @@ from drone_sim.run.simulation import Simulation
 _CLOCK_PERIOD = 1 / 200  # s of real time, between two of /clock while nothing else is sent
 
 
+class Stamp(Protocol):
+    """Returns the stamp of what was the case so long ago (s of simulated time)."""
+
+    def __call__(self, ago: float = 0.0) -> rospy.Time:
+        """Return it."""
+
+
 class StepTime:
     """What everything that belongs to a step is stamped with.
 
     In real time that is the moment at which the step began. In simulated time it is the simulation's, and /clock
-    has said it before anything is sent under it; where nothing is sent, /clock need not tell of every step.
+    has said it before anything is sent under it; where nothing is sent, /clock need not tell of every step. What was
+    measured within the step has a stamp of its own: so long before, at the pace of the flight.
     """
 
     def __init__(self, simulation: Simulation, simulated: bool):
@@ -25,24 +35,29 @@ class StepTime:
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if simulated else None
         self._throttle = Throttle(_CLOCK_PERIOD)
         self._began = rospy.Time()
+        self._pace = 0.0  # s of the stamps for a second of simulated time
         self._said = 0.0  # by /clock, s; 0 is no time for ROS
 
     def begin(self) -> None:
         """Say that a step begins."""
         if not self.simulated:
-            self._began = rospy.Time.now()
+            before, self._began = self._began, rospy.Time.now()
+            parameters = self._simulation.parameters
+            # After a late step the next ones come faster: then too no stamp is before those of the step before.
+            elapsed = (self._began - before).to_sec() / parameters.time_step
+            self._pace = min(elapsed, 1 / (parameters.real_time_factor or 1.0))
 
-    def stamp(self) -> rospy.Time:
-        """Return the stamp of what is sent now."""
+    def stamp(self, ago: float = 0.0) -> rospy.Time:
+        """Return the stamp of what is sent now, and was the case `ago` seconds of simulated time before."""
         if self._clock is None:
-            return self._began
+            return self._began - rospy.Duration.from_sec(ago * self._pace) if ago else self._began
         time = self._simulation.time
         stamp = rospy.Time.from_sec(time)
         if time != self._said:
             self._said = time
             if time:
                 self._clock.publish(stamp)
-        return stamp
+        return rospy.Time.from_sec(max(0.0, time - ago)) if ago else stamp
 
     def end(self, at_once: bool = False) -> None:
         """Say that the step has been shown; `at_once`: /clock tells of it in any case."""

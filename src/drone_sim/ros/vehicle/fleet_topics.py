@@ -7,6 +7,7 @@ from collections.abc import Callable
 import rospy
 
 from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.node.step_time import Stamp
 from drone_sim.ros.vehicle.transforms import Transforms
 from drone_sim.ros.vehicle.vehicle_topics import VehicleTopics
 from drone_sim.run.simulation import Simulation
@@ -45,6 +46,11 @@ class FleetTopics:
         """Publish pictures and state of every vehicle, under what `stamp` returns."""
         for topics in self._topics.values():
             topics.publish_state(stamp)
+
+    def publish_readings(self, stamp: Stamp) -> None:
+        """Publish what the sensors of every vehicle read in the step that has just been."""
+        for topics in self._topics.values():
+            topics.publish_readings(stamp, self._simulation.time)
 
     def publish_transforms(self, stamp: Callable[[], rospy.Time]) -> None:
         """Publish what is or becomes transforms: tf2 takes but one for each stamp."""

@@ -20,8 +20,8 @@ _EYES = 1 / 30  # s of real time, between two turns of the blades, which are for
 class Transforms:
     """Broadcasts where the vehicles are, once a step, and where the links of their URDFs sit on them.
 
-    world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says. Those that
-    do not move are told once, by /tf_static.
+    world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says, and sensors
+    on what carries them. What does not move on base_link is told once, by /tf_static.
     """
 
     def __init__(self) -> None:
@@ -33,8 +33,15 @@ class Transforms:
     def tell_fixed(self, vehicles: Iterable[Vehicle]) -> None:
         """Say where the links are that do not move; of vehicles that are new, or no longer there."""
         now = rospy.Time.now()
-        links = [_link(now, one, name) for one in vehicles for name in one.links if name not in one.blade_joints]
-        self._fixed.publish(TFMessage(links))
+        told = []
+        for one in vehicles:
+            told += [_link(now, one, name) for name in one.links if name not in one.blade_joints]
+            own = one.parameters
+            told += [
+                messages.transform(now, own.base_link, f"{own.frame_prefix}{frame}", matrix)
+                for frame, matrix in one.instruments.fixed_frames.items()
+            ]
+        self._fixed.publish(TFMessage(told))
 
     def publish(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
         """Publish all that moves under what `stamp` returns: tf2 takes but one for each stamp."""
@@ -56,6 +63,10 @@ def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
             messages.transform(now, world, f"{prefix}{camera.frame}", vehicle.optical(camera))
             for camera in own.cameras.values()
             if camera.mount is not None  # the URDF does not know them
+        ),
+        *(
+            messages.transform(now, world, f"{prefix}{frame}", pose())
+            for frame, pose in vehicle.instruments.moving_frames.items()
         ),
     ]
 

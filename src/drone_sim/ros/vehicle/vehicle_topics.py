@@ -7,10 +7,12 @@ from collections.abc import Callable
 import rospy
 
 from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.node.step_time import Stamp
 from drone_sim.ros.vehicle.cameras import CameraOutput
 from drone_sim.ros.vehicle.description import set_description
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.ros.vehicle.outputs import VehicleOutputs
+from drone_sim.ros.vehicle.sensors import SensorOutput
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -27,6 +29,9 @@ class VehicleTopics:
             name: CameraOutput(vehicle.parameters, camera, vehicle.parameters.cameras[name])
             for name, camera in vehicle.cameras.items()
         }
+        self._sensors = {
+            name: SensorOutput(vehicle.parameters, sensor) for name, sensor in vehicle.instruments.by_name.items()
+        }
         set_description(vehicle.parameters)
 
     def fits(self, vehicle: Vehicle) -> bool:
@@ -38,6 +43,8 @@ class VehicleTopics:
         self.vehicle = vehicle
         for name, camera in vehicle.cameras.items():
             self._cameras[name].follow(camera)
+        for name, sensor in vehicle.instruments.by_name.items():
+            self._sensors[name].follow(sensor)
 
     def close(self) -> None:
         """Hear and publish no more."""
@@ -45,12 +52,19 @@ class VehicleTopics:
         self._outputs.close()
         for camera in self._cameras.values():
             camera.close()
+        for sensor in self._sensors.values():
+            sensor.close()
 
     def publish_state(self, stamp: Callable[[], rospy.Time]) -> None:
         """Publish pictures and state."""
         for camera in self._cameras.values():
             camera.publish(stamp)
         self._outputs.publish_state(self.vehicle, stamp)
+
+    def publish_readings(self, stamp: Stamp, now: float) -> None:
+        """Publish what the sensors read in a step that ended at `now` (s of simulated time)."""
+        for sensor in self._sensors.values():
+            sensor.publish(stamp, now)
 
     def publish_joints(self, stamp: Callable[[], rospy.Time]) -> None:
         """Publish what becomes transforms elsewhere, too."""

@@ -20,8 +20,19 @@ def _call(function: Callable[[], Any]) -> Any:
     return function()
 
 
+class Readable(Protocol):
+    """A sensor, as the API sees it."""
+
+    def read(self) -> dict[str, Any] | None:
+        """Return its last reading, by field; None before there is one."""
+
+
 class Host(Protocol):
     """The drone, as the API sees it."""
+
+    @property
+    def sensors(self) -> Mapping[str, Readable]:
+        """Its sensors, cameras aside, by the name of their object."""
 
     @property
     def objects(self) -> ObjectTree:

@@ -17,13 +17,15 @@ from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.names import Names
 from drone_sim.scripting.api.objects import Objects
 from drone_sim.scripting.api.scripts import Scripts
+from drone_sim.scripting.api.sensors import Sensors
 from drone_sim.scripting.api.vision import VisionSensors
 
 
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
     """Return `sim` for the script that flies a drone."""
     names = Names(host)
-    parts = (Objects(host), Matrices(), Scripts(host, surroundings, names), VisionSensors(host, surroundings))
+    vision, sensors = VisionSensors(host, surroundings), Sensors(host)
+    parts = (Objects(host), Matrices(), Scripts(host, surroundings, names), vision, sensors)
     others = (names, host.signals, Drawing(host))
     functions = {**public_functions(parts), **{name: f for one in others for name, f in one.functions().items()}}
     return Api("sim", functions, CONSTANTS, names.remember)

@@ -1,0 +1,148 @@
+"""A battery that the propellers drain: sensor_msgs/BatteryState. It does not act on the flight, not even empty.
+
+Momentum theory (Leishman, Principles of Helicopter Aerodynamics, 2006, chapter 2): a hovering propeller of thrust T
+and disk area A needs the power T^1.5 / sqrt(2 ρ A). So, from the power that hovering takes,
+
+    P = idle_power + (hover_power - idle_power) · mean_i (T_i / T_hover)^1.5,   T_hover = weight / propellers
+
+The cells are a source U0 behind a resistance R (the Rint model): with U = U0 - R I and U I = P,
+
+    I = (U0 - sqrt(U0² - 4 R P)) / 2R
+
+U0 falls in a straight line with the charge, from `full` to `empty` volts a cell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Literal, NamedTuple
+
+from drone_sim.config.types import Finite, Fraction, Name, ParameterError, Within
+from drone_sim.sensors.noise import NoiseParameters
+from drone_sim.sensors.parameters import SensorParameters, Topic
+from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output
+
+_DISCHARGING, _GOOD, _DEAD, _LIPO = 2, 1, 3, 3  # sensor_msgs/BatteryState: status, health, health, technology
+_HOUR = 3600.0  # s
+_Volts = Annotated[Finite, Within(0.1, 1e3)]
+_Watts = Annotated[Finite, Within(0, 1e6)]
+
+
+class BatteryParameters(SensorParameters):
+    """Lithium polymer cells in series."""
+
+    kind: Literal["battery"]
+    topic: Topic = "battery"
+    frame: Name = "base_link"
+    cells: Annotated[int, Within(1, 1000)]
+    capacity: Annotated[Finite, Within(1e-3, 1e4)]  # Ah
+    full: _Volts  # V a cell, without load
+    empty: _Volts  # V a cell, without load
+    resistance: Annotated[Finite, Within(0, 1e3)]  # Ω, of all of it
+    hover_power: _Watts
+    idle_power: _Watts
+    charge: Fraction = 1.0  # at the start, of the capacity
+    noise: NoiseParameters = NoiseParameters()  # V
+
+    def make(self, fitting: Fitting) -> Battery:
+        """Return the instrument; `reset` comes before its first look."""
+        return Battery(self, fitting)
+
+    def check(self, sub_step: float) -> None:
+        """Raise ParameterError for periods that sub_step does not divide, or values that contradict each other."""
+        super().check(sub_step)
+        if self.empty > self.full:
+            raise ParameterError(f"empty = {self.empty:g}: must not be more than full = {self.full:g}", ("empty",))
+        if self.idle_power > self.hover_power:
+            limit = f"must not be more than hover_power = {self.hover_power:g}"
+            raise ParameterError(f"idle_power = {self.idle_power:g}: {limit}", ("idle_power",))
+
+
+class BatterySample(NamedTuple):
+    """What a battery monitor shows."""
+
+    voltage: float  # V
+    current: float  # A, out of the battery
+    charge: float  # Ah that are left
+
+
+class Battery(Instrument):
+    """Gives its charge away in every sub-step."""
+
+    parameters: BatteryParameters
+
+    def __init__(self, parameters: BatteryParameters, fitting: Fitting):
+        """Take what it is like."""
+        super().__init__(parameters, fitting)
+        self._noise = self.make_noise(parameters.noise, 1)
+        self._charge = 0.0  # Ah
+        self.outputs = (Output("", "sensor_msgs/BatteryState", self._message),)
+
+    def reset(self) -> None:
+        """Begin anew, as charged as at the start."""
+        super().reset()
+        self._charge = self.parameters.charge * self.parameters.capacity
+
+    def look(self, count: int) -> None:
+        """Drain, then sample if it is time."""
+        used = self._load()[1] * self.fitting.sub_step / _HOUR
+        self._charge = max(0.0, self._charge - used)
+        super().look(count)
+
+    def sample(self) -> BatterySample:
+        """Return voltage, current and charge."""
+        voltage, current = self._load()
+        (measured,) = self._noise.add((voltage,))
+        return BatterySample(measured, current, self._charge)
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back the charge, too."""
+        base, charge = super().remember(), self._charge
+
+        def recall() -> None:
+            base()
+            self._charge = charge
+
+        return recall
+
+    def power(self) -> float:
+        """Return what is drawn now, in W."""
+        own, thrusts = self.parameters, self.carrier.thrusts
+        hover = self.carrier.mass * abs(self.carrier.gravity) / len(thrusts)
+        if not hover:
+            return own.idle_power
+        lift = sum(abs(thrust / hover) ** 1.5 for thrust in thrusts) / len(thrusts)
+        return own.idle_power + (own.hover_power - own.idle_power) * lift
+
+    def _load(self) -> tuple[float, float]:
+        """Return voltage (V) and current (A) under the present load."""
+        own = self.parameters
+        source = own.cells * (own.empty + (own.full - own.empty) * self._charge / own.capacity)
+        if not self._charge:
+            return source, 0.0
+        power = self.power()
+        if not own.resistance:
+            return source, power / source
+        # Beyond U0²/4R it cannot give what is asked for; then it gives the most that it can.
+        root = math.sqrt(max(0.0, source**2 - 4 * own.resistance * power))
+        current = (source - root) / (2 * own.resistance)
+        return source - own.resistance * current, current
+
+    def _message(self, value: BatterySample, header: Mapping[str, Any]) -> Fields:
+        own = self.parameters
+        return {
+            "header": header,
+            "voltage": value.voltage,
+            "temperature": math.nan,
+            "current": -value.current,  # negative when discharging
+            "charge": value.charge,
+            "capacity": own.capacity,
+            "design_capacity": own.capacity,
+            "percentage": value.charge / own.capacity,
+            "power_supply_status": _DISCHARGING,
+            "power_supply_health": _GOOD if value.charge else _DEAD,
+            "power_supply_technology": _LIPO,
+            "present": True,
+            "cell_voltage": [value.voltage / own.cells] * own.cells,
+        }

@@ -1,0 +1,99 @@
+"""What sets a measurement apart from the truth: white noise, a bias that wanders, steps of a scale.
+
+    measured = truth + b + n, rounded to whole steps of the quantisation
+    n: white; of standard deviation sqrt(deviation² + density² · rate) in every sample
+    b: starts as N(0, bias²), then  db/dt = -b / bias_time + bias_walk · w,  w white of unit density
+
+The model, its words and its units are those of Kalibr and RotorS (Furrer et al. 2016, Robot Operating System: The
+Complete Reference 1, p. 595-625), after IEEE Std 952-1997, annex C: with bias_time 0 the bias is a random walk (rate
+random walk); with any other it is a first-order Gauss-Markov process, exact from sample to sample:
+
+    b' = φ b + sqrt(bias_walk² · bias_time / 2 · (1 - φ²)) N(0, 1),  φ = exp(-Δt / bias_time)
+
+The Allan deviation over τ is density / sqrt(τ) of the white part, and bias_walk · sqrt(τ / 3) of a random walk.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Annotated
+
+from numpy.random import Generator
+
+from drone_sim.config.types import Checked, Finite, Within
+
+_Amount = Annotated[Finite, Within(0, 1e6)]  # in the unit of what is measured; any of them left out is 0
+
+
+class NoiseParameters(Checked):
+    """What is wrong with every axis of a measurement in some unit u; what is left out is 0."""
+
+    deviation: _Amount = 0.0  # u, standard deviation of a sample
+    density: _Amount = 0.0  # u/√Hz, the same in proportion to the square root of the rate
+    bias: _Amount = 0.0  # u, standard deviation of the bias at the start
+    bias_walk: _Amount = 0.0  # u/s/√Hz
+    bias_time: Annotated[Finite, Within(1e-3, 1e9, or_zero=True)] = 0.0  # s, in which the bias forgets; 0: never
+    quantisation: _Amount = 0.0  # u, of a step
+    variance: Annotated[Finite, Within(0, 1e12)] | None = None  # u², what messages say; what the others come to if none
+
+
+class Noise:
+    """The noise of one measurement of some axes, which are independent of each other."""
+
+    def __init__(self, parameters: NoiseParameters, axes: int, interval: float):
+        """Take what it is like, for samples `interval` seconds apart; `restart` comes before the first."""
+        own = self._parameters = parameters
+        self._axes = axes
+        self._white = math.sqrt(own.deviation**2 + own.density**2 / interval)
+        if own.bias_time:
+            self._keep = math.exp(-interval / own.bias_time)
+            self._walk = own.bias_walk * math.sqrt(own.bias_time / 2 * (1 - self._keep**2))
+        else:
+            self._keep, self._walk = 1.0, own.bias_walk * math.sqrt(interval)
+        self._random: Generator | None = None
+        self._bias = [0.0] * axes
+
+    @property
+    def variance(self) -> float:
+        """Variance of a sample's error, as messages are to say: as configured, or what the noise comes to.
+
+        A random walk, whose variance has no end, counts for nothing in it. 0 where there is no noise at all.
+        """
+        own = self._parameters
+        if own.variance is not None:
+            return own.variance
+        wandering = own.bias_walk**2 * own.bias_time / 2  # of the Gauss-Markov process, in the long run
+        return self._white**2 + own.bias**2 + wandering + own.quantisation**2 / 12
+
+    def restart(self, random: Generator) -> None:
+        """Begin anew, drawing from `random`."""
+        self._random = random
+        spread = self._parameters.bias
+        self._bias = (
+            [spread * one for one in random.standard_normal(self._axes).tolist()] if spread else [0.0] * self._axes
+        )
+
+    def add(self, truth: Sequence[float]) -> list[float]:
+        """Return the next sample of a truth, one number for each axis."""
+        if self._random is None:
+            raise RuntimeError("noise that has not been started")
+        # Lists of floats: of so few axes numpy takes longer for a sum than Python does.
+        measured = [true + bias for true, bias in zip(truth, self._bias)]
+        if self._white:
+            white, drawn = self._white, self._random.standard_normal(self._axes).tolist()
+            measured = [one + white * by for one, by in zip(measured, drawn)]
+        if self._walk or self._keep != 1.0:
+            keep, walk, drawn = self._keep, self._walk, self._random.standard_normal(self._axes).tolist()
+            self._bias = [keep * one + walk * by for one, by in zip(self._bias, drawn)]
+        step = self._parameters.quantisation
+        return [round(one / step) * step for one in measured] if step else measured
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings the present bias back; the random generator is the sensor's to restore."""
+        bias = self._bias  # never changed, only replaced
+
+        def recall() -> None:
+            self._bias = bias
+
+        return recall

@@ -1,0 +1,72 @@
+"""What sensors ask of PyBullet: what a ray meets, and what touches a body. Metres, newtons, world frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import dist
+from typing import Any, NamedTuple
+
+import pybullet
+
+from drone_sim.mechanics.frames import Vector
+
+_NOTHING = -1  # as the body of a ray that meets none
+
+
+class RayHit(NamedTuple):
+    """What a ray met: the body, how far from its start (m), the unit normal of the surface."""
+
+    body: int
+    distance: float
+    normal: Vector
+
+
+class Touch(NamedTuple):
+    """One contact of the last sub-step: the other body, where (m), its unit normal, the force (N) that it exerts."""
+
+    body: int
+    point: Vector
+    normal: Vector
+    force: Vector  # on the body that was asked about, friction included
+
+
+def ray(client: int, start: Vector, end: Vector, ignoring: int) -> RayHit | None:
+    """Return the nearest body but one (-1 ignores none) between two points; None where there is none."""
+    hit = pybullet.rayTest(start, end, physicsClientId=client)[0]
+    if hit[0] == _NOTHING:
+        return None
+    if hit[0] == ignoring:
+        others = [one for one in _all_hits(client, start, end) if one[0] != ignoring]
+        if not others:
+            return None
+        hit = min(others, key=lambda one: one[2])  # PyBullet numbers them in no order
+    body, _, fraction, _, normal = hit
+    return RayHit(body, fraction * dist(start, end), normal)
+
+
+def _all_hits(client: int, start: Vector, end: Vector) -> Iterator[Any]:
+    number = 0
+    while True:
+        hit = pybullet.rayTestBatch([start], [end], reportHitNumber=number, physicsClientId=client)[0]
+        if hit[0] == _NOTHING:
+            return
+        yield hit
+        number += 1
+
+
+def contacts(client: int, body: int) -> list[Touch]:
+    """Return where a body was pushed by others in the last sub-step."""
+    found = pybullet.getContactPoints(bodyA=body, physicsClientId=client)
+    if not found:
+        return []
+    # Asked for a body, PyBullet turns the contacts round in which it is the second one: names, places and normal, but
+    # not the friction. Those come once more where it is asked for as the second.
+    turned = {row[1] for row in pybullet.getContactPoints(bodyB=body, physicsClientId=client)}
+    return [_touch(row, -1.0 if row[2] in turned else 1.0) for row in found if row[9] > 0.0]
+
+
+def _touch(row: Any, sense: float) -> Touch:
+    other, point, normal = row[2], row[5], row[7]
+    push, first, along, second, across = row[9], row[10] * sense, row[11], row[12] * sense, row[13]
+    x, y, z = (n * push + a * first + b * second for n, a, b in zip(normal, along, across))
+    return Touch(other, point, normal, (x, y, z))

@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+"""Every sensor as ROS sees it: types, stamps, frames, and nothing twice."""
+
+import itertools
+import math
+import sys
+import threading
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import PointStamped, PoseStamped, WrenchStamped
+from listening import Listener, connected
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import BatteryState, FluidPressure, Imu, MagneticField, NavSatFix, Range
+from std_srvs.srv import SetBool, Trigger
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
+
+from drone_sim.files.resources import package_path
+from drone_sim.ros.node.node import Node
+from drone_sim.run import parameters
+
+SMALL = {name: {"width": 64, "height": 48} for name in ("front", "depth", "track", "floor")}
+TOPICS = {  # type, Hz, frame
+    "imu/data": (Imu, 200, "imu_link"),
+    "imu/data_raw": (Imu, 200, "imu_link"),
+    "magnetic_field": (MagneticField, 50, "imu_link"),
+    "pressure": (FluidPressure, 50, "imu_link"),
+    "pressure/height": (PointStamped, 50, "world"),
+    "range": (Range, 20, "range_link"),
+    "fix": (NavSatFix, 5, "gps_link"),
+    "contacts/wrench": (WrenchStamped, 20, "base_link"),
+    "battery": (BatteryState, 10, "base_link"),
+}
+
+
+class Sensors(unittest.TestCase):
+    """A node that runs in this process."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.thread = threading.Thread(target=cls.run_node)
+        cls.thread.start()
+        cls.fixed = Listener("/tf_static", TFMessage)
+        cls.listeners = {topic: Listener(f"/drone/{topic}", kind) for topic, (kind, _, _) in TOPICS.items()}
+        cls.contacts, cls.odometry = Listener("/drone/contacts", MarkerArray), Listener("/drone/odom", Odometry)
+        for listener in (cls.fixed, cls.contacts, cls.odometry, *cls.listeners.values()):
+            listener.wait_for()
+        cls.poses = connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=1))
+
+    @classmethod
+    def tearDownClass(cls):
+        rospy.signal_shutdown("done")
+        cls.thread.join()
+
+    @classmethod
+    def run_node(cls):
+        """Make and run it in one thread."""
+        file = str(package_path() / "config" / "sensors.yaml")
+        cls.node = Node(parameters.load({"config": file, "cameras": SMALL, "real_time_factor": 5.0}))
+        cls.node.run()
+        cls.node.close()
+
+    def setUp(self):
+        self.assertTrue(rospy.ServiceProxy("~restart", Trigger)().success)
+        self.odometry.wait_for(lambda o: 0 < o.header.stamp.to_sec() < 1)
+
+    def pause(self, on):
+        self.assertTrue(rospy.ServiceProxy("~pause", SetBool)(on).success)
+
+    def test_rates_and_frames(self):
+        for topic, (_, rate, frame) in TOPICS.items():
+            listener = self.listeners[topic]
+            start = len(listener.messages)
+            listener.wait_for(lambda m, start=start, listener=listener: len(listener.messages) > start + 10)
+            headers = [message.header for message in listener.messages[start : start + 10]]
+            gaps = {round((b.stamp - a.stamp).to_sec() * rate, 6) for a, b in itertools.pairwise(headers)}
+            self.assertEqual(gaps, {1.0}, topic)
+            self.assertEqual({header.frame_id for header in headers}, {frame}, topic)
+
+    def test_their_frames_are_told(self):
+        told = self.fixed.wait_for(after=0)
+        sensors = {one.child_frame_id: one for one in told.transforms if one.child_frame_id.endswith("_link")}
+        self.assertLessEqual({"imu_link", "range_link", "gps_link"}, set(sensors))
+        self.assertEqual(
+            {sensors[name].header.frame_id for name in ("imu_link", "range_link", "gps_link")}, {"base_link"}
+        )
+        turn = sensors["range_link"].transform.rotation
+        self.assertAlmostEqual(turn.y, math.sqrt(0.5))  # x points down
+
+    def test_what_they_say(self):
+        data, raw = (self.listeners[f"imu/{name}"].wait_for() for name in ("data", "data_raw"))
+        self.assertEqual(raw.orientation_covariance[0], -1)
+        self.assertGreater(data.orientation_covariance[0], 0)
+        self.assertLess(abs(data.linear_acceleration.z - 9.81), 3)
+        self.assertLess(abs(self.listeners["fix"].wait_for().latitude - 47.397742), 1e-4)
+        self.assertLess(abs(self.listeners["range"].wait_for().range - 0.8), 0.1)
+        self.assertLess(abs(self.listeners["pressure"].wait_for().fluid_pressure - 95589), 300)
+        self.assertLess(self.listeners["battery"].wait_for().current, -1)
+        self.assertLess(self.listeners["magnetic_field"].wait_for().magnetic_field.z, -4e-5)
+
+    def test_contacts_when_it_is_on_the_floor(self):
+        message = PoseStamped()
+        message.header.frame_id = "world"
+        message.pose.position.z, message.pose.orientation.w = 0.0, 1.0
+        self.poses.publish(message)
+        touched = self.contacts.wait_for(lambda array: array.markers)
+        self.assertEqual({marker.ns for marker in touched.markers}, {"Floor"})
+        self.assertEqual({marker.header.frame_id for marker in touched.markers}, {"world"})
+
+    def test_while_it_is_paused_nothing_comes_twice(self):
+        raw = self.listeners["imu/data_raw"]
+        self.pause(True)
+        self.odometry.wait_for(lambda o: True, after=0)
+        rospy.ServiceProxy("~step", Trigger)()
+        stamps = []
+        for _ in range(3):
+            start = len(raw.messages)
+            rospy.ServiceProxy("~step", Trigger)()
+            raw.wait_for(lambda m, start=start: len(raw.messages) >= start + 10, after=0)
+            stamps.append([message.header.stamp for message in raw.messages[start:]])
+        self.pause(False)
+        self.assertEqual([len(one) for one in stamps], [10, 10, 10])
+        self.assertEqual(len({stamp for one in stamps for stamp in one}), 30)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_sensors", disable_rostime=True)
+    sys.exit(rostest.rosrun("drone_sim", "sensors", Sensors))

@@ -1,0 +1,169 @@
+"""Noise: Allan deviations and variances against closed forms; seeds, latency, snapshots."""
+
+import math
+
+import numpy as np
+import pytest
+from carried import Carried
+
+from drone_sim.sensors.magnetic_field import MagneticFieldParameters
+from drone_sim.sensors.noise import Noise, NoiseParameters
+
+HOUR = 72_000  # samples
+INTERVAL = 0.05  # s: an hour of them
+AXES = 16  # at once, to average over
+
+
+def record(samples=HOUR, axes=AXES, truth=0.0, **parameters):
+    noise = Noise(NoiseParameters(**parameters), axes, INTERVAL)
+    noise.restart(np.random.default_rng(7))
+    given = [truth] * axes
+    return np.array([noise.add(given) for _ in range(samples)])
+
+
+def allan_deviation(samples, tau):
+    """Return the overlapping Allan deviation over tau (s), averaged over the axes (IEEE Std 952-1997, annex C)."""
+    size = round(tau / INTERVAL)
+    sums = np.cumsum(np.insert(samples, 0, 0.0, axis=0), axis=0)
+    means = (sums[size:] - sums[:-size]) / size
+    return math.sqrt(np.mean((means[size:] - means[:-size]) ** 2) / 2)
+
+
+@pytest.fixture(name="white", scope="module")
+def _white():
+    return record(density=0.02)
+
+
+@pytest.mark.parametrize("tau", [0.1, 1.0, 10.0, 100.0])
+def test_white_noise_has_the_allan_deviation_of_its_density(white, tau):
+    assert allan_deviation(white, tau) == pytest.approx(0.02 / math.sqrt(tau), rel=0.1)
+
+
+def test_a_sample_s_deviation_is_the_density_by_the_root_of_the_rate(white):
+    assert white.std() == pytest.approx(0.02 / math.sqrt(INTERVAL), rel=0.01)
+
+
+@pytest.mark.parametrize("tau", [1.0, 10.0, 100.0])
+def test_a_bias_that_walks_has_the_allan_deviation_of_a_random_walk(tau):
+    walk = record(HOUR // 2, 48, bias_walk=0.003)
+    assert allan_deviation(walk, tau) == pytest.approx(0.003 * math.sqrt(tau / 3), rel=0.1)
+
+
+def test_both_together_cross_where_they_must():
+    both = record(density=0.02, bias_walk=0.003)
+    for tau in (1.0, 11.5, 100.0):
+        expected = math.hypot(0.02 / math.sqrt(tau), 0.003 * math.sqrt(tau / 3))
+        assert allan_deviation(both, tau) == pytest.approx(expected, rel=0.1)
+
+
+def test_a_bias_that_forgets_has_the_variance_and_the_correlation_of_gauss_markov():
+    bias = record(bias_walk=0.1, bias_time=2.0)[HOUR // 10 :]
+    assert bias.var() == pytest.approx(0.1**2 * 2.0 / 2, rel=0.05)
+    lag = round(2.0 / INTERVAL)
+    assert np.mean(bias[lag:] * bias[:-lag]) / bias.var() == pytest.approx(math.exp(-1), abs=0.03)
+
+
+def test_the_bias_at_the_start_stays():
+    samples = record(10, 2000, bias=0.5)
+    assert samples[0].std() == pytest.approx(0.5, rel=0.05)
+    assert (samples == samples[0]).all()
+
+
+def test_quantisation_rounds_to_whole_steps():
+    samples = record(1000, 1, truth=0.3, deviation=1.0, quantisation=0.25)
+    assert (samples / 0.25 == np.round(samples / 0.25)).all()
+    assert record(1, 3, truth=0.3, quantisation=0.25).tolist() == [[0.25] * 3]
+
+
+def test_what_is_left_out_is_no_noise():
+    assert record(3, 2, truth=0.1).tolist() == [[0.1, 0.1]] * 3
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"deviation": 0.3},
+        {"density": 0.2, "deviation": 0.1},
+        {"bias": 0.7, "deviation": 0.1},
+        {"bias_walk": 0.4, "bias_time": 0.5},
+        {"quantisation": 1.0, "deviation": 2.0},
+    ],
+)
+def test_the_variance_that_messages_tell_is_that_of_the_samples(parameters):
+    samples = record(300, 2000, truth=0.37, **parameters)[50:]
+    told = Noise(NoiseParameters(**parameters), 1, INTERVAL).variance
+    assert np.mean((samples - 0.37) ** 2) == pytest.approx(told, rel=0.06)
+
+
+def test_a_variance_that_is_configured_is_told():
+    assert Noise(NoiseParameters(deviation=1.0, variance=4.0), 1, INTERVAL).variance == 4.0
+    assert Noise(NoiseParameters(), 1, INTERVAL).variance == 0.0
+
+
+# ---- of a sensor
+
+COMPASS = {"kind": "magnetic_field", "rate": 100, "noise": {"deviation": 1.0, "bias": 1.0, "bias_walk": 1.0}}
+
+
+def readings(steps=20, name="drone/compass", **parameters):
+    body = Carried()
+    sensor = body.fit(MagneticFieldParameters(**{**COMPASS, **parameters}), name=name)
+    for _ in range(steps):
+        body.look()
+    return [reading.value for reading in sensor.readings]
+
+
+def test_the_noise_is_of_seed_vehicle_and_sensor():
+    first = readings()
+    assert len(first) == 10
+    assert readings() == first
+    others = [readings(seed=1), readings(name="drone2/compass"), readings(name="drone/other")]
+    everything = [first, *others]
+    assert len({str(one) for one in everything}) == 4
+    steps = [np.subtract(one, first).std() for one in others]
+    assert min(steps) > 0.5
+
+
+def test_a_reset_begins_the_same_noise_again():
+    body = Carried()
+    sensor = body.fit(MagneticFieldParameters(**COMPASS))
+    body.look()
+    body.look()
+    first = body.values(sensor)
+    body.look()
+    sensor.reset()
+    body.count = 0
+    body.look()
+    assert sensor.readings == [] and sensor.latest is None
+    body.look()
+    assert body.values(sensor) == first
+
+
+def test_latency_delays_a_reading_and_not_its_stamp():
+    body = Carried()
+    sensor = body.fit(MagneticFieldParameters(kind="magnetic_field", rate=100, latency=0.035))
+    came = []
+    for _ in range(20):
+        body.look()
+        came += [(body.count, reading.at) for reading in sensor.readings]
+        sensor.readings.clear()
+    assert came == [(at + 7, at) for at in (2, 4, 6, 8, 10, 12)]
+    assert sensor.header(sensor.latest)["stamp"] == pytest.approx(12 * 0.005)
+
+
+def test_a_snapshot_brings_back_noise_and_what_is_on_its_way():
+    body = Carried()
+    sensor = body.fit(MagneticFieldParameters(**COMPASS, latency=0.05))
+
+    def fly():
+        for _ in range(40):
+            body.look()
+        return list(sensor.readings), sensor.latest
+
+    fly()
+    recall, count = sensor.remember(), body.count
+    first = fly()
+    for _ in range(2):
+        recall()
+        body.count = count
+        assert fly() == first

@@ -1,0 +1,120 @@
+"""What `sensors:` may say, and the one line that a mistake gets."""
+
+import pytest
+
+from drone_sim.files.resources import package_path
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+ALL = str(package_path() / "config" / "sensors.yaml")
+IMU = {"kind": "imu", "rate": 200}
+RANGE = {"kind": "range", "rate": 20, "min_range": 0.1, "max_range": 4.0}
+BATTERY = {
+    **{"kind": "battery", "rate": 10, "cells": 3, "capacity": 1.0, "full": 4.2, "empty": 3.3, "resistance": 0.1},
+    **{"hover_power": 60.0, "idle_power": 6.0},
+}
+DOWN = {"position": [0, 0, -0.1], "rpy": [0, 1.5708, 0]}
+
+
+def refused(overrides):
+    with pytest.raises(parameters.ParameterError) as error:
+        Simulation(parameters.load(overrides)).close()
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    "sensors, words",
+    [
+        ({"imu": 3}, "sensors/imu = 3: must hold `key: value` lines, of which one is `kind`"),
+        ({"imu": {"rate": 200}}, "sensors/imu/kind: missing; must be one of 'imu', 'range', 'magnetic_field'"),
+        ({"imu": {"kind": "lidar"}}, "sensors/imu/kind = 'lidar': must be one of 'imu', 'range'"),
+        ({"imu": {**IMU, "rat": 1}}, "sensors/imu/rat: unknown key; known are rate"),
+        ({"imu": {"kind": "imu"}}, "sensors/imu/rate: missing"),
+        (
+            {"imu": {**IMU, "rate": 150}},
+            "sensors/imu/rate = 150: its period must be a whole multiple of sub_step = 0.005",
+        ),
+        ({"imu": {**IMU, "rate": 150}}, "200 Hz is near"),
+        ({"imu": {**IMU, "rate": 1000}}, "sensors/imu/rate = 1000: its period must be"),
+        ({"imu": {**IMU, "rate": 0}}, "sensors/imu/rate = 0: input should be greater"),
+        ({"imu": {**IMU, "latency": 0.007}}, "sensors/imu/latency = 0.007: must be a whole multiple of sub_step"),
+        ({"imu": {**IMU, "noise": {"angular_velocity": {"density": -1}}}}, "noise/angular_velocity/density = -1"),
+        ({"imu": {**IMU, "noise": {"gyro": {}}}}, "sensors/imu/noise/gyro: unknown key; known are"),
+        ({"imu": {**IMU, "seed": -1}}, "sensors/imu/seed = -1"),
+        ({"imu": {**IMU, "mount": {"rpy": [0, 0]}}}, "sensors/imu/mount/rpy = [0, 0]: must be 3 numbers"),
+        ({"imu": {**IMU, "topic": "odom/"}}, "sensors/imu/topic = 'odom/': must be like rear/image"),
+        (
+            {"range": {**RANGE, "topic": "odom"}},
+            "sensors/range/topic = 'odom': its range would be odom, which is the drone's",
+        ),
+        (
+            {"range": {**RANGE, "topic": "imu/data"}, "imu": IMU},
+            "sensors/imu/topic = 'imu': its data would be imu/data",
+        ),
+        ({"range": {**RANGE, "topic": "front"}}, "which is the image of cameras/front"),
+        ({"a": IMU, "b": {**IMU, "topic": "b", "object": "a"}}, "sensors/b/object = 'a': is that of sensors/a too"),
+        ({"a": {**IMU, "object": "FrontVision"}}, "sensors/a/object = 'FrontVision': is that of cameras/front too"),
+        ({"range": {**RANGE, "min_range": 4.0}}, "sensors/range/min_range = 4: must be less than max_range = 4"),
+        ({"range": {**RANGE, "radiation": "sound"}}, "radiation = 'sound': input should be 'ultrasound' or 'infrared'"),
+        ({"battery": {**BATTERY, "empty": 5.0}}, "sensors/battery/empty = 5: must not be more than full = 4.2"),
+        (
+            {"battery": {**BATTERY, "idle_power": 99}},
+            "sensors/battery/idle_power = 99: must not be more than hover_power",
+        ),
+        ({"battery": {"kind": "battery", "rate": 10}}, "sensors/battery: cells, capacity, full, empty, resistance"),
+        ({"a": IMU, "b": {**IMU, "topic": "b", "mount": DOWN}}, "sensors/b/frame = 'imu_link': is that of sensors/a"),
+        ({"a": {**IMU, "frame": "Track_base"}}, "sensors/a/frame = 'Track_base': is that of the vehicle"),
+        ({"a": {**IMU, "frame": "track_optical"}}, "sensors/a/frame = 'track_optical': is that of cameras/track"),
+        ({f"s{number}": {} for number in range(70)}, "parameter sensors"),
+        ({"a": {**IMU, "frame": "base_link", "mount": DOWN}}, "sensor a: the URDF says where base_link is"),
+        ({"a": {**IMU, "mount": {**DOWN, "parent": "Nobody"}}}, "sensor a: no object is named Nobody"),
+        ({"Drone": IMU}, "sensor Drone: an object named 'Drone' is there already"),
+    ],
+)
+def test_a_mistake_gets_one_line(sensors, words):
+    assert words in refused({"sensors": sensors})
+
+
+def test_a_mistake_has_the_line_of_its_file(tmp_path):
+    file = tmp_path / "my.yaml"
+    file.write_text("sensors:\n  imu:\n    kind: imu\n    rate: 150\n")
+    assert refused({"config": str(file)}).startswith(f"{file}: line 4: parameter sensors/imu/rate = 150")
+    file.write_text("sensors:\n  imu:\n    kind: imu\n    rate: 100\n    noise: {angular_velocity: {densty: 1}}\n")
+    assert f"{file}: line 5: parameter sensors/imu/noise/angular_velocity/densty: unknown key" in refused(
+        {"config": str(file)}
+    )
+
+
+def test_a_mistake_of_one_vehicle_names_it():
+    fleet = {"drone1": {}, "drone2": {"sensors": {"imu": {"rate": 150}}}}
+    assert "vehicles/drone2/sensors/imu/rate = 150" in refused({"sensors": {"imu": IMU}, "vehicles": fleet})
+
+
+def test_there_are_none_unless_somebody_wants_them():
+    assert parameters.load().sensors == {}
+
+
+def test_the_file_with_all_of_them_is_good():
+    read = parameters.load({"config": ALL})
+    assert {one.kind for one in read.sensors.values()} == {
+        *("imu", "range", "magnetic_field", "pressure", "fix", "contacts", "battery")
+    }
+    assert [*read.sensors] == [*read.fleet[0].sensors]
+
+
+@pytest.mark.parametrize("datum", [{"latitude": 91}, {"longitude": 200}, {"altitude": 1e5}, {"height": 3}])
+def test_a_datum_that_is_nowhere(datum):
+    assert f"scene/datum/{next(iter(datum))}" in refused({"scene": {"datum": datum}})
+
+
+def test_a_scene_file_has_its_datum_and_its_field(tmp_path):
+    file = tmp_path / "scene.yaml"
+    file.write_text("datum: {latitude: -33.5, altitude: 10}\nmagnetic_field: [0, 2.4e-5, 5.1e-5]\n")
+    read = parameters.load({"scene_file": str(file)}).scene
+    assert (read.datum.latitude, read.datum.longitude, read.datum.altitude) == (-33.5, 8.545594, 10.0)
+    assert read.magnetic_field == (0.0, 2.4e-5, 5.1e-5)
+    simulation = Simulation(parameters.load({"scene_file": str(file)}))
+    simulation.save_scene(tmp_path / "saved.yaml")
+    simulation.close()
+    assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.datum == read.datum
