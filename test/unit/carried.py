@@ -83,6 +83,7 @@ class Flown(Carried):
 
     def __init__(self, pose=ABOVE, gravity=GRAVITY, floor=True):
         self.world = World(SUB_STEP, gravity)
+        self.world.solve_contacts_for_instruments()
         self.floor = self.world.add_floor(20.0, FLOOR) if floor else -1
         self.body = self.world.add_rigid_body(BODY, pose)
         self.names = {self.floor: "Floor"}

@@ -197,6 +197,16 @@ def test_a_new_one_whose_script_fails_goes_again(fly, tmp_path):
     simulation.step()
 
 
+def test_one_that_cannot_be_built_leaves_nothing(fly):
+    simulation = fly(vehicles=1)
+    names, bodies = set(simulation.drone.objects.names), len(simulation.world.visuals())
+    wrong = {"guest": {"cameras": {"front": {"frame": "nowhere"}}, "position": [2, 0, 1]}}
+    with pytest.raises(parameters.ParameterError, match="nowhere"):
+        simulation.set_vehicles({"drone1": {}, **wrong})
+    assert set(simulation.drone.objects.names) == names and len(simulation.world.visuals()) == bodies
+    simulation.step()
+
+
 def test_start_brings_back_those_that_were_set(fly):
     simulation = fly(vehicles=2)
     simulation.set_vehicles({"drone1": {"position": [1, 1, 1]}})

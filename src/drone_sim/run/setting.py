@@ -61,6 +61,8 @@ class Setting:
     def _put(self, parameters: VehicleParameters) -> Vehicle:
         vehicle = Vehicle(parameters, self._free_suffix(), self.shared)
         self.vehicles[vehicle.name] = vehicle
+        if vehicle.instruments:
+            self.world.solve_contacts_for_instruments()
         return vehicle
 
     def _free_suffix(self) -> str:

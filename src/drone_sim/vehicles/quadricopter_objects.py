@@ -48,11 +48,11 @@ def joint(number: int) -> str:
 class QuadricopterObjects:
     """Puts the objects of one vehicle into the tree, all under names with its suffix."""
 
-    def __init__(self, objects: ObjectTree, suffix: str):
-        """Take the tree, and '' or '#0' and so on."""
+    def __init__(self, objects: ObjectTree, suffix: str, handles: list[int]):
+        """Take the tree, '' or '#0' and so on, and the list to which every object's handle is added."""
         self._objects = objects
         self._suffix = suffix
-        self._handles: list[int] = []
+        self._handles = handles
 
     def add(
         self,
@@ -61,8 +61,8 @@ class QuadricopterObjects:
         propellers: Sequence[Matrix],
         cameras: Mapping[str, CameraParameters],
         sensors: Mapping[str, SensorParameters],
-    ) -> list[int]:
-        """Return the handles of all; `links` and `propellers` are poses in the root link's frame.
+    ) -> None:
+        """Add all; `links` and `propellers` are poses in the root link's frame.
 
         Raises ParameterError for a camera or sensor that cannot be where it is said to be.
         """
@@ -83,7 +83,6 @@ class QuadricopterObjects:
             self._add_camera(links, camera)
         for name, sensor in sensors.items():
             self._add_sensor(links, name, sensor)
-        return self._handles
 
     def _add(
         self,

@@ -77,11 +77,16 @@ class Vehicle:
         }
         self.script: load.Script = load.NoScript()
         self._tree: ObjectTree | None = None  # the one that its objects are in
+        self._handles: list[int] = []  # of its objects
         self.cameras = {name: self._camera(one) for name, one in parameters.cameras.items()}
         shared.names[self.body.number] = (parameters.name, self.own_script)
         carrying = Carrying(self.body, lambda: self._propellers.thrusts, shared)
-        self.instruments = Instruments(parameters, suffix, self.body, carrying, shared)
-        self.reset()
+        try:
+            self.instruments = Instruments(parameters, suffix, self.body, carrying, shared)
+            self.reset()
+        except BaseException:
+            self.leave()
+            raise
 
     def _camera(self, parameters: CameraParameters) -> Camera:
         size = (parameters.width, parameters.height)
@@ -106,9 +111,10 @@ class Vehicle:
         self.turned = False  # by its script, since the blades were shown
         self._leave_tree()
         self._tree = self.objects
-        objects = QuadricopterObjects(self._tree, self.suffix)
+        self._handles = []
+        objects = QuadricopterObjects(self._tree, self.suffix, self._handles)
         own, links = self.parameters, self.body.rigid.links
-        self._handles = objects.add(self.body, links, self._rotors.links, own.cameras, own.sensors)
+        objects.add(self.body, links, self._rotors.links, own.cameras, own.sensors)
         self._track = self.objects[self.objects.handle(TRACK_BASE + self.suffix)]
         self.script_parameters = self._script_parameters()
         self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in _NUMBERS]
@@ -285,8 +291,8 @@ class Vehicle:
         """Go out of the world, without a word to the script."""
         self.close()
         self._leave_tree()
+        self._shared.names.pop(self.body.number, None)
         self._shared.world.remove(self.body.number)
-        del self._shared.names[self.body.number]
 
     def close(self) -> None:
         """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""

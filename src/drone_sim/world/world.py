@@ -25,7 +25,7 @@ from drone_sim.world.pictures import Pictures
 _changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
 # (N s)², the square of the last change of an impulse after which Bullet holds the contacts for solved. With PyBullet's
-# 1e-7 what lies still rattles at some 1e-3 m/s²; this is less than 1e-6 m/s² of a drone, and costs nothing in flight.
+# 1e-7 what lies still rattles at some 1e-3 m/s², which only an accelerometer feels; this is less than 1e-6 m/s².
 _SOLVED = 1e-18
 
 
@@ -57,7 +57,6 @@ class World:
         pybullet.resetSimulation(physicsClientId=self._client)  # its first argument is another
         pybullet.setGravity(0, 0, self._gravity, self._client)
         pybullet.setTimeStep(self._sub_step, self._client)
-        pybullet.setPhysicsEngineParameter(solverResidualThreshold=_SOLVED, physicsClientId=self._client)
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: dict[int, tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
         self._beginning: dict[int, tuple[Vector, Quaternion, list[float]]] = {}
@@ -173,6 +172,13 @@ class World:
         self._inertial_frames[number] = (inertial, backwards)
 
     # ---- dynamics
+
+    def solve_contacts_for_instruments(self) -> None:
+        """Solve contacts so far that what lies still does so for an accelerometer, too.
+
+        It costs nothing in flight; what touches something goes another way in its last bits.
+        """
+        pybullet.setPhysicsEngineParameter(solverResidualThreshold=_SOLVED, physicsClientId=self._client)
 
     def inertial_frame(self, body: int) -> Matrix:
         """Return the transform root link from inertial frame (centre of mass, principal axes)."""
