@@ -88,8 +88,9 @@ def sysCall_sensing():
     roll_target = target_angle(twist[1], d_local_pos[1])
     self.roll_corr = self.Pangle * (roll_target - roll) - self.Dangle * droll
 
-    data, w, h = sim.getVisionSensorCharImage(self.frontImage)
-    simROS.imageTransportPublish(self.image_publisher, data, w, h, "front_optical")
+    if simROS.getNumSubscribers(self.image_publisher):  # a picture that nobody gets is not drawn
+        data, w, h = sim.getVisionSensorCharImage(self.frontImage)
+        simROS.imageTransportPublish(self.image_publisher, data, w, h, "front_optical")
 
 
 def target_angle(command, speed):

@@ -30,5 +30,8 @@ class _Topic:
     def publish(self, message):
         self._published.append(Published(self._topic, self._kind, message))
 
+    def subscribers(self):
+        return 1
+
     def shutdown(self):
         pass

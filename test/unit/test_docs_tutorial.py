@@ -154,6 +154,12 @@ def test_the_camera_stage_publishes_every_step_s_picture():
     assert seen.reshape(-1, 3).std(axis=0).min() > 10  # there is something to see
 
 
+def test_the_camera_stage_draws_no_picture_that_nobody_gets(monkeypatch):
+    with flying("7_camera") as simulation:
+        monkeypatch.setattr(simulation.vision, "picture", lambda *_: pytest.fail("a picture was drawn"))
+        fly(simulation, 0.15)
+
+
 # ---- the text
 
 

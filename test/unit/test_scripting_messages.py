@@ -79,12 +79,14 @@ def test_what_is_published(backend):
         ("/drone/said", "std_msgs/String", {"data": "x"}),
         ("/drone/front", "sensor_msgs/Image", Image(bytes([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5]), 2, 2, "here")),
     ]
+    assert [bus.getNumSubscribers(one) for one in (handle, image)] == ([0, 0] if backend is None else [1, 1])
     with pytest.raises(ValueError, match="an image of 2 x 2 has 12 bytes, not 3"):
         bus.imageTransportPublish(image, b"abc", 2, 2, "here")
     bus.shutdownPublisher(handle)
     bus.imageTransportShutdownPublisher(image)
-    with pytest.raises(ValueError, match="no publisher has the handle"):
-        bus.publish(handle, {})
+    for call in (lambda: bus.publish(handle, {}), lambda: bus.getNumSubscribers(handle)):
+        with pytest.raises(ValueError, match="no publisher has the handle"):
+            call()
 
 
 def test_a_backend_carries_messages():

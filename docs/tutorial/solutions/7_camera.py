@@ -90,7 +90,7 @@ def sysCall_sensing():
     self.roll_corr = self.Pangle * (roll_target - roll) - self.Dangle * droll
 
     self.steps += 1
-    if self.steps % 4 == 0:
+    if self.steps % 4 == 0 and simROS.getNumSubscribers(self.image_publisher):
         publish()
 
 

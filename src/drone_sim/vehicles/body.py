@@ -60,9 +60,9 @@ class Body:
         wrench, self.wrench = self.wrench, Wrench()
         return wrench
 
-    def push(self, force: Force) -> None:
+    def apply(self, force: Force) -> None:
         """Let a force act in the sub-step that comes, as it is at this moment."""
         self.refresh()
         wrench = Wrench()
         force.add_to(wrench, self)
-        self._world.push(self.number, wrench)
+        self._world.apply(self.number, wrench)

@@ -324,7 +324,7 @@ class Vehicle:
     def before_sub_step(self) -> None:
         """Let the forces act that follow the body through the sub-steps."""
         for force in self.sub_step_forces:
-            self.body.push(force)
+            self.body.apply(force)
 
     def after_sub_step(self, count: int) -> None:
         """Let the instruments look, after so many sub-steps of the run."""

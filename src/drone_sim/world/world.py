@@ -236,7 +236,7 @@ class World:
         """
         # Local names and positional arguments: this loop is most of a step.
         client, in_world = self._client, pybullet.WORLD_FRAME
-        where, push, turn, step = (
+        where, pull, turn, step = (
             pybullet.getBasePositionAndOrientation,
             pybullet.applyExternalForce,
             pybullet.applyExternalTorque,
@@ -249,7 +249,7 @@ class World:
                 before()
             for body, force, torque_under in loads:
                 centre, orientation = (known and known.get(body)) or where(body, client)
-                push(body, -1, force, centre, in_world, client)
+                pull(body, -1, force, centre, in_world, client)
                 turn(body, -1, torque_under(orientation), in_world, client)
             step(client)
             known = {}
@@ -258,7 +258,7 @@ class World:
         self._centres.clear()
         self.changes = next(_changes)
 
-    def push(self, body: int, wrench: Wrench) -> None:
+    def apply(self, body: int, wrench: Wrench) -> None:
         """Let a wrench act on a body in the next sub-step, beside what `advance` applies."""
         centre, orientation = self._centres.get(body) or pybullet.getBasePositionAndOrientation(body, self._client)
         pybullet.applyExternalForce(body, -1, wrench.force, centre, pybullet.WORLD_FRAME, self._client)

@@ -11,7 +11,7 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_sim.ros.vehicle.messages import WORLD
+from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run.pacing import Throttle
 from drone_sim.scripting.api.drawings import DrawingObject, Drawings, Item
 
@@ -50,7 +50,7 @@ class DrawingMarkers:
 
 def _marker(handle: int, drawn: DrawingObject) -> Marker:
     marker = Marker(type=_KINDS.get(drawn.kind, Marker.TRIANGLE_LIST), ns="drawing", id=handle, frame_locked=True)
-    marker.header.frame_id = WORLD
+    marker.header.frame_id = WORLD_FRAME
     marker.pose.orientation.w = 1.0
     marker.color = ColorRGBA(*drawn.rgba)
     if marker.type == Marker.TRIANGLE_LIST:

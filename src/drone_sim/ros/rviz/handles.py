@@ -16,7 +16,7 @@ from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.rviz.held import Held
 from drone_sim.ros.rviz.marker_topic import namespace
 from drone_sim.ros.vehicle.inputs import checked_pose
-from drone_sim.ros.vehicle.messages import WORLD
+from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
@@ -138,7 +138,7 @@ def _ring() -> Marker:
 def _handle(name: str, look: Marker) -> InteractiveMarker:
     """Return a handle that slides level when its body is dragged, and has an arrow up and a ring to turn it."""
     handle = InteractiveMarker(name=name, scale=0.5)
-    handle.header.frame_id = WORLD
+    handle.header.frame_id = WORLD_FRAME
     slide = InteractiveMarkerControl(name="slide", orientation=_UPRIGHT, always_visible=True)
     slide.interaction_mode = InteractiveMarkerControl.MOVE_PLANE
     slide.markers.append(look)

@@ -10,7 +10,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.mechanics import frames
-from drone_sim.ros.vehicle.messages import WORLD
+from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
@@ -49,7 +49,7 @@ class MarkerTopic:
         shown = [marker or Marker(action=Marker.DELETE) for marker in markers]
         shown += [Marker(action=Marker.DELETE) for _ in self._shown[len(shown) :]]
         for number, marker in enumerate(shown):
-            marker.header.frame_id, marker.id = marker.header.frame_id or WORLD, number
+            marker.header.frame_id, marker.id = marker.header.frame_id or WORLD_FRAME, number
             before = self._shown[number].ns if number < len(self._shown) else ""
             marker.ns = marker.ns or (marker.action == Marker.DELETE and before) or self._name
         self._shown = shown

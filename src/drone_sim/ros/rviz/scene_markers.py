@@ -15,7 +15,7 @@ from drone_sim.mechanics import frames
 from drone_sim.ros.rviz import lit_triangles
 from drone_sim.ros.rviz.marker_topic import namespace
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
-from drone_sim.ros.vehicle.messages import WORLD
+from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.shapes.primitive import Primitive
@@ -58,7 +58,7 @@ class SceneMarkers:
         for visual, pose in zip(visuals, poses):
             markers += markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
         for number, marker in enumerate(markers):
-            marker.header.frame_id, marker.ns, marker.id = WORLD, "scene", number
+            marker.header.frame_id, marker.ns, marker.id = WORLD_FRAME, "scene", number
             marker.frame_locked = True
         self._publisher.publish(MarkerArray(markers))
 

@@ -12,7 +12,7 @@ from geometry_msgs.msg import Twist as TwistMessage
 
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.node.inbox import Inbox
-from drone_sim.ros.vehicle.messages import WORLD
+from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
@@ -103,8 +103,8 @@ def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParamete
 
 
 def _check_frame(frame: str) -> None:
-    if frame.lstrip("/") not in ("", WORLD):
-        raise checks.Refused(f"frame_id {shown(frame)}: must be '{WORLD}'")
+    if frame.lstrip("/") not in ("", WORLD_FRAME):
+        raise checks.Refused(f"frame_id {shown(frame)}: must be '{WORLD_FRAME}'")
 
 
 def _numbers(message: PoseMessage) -> Sequence[float]:

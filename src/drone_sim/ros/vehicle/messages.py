@@ -15,13 +15,13 @@ from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.state import State, Twist
 from drone_sim.render.intrinsics import Intrinsics
 
-WORLD = "world"
+WORLD_FRAME = "world"
 
 
 def odometry(stamp: rospy.Time, state: State, child: str) -> Odometry:
     """Return the ground truth: pose in the world, twist in the child frame (covariances 0: exact)."""
     message = Odometry()
-    message.header.stamp, message.header.frame_id, message.child_frame_id = stamp, WORLD, child
+    message.header.stamp, message.header.frame_id, message.child_frame_id = stamp, WORLD_FRAME, child
     place, turn = message.pose.pose.position, message.pose.pose.orientation
     place.x, place.y, place.z = state.position
     turn.x, turn.y, turn.z, turn.w = state.orientation

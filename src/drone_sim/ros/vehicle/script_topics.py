@@ -49,6 +49,9 @@ class _Sender:
             self._stamp()  # /clock before the message
         self._publisher.publish(fill(self._made(), message, self._made._type))
 
+    def subscribers(self) -> int:
+        return int(self._publisher.get_num_connections())
+
     def shutdown(self) -> None:
         self._publisher.unregister()
 
@@ -64,6 +67,9 @@ class _ImageSender:
         message.data = image.data
         self._publisher.publish(message)
 
+    def subscribers(self) -> int:
+        return int(self._publisher.get_num_connections())
+
     def shutdown(self) -> None:
         self._publisher.unregister()
 
@@ -71,6 +77,9 @@ class _ImageSender:
 class _Silence:
     def publish(self, _message: Any) -> None:
         pass
+
+    def subscribers(self) -> int:
+        return 0
 
     def shutdown(self) -> None:
         pass

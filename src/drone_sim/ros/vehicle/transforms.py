@@ -54,7 +54,7 @@ class Transforms:
 
 
 def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
-    own, world = vehicle.parameters, messages.WORLD
+    own, world = vehicle.parameters, messages.WORLD_FRAME
     prefix = own.frame_prefix
     return [
         messages.transform(now, world, own.base_link, vehicle.matrix),

@@ -27,6 +27,9 @@ class Sender(Protocol):
         Raises ValueError, in one line, for a field that does not exist or does not fit.
         """
 
+    def subscribers(self) -> int:
+        """Return how many listen; 0 also where what is published here is not sent."""
+
     def shutdown(self) -> None:
         """Stop advertising."""
 

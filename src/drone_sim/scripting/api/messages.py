@@ -50,6 +50,7 @@ class MessageBus:
             "advertise",
             "publish",
             "shutdownPublisher",
+            "getNumSubscribers",
             "imageTransportAdvertise",
             "imageTransportPublish",
             "imageTransportShutdownPublisher",
@@ -99,6 +100,10 @@ class MessageBus:
     def shutdownPublisher(self, handle: Handle) -> None:
         """Stop advertising; raises ValueError where nothing has that handle."""
         self._publishers.end(handle)
+
+    def getNumSubscribers(self, handle: Handle) -> int:
+        """Return how many listen to what is published; V-REP has no such function."""
+        return self._publishers.subscribers(handle)
 
     def imageTransportAdvertise(self, topic: Name, queue: int = 1) -> int:
         """Advertise an image topic; return a handle to publish on."""

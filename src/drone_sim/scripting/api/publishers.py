@@ -36,6 +36,11 @@ class Publishers:
         if sender is not None:
             sender.publish(message)
 
+    def subscribers(self, handle: int) -> int:
+        """Return how many listen; raises ValueError where nothing has that handle."""
+        sender = self._publisher(handle).sender
+        return 0 if sender is None else sender.subscribers()
+
     def end(self, handle: int) -> None:
         """Stop advertising; raises ValueError where nothing has that handle."""
         sender = self._publisher(handle).sender
