@@ -21,6 +21,7 @@ from std_msgs.msg import Float64, String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerUpdate, Marker, MarkerArray
 
+from drone_sim.mechanics import frames
 from drone_sim.ros.node.node import Node
 from drone_sim.run import parameters
 
@@ -41,6 +42,10 @@ def sysCall_cleanup():
     print('cleaned up')
 """
 
+LETS_GO = """
+def sysCall_init():
+    sim.setObjectParent(sim.getObjectHandle('DronePosition'), -1, True)
+"""
 DRAWS = """
 def sysCall_init():
     self.path = sim.addDrawingObject(sim.drawing_linestrip, 2, 0, -1, 100, [1, 0, 0])
@@ -190,8 +195,7 @@ class Toolbar(unittest.TestCase):
         )
         rospy.set_param("~scene_file", str(self.scene))
         self.assertIn(str(self.scene), self.call("load_scene"))
-        self.odometry.wait_for(lambda o: abs(o.pose.pose.position.y - 2) < 0.1)
-        rospy.rostime.wallsleep(0.2)
+        self.odometry.wait_for(lambda o: abs(o.pose.pose.position.y - 2) < 0.1 and o.pose.pose.position.z < 2.9)
         self.pause(True)
         self.assertIn(str(self.scene), self.call("save_scene"))
         saved = yaml.safe_load(self.scene.read_text())
@@ -201,7 +205,7 @@ class Toolbar(unittest.TestCase):
         self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
         self.scene.write_text("object: []\n")
         self.assertIn(
-            "unknown key object; known are drone, floor, objects, vehicles", self.call("load_scene", expected=False)
+            "unknown key object; known are datum, drone, floor, magnetic_field, objects, vehicles", self.call("load_scene", expected=False)
         )
 
     def test_rviz_sees_the_objects_and_where_they_go(self):
@@ -257,15 +261,33 @@ class Toolbar(unittest.TestCase):
         self.assertIn("earlier run", self.call("restore", expected=False))
 
     def test_the_sphere_and_the_drone_are_dragged(self):
+        self.script.write_text(LETS_GO)
+        self.call("start")
+        self.pause(True)
+        handles = Listener("/drone/markers/update", InteractiveMarkerUpdate)
+        handles.wait_for(lambda m: "DronePosition" in {one.name for one in (*m.markers, *m.poses)}, after=0)
         feedback = connected(rospy.Publisher("/drone/markers/feedback", InteractiveMarkerFeedback, queue_size=10))
         for name, where in (("DronePosition", (1.0, 2.0, 3.0)), ("Drone", (-1.0, 0.5, 2.0))):
+            self.assertNotEqual(self.place_of(name), where)
             message = InteractiveMarkerFeedback(client_id="test", marker_name=name, control_name="slide")
             message.event_type = InteractiveMarkerFeedback.POSE_UPDATE
             message.header.frame_id = "world"
             message.pose.position.x, message.pose.position.y, message.pose.position.z = where
             message.pose.orientation.w = 1.0
             feedback.publish(message)
-        self.odometry.wait_for(lambda o: abs(o.pose.pose.position.y - 0.5) < 0.1)
+            self.wait_until(lambda name=name, where=where: self.place_of(name) == where)
+        self.assertEqual(self.place_of("DronePosition"), (1.0, 2.0, 3.0), "the drone does not take it along")
+
+    def place_of(self, name):
+        """Return where an object is: the node has been paused."""
+        objects = self.simulation.drone.objects
+        return tuple(round(value, 9) for value in frames.position(objects.matrix(objects.handle(name))))
+
+    def wait_until(self, condition):
+        end = time.monotonic() + 20
+        while not condition():
+            self.assertLess(time.monotonic(), end, "nothing such in 20 s")
+            rospy.rostime.wallsleep(0.01)
 
     def test_a_flood_of_input_makes_no_flood_of_output(self):
         poses = connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=10))
@@ -289,8 +311,7 @@ class Toolbar(unittest.TestCase):
         feedback.publish(message)
         held = self.node._handles._held
         for expected in ({"Drone"}, set()):
-            while held.names() != expected:
-                rospy.rostime.wallsleep(0.01)
+            self.wait_until(lambda expected=expected: held.names() == expected)
         handles.wait_for(lambda m: any(pose.name == "Drone" for pose in m.poses))
 
     def test_target_pose_and_push(self):
@@ -305,12 +326,10 @@ class Toolbar(unittest.TestCase):
         push.publish(wrench)
         connected(target)
         connected(push)
-        rospy.rostime.wallsleep(0.5)  # both stand in the inbox by now
+        self.wait_until(lambda: self.place_of("DronePosition") == (1.5, 0.0, 2.0))
+        self.wait_until(lambda: self.simulation.drone._pushes._lasting)
         for _ in range(8):
             self.call("step")
-        objects = self.simulation.drone.objects
-        where = objects.matrix(objects.handle("DronePosition"), objects.handle("Drone"))
-        self.assertGreater(abs(where[3]), 1.0)
         # 1.04 N on 0.52 kg for the 0.2 s that a push lasts
         self.assertAlmostEqual(self.simulation.drone.state.linear_velocity[0], 0.4, places=4)
         wrench.wrench.force.x = float("nan")
