@@ -1,14 +1,15 @@
 """What sets a measurement apart from the truth: white noise, a bias that wanders, steps of a scale.
 
-    measured = truth + b + n, rounded to whole steps of the quantisation
+    measured = truth + c + b + n, rounded to whole steps of the quantisation
     n: white; of standard deviation sqrt(deviation² + density² · rate) in every sample
-    b: starts as N(0, bias²), then  db/dt = -b / bias_time + bias_walk · w,  w white of unit density
+    c: constant through a run, N(0, bias²)
+    b: wanders, db/dt = -b / bias_time + bias_walk · w,  w white of unit density
 
 The model, its words and its units are those of Kalibr and RotorS (Furrer et al. 2016, Robot Operating System: The
-Complete Reference 1, p. 595-625), after IEEE Std 952-1997, annex C: with bias_time 0 the bias is a random walk (rate
-random walk); with any other it is a first-order Gauss-Markov process, exact from sample to sample:
+Complete Reference 1, p. 595-625), after IEEE Std 952-1997, annex C: with bias_time 0 b is a random walk from 0 (rate
+random walk); with any other it is a first-order Gauss-Markov process, stationary, and exact from sample to sample:
 
-    b' = φ b + sqrt(bias_walk² · bias_time / 2 · (1 - φ²)) N(0, 1),  φ = exp(-Δt / bias_time)
+    b' = φ b + s sqrt(1 - φ²) N(0, 1),  φ = exp(-Δt / bias_time),  s² = bias_walk² · bias_time / 2
 
 The Allan deviation over τ is density / sqrt(τ) of the white part, and bias_walk · sqrt(τ / 3) of a random walk.
 """
@@ -31,9 +32,9 @@ class NoiseParameters(Checked):
 
     deviation: _Amount = 0.0  # u, standard deviation of a sample
     density: _Amount = 0.0  # u/√Hz, the same in proportion to the square root of the rate
-    bias: _Amount = 0.0  # u, standard deviation of the bias at the start
+    bias: _Amount = 0.0  # u, standard deviation of the constant bias
     bias_walk: _Amount = 0.0  # u/s/√Hz
-    bias_time: Annotated[Finite, Within(1e-3, 1e9, or_zero=True)] = 0.0  # s, in which the bias forgets; 0: never
+    bias_time: Annotated[Finite, Within(1e-3, 1e9, or_zero=True)] = 0.0  # s, in which what wanders forgets; 0: never
     quantisation: _Amount = 0.0  # u, of a step
     variance: Annotated[Finite, Within(0, 1e12)] | None = None  # u², what messages say; what the others come to if none
 
@@ -46,13 +47,15 @@ class Noise:
         own = self._parameters = parameters
         self._axes = axes
         self._white = math.sqrt(own.deviation**2 + own.density**2 / interval)
+        self._spread = own.bias_walk * math.sqrt(own.bias_time / 2)  # of the Gauss-Markov process
         if own.bias_time:
             self._keep = math.exp(-interval / own.bias_time)
-            self._walk = own.bias_walk * math.sqrt(own.bias_time / 2 * (1 - self._keep**2))
+            self._walk = self._spread * math.sqrt(1 - self._keep**2)
         else:
             self._keep, self._walk = 1.0, own.bias_walk * math.sqrt(interval)
         self._random: Generator | None = None
-        self._bias = [0.0] * axes
+        self._constant = [0.0] * axes
+        self._bias = [0.0] * axes  # that wanders
 
     @property
     def variance(self) -> float:
@@ -63,15 +66,14 @@ class Noise:
         own = self._parameters
         if own.variance is not None:
             return own.variance
-        wandering = own.bias_walk**2 * own.bias_time / 2  # of the Gauss-Markov process, in the long run
-        return self._white**2 + own.bias**2 + wandering + own.quantisation**2 / 12
+        return self._white**2 + own.bias**2 + self._spread**2 + own.quantisation**2 / 12
 
     def restart(self, random: Generator) -> None:
         """Begin anew, drawing from `random`."""
         self._random = random
-        spread = self._parameters.bias
-        self._bias = (
+        self._constant, self._bias = (
             [spread * one for one in random.standard_normal(self._axes).tolist()] if spread else [0.0] * self._axes
+            for spread in (self._parameters.bias, self._spread)
         )
 
     def add(self, truth: Sequence[float]) -> list[float]:
@@ -79,11 +81,11 @@ class Noise:
         if self._random is None:
             raise RuntimeError("noise that has not been started")
         # Lists of floats: of so few axes numpy takes longer for a sum than Python does.
-        measured = [true + bias for true, bias in zip(truth, self._bias)]
+        measured = [true + constant + bias for true, constant, bias in zip(truth, self._constant, self._bias)]
         if self._white:
             white, drawn = self._white, self._random.standard_normal(self._axes).tolist()
             measured = [one + white * by for one, by in zip(measured, drawn)]
-        if self._walk or self._keep != 1.0:
+        if self._walk:
             keep, walk, drawn = self._keep, self._walk, self._random.standard_normal(self._axes).tolist()
             self._bias = [keep * one + walk * by for one, by in zip(self._bias, drawn)]
         step = self._parameters.quantisation
