@@ -90,8 +90,8 @@ class Setting:
 
     def _show_blades(self) -> None:
         """Turn the blades of all vehicles in the world's pictures to where they are, once for all cameras."""
-        if self._blades_shown == self.world.changes and not any(one.turned for one in self.vehicles.values()):
+        if self._blades_shown == self.world.changes and not any(one.blades.turned for one in self.vehicles.values()):
             return
         for vehicle in self.vehicles.values():
-            vehicle.show_blades()
+            vehicle.blades.show()
         self._blades_shown = self.world.changes

@@ -12,6 +12,7 @@ from drone_sim.mechanics.frames import Matrix
 from drone_sim.render.context import RendererUnavailable
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Renderer
+from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.sensor import Reading, Sensor
 from drone_sim.shapes.visual import Visual
 
@@ -101,14 +102,13 @@ class Camera(Sensor):
     somebody wants to know.
     """
 
-    def __init__(self, kind: str, intrinsics: Intrinsics, pose: Callable[[], Matrix], vision: Vision, period: int = 1):
-        """Take what it measures ("color" or "depth"), how, from where (world from optical frame), by what, how often.
-
-        `period` is the number of simulation steps between two pictures.
-        """
-        super().__init__(period)
-        self.kind = kind
-        self.intrinsics = intrinsics
+    def __init__(self, parameters: CameraParameters, pose: Callable[[], Matrix], vision: Vision):
+        """Take what it is, from where it looks (world from optical frame), and what draws."""
+        super().__init__(parameters.every)
+        self.kind = parameters.kind
+        self.intrinsics = Intrinsics(
+            parameters.width, parameters.height, parameters.horizontal_fov, parameters.near, parameters.far
+        )
         self.watched: Callable[[], bool] = lambda: False
         self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
         self.pose = pose

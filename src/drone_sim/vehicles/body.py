@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from drone_sim.forces.force import Force
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
@@ -24,6 +26,7 @@ class Body:
         self.jumps = 0  # how often it was put somewhere else
         self.number = world.add_rigid_body(rigid, start)
         self.inertial_from_root: Matrix = frames.invert(world.inertial_frame(self.number))
+        self._links = {name: (self._named(above), matrix) for name, (above, matrix) in rigid.parents.items()}
         self._start = start
         self._world = world
         self.reset()
@@ -44,6 +47,23 @@ class Body:
         self.jumps += 1
         self._world.set_pose(self.number, pose)
         self.refresh()
+
+    @property
+    def links(self) -> dict[str, tuple[str, Matrix]]:
+        """Of each link of the URDF but the root: the one above, `base_link` for the root, and where it sits on it."""
+        return self._links
+
+    @property
+    def visual_places(self) -> list[tuple[str, Matrix]]:
+        """Of each visual: the link that it belongs to, and where it sits on that."""
+        return [(self._named(name), matrix) for name, matrix in self.rigid.visuals]
+
+    def _named(self, link: str) -> str:
+        return link if link in self.rigid.parents else "base_link"
+
+    def place_visuals(self, places: Mapping[int, Matrix]) -> None:
+        """Move some of its visuals, by index, to other places in the root link's frame: looks only."""
+        self._world.place_visuals(self.number, places)
 
     def restored(self) -> None:
         """Follow the world, which was put back to what it had been."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,6 @@ from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.state import Pose, State, Twist
 from drone_sim.mechanics.wrench import Wrench
-from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.scripting import load
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import Surroundings
@@ -27,6 +25,7 @@ from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.sensor import Instrument
+from drone_sim.vehicles.blades import Blades
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.instruments import Carrying, Instruments
 from drone_sim.vehicles.parameters import VehicleParameters
@@ -36,15 +35,11 @@ from drone_sim.vehicles.quadricopter_objects import (
     TARGET,
     TRACK_BASE,
     QuadricopterObjects,
-    joint,
     respondable,
 )
 from drone_sim.vehicles.rotors import Rotors
+from drone_sim.vehicles.script_parameters import NUMBERS, PARTICLE_VELOCITY, bring_back, script_parameters
 from drone_sim.vehicles.shared import Shared
-from drone_sim.wording import near_names
-
-_PARTICLE_VELOCITY = "particleVelocity"
-_NUMBERS = (1, 2, 3, 4)  # of the propellers
 
 
 class Vehicle:
@@ -64,21 +59,20 @@ class Vehicle:
         self._timeout, self._time_step = parameters.cmd_vel_timeout, shared.time_step  # asked for in every step
         rigid = urdf.read(parameters.urdf)
         self._rotors = Rotors(rigid, parameters.urdf)
-        self._links = {
-            name: (above if above in rigid.parents else "base_link", matrix)
-            for name, (above, matrix) in rigid.parents.items()
-        }
         start = Pose(parameters.position, frames.to_quaternion(frames.from_rpy((0, 0, 0), (0, 0, parameters.yaw))))
         self.body = Body(rigid, start, shared.world)
-        shapes = [(respondable(number), link) for number, link in zip(_NUMBERS, self._rotors.links)]
+        shapes = [(respondable(number), link) for number, link in zip(NUMBERS, self._rotors.links)]
         self._shapes = {
             name + suffix: frames.multiply(self.body.inertial_from_root, link)
             for name, link in [(DRONE, IDENTITY), *shapes]
         }
+        self.blades = Blades(self._rotors, self.body, suffix, lambda: self._propellers.air)
         self.script: load.Script = load.NoScript()
         self._tree: ObjectTree | None = None  # the one that its objects are in
         self._handles: list[int] = []  # of its objects
-        self.cameras = {name: self._camera(one) for name, one in parameters.cameras.items()}
+        self.cameras = {
+            name: Camera(one, partial(self.optical, one), shared.vision) for name, one in parameters.cameras.items()
+        }
         shared.names[self.body.number] = (parameters.name, self.own_script)
         carrying = Carrying(self.body, lambda: self._propellers.thrusts, shared)
         try:
@@ -87,13 +81,6 @@ class Vehicle:
         except BaseException:
             self.leave()
             raise
-
-    def _camera(self, parameters: CameraParameters) -> Camera:
-        size = (parameters.width, parameters.height)
-        intrinsics = Intrinsics(*size, parameters.horizontal_fov, parameters.near, parameters.far)
-        return Camera(
-            parameters.kind, intrinsics, lambda: self.optical(parameters), self._shared.vision, parameters.every
-        )
 
     def reset(self) -> None:
         """Return to the starting place, at rest, with no script loaded, and its objects anew in the shared tree."""
@@ -107,8 +94,7 @@ class Vehicle:
         self.sub_step_forces = [one for one in others if one.every_sub_step]
         self.command = Twist()
         self._command_age = 0.0
-        self._joint_angles: dict[str, float] = {}
-        self.turned = False  # by its script, since the blades were shown
+        self.blades.reset()
         self._leave_tree()
         self._tree = self.objects
         self._handles = []
@@ -116,8 +102,8 @@ class Vehicle:
         own, links = self.parameters, self.body.rigid.links
         objects.add(self.body, links, self._rotors.links, own.cameras, own.sensors)
         self._track = self.objects[self.objects.handle(TRACK_BASE + self.suffix)]
-        self.script_parameters = self._script_parameters()
-        self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in _NUMBERS]
+        self.script_parameters = script_parameters(self.parameters, self.suffix)
+        self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in NUMBERS]
         for camera in self.cameras.values():
             camera.reset()
         self.instruments.reset()
@@ -127,22 +113,6 @@ class Vehicle:
         if self._tree is self.objects:
             self._tree.remove(self._handles)
             self._tree = None
-
-    def _script_parameters(self) -> dict[str, dict[str, Any]]:
-        """Return what V-REP's scripts have as simulation parameters, the gains of control, and the user's own."""
-        law = self.parameters.propellers
-        seen = {"particlesAreVisible": True, "simulateParticles": True, "fakeShadow": True}
-        particles = {
-            "particleCountPerSecond": law.particles_per_second,
-            "particleDensity": law.particle_density,
-            "particleSize": 1.0,  # a factor, in the stock scripts
-        }
-        own = {**self.parameters.control.model_dump(), **seen, **particles, "propeller_law": law.law}
-        own.update(self.parameters.script_parameters)
-        return {
-            self.own_script: own,
-            **{respondable(number) + self.suffix: {_PARTICLE_VELOCITY: 0.0, **particles} for number in _NUMBERS},
-        }
 
     # ---- what scripts and topics see
 
@@ -194,50 +164,22 @@ class Vehicle:
     @property
     def particle_velocities(self) -> tuple[float, ...]:
         """What the script commands: m/s, propellers 1 to 4."""
-        (first, second, third, fourth), key = self._commanded, _PARTICLE_VELOCITY
+        (first, second, third, fourth), key = self._commanded, PARTICLE_VELOCITY
         return first[key], second[key], third[key], fourth[key]
 
     @property
     def blade_angles(self) -> dict[str, float]:
         """Angle (rad) of each propeller's blades, by joint of the URDF."""
-        return self._rotors.by_joint([self.turn_joint(joint(number) + self.suffix) for number in _NUMBERS])
+        return self.blades.angles
 
-    def turn_joint(self, name: str, angle: float | None = None) -> float:
+    def turn_joint(self, joint: str, angle: float | None = None) -> float:
         """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError."""
-        names = [joint(number) + self.suffix for number in _NUMBERS]
-        if name not in names:
-            raise ValueError(f"'{name}' is not a joint; {near_names(name, names)}")
-        if angle is not None:
-            self._joint_angles[name] = angle
-            self.turned = True
-        number = names.index(name)
-        return self._joint_angles.get(name, self._rotors.angle(number, self._propellers.air[number]))
-
-    def show_blades(self) -> None:
-        """Turn the blades in the world's pictures to where they are."""
-        self.turned = False
-        self._shared.world.place_visuals(self.body.number, self._rotors.visuals(self.blade_angles))
+        return self.blades.turn(joint, angle)
 
     def optical(self, camera: CameraParameters) -> Matrix:
         """World from a camera's optical frame (z forward, x right, y down)."""
         sensor = self.objects.matrix(self.objects.handle(camera.object + self.suffix))
         return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
-
-    @property
-    def links(self) -> dict[str, tuple[str, Matrix]]:
-        """Of each link of the URDF but the root: the one above (`base_link` is the root), and where it sits on it."""
-        return self._links
-
-    @property
-    def visual_places(self) -> list[tuple[str, Matrix]]:
-        """Of each of the body's visuals: the link that it belongs to, and where it sits on that."""
-        links = self._links
-        return [(name if name in links else "base_link", matrix) for name, matrix in self.body.rigid.visuals]
-
-    @property
-    def blade_joints(self) -> dict[str, str]:
-        """Of each link that turns: the joint about whose z axis it does."""
-        return self.body.rigid.blade_joints
 
     # ---- commands
 
@@ -346,26 +288,18 @@ class Vehicle:
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back what the body is not: forces, script, messages, parameters."""
-        own = (self.command, self._command_age, dict(self._joint_angles))
+        command, age = self.command, self._command_age
         parameters = copy.deepcopy(self.script_parameters)
-        parts = (*self._forces, *self.sub_step_forces, self.bus, self.script, *self.cameras.values())
+        parts = (*self._forces, *self.sub_step_forces, self.blades, self.bus, self.script, *self.cameras.values())
         others = [one.remember() for one in parts]
         instruments = self.instruments.remember()
 
         def recall() -> None:
-            self.command, self._command_age, angles = own
-            self._joint_angles, self.turned = dict(angles), True
-            _set_all(self.script_parameters, parameters)
+            self.command, self._command_age = command, age
+            bring_back(self.script_parameters, parameters)
             for one in others:
                 one()
             self.body.restored()
             instruments()  # which ask the body how often it was put somewhere
 
         return recall
-
-
-def _set_all(values: Mapping[str, dict[str, Any]], kept: Mapping[str, dict[str, Any]]) -> None:
-    """Give every mapping what was kept of it; the mappings stay the same ones."""
-    for name, one in copy.deepcopy(dict(kept)).items():
-        values[name].clear()
-        values[name].update(one)

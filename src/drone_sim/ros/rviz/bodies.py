@@ -29,7 +29,9 @@ class Bodies:
 
     def _looks(self, vehicle: Vehicle) -> list[Marker]:
         markers = []
-        for visual, (link, matrix) in zip(self._simulation.world.visuals([vehicle.body.number]), vehicle.visual_places):
+        for visual, (link, matrix) in zip(
+            self._simulation.world.visuals([vehicle.body.number]), vehicle.body.visual_places
+        ):
             for marker in markers_of(visual, matrix, self._files):
                 marker.header.frame_id = f"{vehicle.parameters.frame_prefix}{link}"
                 marker.ns, marker.frame_locked = vehicle.name, True

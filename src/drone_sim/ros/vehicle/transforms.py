@@ -35,7 +35,7 @@ class Transforms:
         now = rospy.Time.now()
         told = []
         for one in vehicles:
-            told += [_link(now, one, name) for name in one.links if name not in one.blade_joints]
+            told += [_link(now, one, name) for name in one.body.links if name not in one.body.rigid.blade_joints]
             own = one.parameters
             told += [
                 messages.transform(now, own.base_link, f"{own.frame_prefix}{frame}", matrix)
@@ -73,12 +73,14 @@ def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
 
 def _turning(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
     angles = vehicle.blade_angles
-    return [_link(now, vehicle, link, angles.get(joint, 0.0)) for link, joint in vehicle.blade_joints.items()]
+    return [
+        _link(now, vehicle, link, angles.get(joint, 0.0)) for link, joint in vehicle.body.rigid.blade_joints.items()
+    ]
 
 
 def _link(now: rospy.Time, vehicle: Vehicle, name: str, angle: float = 0.0) -> TransformStamped:
     """Return where a link sits on the one that it hangs on, turned about its z axis."""
-    parent, matrix = vehicle.links[name]
+    parent, matrix = vehicle.body.links[name]
     if angle:
         matrix = frames.multiply(matrix, frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angle)))
     prefix = vehicle.parameters.frame_prefix

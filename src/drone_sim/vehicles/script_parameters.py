@@ -1,0 +1,36 @@
+"""The simulation parameters of a vehicle's scripts, as V-REP's have them."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+from drone_sim.vehicles.parameters import VehicleParameters
+from drone_sim.vehicles.quadricopter_objects import DRONE, respondable
+
+PARTICLE_VELOCITY = "particleVelocity"
+NUMBERS = (1, 2, 3, 4)  # of the propellers
+
+
+def script_parameters(vehicle: VehicleParameters, suffix: str) -> dict[str, dict[str, Any]]:
+    """Return them by the object that a script is attached to: V-REP's, the gains of control, and the user's own."""
+    law = vehicle.propellers
+    seen = {"particlesAreVisible": True, "simulateParticles": True, "fakeShadow": True}
+    particles = {
+        "particleCountPerSecond": law.particles_per_second,
+        "particleDensity": law.particle_density,
+        "particleSize": 1.0,  # a factor, in the stock scripts
+    }
+    own = {**vehicle.control.model_dump(), **seen, **particles, "propeller_law": law.law}
+    return {
+        DRONE + suffix: {**own, **vehicle.script_parameters},
+        **{respondable(number) + suffix: {PARTICLE_VELOCITY: 0.0, **particles} for number in NUMBERS},
+    }
+
+
+def bring_back(values: Mapping[str, dict[str, Any]], kept: Mapping[str, dict[str, Any]]) -> None:
+    """Give every script's parameters the values that were kept of them; the mappings stay the same ones."""
+    for name, one in copy.deepcopy(dict(kept)).items():
+        values[name].clear()
+        values[name].update(one)
