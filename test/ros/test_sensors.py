@@ -40,6 +40,7 @@ class Sensors(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
+        cls.over = threading.Event()
         cls.thread = threading.Thread(target=cls.run_node)
         cls.thread.start()
         cls.fixed = Listener("/tf_static", TFMessage)
@@ -51,7 +52,7 @@ class Sensors(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        rospy.signal_shutdown("done")
+        cls.over.set()
         cls.thread.join()
 
     @classmethod
@@ -59,7 +60,7 @@ class Sensors(unittest.TestCase):
         """Make and run it in one thread."""
         file = str(package_path() / "config" / "sensors.yaml")
         cls.node = Node(parameters.load({"config": file, "cameras": SMALL, "real_time_factor": 5.0}))
-        cls.node.run()
+        cls.node.run(cls.over.is_set)
         cls.node.close()
 
     def setUp(self):

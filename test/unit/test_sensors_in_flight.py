@@ -138,6 +138,16 @@ def test_flown_acceleration_against_the_odometry(simulate):
     assert np.array(felt)[:, :2] == pytest.approx(expected[:, :2], rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.parametrize("size", [5.3, 10.0, 20.0, 60.0])
+def test_lying_on_any_floor_it_feels_its_weight(simulate, still, size):
+    scene = {"floor": {"size": size}}
+    simulation = simulate({"sensors": EXACT, "scene": scene, "drone": {"position": [0, 0, 0.05]}}, script=still)
+    fly(simulation, 100)
+    felt = np.array([one.value.specific_force for _, _, one in fly(simulation, 40)])
+    assert felt[:, 2] == pytest.approx(np.full(len(felt), 9.81), abs=1e-6)
+    assert np.linalg.norm(felt, axis=1) == pytest.approx(felt[:, 2], abs=1e-6)
+
+
 def test_being_moved_and_restored_is_no_acceleration(simulate):
     simulation = simulate({"sensors": EXACT})
     simulation.drone.receive(Twist(Vector3(2, 0, 0)))

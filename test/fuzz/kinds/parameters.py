@@ -1,5 +1,6 @@
 """Parameters: config/drone.yaml with some keys overridden by something else, nested as they are there."""
 
+import copy
 from pathlib import Path
 
 import yaml
@@ -8,7 +9,10 @@ from hypothesis import strategies as st
 
 from kinds.values import junk, mostly, numbers, texts, vectors, words
 
-_DEFAULTS = yaml.safe_load((Path(__file__).parents[3] / "config" / "drone.yaml").read_text(encoding="utf-8"))
+_CONFIG = Path(__file__).parents[3] / "config"
+_DEFAULTS, _SENSORS = (
+    yaml.safe_load((_CONFIG / name).read_text(encoding="utf-8")) for name in ("drone.yaml", "sensors.yaml")
+)
 _CAMERA = _DEFAULTS["cameras"]["track"]
 
 
@@ -19,7 +23,7 @@ def _leaves(values, path=()):
             yield from _leaves(value, (*path, key))
 
 
-_KEYS = sorted(_leaves(_DEFAULTS), key=lambda leaf: leaf[0])
+_KEYS = sorted([*_leaves(_DEFAULTS), *_leaves(_SENSORS)], key=lambda leaf: leaf[0])
 
 
 _WORDS = [
@@ -51,7 +55,7 @@ def _alike(value):
 
 @st.composite
 def _overrides(draw):
-    overrides = {}
+    overrides = copy.deepcopy(draw(st.sampled_from([{}, _SENSORS])))
     for _ in range(draw(st.integers(1, 3))):
         path, value = draw(st.sampled_from(_KEYS))
         if draw(st.integers(0, 19)) == 0:
