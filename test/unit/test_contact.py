@@ -81,7 +81,7 @@ def test_propellers_have_limits():
     """Without them the bare law throws the drone off the wall at hundreds of m/s of particle velocity."""
     bare = {"thrust_limits": "none", "recovery_margin": "none"}
     thrown = Flight(WALL, control=bare, propellers={"velocity_limits": "none"})
-    thrown.fly((1.5, 0, 0, 0), 10)
+    thrown.fly((1, 0, 0, 0), 10)
     held = Flight(WALL, control=bare, propellers={"velocity_limits": [0, 12]})
-    held.fly((1.5, 0, 0, 0), 10)
+    held.fly((1, 0, 0, 0), 10)
     assert held.fastest_turn < 5.0 < thrown.fastest_turn

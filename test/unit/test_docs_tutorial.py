@@ -106,7 +106,7 @@ def test_the_finished_control_survives_being_thrown_about():
 
 
 def test_the_bare_law_falls_where_the_limits_hold():
-    fallen = fly_timeline("5_roll", "fall.yaml", "drone.position=[0, 0, 5]", "propellers.velocity_limits=null")
+    fallen = fly_timeline("5_roll", "fall.yaml", "drone.position=[0, 0, 5]")
     assert fallen.propellers.min() < 0
     assert fallen.z[-1] < 2
     held = fly_timeline("tutorial", "fall.yaml", "drone.position=[0, 0, 5]", seconds=26)
