@@ -112,7 +112,7 @@ make_pybullet() {
 
 build() {
   local wanted
-  wanted="$root $(cat CMakeLists.txt setup.py package.xml cmake/* | cksum) $(ls test/ros)"
+  wanted="$root $(cat CMakeLists.txt setup.py package.xml cmake/* | cksum) $(ls test/ros/*.test)"
   if fresh build/.made-from "$wanted"; then return; fi
   say "building into build/ and devel/"
   rm -rf build devel
