@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | lint | bench [NAME...] |
-#   fuzz [CASES] | soak [MINUTES] | deb
+#   fuzz [CASES] | soak [MINUTES] | pythons [VERSION...] | deb
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
 # build/ and devel/. What is there already is left alone, so a second run takes seconds. Where another ROS 1 has
@@ -28,7 +28,11 @@ ros=$(sourced_ros)
 python=/usr/bin/python3
 if [ -x "$ros/bin/python3" ]; then python=$ros/bin/python3; fi
 
-wheels=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim/wheels
+venv=$root/.venv
+venv_options=--system-site-packages
+cache=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim
+wheels=$cache/wheels
+PYTHONS="3.10 3.11 3.12 3.13"
 PYBULLET_MINUTES=5 # on one core
 PYBULLET_FILES=267
 
@@ -69,13 +73,13 @@ install_packages() { # install_packages NAME...
 fresh() { [ "$(cat "$1" 2>/dev/null)" = "$2" ]; }
 
 make_venv() { # make_venv REQUIREMENTS...
-  local stamp=.venv/.made-from-$1 wanted
-  wanted="$root $("$python" --version) $(cksum <"$1")"
+  local stamp=$venv/.made-from-$1 wanted
+  wanted="$venv $("$python" --version) $(cksum <"$1")"
   if fresh "$stamp" "$wanted"; then return; fi
-  if ! .venv/bin/python -c "import sys; sys.exit(sys.prefix != '$root/.venv')" 2>/dev/null; then
-    say "making .venv beside the system's python packages"
-    rm -rf .venv
-    "$python" -m venv --system-site-packages .venv
+  if ! "$venv/bin/python" -c "import sys; sys.exit(sys.prefix != '$venv')" 2>/dev/null; then
+    say "making $venv"
+    rm -rf "$venv"
+    "$python" -m venv $venv_options "$venv"
   fi
   if [ "$1" = requirements.txt ]; then make_pybullet; fi
   say "installing the python packages of $1 (a minute, once)"
@@ -83,18 +87,19 @@ make_venv() { # make_venv REQUIREMENTS...
   echo "$wanted" >"$stamp"
 }
 
-pip() { .venv/bin/python -m pip --disable-pip-version-check "$@"; }
+pip() { "$venv/bin/python" -m pip --disable-pip-version-check "$@"; }
 
 # There is no wheel of PyBullet for Python 3.12 and later. It is compiled once, on all cores, into a wheel that other
 # checkouts of this user find in $wheels.
 make_pybullet() {
-  local wanted tag scratch log=$root/.venv/pybullet.log compiling
+  local wanted tag scratch log=$venv/pybullet.log compiling
   wanted=$(grep '^pybullet==' requirements.txt)
-  tag=$(.venv/bin/python -c 'import sys; print("cp{}{}".format(*sys.version_info))')
+  tag=$("$venv/bin/python" -c 'import sys; print("cp{}{}".format(*sys.version_info))')
   mkdir -p "$wheels"
   if compgen -G "$wheels/${wanted/==/-}-$tag-*.whl" >/dev/null; then return; fi
   if pip install -q --dry-run --no-deps --only-binary :all: "$wanted" >/dev/null 2>&1; then return; fi
   say "compiling PyBullet, of which there is no wheel for $("$python" --version): about $((PYBULLET_MINUTES / $(nproc) + 1)) minutes, once"
+  pip install -q setuptools numpy >&2 # where they are not the system's
   # Without debug information, and with numpy's arrays as the wheels have them, for which gcc 14 has to be lenient.
   scratch=$(mktemp -d)
   TMPDIR=$scratch CFLAGS="-g0 -w -Wno-incompatible-pointer-types" pip wheel -v --no-deps --no-build-isolation \
@@ -112,7 +117,7 @@ make_pybullet() {
 
 build() {
   local wanted
-  wanted="$root $(cat CMakeLists.txt setup.py package.xml cmake/* | cksum) $(ls test/ros)"
+  wanted="$root $(cat CMakeLists.txt setup.py package.xml cmake/* | cksum) $(ls test/ros/*.test)"
   if fresh build/.made-from "$wanted"; then return; fi
   say "building into build/ and devel/"
   rm -rf build devel
@@ -169,6 +174,44 @@ run_tests() {
   PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test
 }
 
+# A python of that version which can make an environment. pyenv's are found where it has put them: its shims on the
+# PATH are of the version that has been chosen there only.
+find_python() { # find_python VERSION
+  local candidate
+  for candidate in $(type -ap "python$1") "${PYENV_ROOT:-$HOME/.pyenv}/versions/$1".*/bin/python3; do
+    if [ "$("$candidate" -c 'import ensurepip, sys, venv; print("{}.{}".format(*sys.version_info))' 2>/dev/null)" = "$1" ]; then
+      echo "$candidate"
+      return
+    fi
+  done
+}
+
+# The unit tests that need no ROS, each time in an environment without ROS: what they leave out, they print.
+test_pythons() { # test_pythons VERSION...
+  local version found=()
+  for version in $PYTHONS; do
+    python=$(find_python "$version")
+    say "Python $version: ${python:-not found}"
+    if [ -n "$python" ]; then found+=("$version"); fi
+  done
+  [ ${#found[@]} != 0 ] || fail "none of them is here"
+  if [ $# = 0 ]; then # the oldest, and the newest if it is another one
+    set -- "${found[0]}"
+    if [ ${#found[@]} != 1 ]; then set -- "$1" "${found[-1]}"; fi
+  fi
+  unset PYTHONPATH ROS_PACKAGE_PATH
+  venv_options=
+  for version in "$@"; do
+    python=$(find_python "$version")
+    [ -n "$python" ] || fail "no Python $version here"
+    venv=$cache/python$version
+    make_venv requirements.txt
+    make_venv requirements-dev.txt
+    say "the unit tests that need no ROS, on $("$python" --version)"
+    "$venv/bin/python" -m pytest -n auto -rs test/unit
+  done
+}
+
 command=${1:-help}
 shift || true
 case "$command" in
@@ -179,6 +222,9 @@ case "$command" in
   bench) setup; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
+  pythons) # shellcheck disable=SC2046 # one word each
+    install_packages $(packages)
+    test_pythons "$@" ;;
   deb) install_packages python3-matplotlib python3-opencv python3-pil python3-tqdm
     setup; packaging/deb.sh "$wheels" ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;

@@ -1,4 +1,6 @@
-"""One renderer for all tests that draw: compiling its shaders takes longer than most of them."""
+"""One renderer for all tests that draw: compiling its shaders takes longer than most of them. What needs ROS."""
+
+from importlib.util import find_spec
 
 import pytest
 
@@ -16,6 +18,13 @@ def _shared_renderer():
 def _renderer(shared_renderer):
     shared_renderer.set_visuals(())
     return shared_renderer
+
+
+def pytest_collection_modifyitems(items):
+    if find_spec("rospkg") is None:
+        for item in items:
+            if item.get_closest_marker("ros"):
+                item.add_marker(pytest.mark.skip(reason="needs ROS"))
 
 
 def pytest_make_parametrize_id(val):

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-pytest.importorskip("cv_bridge")
+pytest.importorskip("cv_bridge", reason="needs ROS")
 
 from cv_bridge import CvBridge
 from sensor_msgs.msg import CompressedImage, Image

@@ -149,7 +149,11 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         (f"objects: [{BLOCK.replace('block', 'nonsense')}]", "mesh"),
         (f"objects: [{BLOCK.replace('block.obj', 'nonsense.stl')}]", "nonsense.stl: "),
         (f"objects: [{BLOCK.replace('block.obj', 'nonsense.png')}]", "must be one of .obj, .stl, .dae"),
-        (f"objects: [{BLOCK.replace('block.obj', 'package://nowhere_at_all/a.obj')}]", "no ROS package nowhere_at_all"),
+        pytest.param(
+            f"objects: [{BLOCK.replace('block.obj', 'package://nowhere_at_all/a.obj')}]",
+            "no ROS package nowhere_at_all",
+            marks=pytest.mark.ros,
+        ),
         ("objects: [{shape: urdf, file: nonsense.urdf, position: [0, 0, 0]}]", "nonsense.urdf: syntax error"),
         (
             "objects: [{name: Drone, shape: sphere, size: [1], position: [9, 0, 0]}]",

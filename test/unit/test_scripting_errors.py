@@ -184,7 +184,7 @@ def test_a_callback_that_does_not_exist_is_named(tmp_path):
         ("missing.lua", "no such file"),
         ("missing.py", "no such file"),
         ("turtorial", "no built-in script of that name; near names are tutorial"),
-        ("package://no_such_package_/x.lua", "no ROS package"),
+        pytest.param("package://no_such_package_/x.lua", "no ROS package", marks=pytest.mark.ros),
     ],
 )
 def test_a_wrong_file(name, words, tmp_path, monkeypatch):
