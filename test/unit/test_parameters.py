@@ -20,7 +20,9 @@ BALL = {"name": "Ball", "shape": "sphere", "size": [1], "position": [9, 0, 1]}
         ({"real_time_factor": float("nan")}, "parameter real_time_factor = nan: input should be a finite number"),
         ({"drone": {"urdf": "/no/such.urdf"}}, "parameter drone/urdf = '/no/such.urdf': no such file"),
         pytest.param(
-            {"drone": {"urdf": "package://nowhere_at_all/x.urdf"}}, "no ROS package nowhere_at_all", marks=pytest.mark.ros
+            {"drone": {"urdf": "package://nowhere_at_all/x.urdf"}},
+            "no ROS package nowhere_at_all",
+            marks=pytest.mark.ros,
         ),
         ({"control": {"thrust_limits": [8, 3]}}, "must be [lowest, highest] with lowest < highest"),
         ({"propellers": {"law": "5.x"}}, "parameter propellers/law = '5.x': input should be '3.x' or '4.x'"),

@@ -23,6 +23,7 @@ class Bodies:
 
     def update(self) -> None:
         """Publish what is new, if anybody listens."""
+        self._topic.repeat()
         if self._simulation.era != self._shown and self._topic.due():
             self._shown = self._simulation.era
             self._topic.show([one for vehicle in self._simulation.vehicles.values() for one in self._looks(vehicle)])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
+from typing import Any
 
 import rospy
 from geometry_msgs.msg import Point, Quaternion, Vector3
@@ -16,7 +18,26 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
 
 EYES = 0.03  # s of real time, between two messages about what moves
+_SETTLED = 3.0  # s, after which rviz has started
 WORDS = 0.19  # s, between two texts: numbers that change faster cannot be read
+
+
+class _Newcomers(rospy.SubscribeListener):  # type: ignore[misc] # rospy has no types
+    """When somebody has begun to listen; rospy's threads say so."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._came: float | None = None
+
+    def peer_subscribe(self, *_: Any) -> None:
+        self._came = time.monotonic()
+
+    def have_settled(self) -> bool:
+        """Tell, once, that somebody has come a while ago."""
+        settled = self._came is not None and time.monotonic() - self._came > _SETTLED
+        if settled:
+            self._came = None
+        return settled
 
 
 def namespace(simulation: Simulation) -> str:
@@ -32,7 +53,10 @@ class MarkerTopic:
         """Advertise; `period` is in s of real time."""
         self._name = topic.rpartition("/")[2]
         self._throttle = Throttle(period)
-        self._publisher = rospy.Publisher(topic, MarkerArray, queue_size=1, latch=True)
+        self._newcomers = _Newcomers()
+        self._publisher = rospy.Publisher(
+            topic, MarkerArray, subscriber_listener=self._newcomers, queue_size=1, latch=True
+        )
         self._shown: list[Marker] = []
 
     @property
@@ -44,10 +68,19 @@ class MarkerTopic:
         """Tell whether it is time for another message; it counts as sent then."""
         return self.watched and self._throttle.passes()
 
+    def repeat(self) -> None:
+        """Show what stands still once more, a while after somebody has come.
+
+        While it starts, rviz may forget what it has been sent.
+        """
+        if self._newcomers.have_settled() and self._shown:
+            self._publisher.publish(MarkerArray(self._shown))
+
     def show(self, markers: Sequence[Marker | None]) -> None:
         """Publish; None takes away what may be shown in that place, and so does a shorter list at its end."""
         shown = [marker or Marker(action=Marker.DELETE) for marker in markers]
-        shown += [Marker(action=Marker.DELETE) for _ in self._shown[len(shown) :]]
+        if not shown or shown[0].action != Marker.DELETEALL:
+            shown += [Marker(action=Marker.DELETE) for _ in self._shown[len(shown) :]]
         for number, marker in enumerate(shown):
             marker.header.frame_id, marker.id = marker.header.frame_id or WORLD_FRAME, number
             before = self._shown[number].ns if number < len(self._shown) else ""

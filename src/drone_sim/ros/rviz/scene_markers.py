@@ -8,15 +8,13 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from std_msgs.msg import ColorRGBA
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import Marker
 
 from drone_sim.files.mesh_files import WHITE
 from drone_sim.mechanics import frames
 from drone_sim.ros.rviz import lit_triangles
-from drone_sim.ros.rviz.marker_topic import namespace
+from drone_sim.ros.rviz.marker_topic import MarkerTopic, namespace
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
-from drone_sim.ros.vehicle.messages import WORLD_FRAME
-from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.shapes.primitive import Primitive
 from drone_sim.shapes.triangles import Rgba
@@ -41,14 +39,13 @@ class SceneMarkers:
         """Advertise in the drone's namespace."""
         self._simulation = simulation
         self._files = files
-        self._throttle = Throttle(_PERIOD)
         self._shown: tuple[list[Visual], np.ndarray] | None = None
-        name = f"{namespace(simulation)}/scene"
-        self._publisher = rospy.Publisher(name, MarkerArray, queue_size=1, latch=True)
+        self._topic = MarkerTopic(f"{namespace(simulation)}/scene", _PERIOD)
 
     def update(self) -> None:
         """Publish what has moved, come or gone, if anybody listens."""
-        if not self._publisher.get_num_connections() or not self._throttle.passes():
+        self._topic.repeat()
+        if not self._topic.due():
             return
         visuals, poses = self._simulation.scene.visuals()
         if self._shown and visuals == self._shown[0] and np.array_equal(poses, self._shown[1]):
@@ -57,10 +54,9 @@ class SceneMarkers:
         markers = [Marker(action=Marker.DELETEALL)]
         for visual, pose in zip(visuals, poses):
             markers += markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
-        for number, marker in enumerate(markers):
-            marker.header.frame_id, marker.ns, marker.id = WORLD_FRAME, "scene", number
+        for marker in markers:
             marker.frame_locked = True
-        self._publisher.publish(MarkerArray(markers))
+        self._topic.show(markers)
 
 
 def markers_of(visual: Visual, matrix: frames.Matrix, files: RvizMeshes) -> Sequence[Marker]:

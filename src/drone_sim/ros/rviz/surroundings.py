@@ -46,6 +46,7 @@ class Surroundings:
 
     def update(self) -> None:
         """Publish what is new, if anybody listens."""
+        self._topic.repeat()
         scene = self._simulation.scene
         if scene is self._shown or not self._topic.due():
             return
