@@ -9,6 +9,8 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.shared import Shared
 from drone_sim.vehicles.vehicle import Vehicle
@@ -47,6 +49,25 @@ class Setting:
         for vehicle in self.vehicles.values():
             vehicle.reset()
         self._name_objects()
+
+    def end_scripts(self, clean_up: bool) -> None:
+        """Let go of every script; `clean_up`: call its cleanup before, whatever the others' do.
+
+        Raises the first ScriptError.
+        """
+        errors: list[ScriptError] = []
+        for vehicle in self.vehicles.values():
+            try:
+                if clean_up:
+                    vehicle.script.call("cleanup")
+            except ScriptError as error:
+                errors.append(error)
+            finally:
+                vehicle.close()
+        for second in errors[1:]:
+            LOG.error("%s", second)
+        if errors:
+            raise errors[0]
 
     def add(self, parameters: VehicleParameters) -> Vehicle:
         """Put one more vehicle into the world, without a script. Raises ParameterError and UrdfError."""

@@ -234,21 +234,8 @@ class Simulation:
             self.world.close()
 
     def _clean_up(self) -> None:
-        """Call every script's cleanup, whatever the others' do. Raises the first ScriptError."""
         was_running, self.running = self.running, False
-        errors: list[ScriptError] = []
-        for vehicle in self._flying:
-            try:
-                if was_running:
-                    vehicle.script.call("cleanup")
-            except ScriptError as error:
-                errors.append(error)
-            finally:
-                vehicle.close()
-        for second in errors[1:]:
-            LOG.error("%s", second)
-        if errors:
-            raise errors[0]
+        self._setting.end_scripts(clean_up=was_running)
 
     # ---- stepping
 

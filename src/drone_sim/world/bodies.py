@@ -35,9 +35,3 @@ def create(client: int, files: OwnFiles, shape: SceneShape, pose: Pose, *, mass:
 def _collision(told: Geometry) -> dict[str, Any]:
     flags = {"flags": getattr(pybullet, told.flags)} if told.flags else {}
     return {"shapeType": getattr(pybullet, told.type), **told.collision, **flags}
-
-
-def dress(client: int, body: int, visual: int, path: str) -> None:
-    """Cover a visual shape of a body (-1: all of its root link's) with the image at `path`."""
-    image = pybullet.loadTexture(path, physicsClientId=client)
-    pybullet.changeVisualShape(body, -1, visual, textureUniqueId=image, physicsClientId=client)

@@ -19,8 +19,10 @@ from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.shape import DrawnShape, SceneShape
 from drone_sim.shapes.visual import Visual
 from drone_sim.world import bodies, floor, probing
+from drone_sim.world.beginning import Beginning
 from drone_sim.world.own_files import OwnFiles
 from drone_sim.world.pictures import Pictures
+from drone_sim.world.textures import Textures
 
 _changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -59,11 +61,10 @@ class World:
         pybullet.setTimeStep(self._sub_step, self._client)
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: dict[int, tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
-        self._beginning: dict[int, tuple[Vector, Quaternion, list[float]]] = {}
+        self._beginning = Beginning(self._client)
         self._files.clear()
         self._pictures = Pictures(self._client, self._files.origin)
-        # Bodies whose texture PyBullet has not been given, and for which visual shape it is (-1: all).
-        self._undressed: dict[int, tuple[str, int]] = {}
+        self._textures = Textures(self._client, self._files)
 
     def close(self) -> None:
         """Free the world; may be called twice."""
@@ -120,16 +121,9 @@ class World:
         return number
 
     def _cover(self, body: int, texture: str, visual: int = -1) -> None:
-        if texture:
-            self._undressed[body] = (texture, visual)
+        self._textures.cover(body, texture, visual)
         if self._gui:
-            self._dress()
-
-    def _dress(self) -> None:
-        """Give PyBullet the textures, which only its window and its own renderer show."""
-        while self._undressed:
-            body, (texture, visual) = self._undressed.popitem()
-            bodies.dress(self._client, body, visual, self._files.texture(texture))
+            self._textures.show()
 
     def remove(self, body: int) -> None:
         """Take a body out of the world."""
@@ -139,8 +133,8 @@ class World:
         self._snapshots.clear()
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
-        self._beginning.pop(body, None)
-        self._undressed.pop(body, None)
+        self._beginning.forget(body)
+        self._textures.forget(body)
         self._centres.pop(body, None)
         self._pictures.remove(body)
 
@@ -266,27 +260,21 @@ class World:
         pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, self._client)
 
     def keep_beginning(self) -> None:
-        """Remember where everything stands, at rest, for `begin_anew`: a snapshot would copy every mesh."""
+        """Remember where everything stands, at rest, for `begin_anew`."""
         for body in self._inertial_frames:
             self.keep_beginning_of(body)
         self.begin_anew()  # so that the first time is like every other, to the last bit
 
     def keep_beginning_of(self, body: int) -> None:
         """Remember where a body stands, at rest, for `begin_anew`."""
-        joints = range(pybullet.getNumJoints(body, self._client))
-        angles = [pybullet.getJointState(body, joint, self._client)[0] for joint in joints]
-        self._beginning[body] = (*pybullet.getBasePositionAndOrientation(body, self._client), angles)
+        self._beginning.keep(body)
 
     def begin_anew(self) -> None:
         """Put everything where it stood, at rest."""
         self.changes = next(_changes)
         self._centres.clear()
         self._pictures.all_moved()
-        for body, (centre, turn, angles) in self._beginning.items():
-            pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
-            pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
-            for joint, angle in enumerate(angles):
-                pybullet.resetJointState(body, joint, angle, 0, self._client)
+        self._beginning.bring_back()
 
     def snapshot(self) -> int:
         """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget`."""
@@ -337,7 +325,7 @@ class World:
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return RGB and depth of PyBullet's software renderer: see Pictures.tiny."""
-        self._dress()
+        self._textures.show()
         return self._pictures.tiny(camera, (width, height), vertical_fov, (near, far))
 
     def look_from_behind(self, position: Sequence[float], yaw: float) -> None:
