@@ -62,6 +62,7 @@ class World:
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: dict[int, tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
         self._beginning = Beginning(self._client)
+        self._poses: tuple[int, np.ndarray] | None = None  # of all visuals, and the changes that they are of
         self._files.clear()
         self._pictures = Pictures(self._client, self._files.origin)
         self._textures = Textures(self._client, self._files)
@@ -313,8 +314,12 @@ class World:
 
     def visual_poses(self, bodies: Sequence[int] | None = None) -> np.ndarray:
         """Return the poses world from visual, (N, 4, 4), of these bodies, or of all."""
-        chosen = self._inertial_frames if bodies is None else bodies
-        return self._pictures.poses({body: self._inertial_frames[body][1] for body in chosen})
+        if bodies is not None:
+            return self._pictures.poses({body: self._inertial_frames[body][1] for body in bodies})
+        if self._poses is None or self._poses[0] != self.changes:  # once for all cameras of a step
+            everything = {body: backwards for body, (_, backwards) in self._inertial_frames.items()}
+            self._poses = self.changes, self._pictures.poses(everything)
+        return self._poses[1]
 
     def place_visuals(self, body: int, places: Mapping[int, Matrix]) -> None:
         """Move some of a body's visuals, by index, to other places in its root link's frame."""
