@@ -26,7 +26,7 @@ def _simulation(number: int, cameras: bool = False) -> Simulation:
 def in_the_loop(rounds: int = 5, seconds: float = 0.4) -> list[Row]:
     """Without ROS, on one core: simulated seconds per second, and what a step of one of the drones costs."""
     with one_core():
-        flown = {f"{number} drones, no camera": number for number in NUMBERS}
+        flown = {f"{number} drone{'s' if number > 1 else ''}, no camera": number for number in NUMBERS}
         simulations = {name: _simulation(number) for name, number in flown.items()}
         name = f"{HEARD} drones, {HEARD} front cameras"
         simulations[name], flown[name] = _simulation(HEARD, cameras=True), HEARD

@@ -59,8 +59,8 @@ def bare() -> Callable[[], None]:
     settings = parameters.load()
     world.add_floor(settings.scene.floor.size, settings.scene.floor.texture)
     simulation = Simulation(settings)
-    body = world.add_rigid_body(simulation.drone.body, Pose(settings.drone.position))
-    places = [frames.position(simulation.drone.body.links[f"propeller_{place}"]) for place, _ in PROPELLERS]
+    body = world.add_rigid_body(simulation.drone.body.rigid, Pose(settings.drone.position))
+    places = [frames.position(simulation.drone.body.rigid.links[f"propeller_{place}"]) for place, _ in PROPELLERS]
     simulation.close()
     client = world._client  # the bare loop is the one thing that goes behind the world's back
     thrust = [0.0, 0.0, 0.52 * 9.81 / 4]
