@@ -330,7 +330,7 @@ class Toolbar(unittest.TestCase):
         connected(target)
         connected(push)
         self.wait_until(lambda: self.place_of("DronePosition") == (1.5, 0.0, 2.0))
-        self.wait_until(lambda: self.simulation.drone._pushes._lasting)
+        self.wait_until(lambda: self.simulation.drone._pushes.lasting)
         for _ in range(8):
             self.call("step")
         # 1.04 N on 0.52 kg for the 0.2 s that a push lasts

@@ -71,6 +71,7 @@ class Propellers(Force):
         self._commanded = commanded
         self.air = [0.0] * len(axes)  # m of it that went through each
         self._newtons = 0.0  # per m/s, of the step
+        self._emitted: Sequence[float] = [0.0] * len(axes)  # m/s, of the step
         self._law = ParticleLaw(parameters, time_step)
         self._time_step = time_step
         self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
@@ -81,7 +82,10 @@ class Propellers(Force):
 
     def add_to(self, wrench: Wrench, body: Carried) -> None:
         """Emit a step's particles at the velocities that are commanded, within limits."""
-        velocities, matrix = self._velocities(), body.matrix
+        velocities, matrix = self._commanded(), body.matrix
+        if min(velocities) < self._slowest or max(velocities) > self._fastest:
+            velocities = [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
+        self._emitted = velocities
         newtons = self._newtons = self._law.emit()
         air, time_step = self.air, self._time_step
         for axis, members in self._by_axis:
@@ -103,16 +107,10 @@ class Propellers(Force):
                 along,
             )
 
-    def _velocities(self) -> Sequence[float]:
-        velocities = self._commanded()
-        if min(velocities) < self._slowest or max(velocities) > self._fastest:
-            return [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
-        return velocities
-
     @property
     def thrusts(self) -> list[float]:
         """Thrust of each propeller in N, as in the last step."""
-        return [self._newtons * velocity for velocity in self._velocities()]
+        return [self._newtons * velocity for velocity in self._emitted]
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back the fraction of a particle and the blades' way."""

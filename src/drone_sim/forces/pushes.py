@@ -24,24 +24,23 @@ class Pushes(Force):
     def __init__(self, time_step: float):
         """Begin with none; `time_step` in seconds."""
         self._time_step = time_step
-        self._lasting: list[tuple[Push, int]] = []  # and its steps that are left
+        self.lasting: list[tuple[Push, int]] = []  # and the steps that are left
 
     def add(self, push: Push) -> None:
         """Begin a push; its duration is rounded to whole steps, one at least."""
-        self._lasting.append((push, max(1, round(push.duration / self._time_step))))
+        self.lasting.append((push, max(1, round(push.duration / self._time_step))))
 
     def add_to(self, wrench: Wrench, body: Carried) -> None:
         """Add what pushes, and use up a step of it."""
-        if self._lasting:
-            for push, _ in self._lasting:
-                wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
-            self._lasting = [(push, steps - 1) for push, steps in self._lasting if steps > 1]
+        for push, _ in self.lasting:
+            wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
+        self.lasting = [(push, steps - 1) for push, steps in self.lasting if steps > 1]
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back what still lasts."""
-        kept = list(self._lasting)
+        kept = list(self.lasting)
 
         def recall() -> None:
-            self._lasting = list(kept)
+            self.lasting = list(kept)
 
         return recall

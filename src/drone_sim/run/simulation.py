@@ -127,7 +127,7 @@ class Simulation:
 
     def _begin(self) -> None:
         """Be at time 0 of a new run, in the initial scene."""
-        self._whereabouts = Whereabouts(self.parameters.scene.floor)
+        self._whereabouts = Whereabouts(self.parameters.scene.floor, lambda: self.time)
         self.steps = 0
         self._runs += 1
         self._changed_vehicles()
@@ -136,8 +136,7 @@ class Simulation:
     def _changed_vehicles(self) -> None:
         self._era += 1
         self._flying = tuple(self.vehicles.values())
-        self._any_in_sub_steps = any(vehicle.sub_step_forces for vehicle in self._flying)
-        self._sensing = tuple(vehicle for vehicle in self._flying if vehicle.instruments)
+        self._any_between = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self._flying)
 
     # ---- what flies
 
@@ -254,26 +253,27 @@ class Simulation:
         vehicles = self._flying
         for vehicle in vehicles:
             vehicle.actuation()
-        before = self._before_sub_step if self._any_in_sub_steps else None
-        wrenches = {vehicle.body.number: vehicle.wrench() for vehicle in vehicles}
-        after = self._after_sub_step if self._sensing else None
-        self.world.advance(wrenches, self._sub_steps, before, after)
+        wrenches = {}
+        for vehicle in vehicles:
+            wrenches[vehicle.body.number] = vehicle.wrench()
+        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
         for vehicle in vehicles:
             vehicle.body.refresh()
         self.steps += 1
-        self._whereabouts.check(vehicles, self.time)
+        self._whereabouts.check(vehicles)
         for vehicle in vehicles:
             vehicle.take_pictures(self.steps)
         for vehicle in vehicles:
             vehicle.script.call("sensing")
 
-    def _before_sub_step(self) -> None:
-        for vehicle in self._flying:
-            vehicle.before_sub_step()
-
-    def _after_sub_step(self, count: int) -> None:
-        for vehicle in self._sensing:
-            vehicle.after_sub_step(self.steps * self._sub_steps + count)
+    def _between(self, count: int) -> None:
+        """Do what is due after so many sub-steps of the step: instruments look, and forces follow."""
+        if count:
+            for vehicle in self._flying:
+                vehicle.after_sub_step(self.steps * self._sub_steps + count)
+        if count < self._sub_steps:
+            for vehicle in self._flying:
+                vehicle.before_sub_step()
 
     def look(self) -> None:
         """Let cameras that are watched show what is there now, between two steps."""

@@ -75,11 +75,6 @@ class Body:
         """Let a force (N, world) act in the next step at a point (m, inertial frame), and a torque (N m, world)."""
         self.wrench.add(force, torque, point)
 
-    def take_wrench(self) -> Wrench:
-        """Return the wrench of this step, and begin that of the next."""
-        wrench, self.wrench = self.wrench, Wrench()
-        return wrench
-
     def apply(self, force: Force) -> None:
         """Let a force act in the sub-step that comes, as it is at this moment."""
         self.refresh()

@@ -77,6 +77,7 @@ class Vehicle:
         carrying = Carrying(self.body, lambda: self._propellers.thrusts, shared)
         try:
             self.instruments = Instruments(parameters, suffix, self.body, carrying, shared)
+            self.sensors: Mapping[str, Instrument] = self.instruments.by_object  # as scripts find them
             self.reset()
         except BaseException:
             self.leave()
@@ -87,10 +88,10 @@ class Vehicle:
         self.close()
         self.body.reset()
         law, from_root = self.parameters.propellers, self.body.inertial_from_root
-        self._propellers = self._rotors.propellers(law, from_root, self._time_step, lambda: self.particle_velocities)
+        self._propellers = self._rotors.propellers(law, from_root, self._time_step, self._velocities)
         self._pushes = Pushes(self._time_step)
         others = [one.make() for one in self.parameters.forces.values()]
-        self._forces: list[Force] = [self._propellers, self._pushes, *(one for one in others if not one.every_sub_step)]
+        self._forces: list[Force] = [self._propellers, *(one for one in others if not one.every_sub_step)]
         self.sub_step_forces = [one for one in others if one.every_sub_step]
         self.command = Twist()
         self._command_age = 0.0
@@ -137,11 +138,6 @@ class Vehicle:
         return self._shared.drawings
 
     @property
-    def sensors(self) -> Mapping[str, Instrument]:
-        """The instruments, by the name of the object that scripts find."""
-        return self.instruments.by_object
-
-    @property
     def state(self) -> State:
         """Pose and velocity of base_link, after the last step or move."""
         return self.body.state
@@ -164,6 +160,9 @@ class Vehicle:
     @property
     def particle_velocities(self) -> tuple[float, ...]:
         """What the script commands: m/s, propellers 1 to 4."""
+        return self._velocities()
+
+    def _velocities(self) -> tuple[float, ...]:
         (first, second, third, fourth), key = self._commanded, PARTICLE_VELOCITY
         return first[key], second[key], third[key], fourth[key]
 
@@ -246,7 +245,8 @@ class Vehicle:
 
     def actuation(self) -> None:
         """Hand waiting messages to the script, then let it command the propellers."""
-        self.instruments.clear()
+        if self.sensors:
+            self.instruments.clear()
         timeout = self._timeout
         if timeout and self._command_age > timeout - self._time_step / 2 and self.command != Twist():
             self.receive(Twist())
@@ -258,9 +258,11 @@ class Vehicle:
     def wrench(self) -> Wrench:
         """Return what pushes the body through this step, the forces of single sub-steps aside."""
         body = self.body
-        wrench = body.take_wrench()
+        wrench, body.wrench = body.wrench, Wrench()
         for force in self._forces:
             force.add_to(wrench, body)
+        if self._pushes.lasting:
+            self._pushes.add_to(wrench, body)
         return wrench
 
     def before_sub_step(self) -> None:
@@ -276,8 +278,10 @@ class Vehicle:
     def take_pictures(self, steps: int, now: bool = False) -> None:
         """Let the cameras that are watched take a picture: those that are due after so many steps, or all `now`."""
         for camera in self.cameras.values():
-            looks = camera.watched() and (now or camera.is_due(steps))
-            camera.show(steps, self.look(camera) if looks else None)
+            if camera.watched():
+                camera.show(steps, self.look(camera) if now or camera.is_due(steps) else None)
+            elif camera.image is not None:
+                camera.show(steps, None)
 
     def look(self, camera: Camera) -> np.ndarray:
         """Return what a camera sees now."""
@@ -290,7 +294,15 @@ class Vehicle:
         """Return a function that brings back what the body is not: forces, script, messages, parameters."""
         command, age = self.command, self._command_age
         parameters = copy.deepcopy(self.script_parameters)
-        parts = (*self._forces, *self.sub_step_forces, self.blades, self.bus, self.script, *self.cameras.values())
+        parts = (
+            *self._forces,
+            self._pushes,
+            *self.sub_step_forces,
+            self.blades,
+            self.bus,
+            self.script,
+            *self.cameras.values(),
+        )
         others = [one.remember() for one in parts]
         instruments = self.instruments.remember()
 

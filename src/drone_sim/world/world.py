@@ -218,16 +218,11 @@ class World:
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
 
     def advance(
-        self,
-        wrenches: Mapping[int, Wrench],
-        sub_steps: int,
-        before: Callable[[], None] | None = None,
-        after: Callable[[int], None] | None = None,
+        self, wrenches: Mapping[int, Wrench], sub_steps: int, between: Callable[[int], None] | None = None
     ) -> None:
         """Step `sub_steps` times, re-applying each body's wrench every time (PyBullet forgets it).
 
-        `before` is called before each of these sub-steps, with everything where it is by then; `after` after each,
-        with how many there have been.
+        `between` is called with 0 before the first of these sub-steps, and after each with how many there have been.
         """
         # Local names and positional arguments: this loop is most of a step.
         client, in_world = self._client, pybullet.WORLD_FRAME
@@ -239,17 +234,17 @@ class World:
         )
         known = self._centres  # in the first sub-step
         loads = [(body, wrench.force, wrench.torque_under) for body, wrench in wrenches.items()]
+        if between is not None:
+            between(0)
         for count in range(1, sub_steps + 1):
-            if before is not None:
-                before()
             for body, force, torque_under in loads:
                 centre, orientation = (known and known.get(body)) or where(body, client)
                 pull(body, -1, force, centre, in_world, client)
                 turn(body, -1, torque_under(orientation), in_world, client)
             step(client)
             known = {}
-            if after is not None:
-                after(count)
+            if between is not None:
+                between(count)
         self._centres.clear()
         self.changes = next(_changes)
 

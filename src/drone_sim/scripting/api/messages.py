@@ -39,6 +39,8 @@ class MessageBus:
         own = _OWN_TOPICS if own_topics is None else own_topics
         self._own_topics = {self._resolve(topic): kind for topic, kind in own.items()}
         self._subscriptions = Subscriptions()
+        # Asked for in every step: without another call in between.
+        self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
         self._publishers = Publishers()
         self._last_handle = 0
 
@@ -127,14 +129,6 @@ class MessageBus:
     def post(self, topic: str, message: Any) -> None:
         """Leave a message for the next step; any thread may call it."""
         self._subscriptions.post(self._resolve(topic), message)
-
-    def new_callbacks(self) -> list[Callback]:
-        """Return what was subscribed with since the last call."""
-        return self._subscriptions.new_callbacks()
-
-    def deliver(self, call: Callable[[Callback, Any], None]) -> None:
-        """Hand every waiting message to `call(callback, message)`, oldest first."""
-        self._subscriptions.deliver(call)
 
     def close(self) -> None:
         """End every subscription and stop advertising: the script that made them is gone."""
