@@ -48,17 +48,12 @@ class Node:
         """Build the scene and advertise. Raises what Simulation raises."""
         self._parameters = parameters
         logging.getLogger("drone_sim").handlers = [_ToRosout()]
-        images = {
-            rospy.resolve_name(f"{vehicle.name}/{camera.topic}")
-            for vehicle in parameters.fleet
-            for camera in vehicle.cameras.values()
-        }
         drawings = Drawings()
         self.simulation = Simulation(
             parameters,
             script=parameters.script,
             gui=parameters.gui,
-            backend=RosBackend(images, lambda: self._time.stamp()),
+            backend=RosBackend(self._is_of_a_camera, lambda: self._time.stamp()),
             drawings=drawings,
             started=False,
         )
@@ -142,6 +137,14 @@ class Node:
 
     def _left(self) -> float:
         return self._beat.left(self.simulation.world.changes != self._shown)
+
+    def _is_of_a_camera(self, topic: str) -> bool:
+        """Tell whether a resolved topic is that of a camera's images."""
+        return any(
+            topic == rospy.resolve_name(f"{vehicle.name}/{camera.topic}")
+            for vehicle in self.simulation.vehicles.values()
+            for camera in vehicle.parameters.cameras.values()
+        )
 
     # ---- what is there
 

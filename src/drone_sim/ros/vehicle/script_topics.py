@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from typing import Any
 
 import genpy
@@ -16,9 +16,9 @@ from drone_sim.scripting.api.backend import Image
 class RosBackend:
     """Subscribes and advertises any installed message type."""
 
-    def __init__(self, camera_topics: Collection[str], stamp: Callable[[], rospy.Time]):
-        """Take the resolved image topics that the node's own cameras publish already, and what to stamp with."""
-        self._camera_topics = camera_topics
+    def __init__(self, is_of_a_camera: Callable[[str], bool], stamp: Callable[[], rospy.Time]):
+        """Take what tells the topics on which the node's own cameras publish already, and what to stamp with."""
+        self._is_of_a_camera = is_of_a_camera
         self._stamp = stamp
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
@@ -32,7 +32,7 @@ class RosBackend:
 
     def advertise_image(self, topic: str, queue: int) -> Any:
         """Advertise an image topic; one that a camera publishes already stays the camera's."""
-        if topic in self._camera_topics:
+        if self._is_of_a_camera(topic):
             rospy.loginfo(f"{topic}: the node's camera publishes it already; the script's images are not sent twice")
             return _Silence()
         return _ImageSender(rospy.Publisher(topic, ImageMessage, queue_size=queue), self._stamp)
