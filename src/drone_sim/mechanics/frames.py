@@ -139,6 +139,17 @@ def relative(a: Sequence[float], b: Sequence[float]) -> Matrix:
     )  # fmt: skip
 
 
+def relative_turn(a: Sequence[float], b: Sequence[float]) -> Matrix:
+    """Return what `relative` does without its translation, which a question for an orientation does not need."""
+    a0, a1, a2, _, a4, a5, a6, _, a8, a9, a10, _ = a
+    b0, b1, b2, _, b4, b5, b6, _, b8, b9, b10, _ = b
+    return (
+        a0 * b0 + a4 * b4 + a8 * b8, a0 * b1 + a4 * b5 + a8 * b9, a0 * b2 + a4 * b6 + a8 * b10, 0.0,
+        a1 * b0 + a5 * b4 + a9 * b8, a1 * b1 + a5 * b5 + a9 * b9, a1 * b2 + a5 * b6 + a9 * b10, 0.0,
+        a2 * b0 + a6 * b4 + a10 * b8, a2 * b1 + a6 * b5 + a10 * b9, a2 * b2 + a6 * b6 + a10 * b10, 0.0,
+    )  # fmt: skip
+
+
 def transform(m: Sequence[float], point: Sequence[float]) -> Vector:
     """Return the point m·p (simMultiplyVector)."""
     x, y, z = point

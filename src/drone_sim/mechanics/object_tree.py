@@ -231,6 +231,12 @@ class ObjectTree:
         reference = moved.parent if relative_to == PARENT else self[relative_to]
         return moved.matrix() if reference is None else frames.relative(reference.matrix(), moved.matrix())
 
+    def turn(self, handle: int, relative_to: int = WORLD) -> Matrix:
+        """Return what `matrix` does, of which only the rotation counts."""
+        if relative_to in (WORLD, PARENT):
+            return self.matrix(handle, relative_to)
+        return frames.relative_turn(self[relative_to].matrix(), self[handle].matrix())
+
     def set_matrix(self, handle: int, relative_to: int, matrix: Matrix) -> None:
         """Put an object at a transform relative to another, to its PARENT, or to the WORLD."""
         moved = self[handle]

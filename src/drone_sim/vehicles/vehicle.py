@@ -221,11 +221,7 @@ class Vehicle:
         modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
         self.script = load.load(path, modules, limit)
         self.script.call("init")
-        self._check_callbacks()
-
-    def _check_callbacks(self) -> None:
-        """Raise ScriptError for a subscription since the last check whose function the script does not have."""
-        for callback in self.bus.new_callbacks():
+        for callback in self.bus.new_callbacks():  # whose function the script may not have
             self.script.check(callback)
 
     def leave(self) -> None:
@@ -251,7 +247,8 @@ class Vehicle:
         if timeout and self._command_age > timeout - self._time_step / 2 and self.command != Twist():
             self.receive(Twist())
         self._command_age += self._time_step
-        self._check_callbacks()
+        for callback in self.bus.new_callbacks():
+            self.script.check(callback)
         self.bus.deliver(self.script.callback)
         self.script.call("actuation")
 

@@ -49,7 +49,7 @@ class Objects:
 
     def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the Euler angles of an object."""
-        return list(frames.to_euler(self._objects.matrix(handle, relativeTo)))
+        return list(frames.to_euler(self._objects.turn(handle, relativeTo)))
 
     def setObjectOrientation(self, handle: Handle, relativeTo: Handle, angles: ThreeNumbers = ()) -> None:
         """Turn an object: (handle, relativeTo, angles), or (handle, angles, relativeTo) as in 4.x."""
