@@ -87,7 +87,12 @@ def test_entries_change_what_they_name_alone(fly):
         ({"a": 3}, r"parameter vehicles/a = 3: must hold `key: value` lines"),
         (2.5, r"parameter vehicles = 2\.5: must be a whole number from 0 to 256"),
         (257, r"parameter vehicles = 257: must be a whole number from 0 to 256"),
-        ([1], r"parameter vehicles = \[1\]: "),
+        ([1], r"parameter vehicles = \[1\]: must be a whole number from 0 to 256, or entries"),
+        ("many", r"parameter vehicles = 'many': must be a whole number from 0 to 256, or entries"),
+        (math.nan, r"parameter vehicles = nan: must be a whole number"),
+        (math.inf, r"parameter vehicles = inf: must be a whole number"),
+        (True, r"parameter vehicles = True: must be a whole number"),
+        (None, r"parameter vehicles = None: must be a whole number"),
         ({"a": {"cameras": {"front": {"width": 0}}}}, r"parameter vehicles/a/cameras/front/width = 0: "),
     ],
 )

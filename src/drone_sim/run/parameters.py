@@ -133,14 +133,12 @@ class Parameters(EquipmentParameters):
 
 def _entries(given: Any, drone: Any) -> Any:
     """Return the entries that a number of vehicles stands for: drone1, drone2, ... in a row about the drone."""
-    if isinstance(given, bool) or not isinstance(given, (int, float)):
+    if isinstance(given, Mapping):
         return given
-    if not (given == int(given) and 0 <= given <= MAX_VEHICLES):
-        raise ParameterError(
-            f"parameter vehicles = {shown(given)}: must be a whole number from 0 to {MAX_VEHICLES}, "
-            "or entries such as drone1: {position: [0, 0, 0.8]}",
-            ("vehicles",),
-        )
+    is_number = isinstance(given, (int, float)) and not isinstance(given, bool)
+    if not (is_number and 0 <= given <= MAX_VEHICLES and given == int(given)):
+        must = f"a whole number from 0 to {MAX_VEHICLES}, or entries such as drone1: {{position: [0, 0, 0.8]}}"
+        raise ParameterError(f"parameter vehicles = {shown(given)}: must be {must}", ("vehicles",))
     try:
         x, y, z = map(float, drone["position"])
     except (TypeError, KeyError, ValueError):  # refused with the other values
