@@ -219,6 +219,21 @@ def test_drawing_a_picture_is_not_the_scripts_time():
     assert not limit.exceeded()
 
 
+def test_a_limit_that_passes_while_it_is_looked_at_holds():
+    class Slow(TimeLimit):
+        looks = 0
+
+        def exceeded(self):
+            self.looks += 1
+            return self.looks > 1 and super().exceeded()
+
+        def left(self):
+            return super().left() - 1.0  # the process had to wait for its turn
+
+    with pytest.raises(Stopped):
+        Slow(0.05).run(time.sleep, 10)
+
+
 def test_a_late_stop_never_leaves_the_script():
     """What is raised for a script that returns at the last moment does not strike the simulator."""
     limit = TimeLimit(0.02)

@@ -29,6 +29,7 @@ _AGAIN = 0.25  # s after which a script that swallowed the exception gets anothe
 _UNTIL_HEARD = 0.01  # s between two tries to begin: a recursion may leave no room for a signal handler
 _LATER = 0.001  # s, so that the time is used up when the timer goes off
 _LONGEST = 1e6  # s
+_SOONEST = 1e-4  # s; 0 would switch the timer off
 
 _ROOM = 50  # levels of recursion that the signal handler has beyond what the script may use
 
@@ -195,7 +196,8 @@ class _Timer:
             atexit.register(signal.setitimer, signal.ITIMER_REAL, 0)  # nobody catches it while Python ends
             self._is_ready = True
         self.next = monotonic() + seconds
-        signal.setitimer(signal.ITIMER_REAL, min(seconds, _LONGEST), _UNTIL_HEARD)
+        # Where the process had to wait for its turn, what was left of the time has passed by now.
+        signal.setitimer(signal.ITIMER_REAL, min(max(seconds, _SOONEST), _LONGEST), _UNTIL_HEARD)
 
     def rest(self) -> None:
         """Do not go off any more."""
