@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 from numpy.random import Generator
 
@@ -72,7 +72,7 @@ class Noise:
         """Begin anew, drawing from `random`."""
         self._random = random
         self._constant, self._bias = (
-            [spread * one for one in random.standard_normal(self._axes).tolist()] if spread else [0.0] * self._axes
+            [spread * one for one in _drawn(random, self._axes)] if spread else [0.0] * self._axes
             for spread in (self._parameters.bias, self._spread)
         )
 
@@ -83,10 +83,10 @@ class Noise:
         # Lists of floats: of so few axes numpy takes longer for a sum than Python does.
         measured = [true + constant + bias for true, constant, bias in zip(truth, self._constant, self._bias)]
         if self._white:
-            white, drawn = self._white, self._random.standard_normal(self._axes).tolist()
+            white, drawn = self._white, _drawn(self._random, self._axes)
             measured = [one + white * by for one, by in zip(measured, drawn)]
         if self._walk:
-            keep, walk, drawn = self._keep, self._walk, self._random.standard_normal(self._axes).tolist()
+            keep, walk, drawn = self._keep, self._walk, _drawn(self._random, self._axes)
             self._bias = [keep * one + walk * by for one, by in zip(self._bias, drawn)]
         step = self._parameters.quantisation
         return [round(one / step) * step for one in measured] if step else measured
@@ -99,3 +99,8 @@ class Noise:
             self._bias = bias
 
         return recall
+
+
+def _drawn(random: Generator, count: int) -> list[float]:
+    numbers: Any = random.standard_normal(count).tolist()  # numpy's own types for it differ between releases
+    return numbers
