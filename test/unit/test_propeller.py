@@ -74,4 +74,6 @@ def test_wrench_is_the_sum_of_forces_at_points_that_turn_with_the_body(forces, a
         force += f
         torque += np.add(t, np.cross(frames.rotate(turn, point), f))
     assert wrench.force == pytest.approx(tuple(force), abs=1e-9)
-    assert wrench.torque_under(frames.to_quaternion(turn)) == pytest.approx(tuple(torque), abs=1e-9)
+    quaternion = frames.to_quaternion(turn)
+    assert wrench.torque_under(quaternion) == pytest.approx(tuple(torque), abs=1e-9)
+    assert wrench.torque_law()(quaternion) == wrench.torque_under(quaternion), "to the last bit"

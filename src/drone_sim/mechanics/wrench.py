@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from drone_sim.mechanics.frames import Quaternion, Vector
 
 
@@ -51,3 +53,17 @@ class Wrench:
             sum_y += uz * ax - ux * az
             sum_z += ux * ay - uy * ax
         return sum_x, sum_y, sum_z
+
+    def torque_law(self) -> Callable[[Quaternion], Vector]:
+        """Return `torque_under` as it is by now; without its loop where all forces have one axis, as most often."""
+        if len(self._levers) != 1:
+            return self.torque_under
+        (sum_x, sum_y, sum_z), ((lx, ly, lz, ax, ay, az),) = self._torque, self._levers
+
+        def torque_under(orientation: Quaternion) -> Vector:
+            x, y, z, w = orientation
+            tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
+            ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
+            return sum_x + (uy * az - uz * ay), sum_y + (uz * ax - ux * az), sum_z + (ux * ay - uy * ax)
+
+        return torque_under

@@ -233,7 +233,7 @@ class World:
             pybullet.stepSimulation,
         )
         known = self._centres  # in the first sub-step
-        loads = [(body, wrench.force, wrench.torque_under) for body, wrench in wrenches.items()]
+        loads = [(body, wrench.force, wrench.torque_law()) for body, wrench in wrenches.items()]
         if between is not None:
             between(0)
         for count in range(1, sub_steps + 1):
