@@ -32,7 +32,7 @@ class DrawingMarkers:
     """Shows drawing objects, each as one marker."""
 
     def __init__(self, drone: str, drawings: Drawings):
-        """Advertise in the drone's namespace."""
+        """Advertise where all that flies has its topics: see marker_topic.namespace."""
         self._drawings = drawings
         self._throttle = Throttle(_PERIOD)
         self._shown = 0

@@ -19,7 +19,7 @@ class RvizView:
     """The markers of one simulation; each topic is made only while somebody listens to it."""
 
     def __init__(self, simulation: Simulation, player: Player, drawings: Drawings):
-        """Advertise in the drone's namespace."""
+        """Advertise where all that flies has its topics: see marker_topic.namespace."""
         self._files = RvizMeshes()
         self._markers = (
             Surroundings(simulation, self._files),

@@ -36,7 +36,7 @@ class SceneMarkers:
     """Shows the objects of the scene as they stand. The floor is not among them."""
 
     def __init__(self, simulation: Simulation, files: RvizMeshes):
-        """Advertise in the drone's namespace."""
+        """Advertise where all that flies has its topics: see marker_topic.namespace."""
         self._simulation = simulation
         self._files = files
         self._shown: tuple[list[Visual], np.ndarray] | None = None

@@ -38,7 +38,7 @@ class Surroundings:
     """Shows what is around the scene's objects; it changes with the scene alone."""
 
     def __init__(self, simulation: Simulation, files: RvizMeshes):
-        """Advertise in the drone's namespace."""
+        """Advertise where all that flies has its topics: see marker_topic.namespace."""
         self._simulation = simulation
         self._files = files
         self._shown: Scene | None = None
