@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 from drone_sim.mechanics.frames import Quaternion, Vector
 
@@ -41,9 +41,14 @@ class Wrench:
         )
         self._levers.append((2.0 * lx, 2.0 * ly, 2.0 * lz, ax, ay, az))
 
+    @property
+    def terms(self) -> tuple[Vector, Sequence[tuple[float, ...]]]:
+        """What `torque_under` sums: the torque that does not depend on R, and of each axis 2 l and a, in one."""
+        return self._torque, self._levers
+
     def torque_under(self, orientation: Quaternion) -> Vector:
         """Return the torque about the centre of mass (N m, world) while the body has this orientation."""
-        # Written out, without a loop but the one over directions: this runs in every sub-step.
+        # Written out, without a loop but the one over directions: World.advance does the same in every sub-step.
         x, y, z, w = orientation
         sum_x, sum_y, sum_z = self._torque
         for lx, ly, lz, ax, ay, az in self._levers:
@@ -53,17 +58,3 @@ class Wrench:
             sum_y += uz * ax - ux * az
             sum_z += ux * ay - uy * ax
         return sum_x, sum_y, sum_z
-
-    def torque_law(self) -> Callable[[Quaternion], Vector]:
-        """Return `torque_under` as it is by now; without its loop where all forces have one axis, as most often."""
-        if len(self._levers) != 1:
-            return self.torque_under
-        (sum_x, sum_y, sum_z), ((lx, ly, lz, ax, ay, az),) = self._torque, self._levers
-
-        def torque_under(orientation: Quaternion) -> Vector:
-            x, y, z, w = orientation
-            tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
-            ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
-            return sum_x + (uy * az - uz * ay), sum_y + (uz * ax - ux * az), sum_z + (ux * ay - uy * ax)
-
-        return torque_under

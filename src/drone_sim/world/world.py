@@ -233,14 +233,20 @@ class World:
             pybullet.stepSimulation,
         )
         known = self._centres  # in the first sub-step
-        loads = [(body, wrench.force, wrench.torque_law()) for body, wrench in wrenches.items()]
+        loads = [(body, wrench.force, *wrench.terms) for body, wrench in wrenches.items()]
         if between is not None:
             between(0)
         for count in range(1, sub_steps + 1):
-            for body, force, torque_under in loads:
-                centre, orientation = (known and known.get(body)) or where(body, client)
+            for body, force, (torque_x, torque_y, torque_z), levers in loads:
+                centre, (x, y, z, w) = (known and known.get(body)) or where(body, client)
                 pull(body, -1, force, centre, in_world, client)
-                turn(body, -1, torque_under(orientation), in_world, client)
+                for lx, ly, lz, ax, ay, az in levers:  # Wrench.torque_under, without a call
+                    tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
+                    ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
+                    torque_x += uy * az - uz * ay
+                    torque_y += uz * ax - ux * az
+                    torque_z += ux * ay - uy * ax
+                turn(body, -1, (torque_x, torque_y, torque_z), in_world, client)
             step(client)
             known = {}
             if between is not None:
