@@ -11,6 +11,7 @@
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
       DronePosition                              /target                 the green sphere
 
+CoppeliaSim 4.0 to 4.2 say Quadcopter_base, Quadcopter_target, ...: every name with Quadricopter_ has this form, too.
 The names of the second vehicle end in #0, those of the third in #1, and so on, as those of V-REP's copies do.
 Cameras and vision sensors look along their z axis, with y up and x to the left, as V-REP's do.
 """
@@ -43,6 +44,11 @@ def respondable(number: int) -> str:
 def joint(number: int) -> str:
     """Return the name of the joint that turns the blades of propeller 1 to 4."""
     return f"Quadricopter_propeller_joint{number}"
+
+
+def _of_each_generation(name: str) -> list[str]:
+    """Return a name as V-REP 3.x has it, and as CoppeliaSim 4.0 to 4.2 have it where that is another."""
+    return list(dict.fromkeys((name, name.replace("Quadricopter_", "Quadcopter_"))))
 
 
 class QuadricopterObjects:
@@ -96,7 +102,7 @@ class QuadricopterObjects:
     ) -> None:
         own = None if parent is None else f"{parent}{self._suffix}"
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
-        names = [f"{one}{self._suffix}" for one in (name, *also)]
+        names = [f"{one}{self._suffix}" for called in (name, *also) for one in _of_each_generation(called)]
         try:
             handle = self._objects.add(names[0], above, local, body, alias=alias or name, also=names[1:])
         except ValueError as error:  # one of the scene has that name
