@@ -9,6 +9,7 @@ local within_limits, take_snapshot = sandbox.within_limits, sandbox.take_snapsho
 local env, callbacks, sources = sandbox.globals, sandbox.callbacks, sandbox.sources
 
 local PHASES = {bridge.phases()}
+local CALL_TYPES = {bridge.call_types()} -- of sim_call_type, by phase
 local MISSING = 3 -- beside the numbers of the limits
 local chunk -- the script, where it runs once for each phase
 
@@ -42,7 +43,7 @@ end
 
 function sandbox.phase(number)
   if chunk then
-    rawset(env, 'sim_call_type', number - 1)
+    rawset(env, 'sim_call_type', CALL_TYPES[number])
     return run(chunk)
   end
   return run(rawget(env, PHASES[number]))
