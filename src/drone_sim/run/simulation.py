@@ -234,9 +234,19 @@ class Simulation:
 
     def _clean_up(self) -> None:
         was_running, self.running = self.running, False
+        self._setting.shared.control.is_ending = True
         self._setting.end_scripts(clean_up=was_running)
 
     # ---- stepping
+
+    @property
+    def asked(self) -> str:
+        """What a script asked for since it was last taken: 'stop', 'pause' or nothing. Whoever plays this obeys."""
+        return self._setting.shared.control.asked
+
+    def take_asked(self) -> str:
+        """Return what a script asked for, and forget it."""
+        return self._setting.shared.control.take()
 
     @property
     def run(self) -> int:
@@ -285,7 +295,7 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying]
+        parts: list[Any] = [shared.objects, shared.signals, shared.data, self._drawings, *self._flying]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

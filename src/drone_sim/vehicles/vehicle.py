@@ -19,7 +19,7 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.sensors.camera import Camera
@@ -180,6 +180,11 @@ class Vehicle:
         sensor = self.objects.matrix(self.objects.handle(camera.object + self.suffix))
         return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
 
+    def masses(self) -> dict[str, float]:
+        """Return the mass (kg) of each of its shapes, by object name; they are one body."""
+        of_propellers = {respondable(number) + self.suffix: one for number, one in zip(NUMBERS, self._rotors.masses)}
+        return {self.own_script: self.body.mass - sum(of_propellers.values()), **of_propellers}
+
     # ---- commands
 
     def receive(self, twist: Twist) -> None:
@@ -217,8 +222,18 @@ class Vehicle:
         limit = TimeLimit(self._shared.script_time_limit)
         cameras = self.parameters.cameras
         pictures = {cameras[name].object + self.suffix: partial(self.look, one) for name, one in self.cameras.items()}
-        surroundings = Surroundings(self._shared.time, self._time_step, pictures, limit.outside)
-        modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
+        surroundings = Surroundings(
+            clock=self._shared.time,
+            time_step=self._time_step,
+            pictures=pictures,
+            planes={one.object + self.suffix: (one.near, one.far) for one in cameras.values()},
+            outside=limit.outside,
+            gravity=self._shared.gravity,
+            masses=self.masses,
+            control=self._shared.control,
+            data=self._shared.data,
+        )
+        modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus), **make_plugins(self)}
         self.script = load.load(path, modules, limit)
         self.script.call("init")
         for callback in self.bus.new_callbacks():  # whose function the script may not have

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from drone_sim.scripting.errors import UnknownName
 from drone_sim.scripting.api.unknown import not_there
+from drone_sim.scripting.errors import UnknownName
 
 Function = Callable[..., Any]
 _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError)

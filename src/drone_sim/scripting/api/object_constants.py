@@ -5,6 +5,7 @@ from __future__ import annotations
 HANDLES: dict[str, int] = dict(  # what stands for a handle, and what is added to one
     handle_all=-2, handle_all_except_explicit=-3, handle_self=-4, handle_main_script=-5, handle_tree=-6,
     handle_single=-8, handle_default=-9, handle_all_except_self=-10, handle_parent=-11, handle_scene=-12,
+    handle_app=-13,
     handle_world=-1, handle_mainscript=-5, handle_inverse=-14, handle_sceneobject=-16, handle_sandbox=-17,
     handle_mesh=-18, handleflag_assembly=4194304, handleflag_togglevisibility=4194304, handleflag_extended=4194304,
     handleflag_greyscale=4194304, handleflag_codedstring=4194304, handleflag_depthbuffermeters=8388608,

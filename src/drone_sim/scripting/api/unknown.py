@@ -34,8 +34,8 @@ PLUGINS = {
 # Functions of CoppeliaSim, by the beginning of their names, and why they are not here. Flat names are looked up as if
 # they stood in their module: simCreateIkGroup is sim.createIkGroup.
 ABSENT: dict[str, str] = {
-    r"simExtROS_\w+": "the plugin of V-REP 3.0 to 3.2 sent what it was told to; use simROS.advertise and simROS.publish",
-    r"simros_\w+": "the plugin of V-REP 3.0 to 3.2 is not here; use simROS.advertise and simROS.publish",
+    r"simExtROS_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
+    r"simros_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
     r"simExtOMPL_\w+": PLUGINS["simOMPL"],
     r"simExtVision_\w+": PLUGINS["simVision"],
     r"simExtOctomap_\w+": PLUGINS["simOctomap"],
