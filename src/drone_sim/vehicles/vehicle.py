@@ -233,7 +233,11 @@ class Vehicle:
             control=self._shared.control,
             data=self._shared.data,
         )
-        modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus), **make_plugins(self)}
+        modules = {
+            "sim": make_sim(self, surroundings),
+            "simROS": make_sim_ros(self.bus, self._shared.time),
+            **make_plugins(self),
+        }
         self.script = load.load(path, modules, limit)
         self.script.call("init")
         for callback in self.bus.new_callbacks():  # whose function the script may not have

@@ -8,6 +8,8 @@ log names the function, what it got, and what it takes.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from drone_sim.scripting.api.bits import Bits
 from drone_sim.scripting.api.calls import Api, public_functions
 from drone_sim.scripting.api.constants import CONSTANTS
@@ -24,6 +26,7 @@ from drone_sim.scripting.api.object_kinds import ObjectKinds
 from drone_sim.scripting.api.objects import Objects
 from drone_sim.scripting.api.packing import Packing
 from drone_sim.scripting.api.poses import Poses
+from drone_sim.scripting.api.ros_functions import RosFunctions
 from drone_sim.scripting.api.scripts import Scripts
 from drone_sim.scripting.api.sensors import Sensors
 from drone_sim.scripting.api.simulation import SimulationFunctions
@@ -34,7 +37,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
     """Return `sim` for the script that flies a drone."""
     names, ignored = Names(host), _ignored(host)
     parts = (
-        Objects(host, surroundings.time_step),
+        Objects(host),
         ObjectKinds(host, surroundings),
         Dynamics(host, surroundings, ignored),
         Matrices(),
@@ -52,9 +55,9 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
     return Api("sim", {**ignored.functions(), **public_functions(parts), **functions}, CONSTANTS, names.remember)
 
 
-def make_sim_ros(bus: MessageBus) -> Api:
-    """Return `simROS` for the script that flies a drone."""
-    return Api("simROS", bus.functions(), {})
+def make_sim_ros(bus: MessageBus, clock: Callable[[], float] = float) -> Api:
+    """Return `simROS` for the script that flies a drone; `clock` returns the simulated time in s."""
+    return Api("simROS", {**bus.functions(), **RosFunctions(bus, clock).functions()}, {})
 
 
 def make_plugins(host: Host) -> dict[str, Api]:

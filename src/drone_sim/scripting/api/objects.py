@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,17 +10,16 @@ from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import WrongValue, numbers
 from drone_sim.scripting.api.handles import AXIS, bare
 from drone_sim.scripting.api.host import Host
-from drone_sim.scripting.api.matrices import about, unit
+from drone_sim.scripting.api.matrices import unit
 from drone_sim.scripting.api.types import FourNumbers, Handle, Number, SevenNumbers, ThreeNumbers, TwelveNumbers
 
 
 class Objects:
     """The functions on objects."""
 
-    def __init__(self, host: Host, time_step: float):
-        """Take the drone whose objects they are, and the simulation step (s)."""
+    def __init__(self, host: Host):
+        """Take the drone whose objects they are."""
         self._host = host
-        self._time_step = time_step
         self._objects = host.objects
 
     def getObjectParent(self, handle: Handle) -> int:
@@ -97,18 +95,15 @@ class Objects:
     # ---- how they move
 
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return linear velocity (m/s) and turn of an object, in the world frame.
+        """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame.
 
-        The turn is the angular velocity (rad/s) where sim.handleflag_axis is added to the handle. Without it, as in
-        V-REP, it is the Euler angles of the turn in one step, by the step: the same to first order.
+        sim.handleflag_axis may be added to the handle, as V-REP's manual recommends. Without it V-REP gives the Euler
+        angles of the turn in one step, divided by the step: here it is the angular velocity, too.
         """
         if handle >= AXIS:
-            return self.getVelocity(bare(handle))
+            handle = bare(handle)
         linear, angular = self._objects[handle].velocity()
-        if angular == (0.0, 0.0, 0.0):
-            return list(linear), list(angular)
-        turn = frames.from_quaternion((0.0, 0.0, 0.0), about(angular, math.hypot(*angular) * self._time_step))
-        return list(linear), [angle / self._time_step for angle in frames.to_euler(turn)]
+        return list(linear), list(angular)
 
     def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
         """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame."""

@@ -54,6 +54,10 @@ ABSENT: dict[str, str] = {
     r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
     r"sim\.\w*(?:LinkDummy|DummyLink)\w*": "dummies are not linked to each other",
     r"sim\.\w*(?:WorkThread|Module|Plugin)\w*": "plugins are not loaded from scripts",
+    r"simROS\.(?:advertiseService|shutdownServiceServer|serviceServerTreat\w+)": (
+        "a child script offers no services: subscribe to a topic"
+    ),
+    r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
     r"sim\.launchExecutable": "a child script starts no programs: use a launch file",
 }
 _FLAT = re.compile(r"sim([A-Z]\w*)")
