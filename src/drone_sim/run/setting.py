@@ -11,6 +11,7 @@ from drone_sim.scene.scene import Scene
 from drone_sim.scripting.api.control import Control
 from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.tubes import Tubes
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.parameters import VehicleParameters
@@ -95,7 +96,7 @@ class Setting:
 
     def _empty_tree(self) -> None:
         self.shared.objects, self.shared.signals = ObjectTree(), Signals()
-        self.shared.control, self.shared.data = Control(), CustomData()
+        self.shared.control, self.shared.data, self.shared.tubes = Control(), CustomData(), Tubes()
         self.shared.objects.add("Floor", also=("ResizableFloor_5_25",))
 
     def _name_objects(self) -> None:

@@ -295,7 +295,7 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        parts: list[Any] = [shared.objects, shared.signals, shared.data, self._drawings, *self._flying]
+        parts: list[Any] = [shared.objects, shared.signals, shared.data, shared.tubes, self._drawings, *self._flying]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

@@ -232,6 +232,7 @@ class Vehicle:
             masses=self.masses,
             control=self._shared.control,
             data=self._shared.data,
+            tubes=self._shared.tubes,
         )
         modules = {
             "sim": make_sim(self, surroundings),

@@ -14,6 +14,7 @@ from drone_sim.scripting.api.control import Control
 from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.tubes import Tubes
 
 ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
 
@@ -79,3 +80,4 @@ class Surroundings:
     masses: Callable[[], Mapping[str, float]] = dict  # kg, of the shapes that the dynamics move, by object name
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
+    tubes: Tubes = field(default_factory=Tubes)

@@ -50,7 +50,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         Sensors(host),
     )
     data = CustomDataFunctions(host, surroundings.data)
-    others = (names, host.signals, data, Packing(), Drawing(host, ignored))
+    others = (names, host.signals, surroundings.tubes, data, Packing(), Drawing(host, ignored))
     functions = {name: f for one in others for name, f in one.functions().items()}
     return Api("sim", {**ignored.functions(), **public_functions(parts), **functions}, CONSTANTS, names.remember)
 
