@@ -130,7 +130,7 @@ class Scene:
         one = self._entries[index]
         if isinstance(one, KindParameters):
             return one.make(place, self._around)
-        number, link = self._places[index]
+        number, _ = self._places[index]
         if isinstance(one, ObjectParameters) and not one.mass:
             return StaticShape(*place, world=self._world, number=number, hangs=self._hang)
         return SceneObject(*place[:3], IDENTITY, self._body(index), kind="shape")
@@ -148,6 +148,7 @@ class Scene:
                 joint = self._objects[hung.joint]
                 assert isinstance(joint, Joint), "a chain hangs on joints"
                 joint.drive = JointDrive(self._world, *self._places[hung.shape])
+                joint.drive.limit(joint.limits)
                 joint.drive.command(joint.control)
             first = self._objects[chain.hung[0].joint]
             if chain.root is None and first.parent is not None:
