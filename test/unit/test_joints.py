@@ -1,5 +1,6 @@
 """Joints in the dynamics, against closed forms; and the script functions on them."""
 
+import itertools
 import math
 
 import pytest
@@ -12,19 +13,25 @@ from drone_sim.scripting.api.modules import make_sim
 SCENE = """
 objects:
   # a pendulum of 1 m, which swings about the world's y axis
-  - {name: Bob, shape: sphere, size: [0.1], mass: 2, parent: Pivot, position: [0, -1, 0], inertia: {moments: [0.1, 0.1, 0.1]}}
-  - {name: Pivot, kind: joint, type: revolute, mode: passive, value: 0.1, parent: Beam, rpy: [1.5707963267948966, 0, 0]}
+  - {name: Bob, shape: sphere, size: [0.1], mass: 2, parent: Pivot, position: [0, -1, 0],
+     inertia: {moments: [0.1, 0.1, 0.1]}}
+  - {name: Pivot, kind: joint, type: revolute, mode: passive, value: 0.1, parent: Beam,
+     rpy: [1.5707963267948966, 0, 0]}
   - {name: Beam, shape: box, size: [0.1, 0.1, 0.1], position: [4, 0, 3]}
   # a lift, held at a height by a motor
-  - {name: Lift, kind: joint, type: prismatic, mode: position, limits: [0, 2], target: 0.5, max_force: 100, position: [8, 0, 1]}
+  - {name: Lift, kind: joint, type: prismatic, mode: position, limits: [0, 2], target: 0.5, max_force: 100,
+     position: [8, 0, 1]}
   - {name: Cabin, shape: box, size: [0.2, 0.2, 0.2], mass: 3, parent: Lift, position: [0, 0, 0]}
   # a flywheel about the vertical, the axis through its centre
   - {name: Axle, kind: joint, type: revolute, mode: force, target: 0.5, position: [12, 0, 1]}
-  - {name: Flywheel, shape: cylinder, size: [0.5, 0.1], mass: 8, parent: Axle, position: [0, 0, 0], inertia: {moments: [0.5, 0.5, 1]}}
+  - {name: Flywheel, shape: cylinder, size: [0.5, 0.1], mass: 8, parent: Axle, position: [0, 0, 0],
+     inertia: {moments: [0.5, 0.5, 1]}}
   # a cart on one driven wheel and a skid without friction to speak of: a free root
   - {name: Cart, shape: box, size: [0.6, 0.1, 0.1], mass: 1, position: [16, 0, 0.25]}
-  - {name: Left, kind: joint, type: revolute, mode: velocity, target: 2, max_force: 20, parent: Cart, position: [0, 0.3, -0.05], rpy: [-1.5707963267948966, 0, 0]}
-  - {name: Right, kind: joint, type: revolute, mode: velocity, target: 2, max_force: 20, parent: Cart, position: [0, -0.3, -0.05], rpy: [-1.5707963267948966, 0, 0]}
+  - {name: Left, kind: joint, type: revolute, mode: velocity, target: 2, max_force: 20, parent: Cart,
+     position: [0, 0.3, -0.05], rpy: [-1.5707963267948966, 0, 0]}
+  - {name: Right, kind: joint, type: revolute, mode: velocity, target: 2, max_force: 20, parent: Cart,
+     position: [0, -0.3, -0.05], rpy: [-1.5707963267948966, 0, 0]}
   - {name: LeftWheel, shape: cylinder, size: [0.2, 0.05], mass: 1, parent: Left, position: [0, 0, 0]}
   - {name: RightWheel, shape: cylinder, size: [0.2, 0.05], mass: 1, parent: Right, position: [0, 0, 0]}
   - {name: Lamp, kind: dummy, parent: LeftWheel, position: [0.2, 0, 0]}
@@ -59,7 +66,7 @@ def run(simulation, seconds):
 
 def zeros(values, step):
     """Return when values cross 0 upwards."""
-    pairs = zip(values, values[1:])
+    pairs = itertools.pairwise(values)
     return [
         step * (index + before / (before - after)) for index, (before, after) in enumerate(pairs) if before < 0 <= after
     ]

@@ -98,7 +98,7 @@ def test_one_object_alone_and_beyond_a_threshold(simulation, sim):
     assert sim.handleProximitySensor(-3)[0] == 1
     assert sim.handleProximitySensor(ray) == sim.readProximitySensor(ray)
     sim.resetProximitySensor(ray)
-    with pytest.raises(TypeError, match="'Floor' is no proximity sensor"):
+    with pytest.raises(TypeError, match="'Floor' is no sensor of the kind range, and no proximity sensor"):
         sim.readProximitySensor(handle("Floor"))
 
 

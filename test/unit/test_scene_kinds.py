@@ -33,8 +33,10 @@ objects:
       - {shape: box, size: [1, 1, 0.1]}
       - {shape: cylinder, size: [0.05, 0.8], position: [0, 0, -0.45], color: [0, 0, 1]}
       - {shape: box, size: [0.6, 0.6, 0.02], position: [0, 0, -0.84]}
-  - {name: Way, kind: path, parent: Table, position: [0, 0, 1], points: [[0, 0, 0], [3, 0, 0], [3, 4, 0]], closed: false}
-  - {name: Eye, kind: vision_sensor, parent: Hand, position: [0, 0, 2], rpy: [3.141592653589793, 0, 0], width: 32, height: 24}
+  - {name: Way, kind: path, parent: Table, position: [0, 0, 1], points: [[0, 0, 0], [3, 0, 0], [3, 4, 0]],
+     closed: false}
+  - {name: Eye, kind: vision_sensor, parent: Hand, position: [0, 0, 2], rpy: [3.141592653589793, 0, 0],
+     width: 32, height: 24}
 """
 
 

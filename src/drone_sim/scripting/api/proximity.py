@@ -96,7 +96,7 @@ class ProximitySensors:
         sensor = self._sensors.get(name)
         detected = getattr(sensor, "detected", None)
         if sensor is None or detected is None:
-            raise WrongValue(f"'{name}' is no proximity sensor, and no sensor of the kind range: {self._known()}")
+            raise WrongValue(f"'{name}' is no sensor of the kind range, and no proximity sensor: {self._known()}")
         found = detected()
         if found is None:
             return _NOTHING if sensor.read() else _NOT_YET, 0.0, [0.0, 0.0, 0.0], WORLD, [0.0, 0.0, 0.0]
