@@ -66,6 +66,11 @@ def same(functions: Mapping[str, Any]) -> list[tuple[Any, list[str]]]:
     return list(names.items())
 
 
+def is_ignored(function: Any) -> bool:
+    """Tell whether a function of the API does nothing."""
+    return bool(function.__module__ == ignored.__name__)
+
+
 def text() -> str:
     """Return the page."""
     return "\n".join([_INTRODUCTION, *_implemented(), *_ignored(), *_absent()])
@@ -76,7 +81,7 @@ def _implemented() -> Iterator[str]:
     for module, api in apis().items():
         sections: dict[str, list[str]] = {}
         for function, names in same(contents(api)[1]):
-            if function.__module__ == ignored.__name__:
+            if is_ignored(function):
                 continue
             what = _first_sentences(inspect.getdoc(function) or "")
             sections.setdefault(function.__module__, []).append(_row(module, names, what))
@@ -117,8 +122,10 @@ def _ignored() -> Iterator[str]:
     """Yield the section of what is accepted and ignored."""
     yield "## Accepted and ignored\n\nThe log says so once for each function of a script.\n"
     for module, groups in {"sim": ignored.SIM, **ignored.MODULES}.items():
+        found = contents(apis()[module])[1]
         for group in groups:
-            rows = [_row(module, [name], _returned(gives)) for name, gives in group.functions.items()]
+            idle = {name: gives for name, gives in group.functions.items() if is_ignored(found[name])}
+            rows = [_row(module, [name], _returned(gives)) for name, gives in idle.items()]
             yield f"### {module}: {group.why}\n\n{_IGNORED_HEAD}{''.join(sorted(rows, key=str.lower))}"
 
 

@@ -266,9 +266,14 @@ class Simulation:
         wrenches = {}
         for vehicle in vehicles:
             wrenches[vehicle.body.number] = vehicle.wrench()
+        scene = self.scene
+        if scene.carries:
+            scene.follow()
         self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
         for vehicle in vehicles:
             vehicle.body.refresh()
+        if scene.carries:
+            scene.follow()
         self.steps += 1
         self._whereabouts.check(vehicles)
         for vehicle in vehicles:
@@ -295,7 +300,8 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        parts: list[Any] = [shared.objects, shared.signals, shared.data, shared.tubes, self._drawings, *self._flying]
+        kept = (shared.objects, shared.signals, shared.data, shared.tubes, self._drawings)
+        parts: list[Any] = [*kept, *self._flying, self.scene]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:
