@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,7 +16,6 @@ from drone_sim.scripting.python.script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.wording import near_names
 
-_LOG = logging.getLogger(__name__)  # not the script's own words
 _BUILT_IN = Path(__file__).resolve().parents[1] / "child_scripts"
 DEFAULT = "tutorial"
 
@@ -25,7 +23,8 @@ DEFAULT = "tutorial"
 class Script(Protocol):
     """A child script that is loaded."""
 
-    idle: str  # why nothing of it is ever called, '' where something is
+    idle: str  # why none of its phases is ever called, '' where one is
+    is_empty: bool
 
     @property
     def threaded(self) -> bool:
@@ -56,7 +55,7 @@ class Script(Protocol):
 class NoScript:
     """What a drone has before a script is loaded."""
 
-    idle, threaded = "", False
+    idle, is_empty, threaded = "", True, False
 
     def call(self, _phase: str) -> None:
         """Do nothing."""
@@ -102,22 +101,13 @@ def script_path(script: str) -> str:
 
 
 def load(script: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns | None = None) -> Script:
-    """Load a child script, whose thread has those `turns`; raises ScriptError.
-
-    A script none of whose functions would ever be called is refused; an empty one is not.
-    """
+    """Load a child script, whose thread has those `turns`; raises ScriptError."""
     path = script_path(script)
     try:
         source = source_files.read(path)
     except (OSError, ValueError) as error:
         raise ScriptError("load", path, 0, getattr(error, "strerror", None) or str(error)) from None
-    made = _made(path, source, modules, limit, turns or Turns())
-    if made.idle:
-        if source.strip():
-            made.close()
-            raise ScriptError("load", path, 0, made.idle)
-        _LOG.warning("%s: %s", path, made.idle)
-    return made
+    return _made(path, source, modules, limit, turns or Turns())
 
 
 def _made(path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns) -> Script:

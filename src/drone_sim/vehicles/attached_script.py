@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import logging
 from collections import ChainMap
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -21,6 +22,7 @@ from drone_sim.vehicles.script_parameters import bring_back, propeller_script_pa
 from drone_sim.vehicles.shared import Shared
 from drone_sim.vehicles.vehicle import Vehicle
 
+_LOG = logging.getLogger(__name__)  # not the script's own words
 _EVERYWHERE = ""  # namespace of the topics of what belongs to no vehicle
 
 
@@ -112,6 +114,8 @@ class AttachedScript:
         """Load its script and call its init. Raises ScriptError."""
         self.close()
         self.script = load_child_script(path, self, self.bus, self._pictures(), self._shared)
+        if self.script.idle:
+            _LOG.warning("%s, on %s: %s", path, self.own_script, self.script.idle)
         call_init(self.script, self.bus)
 
     def actuation(self) -> None:

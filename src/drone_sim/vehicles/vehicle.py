@@ -26,7 +26,7 @@ from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.sensor import Instrument
 from drone_sim.vehicles.blades import Blades
 from drone_sim.vehicles.body import Body
-from drone_sim.vehicles.child_script import Pictures, call_init, load_child_script
+from drone_sim.vehicles.child_script import Pictures, call_init, load_child_script, refuse_if_idle
 from drone_sim.vehicles.instruments import Carrying, Instruments
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.quadricopter_objects import (
@@ -70,6 +70,7 @@ class Vehicle:
         self.script: load.Script = load.NoScript()
         self._tree: ObjectTree | None = None  # the one that its objects are in
         self._handles: list[int] = []  # of its objects
+        self.script_parameters: dict[str, dict[str, Any]] = {}  # of its scripts, by their objects
         self.cameras = {
             name: Camera(one, partial(self.optical, one), shared.vision) for name, one in parameters.cameras.items()
         }
@@ -251,6 +252,7 @@ class Vehicle:
         """Load a child script ('' for the tutorial's) and call its init. Raises ScriptError."""
         self.close()
         self.script = load_child_script(path, self, self.bus, self.pictures, self._shared)
+        refuse_if_idle(self.script, path, self.bus)
         call_init(self.script, self.bus)
 
     @property

@@ -41,6 +41,7 @@ class Turns:
         self._called += 1
         if self._called > self._most and not self._forbidden:
             self.switch()
+            self._called = 1
 
     @property
     def is_automatic(self) -> bool:

@@ -43,6 +43,7 @@ class LuaScript:
         """Compile the file's text; run its top level unless it is to run in every phase. Raises ScriptError."""
         self._path = path
         self._limit = limit
+        self.is_empty = not source.strip()
         self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0

@@ -25,7 +25,7 @@ from drone_sim.scripting.time_limit import TimeLimit
 
 OLDEST = "lua51"  # V-REP 3.x's
 _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", OLDEST)
-_FILES = ("limits", "matrices", "threads", "values", "code", "snapshots", "calls", "globals")  # each uses those before it
+_FILES = ("limits", "matrices", "threads", "others", "values", "code", "snapshots", "calls", "globals")  # each uses those before it
 _CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
 
 TIME, OVER_MEMORY = 1, 2  # why Lua stops a script (limits.lua)

@@ -20,7 +20,6 @@ end
 
 local function switch(name)
   if not in_thread() then error(name .. ': ' .. bridge.no_thread, 3) end
-  called = 0
   yield()
 end
 
@@ -30,8 +29,8 @@ function sandbox.counted(f)
   return function(...)
     called = called + 1
     if called > most and forbidden == 0 and in_thread() then
-      called = 0
       yield()
+      called = 1
     end
     return f(...)
   end
@@ -62,9 +61,9 @@ function sandbox.take_turn(f)
     thread = create(function() f() end)
     limit(thread)
   end
-  local ok, message = caught(resumed(thread))
+  local ok, message = resumed(thread)
   has_ended = status(thread) == 'dead'
-  if not ok then error(message, 0) end
+  if not caught(ok, message) then error(message, 0) end
 end
 
 -- In Lua 5.1 no coroutine can be left through a pcall: there it is another coroutine.

@@ -55,6 +55,7 @@ class PythonScript:
         """Run the file's top level; its thread has those turns. Raises ScriptError."""
         self._path = path
         self._limit = limit
+        self.is_empty = not source.strip()
         self._modules = modules
         self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
         self._found = {name: self._thread.counted(one) for name, one in modules.items()} if self._thread else modules
