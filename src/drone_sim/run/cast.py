@@ -73,7 +73,9 @@ class Cast:
 
     def of(self, vehicle: str) -> list[AttachedScript]:
         """Return the scripts on a vehicle's own objects, apart from its own one."""
-        return [one for one in self.in_order(self.attached) if isinstance(one, AttachedScript) and one.goes_with == vehicle]
+        return [
+            one for one in self.in_order(self.attached) if isinstance(one, AttachedScript) and one.goes_with == vehicle
+        ]
 
     # ---- in the order of the tree
 

@@ -1,4 +1,4 @@
-"""A child script on any object but a vehicle's own: on its target, its propellers, its sensors, on what stands around."""
+"""A child script on any object but a vehicle's own: its target, propellers, sensors, and what stands around."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import copy
 import logging
 from collections import ChainMap
 from collections.abc import Callable, Mapping
-from functools import partial
 
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree

@@ -33,7 +33,7 @@ class MessageBus:
     """
 
     def __init__(self, namespace: str, own_topics: Mapping[str, str] | None = None):
-        """Take the drone's namespace, such as 'drone' ('' is none), and topics that the drone posts itself, with their types."""
+        """Take the drone's namespace ('drone', '' is none), and topics that the drone posts itself, with their types."""
         self.backend: Backend | None = None
         self._prefix = f"/{namespace}" if namespace else ""
         own = _OWN_TOPICS if own_topics is None else own_topics

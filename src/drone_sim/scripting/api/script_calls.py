@@ -66,8 +66,8 @@ class ScriptCalls:
     def getSimulationState(self) -> int:
         """Return sim.simulation_advancing_running.
 
-        While the simulation ends: sim.simulation_advancing_abouttostop in threads, sim.simulation_advancing_lastbeforestop
-        in clean-up.
+        While the simulation ends it is sim.simulation_advancing_abouttostop in threads, and in clean-up
+        sim.simulation_advancing_lastbeforestop.
         """
         return self._state()
 
@@ -83,7 +83,9 @@ class ScriptCalls:
         values = list(arguments)
         refuse_if_too_large(values)
         try:
-            return self._inside(lambda: self._scripts.call(self._own, callee, lambda one: one.call_function(name, values)))
+            return self._inside(
+                lambda: self._scripts.call(self._own, callee, lambda one: one.call_function(name, values))
+            )
         except ScriptError as error:
             raise ValueError(str(error)) from None
 

@@ -71,9 +71,9 @@ class Threads:
         self._turns.set_timing(numbers((milliseconds,), 1)[0])
 
     def setThreadAutomaticSwitch(self, allowed: bool | int) -> int:
-        """Forbid (false) or allow again (true) that the thread is switched by itself; return how often it was forbidden.
+        """Forbid (false) or allow again (true) that the thread is switched by itself.
 
-        A number sets how often it is forbidden.
+        A number sets how often it is forbidden; return how often it was.
         """
         return self._turns.set_automatic(allowed)
 

@@ -2,8 +2,8 @@
 
 V-REP 3.x scripts run in Lua 5.1, with flat names (simGetObjectPosition, simExtRosInterface_subscribe,
 sim_handle_self); the file's text is run once for each phase with `sim_call_type` set, where it asks for
-that, or as a whole in another form (source.py). CoppeliaSim 4.x scripts run in the newest Lua that lupa has, with `sim` and `simROS` and functions
-sysCall_init, ... Both forms of the API are there in either.
+that, or as a whole in another form (source.py). CoppeliaSim 4.x scripts run in the newest Lua that lupa
+has, with `sim` and `simROS` and functions sysCall_init, ... Both forms of the API are there in either.
 """
 
 from __future__ import annotations
