@@ -16,7 +16,7 @@ from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.sensors.sensor import Instrument
-from drone_sim.vehicles.child_script import Pictures, call_init, check_callbacks, load_child_script
+from drone_sim.vehicles.child_script import call_init, check_callbacks, load_child_script
 from drone_sim.vehicles.script_parameters import bring_back, propeller_script_parameters
 from drone_sim.vehicles.shared import Shared
 from drone_sim.vehicles.vehicle import Vehicle
@@ -87,9 +87,6 @@ class AttachedScript:
     def _seen(self) -> list[Vehicle]:
         return [self.vehicle] if self.vehicle else list(self._vehicles.values())
 
-    def _pictures(self) -> Pictures:
-        return ChainMap(*(dict(one.pictures) for one in self._seen()))
-
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m, world).
 
@@ -112,7 +109,7 @@ class AttachedScript:
     def load_script(self, path: str) -> None:
         """Load its script and call its init. Raises ScriptError."""
         self.close()
-        self.script = load_child_script(path, self, self.bus, self._pictures(), self._shared)
+        self.script = load_child_script(path, self, self.bus, self._seen(), self._shared)
         if self.script.idle:
             _LOG.warning("%s, on %s: %s", path, self.own_script, self.script.idle)
         call_init(self.script, self.bus)

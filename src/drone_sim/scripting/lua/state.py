@@ -32,6 +32,7 @@ _FILES = (
     "others",
     "values",
     "code",
+    "unknown",
     "snapshots",
     "calls",
     "globals",
