@@ -20,6 +20,7 @@ from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
+from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
 
 HERE = Path(__file__).resolve().parent
@@ -46,10 +47,12 @@ _IGNORED_HEAD = "| 3.x | 4.0 to 4.2 | 4.3 and later | returns |\n|---|---|---|--
 
 def apis() -> dict[str, Api]:
     """Return every module of the script API, of a drone that is not there."""
+    scripts = Scripts()
+    scripts.add("Drone", {})
     host: Any = SimpleNamespace(
         objects=ObjectTree(),
         sensors={},
-        script_parameters={"Drone": {}},
+        scripts=scripts,
         signals=Signals(),
         own_script="Drone",
         drawings=Drawings(shown=False),
@@ -101,7 +104,7 @@ def _row(module: str, names: list[str], what: str) -> str:
     if not any(known.values()):
         own = f"`{module}.{names[0]}`"
         return f"| | | {own} (drone_sim's own) | {what} |\n"
-    flat = [_flat(module, name) for name, generations in known.items() if "3" in generations]
+    flat = [flat_name(module, name) for name, generations in known.items() if "3" in generations]
     fourth = [f"{module}.{name}" for name, generations in known.items() if "4" in generations]
     new = [f"{module}.{name}" for name, generations in known.items() if "5" in generations and "4" not in generations]
     kept = [f"{module}.{name}" for name, generations in known.items() if "5" in generations]
@@ -112,7 +115,8 @@ def _listed(names: list[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-def _flat(module: str, name: str) -> str:
+def flat_name(module: str, name: str) -> str:
+    """Return the name of a function in 3.x."""
     if module == "sim":
         return f"sim{name[0].upper()}{name[1:]}"
     return {"simROS": "simExtRosInterface_", "simUI": "simExtCustomUI_"}.get(module, f"{module}.") + name

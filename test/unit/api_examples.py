@@ -15,6 +15,8 @@ BACK = [0, 1, 0, -2, -1, 0, 0, 1, 0, 0, 1, -3]
 POSE = f"{{1,2,3, 0,0,{HALF},{HALF}}}"
 POSE_BACK = [-2, 1, -3, 0, 0, -HALF, HALF]
 STRING = "'\\1\\0\\0\\0\\2\\0\\0\\0'"
+NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
+CALLED = "it waits for this call to end"
 ANY = object()  # whatever comes
 
 
@@ -192,6 +194,31 @@ SIM: dict[str, list[Example]] = {
     "getScriptSimulationParameter": [Example("NAME(sim.handle_self, 'gain')", [0.5])],
     "setUserParameter": [Example("NAME(DRONE, 'gain', 0.25)", [])],
     "getUserParameter": [Example("NAME(DRONE, 'gain')", [0.25])],
+    "getScript": [Example("NAME(1, DRONE) == sim.getScriptHandle()", [True]), Example("NAME(1, FLOOR)", [-1])],
+    "getScriptAssociatedWithObject": [Example("NAME(DRONE) == sim.getScriptHandle()", [True])],
+    "getCustomizationScriptAssociatedWithObject": [Example("NAME(DRONE)", [-1])],
+    "getScriptName": [Example("NAME(sim.handle_self)", ["Drone"])],
+    "getScriptExecutionCount": [Example("NAME()", [0])],
+    "callScriptFunction": [Example("REFUSED(NAME, 'nothing', sim.handle_self)", [CALLED])],
+    "getScriptFunctions": [Example("NAME(sim.handle_self) ~= nil", [True], "NAME(sim.handle_self) is not None")],
+    # ---- threads, of a script that has none
+    "switchThread": [Example("REFUSED(NAME)", [NO_THREAD])],
+    "step": [Example("REFUSED(NAME)", [NO_THREAD])],
+    "wait": [Example("NAME(0)", [0]), Example("REFUSED(NAME, 1)", [NO_THREAD])],
+    "waitForSignal": [Example("NAME('there')", [1])],
+    "setThreadSwitchTiming": [Example("NAME(2)", [])],
+    "setThreadAutomaticSwitch": [Example("NAME(true)", [0])],
+    "getThreadAutomaticSwitch": [Example("NAME()", [True])],
+    "setAutoYield": [Example("NAME(true)", [0])],
+    "getAutoYield": [Example("NAME()", [True])],
+    "setStepping": [Example("NAME(false)", [0])],
+    "acquireLock": [Example("NAME()", []), Example("sim.getAutoYield()", [False])],
+    "releaseLock": [Example("NAME()", []), Example("sim.getAutoYield()", [True])],
+    "getThreadId": [Example("NAME()", [1])],
+    "getThreadExitRequest": [Example("NAME()", [False])],
+    "getThreadExistRequest": [Example("NAME()", [False])],
+    "setThreadResumeLocation": [Example("NAME(0, 0)", [1])],
+    "delegateChildScriptExecution": [Example("NAME()", [1])],
     # ---- the simulation
     "getSimulationState": [Example("NAME() == sim.simulation_advancing_firstafterstop", [True])],
     "stopSimulation": [Example("NAME()", [1])],
@@ -302,6 +329,6 @@ ROS: dict[str, list[Example]] = {
     "deleteParam": [Example("NAME('b')", []), Example("simROS.hasParam('b')", [False])],
     "serviceClient": [Example("NAME('reset', 'std_srvs/Trigger')", [1])],
     "serviceClientTreatUInt8ArrayAsString": [Example("NAME(1)", [])],
-    "call": [Example("REFUSED(NAME, 1)", ["there is no ROS here"])],
+    "call": [Example("REFUSED(NAME, 1)", ["there is no ROS here, and no service"])],
     "shutdownServiceClient": [Example("NAME(1)", [])],
 }

@@ -64,7 +64,11 @@ _PARTICLES = {
     "particle_water": 0x8000,
     "particle_painttag": 0x10000,
 }
-_CALLS = {"initialization": "init", **{phase: phase for phase in PHASES[1:]}}  # names of 3.x, and of 4.x
+_CALLS = {  # names of 3.x, and of 4.x
+    "initialization": "init",
+    **{phase: phase for phase in PHASES[1:]},
+    "threaded": "threadmain",
+}
 _CALL_TYPES = {f"childscriptcall_{old}": script_constants.CALLS[f"syscb_{new}"] for old, new in _CALLS.items()}
 
 CONSTANTS: dict[str, int] = {
@@ -76,4 +80,4 @@ CONSTANTS: dict[str, int] = {
     "handle_world": WORLD,
     "handle_parent": PARENT,
 }
-CALL_TYPES: dict[str, int] = dict(zip(PHASES, _CALL_TYPES.values()))  # of sim_call_type, by phase
+CALL_TYPES: dict[str, int] = dict(zip((*PHASES, "thread"), _CALL_TYPES.values()))  # of sim_call_type, by phase

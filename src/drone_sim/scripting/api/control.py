@@ -13,13 +13,14 @@ class Control:
     def __init__(self) -> None:
         """Begin with nothing asked for."""
         self.asked = ""  # STOP, PAUSE or nothing
+        self.is_stopping = False  # while threads have their last turns
         self.is_ending = False  # while cleanup is called
 
     def state(self, time: float) -> int:
         """Return CoppeliaSim's state of the simulation at a simulated time in s."""
         if self.is_ending:
             return CONSTANTS["simulation_advancing_lastbeforestop"]
-        if self.asked == STOP:
+        if self.asked == STOP or self.is_stopping:
             return CONSTANTS["simulation_advancing_abouttostop"]
         return CONSTANTS["simulation_advancing_running" if time > 0 else "simulation_advancing_firstafterstop"]
 

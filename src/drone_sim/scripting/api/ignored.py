@@ -109,7 +109,7 @@ _ORDER = Group(
         "handleDynamics": 0,
         "getRealTimeSimulation": 1,
         "isRealTimeSimulationStepNeeded": 1,
-        **_nothing("adjustRealTimeTimer", "setThreadSwitchTiming", "setThreadAutomaticSwitch", "setThreadIsFree"),
+        **_nothing("adjustRealTimeTimer", "setThreadIsFree"),
         **_nothing("resumeThreads", "launchThreadedChildScripts", "setSimulationTimeStep"),
         **dict.fromkeys(("handleCustomizationScripts", "handleAddOnScripts", "handleSandboxScript"), 0),
         **dict.fromkeys(("openModule", "handleModule", "closeModule"), 0),

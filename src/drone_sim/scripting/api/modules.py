@@ -30,14 +30,16 @@ from drone_sim.scripting.api.paths import Paths
 from drone_sim.scripting.api.poses import Poses
 from drone_sim.scripting.api.proximity import ProximitySensors
 from drone_sim.scripting.api.ros_functions import RosFunctions
+from drone_sim.scripting.api.script_calls import ScriptCalls
 from drone_sim.scripting.api.scripts import Scripts
 from drone_sim.scripting.api.sensors import Sensors
 from drone_sim.scripting.api.simulation import SimulationFunctions
+from drone_sim.scripting.api.threads import Threads
 from drone_sim.scripting.api.vision import VisionSensors
 
 
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
-    """Return `sim` for the script that flies a drone."""
+    """Return `sim` for a script, on what it is attached to."""
     names, ignored = Names(host), _ignored(host)
     parts = (
         Objects(host),
@@ -50,13 +52,15 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         Poses(),
         Bits(),
         Scripts(host, names),
+        ScriptCalls(host, surroundings, names),
         SimulationFunctions(surroundings, ignored),
         Dialogs(host, ignored),
         VisionSensors(host, surroundings),
         Sensors(host),
     )
     data = CustomDataFunctions(host, surroundings.data)
-    others = (names, host.signals, surroundings.tubes, data, Packing(), Drawing(host, ignored))
+    threads = Threads(surroundings, host.signals)
+    others = (names, host.signals, surroundings.tubes, data, Packing(), threads, Drawing(host, ignored))
     functions = {name: f for one in others for name, f in one.functions().items()}
     return Api("sim", {**ignored.functions(), **public_functions(parts), **functions}, CONSTANTS, names.remember)
 

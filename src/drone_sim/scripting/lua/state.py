@@ -15,6 +15,7 @@ from typing import Any
 
 from drone_sim.scripting import script_log
 from drone_sim.scripting.api.constants import CALL_TYPES
+from drone_sim.scripting.api.turns import CALLS_PER_MS, DEFAULT_MS, LONGEST_MS, NO_THREAD, SHORTEST_MS, SOON
 from drone_sim.scripting.errors import LONGEST_MESSAGE
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.thread import Door, SameThread
@@ -27,6 +28,8 @@ _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", OLDEST)
 _FILES = (
     "limits",
     "matrices",
+    "threads",
+    "others",
     "values",
     "code",
     "unknown",
@@ -59,8 +62,8 @@ def new_runtime(dialect: str) -> Any:
     )
 
 
-def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaHelpers) -> Any:
-    """Run the .lua files in a new state; return their `sandbox`.
+def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaHelpers, threads: bool) -> Any:
+    """Run the .lua files in a new state; return their `sandbox`. `threads`: the script may have some.
 
     What Lua gets of Python must not lead back to the script's object, or neither is ever freed.
     """
@@ -73,6 +76,13 @@ def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, hel
         "longest_line": 4 * script_log.LONGEST,
         "phases": _phase_functions,
         "call_types": _call_types,
+        "threads": threads,
+        "no_thread": NO_THREAD.encode(),
+        "soon": SOON,
+        "calls_per_ms": CALLS_PER_MS,
+        "default_ms": DEFAULT_MS,
+        "shortest_ms": SHORTEST_MS,
+        "longest_ms": LONGEST_MS,
         "module": _reader(door, helpers),
     }
     table, sandbox = runtime.table_from({key.encode(): value for key, value in bridge.items()}), runtime.table()
@@ -114,7 +124,7 @@ def _phase_functions() -> tuple[bytes, ...]:
 
 
 def _call_types() -> tuple[int, ...]:
-    return tuple(CALL_TYPES[phase] for phase in FUNCTIONS)
+    return tuple(CALL_TYPES.values())
 
 
 def _nothing_of_python(_object: Any, name: Any, _is_setting: bool) -> Any:
