@@ -41,6 +41,7 @@ def _failed(tmp_path):
         ("simUI.creat('')", "simUI has no 'creat'; near names are create"),
         ("sim.createIkGroup(1)", "there is no sim.createIkGroup here: there is no inverse kinematics"),
         ("simCreateIkGroup(1)", "there is no simCreateIkGroup here: there is no inverse kinematics"),
+        ("local s = 'AB' print(s[1])", "a string has no [1]: uint8[] is a string here"),
         ("simExtROS_enablePublisher('x')", "there is no simExtROS_enablePublisher here: the plugin of V-REP 3.0"),
     ],
 )
@@ -64,6 +65,7 @@ def test_a_plugin_that_is_not_there_says_so(failed):
         "assert(not pcall(function() return sim.nothing end))",
         "assert(require('sim') == sim and require('simUI') == simUI)",
         "local i, n = -1 repeat i = i + 1 n = simGetModuleName(i) until not n or n == 'RosInterface' assert(n)",
+        "local s = 'AB' assert(s:len() == 2 and s.upper and s.nothing == nil)",
         "simRemoteApi.start(19999) simExtRemoteApiStart(19999)",
     ],
 )

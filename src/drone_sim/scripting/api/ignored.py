@@ -110,6 +110,8 @@ _ORDER = Group(
         "getRealTimeSimulation": 1,
         "isRealTimeSimulationStepNeeded": 1,
         **_nothing("adjustRealTimeTimer", "setThreadIsFree"),
+        "getScriptAttribute": 0,
+        **_nothing("setScriptAttribute", "registerScriptFunction", "auxFunc"),
         **_nothing("resumeThreads", "launchThreadedChildScripts", "setSimulationTimeStep"),
         **dict.fromkeys(("handleCustomizationScripts", "handleAddOnScripts", "handleSandboxScript"), 0),
         **dict.fromkeys(("openModule", "handleModule", "closeModule"), 0),

@@ -110,11 +110,11 @@ class MessageBus:
         return self._publishers.subscribers(handle)
 
     def publisherTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] may be a string or a table anyhow."""
+        """Do nothing: uint8[] goes as a string or a table anyhow."""
         self._publishers.subscribers(handle)
 
     def subscriberTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] arrives as a string anyhow."""
+        """Do nothing: uint8[] arrives as a string anyhow; string.byte(data, 1) is its first byte."""
         self._subscriptions.check(handle)
 
     def imageTransportAdvertise(self, topic: Name, queue: int = 1) -> int:

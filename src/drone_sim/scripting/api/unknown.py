@@ -58,6 +58,9 @@ ABSENT: dict[str, str] = {
         "a child script offers no services: subscribe to a topic"
     ),
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
+    r"sim\.followPath|sim\.\w*PathTarget\w*": "there is no trajectory generator: set the target in every step",
+    r"sim\.(?:sendData|receiveData)": "there is no wireless transmission: use signals or tubes",
+    r"sim\.\w+ObjectCustomData": "use writeCustomDataBlock and readCustomDataBlock",
     r"sim\.launchExecutable": "a child script starts no programs: use a launch file",
 }
 _FLAT = re.compile(r"sim([A-Z]\w*)")

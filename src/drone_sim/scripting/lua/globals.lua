@@ -31,6 +31,13 @@ env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.diffti
 for _, name in pairs{'math', 'string', 'table', 'coroutine', 'os', 'utf8'} do modules[name] = env[name] end
 string.dump = nil
 
+-- uint8[] fields of messages are strings here, and tables in V-REP, where data[1] is the first byte; it would be nil.
+setmetatable(string, {__index = function(_, key)
+  if type(key) == 'number' then
+    error('a string has no [' .. key .. ']: uint8[] is a string here, of which string.byte(data, i) is the i-th', 2)
+  end
+end})
+
 function env.print(...)
   local words = {}
   for i = 1, select('#', ...) do words[i] = tostring((select(i, ...))) end

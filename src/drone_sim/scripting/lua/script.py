@@ -8,6 +8,7 @@ has, with `sim` and `simROS` and functions sysCall_init, ... Both forms of the A
 
 from __future__ import annotations
 
+import difflib
 import logging
 import re
 import weakref
@@ -31,6 +32,7 @@ from drone_sim.wording import near_names
 _LOG = logging.getLogger(__name__)  # not the script's own words
 _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NUMBERS = {phase: number for number, phase in enumerate((*PHASES, "thread"), start=1)}
+_NEAR = 0.8  # of difflib's ratio
 _EVERY_STEP = ("actuation", "sensing")
 _THREAD = 1 << _NUMBERS["thread"] - 1
 _CALLS = ("open", "phase", "called", "called_back", "has", "functions", "remember", "recall")  # in calls.lua
@@ -217,8 +219,8 @@ class LuaScript:
         name = match.group(1)
         if name in PLUGINS:
             return f"; {not_there('', name, ())}"
-        near = near_names(name, [known for known in self._known if known.startswith("sim") == name.startswith("sim")])
-        return f"; {near}" if near.startswith("near") else ""
+        near = difflib.get_close_matches(name, self._known, cutoff=_NEAR)  # it is the script's own, most often
+        return f"; near names are {', '.join(near)}" if near else ""
 
 
 def _free(thread: Door, values: Values) -> None:
