@@ -116,7 +116,6 @@ SIM: dict[str, list[Example]] = {
     "getPathPosition": [Example("NAME(LINE)", [1.5])],
     "getPathLengths": [Example("NAME({0,0,0, 3,4,0}, 3)", [[0, 5], 5])],
     "getPathInterpolatedConfig": [Example("NAME({0,0,0, 3,4,0}, {0,5}, 2.5)", [near(1.5, 2, 0)])],
-    # ---- the dynamics
     "resetDynamicObject": [Example("NAME(BASE)", [])],
     "isDynamicallyEnabled": [Example("NAME(BASE)", [True]), Example("NAME(FLOOR)", [False])],
     "getShapeMass": [Example("NAME(DRONE)", [approx(0.12)]), Example("NAME(FLOOR)", [0])],
@@ -185,7 +184,6 @@ SIM: dict[str, list[Example]] = {
     "transformBuffer": [
         Example("sim.unpackFloatTable(NAME('AB', sim.buffer_uint8, 2, 1, sim.buffer_float))", [[131, 133]]),
     ],
-    # ---- scripts
     "addLog": [Example("NAME(sim.verbosity_scriptinfos, 'a line')", [])],
     "addStatusbarMessage": [Example("NAME('a line')", [])],
     "getScriptHandle": [Example("NAME('Drone') == NAME()", [True])],
@@ -241,7 +239,6 @@ SIM: dict[str, list[Example]] = {
     "setStringParam": [Example("NAME(sim.stringparam_video_filename, 'x')", [])],
     "getArrayParam": [Example("NAME(sim.arrayparam_gravity)", [[0, 0, -9.81]])],
     "setArrayParam": [Example("NAME(sim.arrayparam_gravity, {0,0,0})", [])],
-    # ---- signals and custom data
     "setFloatSignal": [Example("NAME('f', 1.5)", [])],
     "getFloatSignal": [Example("NAME('f')", [1.5])],
     "clearFloatSignal": [Example("NAME('f')", []), Example("sim.getFloatSignal('f')", [])],
@@ -299,36 +296,4 @@ SIM: dict[str, list[Example]] = {
     "checkProximitySensorEx": [Example("NAME(FEELER, FLOOR, 0, 1, 0)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "resetProximitySensor": [Example("NAME(FEELER)", [])],
     "readSensor": [Example("NAME(RANGE)", [])],
-}
-
-ROS: dict[str, list[Example]] = {
-    "subscribe": [Example("NAME('in', 'std_msgs/String', 'heard')", [1])],
-    "subscriberTreatUInt8ArrayAsString": [Example("NAME(1)", [])],
-    "shutdownSubscriber": [Example("NAME(1)", [])],
-    "advertise": [Example("NAME('out', 'std_msgs/String')", [2])],
-    "publisherTreatUInt8ArrayAsString": [Example("NAME(2)", [])],
-    "getNumSubscribers": [Example("NAME(2)", [0])],
-    "publish": [Example("NAME(2, MESSAGE)", [])],
-    "shutdownPublisher": [Example("NAME(2)", [])],
-    "imageTransportAdvertise": [Example("NAME('image')", [3])],
-    "imageTransportPublish": [Example("NAME(3, '123456', 1, 2, 'camera')", [])],
-    "imageTransportShutdownPublisher": [Example("NAME(3)", [])],
-    "getTime": [Example("NAME()", [0])],
-    "sendTransform": [Example("NAME(MESSAGE)", [])],
-    "sendTransforms": [Example("NAME({MESSAGE})", [])],
-    "setParamString": [Example("NAME('s', 'text')", [])],
-    "getParamString": [Example("NAME('s')", [True, "text"]), Example("NAME('none', 'x')", [False, "x"])],
-    "setParamInt": [Example("NAME('i', 2)", [])],
-    "getParamInt": [Example("NAME('i')", [True, 2])],
-    "setParamDouble": [Example("NAME('d', 2.5)", [])],
-    "getParamDouble": [Example("NAME('d')", [True, 2.5])],
-    "setParamBool": [Example("NAME('b', true)", [])],
-    "getParamBool": [Example("NAME('b')", [True, True])],
-    "hasParam": [Example("NAME('b')", [True])],
-    "searchParam": [Example("NAME('b')", [True, "/drone/b"]), Example("NAME('none')", [False, ""])],
-    "deleteParam": [Example("NAME('b')", []), Example("simROS.hasParam('b')", [False])],
-    "serviceClient": [Example("NAME('reset', 'std_srvs/Trigger')", [1])],
-    "serviceClientTreatUInt8ArrayAsString": [Example("NAME(1)", [])],
-    "call": [Example("REFUSED(NAME, 1)", ["there is no ROS here, and no service"])],
-    "shutdownServiceClient": [Example("NAME(1)", [])],
 }

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from api_examples import ANY, ROS, SIM
+from api_examples import ANY, SIM
+from api_examples_ros import ROS
 
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
