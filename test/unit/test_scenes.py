@@ -109,7 +109,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: [", "scene.yaml: while parsing"),
         (
             "boxes: []",
-            "scene.yaml: line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, vehicles",
+            "line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, scripts, vehicles",
         ),
         ("1: 2", "key '1' must be a text (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
@@ -187,19 +187,20 @@ objects:
   - {shape: sphere, size: 0.3, colour: [1, 0, 0]}
 """
     )
-    shapes = "'box', 'cylinder', 'sphere', 'mesh', 'urdf'"
+    shapes = "'box', 'cylinder', 'sphere', 'mesh', 'urdf', 'capsule', 'compound'"
+    kinds = "; or `kind`: one of 'dummy', 'joint', 'proximity_sensor', 'vision_sensor', 'path'"
     with pytest.raises(ParameterError) as refused:
         parameters.load({"scene_file": file, "gravity": "down"})
     first, *others = str(refused.value).split("; line ")
     assert first == f"{file}: line 1: parameter floor/size = 'a': input should be a valid number"
     assert others == [
-        "2: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, vehicles",
+        "2: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, scripts, vehicles",
         "4: parameter drone/position = [1, 2]: must be 3 numbers, [x, y, z] in m",
         "5: parameter drone/yam: unknown key; known are yaw",
         "9: parameter objects/0/color = [1, 0]: must be 3 or 4 numbers from 0 to 1, "
         "[red, green, blue] or [red, green, blue, opacity]",
         f"11: parameter objects/1/shape = 'cone': must be one of {shapes}",
-        f"12: parameter objects/2/shape: missing; must be one of {shapes}",
+        f"12: parameter objects/2/shape: missing; must be one of {shapes}{kinds}",
         "13: parameter objects/3/size = 0.3: must be a list of 1 number, [radius] in m; and 3 more",
     ]
 
