@@ -52,6 +52,7 @@ def load_child_script(path: str, host: Host, bus: MessageBus, seen: Sequence[See
         masses=lambda: _together(one.masses() for one in seen),
         control=shared.control,
         data=shared.data,
+        tubes=shared.tubes,
     )
     modules = {"sim": make_sim(host, surroundings), "simROS": make_sim_ros(bus, shared.time), **make_plugins(host)}
     script = load.load(path, modules, limit, turns)
