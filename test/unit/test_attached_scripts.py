@@ -241,7 +241,7 @@ def test_scripts_call_each_other_by_value(build, asking, answering):
         ("'fails@DronePosition', 1", r"1.lua:4: no"),
         ("'nothing@DronePosition', 1", "the script has no function 'nothing' to call"),
         ("'add@Drone_Position', 1", "no object named 'Drone_Position'; near names are DronePosition"),
-        ("'f@Quadricopter_propeller_respondable1', 1", "has no functions to call"),
+        ("'f@Quadricopter_propeller_respondable1', 1", "is a built-in law, and has no functions"),
         ("'back@DronePosition', 1", "is being called already: it waits for this call to end"),
         ("'add', 99", "no script has the handle 99"),
         ("'hangs@DronePosition', 1", "stopped after 0.2 s"),
