@@ -106,6 +106,16 @@ def test_each_has_parameters_names_and_a_state_of_its_own(build):
     assert handle.parameters == {"step": 2.0}
 
 
+def test_each_requires_what_lies_beside_it(build, tmp_path):
+    (tmp_path / "gains.lua").write_text("return {kp = 3}", encoding="utf-8")
+    (tmp_path / "more.py").write_text("kd = 4", encoding="utf-8")
+    lua = "sim = require'sim' function sysCall_init() sim.setFloatSignal('kp', require('gains').kp) end"
+    simulation = build(
+        {"Floor": lua, "DronePosition": "import more\ndef sysCall_init(): sim.setFloatSignal('kd', more.kd)"}
+    )
+    assert [simulation.drone.signals.getFloatSignal(name) for name in ("kp", "kd")] == [3, 4]
+
+
 def test_an_error_names_file_line_and_phase(build, tmp_path):
     simulation = build({"Floor": "function sysCall_sensing()\n  sim.getObject('/Nobody')\nend"})
     with pytest.raises(ScriptError, match=rf"\[sensing\] {tmp_path}/0.lua:2: sim.getObject: no object '/Nobody'"):
