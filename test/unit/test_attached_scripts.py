@@ -1,6 +1,7 @@
 """Scripts on any object: each with its own state and API, called in the order of the tree."""
 
 import math
+import re
 import struct
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
 
 SCRIPTS = Path(__file__).parent / "scripts"
+DOCS = Path(__file__).parents[2] / "docs" / "scripts.md"
 PROPELLERS = [f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4)]
 TELL_LUA = """
 local function tell(phase)
@@ -102,6 +104,16 @@ def test_each_has_parameters_names_and_a_state_of_its_own(build):
     assert simulation.drone.signals.getFloatSignal("DronePosition#0") == 4
     handle = next(one for one in simulation.drone.scripts if one.name == "DronePosition#0")
     assert handle.parameters == {"step": 2.0}
+
+
+def test_each_requires_what_lies_beside_it(build, tmp_path):
+    (tmp_path / "gains.lua").write_text("return {kp = 3}", encoding="utf-8")
+    (tmp_path / "more.py").write_text("kd = 4", encoding="utf-8")
+    lua = "sim = require'sim' function sysCall_init() sim.setFloatSignal('kp', require('gains').kp) end"
+    simulation = build(
+        {"Floor": lua, "DronePosition": "import more\ndef sysCall_init(): sim.setFloatSignal('kd', more.kd)"}
+    )
+    assert [simulation.drone.signals.getFloatSignal(name) for name in ("kp", "kd")] == [3, 4]
 
 
 def test_an_error_names_file_line_and_phase(build, tmp_path):
@@ -239,7 +251,7 @@ def test_scripts_call_each_other_by_value(build, asking, answering):
         ("'fails@DronePosition', 1", r"1.lua:4: no"),
         ("'nothing@DronePosition', 1", "the script has no function 'nothing' to call"),
         ("'add@Drone_Position', 1", "no object named 'Drone_Position'; near names are DronePosition"),
-        ("'f@Quadricopter_propeller_respondable1', 1", "has no functions to call"),
+        ("'f@Quadricopter_propeller_respondable1', 1", "is a built-in law, and has no functions"),
         ("'back@DronePosition', 1", "is being called already: it waits for this call to end"),
         ("'add', 99", "no script has the handle 99"),
         ("'hangs@DronePosition', 1", "stopped after 0.2 s"),
@@ -285,3 +297,17 @@ def test_without_scripts_nothing_is_otherwise(build):
     assert struct.pack("600d", *sum(flown(build({})), ())) == struct.pack(
         "600d", *sum(flown(build({"Floor": TELL_LUA})), ())
     )
+
+
+# ---- docs/scripts.md
+
+
+def test_the_example_leads_the_drone_along_a_circle(tmp_path):
+    scene, circle = re.findall(r"```(?:yaml|lua)\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "scene.yaml").write_text(scene, encoding="utf-8")
+    (tmp_path / "circle.lua").write_text(circle, encoding="utf-8")
+    (tmp_path / "gate.py").write_text("def sysCall_init(): pass", encoding="utf-8")
+    simulation = Simulation(parameters.load({"scene_file": str(tmp_path / "scene.yaml")}), script="target")
+    path = flown(simulation, 240)
+    simulation.close()
+    assert max(x for x, _, _ in path) > 0.4 and path[-1][1] > 0.5

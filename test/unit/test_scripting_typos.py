@@ -46,6 +46,7 @@ ENDINGS = pytest.mark.parametrize("ending", ["py", "lua"])
         ("ysCall_init", "sysCall_init"),
         ("SYSCALL_CLEANUP", "sysCall_cleanup"),
         ("sysCall_begin", "sysCall_init"),
+        ("sysCall_threadmani", "sysCall_threadmain"),
     ],
 )
 def test_a_misspelt_phase_is_refused_with_its_line(load, ending, name, meant):

@@ -12,7 +12,7 @@ _LOG = logging.getLogger(__name__)  # not the script's own words
 _PREFIX = "sysCall_"
 FUNCTIONS = {phase: f"{_PREFIX}{phase}" for phase in PHASES}
 THREADS = (f"{_PREFIX}thread", f"{_PREFIX}threadmain")  # of 4.3 and newer; of 4.0 to 4.2
-_PLAIN = {name.replace("_", "").lower(): name for name in FUNCTIONS.values()}
+_PLAIN = {name.replace("_", "").lower(): name for name in (*FUNCTIONS.values(), *THREADS)}
 _NEAR, _NEAR_WITHOUT_SYS = 0.75, 0.9  # of difflib's ratio
 _LONGEST = 60  # characters of a name that is looked at
 

@@ -98,7 +98,8 @@ class Scripts:
     def call(self, caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
         """Let one script call another. Raises ValueError for one that waits for this call itself, or is too deep."""
         if callee.script is None:
-            raise ValueError(f"the script of '{callee.name}' has no functions to call")
+            why = "is a built-in law, and has no functions" if callee.is_law else "is loaded after this one"
+            raise ValueError(f"the script of '{callee.name}' {why}")
         if callee is caller or callee in self._waiting:
             raise ValueError(f"the script of '{callee.name}' is being called already: it waits for this call to end")
         if len(self._waiting) >= DEEPEST:

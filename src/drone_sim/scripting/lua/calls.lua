@@ -10,6 +10,7 @@ local take_turn, thread_has_ended, hand_back = sandbox.take_turn, sandbox.thread
 local env, callbacks, sources = sandbox.globals, sandbox.callbacks, sandbox.sources
 
 local PHASES, CALL_TYPES = {bridge.phases()}, {bridge.call_types()}
+local may_have_thread = bridge.threads
 local THREADS = {'sysCall_thread', 'sysCall_threadmain'}
 local INIT, ACTUATION, SENSING, CLEANUP, THREAD = 1, 2, 4, 8, 16 -- bits of what a script has
 local MISSING = 3 -- beside the numbers of the limits
@@ -24,12 +25,15 @@ end
 
 -- Tell which phases the script has, and whether it has a thread that has not ended: the sum of their bits.
 local function phases()
-  local found, bit = chunk_has or 0, INIT
-  for number = 1, chunk and 0 or 4 do
-    if type(rawget(env, PHASES[number])) == 'function' then found = found + bit end
-    bit = bit + bit
+  local found, bit = chunk_has, INIT
+  if not found then
+    found = 0
+    for number = 1, 4 do
+      if type(rawget(env, PHASES[number])) == 'function' then found = found + bit end
+      bit = bit + bit
+    end
+    if may_have_thread and thread_function() then found = found + THREAD end
   end
-  if not chunk and thread_function() then found = found + THREAD end
   if found >= THREAD and thread_has_ended() then found = found - THREAD end
   return found
 end

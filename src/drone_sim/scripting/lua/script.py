@@ -59,8 +59,8 @@ class LuaScript:
         self._thread: Door = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
             dialect = state.OLDEST if text.flat or "phases" in text.form else state.newest()
-            self._may_switch = text.threads
-            self._lua = self._thread.run(self._build, dialect)
+            self._has_coroutines = text.coroutines
+            self._lua = self._thread.run(self._build, dialect, text.threads)
             self._run("load", self._lua["open"], text.text, text.form.encode())
             if text.form == "functions":
                 self._check_names()
@@ -68,12 +68,12 @@ class LuaScript:
             self._thread.close()
             raise
 
-    def _build(self, dialect: str) -> dict[str, Any]:
-        """Return what can be called of a new Lua state, with the API in it."""
+    def _build(self, dialect: str, threads: bool) -> dict[str, Any]:
+        """Return what can be called of a new Lua state, with the API in it; `threads`: the script may have some."""
         runtime = state.new_runtime(dialect)
         self._values = Values(runtime)
         self._finalizer = weakref.finalize(self, _free, self._thread, self._values)
-        sandbox = state.make_sandbox(runtime, self._thread, self._limit, self._values, self._helpers, self._may_switch)
+        sandbox = state.make_sandbox(runtime, self._thread, self._limit, self._values, self._helpers, threads)
         self._known = functions.define(runtime, sandbox, self._modules, self._values, self._thread)
         _LOG.debug("%s runs in %s", self._path, dialect)
         return {name: sandbox[name.encode()] for name in _CALLS}
@@ -121,7 +121,7 @@ class LuaScript:
     @property
     def threaded(self) -> bool:
         """Whether it has a thread that has not ended."""
-        return bool(self._phases & _THREAD)
+        return bool(self._phases & _THREAD) and not self._end
 
     def take_turn(self) -> None:
         """Let its thread run until it is left; raises ScriptError."""
@@ -150,7 +150,7 @@ class LuaScript:
         recalls = remember(self._modules.values())
 
         def recall() -> None:
-            if self._may_switch:
+            if self.threaded or self._has_coroutines:
                 script_log.say(script_log.THREAD_GOES_ON.format(self._path))
             self._run("restore", self._lua.get("recall"), snapshot)
             for one in recalls:

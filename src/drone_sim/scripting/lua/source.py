@@ -30,7 +30,8 @@ _IN_THREAD = re.compile(
     rb"\bsim(?:" + b"|".join(rf"{name}|\.{name[0].lower()}{name[1:]}".encode() for name in _THREAD_CALLS) + rb")\b"
     rb"|\bsim[._]simulation_advancing_abouttostop\b|\bthreadFunction\b"
 )
-_THREADS = re.compile(rb"\bcoroutine\b|\bsysCall_thread")
+_COROUTINES = re.compile(rb"\bcoroutine\b")
+_THREADS = re.compile(rb"\bsysCall_thread")
 _STEPS = re.compile(
     rb"\bsim(?:GetScriptExecutionCount|\.getScriptExecutionCount|HandleChildScripts?|\.handleChildScripts?)\b"
 )
@@ -39,7 +40,8 @@ _FLAT_CALL = re.compile(rb"(?<![.:\w])sim[A-Z]\w{0,200}[ \t\r\n]{0,200}\(")
 
 
 class LuaSource:
-    """A script's text; `flat` if it calls V-REP 3.x's functions, `threads` if it may be left before it has ended.
+    """A script's text; `flat` if it calls V-REP 3.x's functions, `threads` if it may be left before it has ended,
+    `coroutines` if it makes some.
 
     `form` is how it is run: `functions` of its own for the phases; as a whole, in all `phases` if it looks at
     sim_call_type, in the `steps` if it counts them (3.0), as a `thread` (3.x).
@@ -52,10 +54,11 @@ class LuaSource:
         self.text = b"--" + text if text.startswith(b"#") else text
         bare = _without_comments(self.text)
         self.form = _form(bare)
-        self.threads = "thread" in self.form or _THREADS.search(bare) is not None
+        helpers = len(_REQUIRE.findall(bare)) > len(_REQUIRE_OWN.findall(bare))
+        self.coroutines = _COROUTINES.search(bare) is not None
+        self.threads = helpers or self.coroutines or "thread" in self.form or _THREADS.search(bare) is not None
         self.call_types = sorted({name.decode() for name in _CALL_TYPE.findall(bare)})
         self.flat = _FLAT_CALL.search(bare) is not None
-        helpers = len(_REQUIRE.findall(bare)) > len(_REQUIRE_OWN.findall(bare))
         self.loops_in_c = helpers or _LOOPS_IN_C.search(bare) is not None
 
     def line(self, word: str) -> int:
