@@ -35,6 +35,10 @@ objects:
   - {name: LeftWheel, shape: cylinder, size: [0.2, 0.05], mass: 1, parent: Left, position: [0, 0, 0]}
   - {name: RightWheel, shape: cylinder, size: [0.2, 0.05], mass: 1, parent: Right, position: [0, 0, 0]}
   - {name: Lamp, kind: dummy, parent: LeftWheel, position: [0.2, 0, 0]}
+  # a shelf on a force sensor, and what holds it
+  - {name: Wall, shape: box, size: [0.1, 0.1, 0.1], position: [20, 0, 2]}
+  - {name: Gauge, kind: force_sensor, parent: Wall, position: [0.1, 0, 0]}
+  - {name: Shelf, shape: box, size: [0.6, 0.2, 0.02], mass: 2, parent: Gauge, position: [0.3, 0, 0]}
   - {name: Loose, shape: box, size: [0.1, 0.1, 0.1], mass: 1, parent: Bob, position: [2, 0, 0]}
 """
 
@@ -87,6 +91,10 @@ def test_joints_move_as_mechanics_says(simulation):
     assert found(simulation, "Loose").matrix()[11] < 0.1, "the tree does not weld"
     wheel, lamp = (found(simulation, name).matrix()[3::4] for name in ("LeftWheel", "Lamp"))
     assert math.dist(wheel, lamp) == pytest.approx(0.2), "what hangs on it turns with it"
+    force, torque = found(simulation, "Gauge").read()
+    assert force == pytest.approx((0, 0, -2 * 9.81), abs=1e-6), "a weight"
+    assert torque == pytest.approx((0, 0.3 * 2 * 9.81, 0), abs=1e-6), "at its arm"
+    assert found(simulation, "Shelf").matrix()[3::4] == pytest.approx((20.4, 0, 2)), "it holds"
     _, turning = found(simulation, "LeftWheel").velocity()
     assert turning[1] == pytest.approx(2, abs=0.2)
 
@@ -113,7 +121,7 @@ def test_scripts_command_joints(simulation):
     assert sim.getJointTargetPosition(lift) == 1.5 and sim.getJointMaxForce(lift) == 20
     assert sim.getJointPosition(lift) == pytest.approx(0.2, abs=0.01), "too weak, it lies on its new lower end"
     assert abs(sim.getJointPosition(pivot) - 0.7) > 0.01, "free again"
-    with pytest.raises(ValueError, match=r"'Cabin' is held by the joint 'Lift'"):
+    with pytest.raises(ValueError, match=r"'Cabin' is held by 'Lift'"):
         sim.setObjectPosition(handle("Cabin"), -1, [0, 0, 0])
     with pytest.raises(TypeError, match="'Cabin' is not a joint of the scene; there are: Pivot, Lift"):
         sim.getJointType(handle("Cabin"))

@@ -35,7 +35,7 @@ class SceneBody:
 
 
 class LinkBody:
-    """A shape that a joint holds."""
+    """A shape that a joint or a force sensor holds."""
 
     def __init__(self, world: World, number: int, link: int, local: Matrix):
         """Take the world, the number of the body in it, of its link, and that link's frame from the shape's."""
@@ -66,14 +66,14 @@ class LinkBody:
 
 
 class HeldShape(SceneObject):
-    """A shape that a joint holds: nobody puts it anywhere else."""
+    """A shape that a joint or a force sensor holds: nobody puts it anywhere else."""
 
     is_loose = False
 
     def put(self, matrix: Matrix) -> None:
         """Refuse. Raises ValueError."""
-        joint = self.parent.name if self.parent is not None else ""
-        raise ValueError(f"'{self.name}' is held by the joint '{joint}': set that, or move what it hangs on")
+        above = self.parent.name if self.parent is not None else ""
+        raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move what it hangs on")
 
 
 class Carried:

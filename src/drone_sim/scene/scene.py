@@ -16,6 +16,7 @@ from drone_sim.mechanics.state import Pose
 from drone_sim.scene import building, chains, order, scene_files
 from drone_sim.scene.bodies import Carried, HeldShape, LinkBody, SceneBody, StaticShape, bodies_above
 from drone_sim.scene.drive import JointDrive
+from drone_sim.scene.kinds.force_sensor import ForceSensor
 from drone_sim.scene.kinds.kind import Around, KindParameters, Look, Place
 from drone_sim.scene.object_parameters import ObjectParameters
 from drone_sim.scene.scene_parameters import SceneParameters
@@ -142,19 +143,23 @@ class Scene:
             self._hanging[shape.number] = shape.carried
 
     def _hold_chains(self) -> None:
-        """Let the dynamics move the joints of chains."""
+        """Let the dynamics move the joints of chains, and force sensors measure."""
         for chain, body in zip(self._chains, self._bases):
             for hung in chain.hung:
-                joint = self._objects[hung.joint]
-                assert isinstance(joint, Joint), "a chain hangs on joints"
-                joint.drive = JointDrive(self._world, *self._places[hung.shape])
-                joint.drive.limit(joint.limits)
-                joint.drive.command(joint.control)
+                self._hold(self._objects[hung.joint], *self._places[hung.shape])
             first = self._objects[chain.hung[0].joint]
             if chain.root is None and first.parent is not None:
                 self._carried_bases.append(Carried(self._world, body, first.parent.below))
                 for above in bodies_above(first):
                     self._world.let_pass(body, above)
+
+    def _hold(self, one: SceneObject, body: int, link: int) -> None:
+        if isinstance(one, ForceSensor):
+            one.hold(self._world, body, link)
+        elif isinstance(one, Joint):
+            one.drive = JointDrive(self._world, body, link)
+            one.drive.limit(one.limits)
+            one.drive.command(one.control)
 
     def _place_loose_ones(self) -> None:
         """Put what hangs on vehicles where they are, now that they are there."""
