@@ -5,6 +5,9 @@ import math
 
 import pytest
 
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.object_tree import WORLD
+from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.host import Surroundings
@@ -157,3 +160,26 @@ def test_moving_the_root_takes_all_along(simulation):
     after = [found(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
     for (x, y, z), there in zip(before, after):
         assert there == pytest.approx((x, y + 2, z), abs=1e-6)
+
+
+def test_a_load_is_taken_up_and_let_go(simulation):
+    """Static, it is carried by its new parent; dynamic again, it falls, with the mass that it had."""
+    loose, tree, drone = found(simulation, "Loose"), simulation.drone.objects, simulation.drone
+    loose.put(frames.from_rpy((-5, 0, 0.9), (0, 0, 0)))
+    loose.set_static(True)
+    tree.set_parent(tree.handle("Loose"), tree.handle("Drone"), keep_in_place=True)
+    drone.receive(Twist(Vector3(0.5, 0, 0.5)))
+    run(simulation, 1)
+    snapshot, there = simulation.snapshot(), loose.matrix()
+    assert frames.relative(drone.matrix, there)[3::4] == pytest.approx((0, 0, -0.1), abs=0.01)
+    assert simulation.world.state(loose.number).position == pytest.approx(there[3::4])
+    loose.set_static(False)
+    tree.set_parent(tree.handle("Loose"), WORLD, keep_in_place=True)
+    run(simulation, 0.2)
+    assert loose.velocity()[0][2] == pytest.approx(-9.81 * 0.2, rel=1e-3)
+    simulation.restore(snapshot)
+    assert loose.is_static and loose.parent.name == "Drone" and loose.matrix() == there
+    simulation.start()
+    assert not found(simulation, "Loose").is_static
+    with pytest.raises(ValueError, match="'Beam' has no mass in the scene file: it stays static"):
+        found(simulation, "Beam").set_static(False)
