@@ -165,10 +165,12 @@ def test_paths(simulate):
     assert sim.getOrientationOnPath(way, 1)[2] == pytest.approx(math.pi / 2)
     sim.setPathPosition(way, sim.getPathPosition(way) + 2)
     assert sim.getPathPosition(way) == 2
+    half = math.sqrt(0.5)
+    table = found(simulation, "Way").table
+    assert table == pytest.approx([0, 0, 0, 0, 0, 0, 1, 3, 0, 0, 0, 0, half, half, 3, 4, 0, 0, 0, half, half])
     flat = [0, 0, 0, 0, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0]
     lengths, total = sim.getPathLengths(flat, 7)
     assert (lengths, total) == ([0, 2], 2)
-    half = math.sqrt(0.5)
     assert sim.getPathInterpolatedConfig(flat, lengths, 1) == pytest.approx([1, 0, 0, 0, 0, half, half])
     for call in (lambda: sim.getPathLength(0), lambda: sim.getPathLengths(flat, 4), lambda: sim.getPathLengths([], 3)):
         with pytest.raises(TypeError):

@@ -153,7 +153,7 @@ class Shape(SceneObject):
             raise ValueError(f"'{self.name}' has no mass in the scene file: it stays static")
         matrix = self.matrix()
         self.body = None if static else SceneBody(self._world, self.number)
-        self._world.freeze(self.number, static)
+        self._world.solidity.freeze(self.number, static)
         self._renew()
         self.put(matrix)
 
@@ -184,9 +184,9 @@ class Shape(SceneObject):
         """Do not collide with what carries it, and tell that something has changed."""
         above = bodies_above(self) if self.is_static else set()
         for number in self._passing - above:
-            self._world.let_pass(self.number, number, passes=False)
+            self._world.solidity.let_pass(self.number, number, passes=False)
         for number in above - self._passing:
-            self._world.let_pass(self.number, number)
+            self._world.solidity.let_pass(self.number, number)
         self._passing = above
         self._changed(self)
 

@@ -52,7 +52,7 @@ def build(
 
 def _make_seem(world: World, one: EntryParameters, body: int, link: int) -> None:
     if isinstance(one, ObjectParameters) and not one.respondable:
-        world.let_everything_pass(body, link)
+        world.solidity.let_everything_pass(body, link)
     if isinstance(one, ObjectParameters) and not one.visible:
         world.hide(body, link)
 

@@ -155,7 +155,7 @@ class Scene:
             if chain.root is None and first.parent is not None:
                 self._carried_bases.append(Carried(self._world, body, first.parent.below))
                 for above in bodies_above(first):
-                    self._world.let_pass(body, above)
+                    self._world.solidity.let_pass(body, above)
 
     def _hold(self, one: SceneObject, body: int, link: int) -> None:
         if isinstance(one, ForceSensor):
