@@ -286,3 +286,15 @@ objects:
         "moved by scripts alone, as no shape with a mass hangs right on it: Empty, Bare",
         "moved by scripts alone, as spherical ones are: Round",
     ]
+
+
+@pytest.mark.ros
+def test_rviz_shows_dummies_as_balls_and_paths_as_lines(simulate):
+    frame_markers = pytest.importorskip("drone_sim.ros.rviz.frame_markers")
+    shown = [*frame_markers.markers_of(simulate(SCENE).scene.objects_now().values())]
+    balls, lines = ([one for one in shown if one.type == kind] for kind in (2, 4))
+    assert len(balls) == 2 and len(lines) == 1
+    assert balls[0].pose.position.x == pytest.approx(5 + math.cos(0.5))
+    assert [(one.x, one.y, one.z) for one in lines[0].points] == pytest.approx(
+        [(0, 9, 1.85), (3, 9, 1.85), (3, 13, 1.85)]
+    )
