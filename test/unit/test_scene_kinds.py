@@ -298,3 +298,20 @@ def test_rviz_shows_dummies_as_balls_and_paths_as_lines(simulate):
     assert [(one.x, one.y, one.z) for one in lines[0].points] == pytest.approx(
         [(0, 9, 1.85), (3, 9, 1.85), (3, 13, 1.85)]
     )
+
+
+def test_what_hung_on_a_vehicle_that_has_gone_stays_where_it_was(tmp_path):
+    file = tmp_path / "scene.yaml"
+    file.write_text(
+        "objects: [{name: Flag, shape: box, size: [0.1, 0.1, 0.1], parent: Drone#0, position: [0, 0, 0.3]}]",
+        encoding="utf-8",
+    )
+    two = {"a": {"position": [0, 0, 1]}, "b": {"position": [2, 0, 1]}}
+    simulation = Simulation(parameters.load({"vehicles": two, "scene_file": str(file)}))
+    simulation.step()
+    simulation.set_vehicles({"a": two["a"]})
+    simulation.step()
+    assert place(simulation, "Flag") == pytest.approx((2, 0, 1.3), abs=1e-3)
+    simulation.stop()
+    assert place(simulation, "Flag") == pytest.approx((2, 0, 1.3))
+    simulation.close()

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from drone_sim.config.types import ParameterError
-from drone_sim.mechanics.frames import IDENTITY, multiply
+from drone_sim.mechanics.frames import IDENTITY, Matrix, multiply
 from drone_sim.mechanics.joint import Joint
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.scene_object import SceneObject
@@ -53,7 +53,7 @@ class Scene:
         self._around = Around(world, look, self._name_of, self.follow)
         self.bodies = [self._body(index) for index in sorted(self._places)]  # of the shapes, as the file has them
         self._add_names()
-        self._is_placed = False
+        self._began: dict[int, Matrix] = {}  # where the objects were at the beginning, by entry; empty before
         self._tree = ObjectTree()
         self._forget_objects()
 
@@ -89,9 +89,9 @@ class Scene:
             if self._entries[index].name:
                 self._objects[index] = self._add(objects, index)
         self._hold_chains()
-        if not self._is_placed:
+        if not self._began:
             self._place_loose_ones()
-            self._is_placed = True
+            self._began = {index: one.matrix() for index, one in self._objects.items()}
         self.follow()
 
     def _forget_objects(self) -> None:
@@ -105,7 +105,8 @@ class Scene:
     def _add(self, objects: ObjectTree, index: int) -> SceneObject:
         one = self._entries[index]
         parent = self._parent(objects, index)
-        place = Place((one.name,), one.alias or one.name, parent, one.local)
+        gone = bool(one.parent) and parent is None  # a vehicle: it stays where it began
+        place = Place((one.name,), one.alias or one.name, parent, self._began[index] if gone else one.local)
         added = self._object(index, place)
         try:
             objects.insert(added)
@@ -119,7 +120,7 @@ class Scene:
             return None
         if name in objects:
             return objects[objects.handle(name)]
-        if self._is_placed:  # a vehicle that has gone
+        if self._began:  # a vehicle that has gone
             return None
         raise ParameterError(
             f"no object is named '{name}', the parent of '{self._entries[index].name}'; "
