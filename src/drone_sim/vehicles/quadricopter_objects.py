@@ -11,6 +11,7 @@
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
       DronePosition                              /target                 the green sphere
 
+Each name that begins with Quadricopter_ stands there with Quadcopter_, too, as in CoppeliaSim 4.0.
 The names of the second vehicle end in #0, those of the third in #1, and so on, as those of V-REP's copies do.
 Cameras and vision sensors look along their z axis, with y up and x to the left, as V-REP's do.
 """
@@ -27,6 +28,7 @@ from drone_sim.mechanics.object_tree import Body, ObjectTree
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.parameters import SensorParameters
 
+_V_REPS, _COPPELIASIMS = "Quadricopter", "Quadcopter"  # what names begin with in 3.x, and in 4.0 to 4.2
 DRONE = "Drone"
 TARGET = "DronePosition"  # the green sphere
 TRACK_BASE = "Track_base"
@@ -107,6 +109,7 @@ class QuadricopterObjects:
         also: Sequence[str] = (),
         kind: str = "",
     ) -> None:
+        also = (*also, *(one.replace(_V_REPS, _COPPELIASIMS) for one in (name, *also) if one.startswith(f"{_V_REPS}_")))
         own = None if parent is None else f"{parent}{self._suffix}"
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
         names = [f"{one}{self._suffix}" for one in (name, *also)]
