@@ -60,6 +60,10 @@ def found(simulation, name):
     return objects[objects.handle(name)]
 
 
+def sim_of(simulation):
+    return make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05))
+
+
 def run(simulation, seconds):
     """Run, and return the joints' positions after each step, by name."""
     joints = {name: found(simulation, name) for name in ("Pivot", "Lift", "Axle", "Left", "Right")}
@@ -103,7 +107,7 @@ def test_joints_move_as_mechanics_says(simulation):
 
 
 def test_scripts_command_joints(simulation):
-    sim, handle = make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05)), simulation.drone.objects.handle
+    sim, handle = sim_of(simulation), simulation.drone.objects.handle
     lift, axle, pivot = handle("Lift"), handle("Axle"), handle("Pivot")
     assert sim.getJointType(lift) == 11 and sim.getJointType(axle) == 10
     assert sim.getJointInterval(lift) == (False, [0, 2]) and sim.getJointInterval(axle)[0] is True
@@ -135,9 +139,32 @@ def test_scripts_command_joints(simulation):
     assert sim.getJointPosition(blades) == 0.5, "looks only"
 
 
+def test_parameters_of_joints_and_shapes(simulation):
+    sim, handle = sim_of(simulation), simulation.drone.objects.handle
+    left, cabin, loose = handle("Left"), handle("Cabin"), handle("Loose")
+    motor, control, static = (
+        sim.jointintparam_motor_enabled,
+        sim.jointintparam_ctrl_enabled,
+        sim.shapeintparam_static,
+    )
+    assert [sim.getObjectInt32Param(left, one) for one in (motor, control)] == [1, 0]
+    sim.setObjectInt32Param(left, control, 1)
+    assert found(simulation, "Left").control.mode == "position"
+    sim.setObjectInt32Param(left, control, 0)
+    sim.setObjectInt32Param(left, motor, 0)
+    assert found(simulation, "Left").control.mode == "passive"
+    sim.setObjectInt32Param(left, motor, 1)
+    assert found(simulation, "Left").control.mode == "velocity"
+    assert (sim.getShapeMass(cabin), sim.getShapeMass(loose), sim.getShapeMass(handle("Beam"))) == (3, 1, 0)
+    sim.setObjectInt32Param(loose, static, 1)
+    assert sim.getObjectInt32Param(loose, static) == 1 and found(simulation, "Loose").is_static
+    sim.setObjectInt32Param(loose, static, 0)
+    sim.resetDynamicObject(sim.handle_all)
+
+
 def test_it_goes_on_from_a_snapshot_and_begins_anew_to_the_last_bit(simulation):
     first = run(simulation, 1)
-    sim, handle = make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05)), simulation.drone.objects.handle
+    sim, handle = sim_of(simulation), simulation.drone.objects.handle
     snapshot = simulation.snapshot()
     then = run(simulation, 1)
     sim.setJointTargetVelocity(handle("Left"), -5)
@@ -152,7 +179,7 @@ def test_it_goes_on_from_a_snapshot_and_begins_anew_to_the_last_bit(simulation):
 
 
 def test_moving_the_root_takes_all_along(simulation):
-    sim, handle = make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05)), simulation.drone.objects.handle
+    sim, handle = sim_of(simulation), simulation.drone.objects.handle
     before = [found(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
     for name in ("Beam", "Cart"):
         x, y, z = sim.getObjectPosition(handle(name), -1)

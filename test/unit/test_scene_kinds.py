@@ -168,6 +168,7 @@ def test_paths(simulate):
     half = math.sqrt(0.5)
     table = found(simulation, "Way").table
     assert table == pytest.approx([0, 0, 0, 0, 0, 0, 1, 3, 0, 0, 0, 0, half, half, 3, 4, 0, 0, 0, half, half])
+    assert sim.unpackDoubleTable(sim.readCustomDataBlock(way, "PATH")) == table
     flat = [0, 0, 0, 0, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0]
     lengths, total = sim.getPathLengths(flat, 7)
     assert (lengths, total) == ([0, 2], 2)

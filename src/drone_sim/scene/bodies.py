@@ -70,6 +70,8 @@ class HeldShape(SceneObject):
     """A shape that a joint or a force sensor holds: nobody puts it anywhere else."""
 
     is_loose = False
+    is_held = True
+    mass = 0.0  # kg
 
     def put(self, matrix: Matrix) -> None:
         """Refuse. Raises ValueError."""
@@ -120,7 +122,7 @@ class Shape(SceneObject):
         """
         self.number = number
         self._world = world
-        self._mass = mass
+        self.mass = mass
         self._parent: SceneObject | None = None
         self._changed, self._follow = changed, follow
         self._passing: set[int] = set()
@@ -149,7 +151,7 @@ class Shape(SceneObject):
         """Let the dynamics leave it alone, or move it again. Raises ValueError for what has never had a mass."""
         if static == self.is_static:
             return
-        if not self._mass:
+        if not self.mass:
             raise ValueError(f"'{self.name}' has no mass in the scene file: it stays static")
         matrix = self.matrix()
         self.body = None if static else SceneBody(self._world, self.number)
@@ -166,7 +168,7 @@ class Shape(SceneObject):
 
     def release(self) -> None:
         """Be in the world as at the beginning, before another object takes its place."""
-        if self._mass:
+        if self.mass:
             self.set_static(False)
         self.parent = None
 

@@ -134,7 +134,9 @@ class Scene:
             return one.make(place, self._around)
         number, link = self._places[index]
         if link != -1:
-            return HeldShape(*place[:3], IDENTITY, self._body(index))
+            held = HeldShape(*place[:3], IDENTITY, self._body(index))
+            held.mass = getattr(one, "mass", 0.0)
+            return held
         mass = one.mass if isinstance(one, ObjectParameters) else 0.0
         return Shape(place, world=self._world, number=number, mass=mass, changed=self._changed, follow=self.follow)
 
