@@ -67,7 +67,7 @@ class Dynamics:
         Those are sim.shapeintparam_static (0 or 1), _respondable and sim.objintparam_visibility_layer.
         """
         found = self._objects[handle]
-        known: dict[str, Callable[[], int]] = {
+        known: dict[str, Callable[[], float]] = {
             "shapeintparam_static": lambda: int(_carrier(found) is None),
             "shapeintparam_respondable": lambda: 1,
             "objintparam_visibility_layer": lambda: 1,
