@@ -1,6 +1,8 @@
 """Objects of a scene that are no shapes, and how they hang together: found, moved, saved, refused."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -316,3 +318,15 @@ def test_what_hung_on_a_vehicle_that_has_gone_stays_where_it_was(tmp_path):
     simulation.stop()
     assert place(simulation, "Flag") == pytest.approx((2, 0, 1.3))
     simulation.close()
+
+
+DOCS = (Path(__file__).parents[2] / "docs/scenes.md").read_text(encoding="utf-8")
+
+
+def test_the_examples_of_the_docs_load(simulate):
+    examples = re.findall(r"^```yaml\n(.*?)^```", DOCS, re.S | re.M)
+    entries = ["".join(line for line in one.splitlines(True) if "file:" not in line) for one in examples]
+    objects = "objects:\n" + "".join(one.partition("objects:")[2].partition("\n")[2] for one in entries)
+    simulation = simulate(objects)
+    assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way"} <= set(simulation.drone.objects.names)
+    simulation.step()
