@@ -295,5 +295,6 @@ SIM: dict[str, list[Example]] = {
     "checkProximitySensor": [Example("NAME(FEELER, FLOOR)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "checkProximitySensorEx": [Example("NAME(FEELER, FLOOR, 0, 1, 0)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "resetProximitySensor": [Example("NAME(FEELER)", [])],
+    "readForceSensor": [Example("NAME(GAUGE)", [1, [0, 0, 0], [0, 0, 0]])],
     "readSensor": [Example("NAME(RANGE)", [])],
 }

@@ -42,6 +42,7 @@ OBJECTS = {
     "BALL": "/Ball",
     "LINE": "/Line",
     "FEELER": "/Feeler",
+    "GAUGE": "/Gauge",
 }
 SCENE = {
     "objects": [
@@ -49,6 +50,7 @@ SCENE = {
         {"name": "Ball", "kind": "joint", "type": "spherical"},
         {"name": "Line", "kind": "path", "points": [[0, 0, 0], [2, 0, 0]]},
         {"name": "Feeler", "kind": "proximity_sensor", "type": "ray", "range": 1.0, "position": [50, 0, 1]},
+        {"name": "Gauge", "kind": "force_sensor"},
     ]
 }
 LUA = """

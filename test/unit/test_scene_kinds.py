@@ -1,6 +1,8 @@
 """Objects of a scene that are no shapes, and how they hang together: found, moved, saved, refused."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -165,10 +167,13 @@ def test_paths(simulate):
     assert sim.getOrientationOnPath(way, 1)[2] == pytest.approx(math.pi / 2)
     sim.setPathPosition(way, sim.getPathPosition(way) + 2)
     assert sim.getPathPosition(way) == 2
+    half = math.sqrt(0.5)
+    table = found(simulation, "Way").table
+    assert table == pytest.approx([0, 0, 0, 0, 0, 0, 1, 3, 0, 0, 0, 0, half, half, 3, 4, 0, 0, 0, half, half])
+    assert sim.unpackDoubleTable(sim.readCustomDataBlock(way, "PATH")) == table
     flat = [0, 0, 0, 0, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0]
     lengths, total = sim.getPathLengths(flat, 7)
     assert (lengths, total) == ([0, 2], 2)
-    half = math.sqrt(0.5)
     assert sim.getPathInterpolatedConfig(flat, lengths, 1) == pytest.approx([1, 0, 0, 0, 0, half, half])
     for call in (lambda: sim.getPathLength(0), lambda: sim.getPathLengths(flat, 4), lambda: sim.getPathLengths([], 3)):
         with pytest.raises(TypeError):
@@ -216,7 +221,7 @@ ONE = "kind: dummy, position: [0, 0, 0]"
     "entry, words",
     [
         ("{kind: dummy}", "scene.yaml: line 2: parameter objects/0/name: missing"),
-        ("{kind: cone}", "line 2: parameter objects/0/kind = 'cone': must be one of 'dummy', 'joint',"),
+        ("{kind: cone}", "line 2: parameter objects/0/kind = 'cone': must be one of 'dummy', 'joint', 'pro"),
         ("{name: A, kind: dummy, mass: 1}", "line 2: parameter objects/0/mass: unknown key"),
         (f"{{name: A, {ONE}}}\n  - {{name: A, {ONE}}}", "line 3: parameter objects/1/name = 'A': comes twice"),
         (f"{{name: A, parent: A, {ONE}}}", "line 2: parameter objects/0/parent = 'A': 'A' would be its own ancestor"),
@@ -284,3 +289,44 @@ objects:
         "moved by scripts alone, as no shape with a mass hangs right on it: Empty, Bare",
         "moved by scripts alone, as spherical ones are: Round",
     ]
+
+
+@pytest.mark.ros
+def test_rviz_shows_dummies_as_balls_and_paths_as_lines(simulate):
+    frame_markers = pytest.importorskip("drone_sim.ros.rviz.frame_markers")
+    shown = [*frame_markers.markers_of(simulate(SCENE).scene.objects_now().values())]
+    balls, lines = ([one for one in shown if one.type == kind] for kind in (2, 4))
+    assert len(balls) == 2 and len(lines) == 1
+    assert balls[0].pose.position.x == pytest.approx(5 + math.cos(0.5))
+    assert [(one.x, one.y, one.z) for one in lines[0].points] == pytest.approx(
+        [(0, 9, 1.85), (3, 9, 1.85), (3, 13, 1.85)]
+    )
+
+
+def test_what_hung_on_a_vehicle_that_has_gone_stays_where_it_was(tmp_path):
+    file = tmp_path / "scene.yaml"
+    file.write_text(
+        "objects: [{name: Flag, shape: box, size: [0.1, 0.1, 0.1], parent: Drone#0, position: [0, 0, 0.3]}]",
+        encoding="utf-8",
+    )
+    two = {"a": {"position": [0, 0, 1]}, "b": {"position": [2, 0, 1]}}
+    simulation = Simulation(parameters.load({"vehicles": two, "scene_file": str(file)}))
+    simulation.step()
+    simulation.set_vehicles({"a": two["a"]})
+    simulation.step()
+    assert place(simulation, "Flag") == pytest.approx((2, 0, 1.3), abs=1e-3)
+    simulation.stop()
+    assert place(simulation, "Flag") == pytest.approx((2, 0, 1.3))
+    simulation.close()
+
+
+DOCS = (Path(__file__).parents[2] / "docs/scenes.md").read_text(encoding="utf-8")
+
+
+def test_the_examples_of_the_docs_load(simulate):
+    examples = re.findall(r"^```yaml\n(.*?)^```", DOCS, re.S | re.M)
+    entries = ["".join(line for line in one.splitlines(True) if "file:" not in line) for one in examples]
+    objects = "objects:\n" + "".join(one.partition("objects:")[2].partition("\n")[2] for one in entries)
+    simulation = simulate(objects)
+    assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way"} <= set(simulation.drone.objects.names)
+    simulation.step()

@@ -39,6 +39,12 @@ class Path(SceneObject):
         """From its beginning to its end, m."""
         return self._ends[-1]
 
+    @property
+    def table(self) -> list[float]:
+        """Its points as 4.x keeps them in an object's data PATH: x, y, z and the quaternion x, y, z, w of each."""
+        ends = [self.at(min(along, math.nextafter(self.length, 0.0))) for along in self._ends]
+        return [one for m, point in zip(ends, self.points) for one in (*point, *frames.to_quaternion(m))]
+
     def at(self, along: float) -> Matrix:
         """Return the frame of the path, in the path's own, so far (m) from its beginning: x ahead, z up.
 

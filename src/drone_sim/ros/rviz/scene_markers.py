@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +13,7 @@ from visualization_msgs.msg import Marker
 
 from drone_sim.files.mesh_files import WHITE
 from drone_sim.mechanics import frames
-from drone_sim.ros.rviz import lit_triangles
+from drone_sim.ros.rviz import frame_markers, lit_triangles
 from drone_sim.ros.rviz.marker_topic import MarkerTopic, namespace
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.run.simulation import Simulation
@@ -40,6 +41,7 @@ class SceneMarkers:
         self._simulation = simulation
         self._files = files
         self._shown: tuple[list[Visual], np.ndarray] | None = None
+        self._frames: list[Marker] = []  # of what has no body
         self._topic = MarkerTopic(f"{namespace(simulation)}/scene", _PERIOD)
 
     def update(self) -> None:
@@ -48,12 +50,15 @@ class SceneMarkers:
         if not self._topic.due():
             return
         visuals, poses = self._simulation.scene.visuals()
-        if self._shown and visuals == self._shown[0] and np.array_equal(poses, self._shown[1]):
+        bodiless = [*frame_markers.markers_of(self._simulation.scene.objects_now().values())]
+        same = self._shown and visuals == self._shown[0] and np.array_equal(poses, self._shown[1])
+        if same and bodiless == self._frames:
             return
-        self._shown = visuals, poses
+        self._shown, self._frames = (visuals, poses), copy.deepcopy(bodiless)
         markers = [Marker(action=Marker.DELETEALL)]
         for visual, pose in zip(visuals, poses):
             markers += markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
+        markers += bodiless
         for marker in markers:
             marker.frame_locked = True
         self._topic.show(markers)

@@ -17,4 +17,13 @@ class DummyParameters(KindParameters):
 
     def make(self, place: Place, around: Around) -> SceneObject:
         """Return the frame."""
-        return SceneObject(*place, kind="dummy")
+        return Dummy(place, self.size)
+
+
+class Dummy(SceneObject):
+    """A frame, and how large it is shown."""
+
+    def __init__(self, place: Place, size: float):
+        """Take where it is, and its size (m)."""
+        super().__init__(*place, kind="dummy")
+        self.size = size

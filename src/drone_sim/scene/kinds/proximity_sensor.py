@@ -117,7 +117,7 @@ class _Seek(NamedTuple):
         if self.volume.type in ("ray", "disc"):
             return []
         origin, reach = frames.position(self.matrix), self.volume.reach
-        found = [self._found(met) for met in self.world.nearest_points(origin, reach, self.counts)]
+        found = [self._found(met) for met in self.world.solidity.nearest_points(origin, reach, self.counts)]
         return [one for one in found if self.volume.holds(one.point)]
 
     def _found(self, met: Met) -> _Found:

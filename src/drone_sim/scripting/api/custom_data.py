@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import copy
+import struct
 from collections.abc import Mapping
 from typing import Any
 
+from drone_sim.mechanics.path import Path
 from drone_sim.scripting.api.calls import Function, WrongValue
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.custom_values import CustomData
@@ -15,6 +17,7 @@ from drone_sim.wording import near_names
 
 _SCENE, _APP = CONSTANTS["handle_scene"], CONSTANTS["handle_app"]
 _CUSTOM = "customData."
+_PATHS = ("PATH", "PATHCTRLPTS")  # tags of CoppeliaSim's own
 _PROPERTIES = (_CUSTOM, "signal.")
 _PROPERTY_KINDS = (
     *("Bool", "Int", "Float", "String", "Buffer", "Table", "Vector2", "Vector3", "Quaternion", "Pose", "Color"),
@@ -47,8 +50,16 @@ class CustomDataFunctions:
     writeCustomStringData = writeCustomBufferData = writeCustomDataBlock
 
     def readCustomDataBlock(self, handle: Handle, tag: Name) -> Any:
-        """Return the string under a tag; nothing where there is none."""
-        return self._data.values.get((self._target(handle), _CUSTOM + tag))
+        """Return the string under a tag; nothing where there is none.
+
+        A path of the scene has its points under PATH, and under PATHCTRLPTS: 7 doubles each.
+        """
+        found = self._data.values.get((self._target(handle), _CUSTOM + tag))
+        return self._path_data(handle) if found is None and tag in _PATHS else found
+
+    def _path_data(self, handle: int) -> bytes | None:
+        found = self._objects[handle] if handle >= 0 else None
+        return struct.pack(f"<{len(found.table)}d", *found.table) if isinstance(found, Path) else None
 
     readCustomStringData = readCustomBufferData = readCustomDataBlock
 

@@ -11,6 +11,7 @@ from drone_sim.scripting.api.calls import WrongValue, numbers
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
+from drone_sim.scripting.api.object_parameters import readable, settable
 from drone_sim.scripting.api.types import Handle, Number, TwelveNumbers
 from drone_sim.wording import near_names
 
@@ -33,15 +34,17 @@ class Dynamics:
         handles = list(self._objects) if handle in _EVERYTHING else [handle]
         bodies = {id(one): one for one in map(_carrier, (self._objects[one] for one in handles)) if one is not None}
         for one in bodies.values():
-            one.put(one.matrix())
+            if not getattr(one, "is_held", False):  # those go with what they hang on
+                one.put(one.matrix())
 
     def isDynamicallyEnabled(self, handle: Handle) -> bool:
-        """Return whether the dynamics move an object."""
+        """Return whether the dynamics move an object, or what carries it."""
         return _carrier(self._objects[handle]) is not None
 
     def getShapeMass(self, handle: Handle) -> float:
         """Return the mass of a shape in kg; 0 where the dynamics do not move it."""
-        return self._masses().get(self._objects[handle].name, 0.0)
+        found = self._objects[handle]
+        return float(getattr(found, "mass", 0.0)) or self._masses().get(found.name, 0.0)
 
     def getShapeMassAndInertia(
         self, handle: Handle, transform: TwelveNumbers | None = None
@@ -59,20 +62,27 @@ class Dynamics:
     # ---- parameters of objects
 
     def getObjectInt32Param(self, handle: Handle, parameter: int) -> int:
-        """Return sim.shapeintparam_static (0 or 1), _respondable, or sim.objintparam_visible; 0 for others."""
+        """Return what object_parameters.py has of an object, or what any object has; 0 for others.
+
+        Those are sim.shapeintparam_static (0 or 1), _respondable and sim.objintparam_visibility_layer.
+        """
         found = self._objects[handle]
-        known: dict[str, Callable[[], int]] = {
+        known: dict[str, Callable[[], float]] = {
             "shapeintparam_static": lambda: int(_carrier(found) is None),
             "shapeintparam_respondable": lambda: 1,
             "objintparam_visibility_layer": lambda: 1,
+            **readable(found),
         }
         return int(self._read("getObjectInt32Param", _WHOLE, parameter, known, 0))
 
     getObjectInt32Parameter = getObjectIntParameter = getObjectIntParam = getObjectInt32Param
 
-    def setObjectInt32Param(self, handle: Handle, parameter: int, _value: int) -> int:
-        """Accept any whole number among an object's parameters and ignore it; return 1."""
-        return self._set("setObjectInt32Param", handle, _WHOLE, parameter)
+    def setObjectInt32Param(self, handle: Handle, parameter: int, value: int) -> int:
+        """Set a parameter of the scene's objects: sim.shapeintparam_static, sim.jointintparam_motor_enabled and others.
+
+        Any other is accepted and ignored. Return 1.
+        """
+        return self._set("setObjectInt32Param", handle, _WHOLE, parameter, value)
 
     setObjectInt32Parameter = setObjectIntParameter = setObjectIntParam = setObjectInt32Param
 
@@ -86,14 +96,15 @@ class Dynamics:
             "objfloatparam_abs_z_velocity": lambda: found.velocity()[0][2],
             "objfloatparam_abs_rot_velocity": lambda: sum(one * one for one in found.velocity()[1]) ** 0.5,
             "objfloatparam_size_factor": lambda: 1.0,
+            **readable(found),
         }
         return float(self._read("getObjectFloatParam", _FLOAT, parameter, known, 0.0))
 
     getObjectFloatParameter = getObjectFloatParam
 
-    def setObjectFloatParam(self, handle: Handle, parameter: int, _value: Number) -> int:
+    def setObjectFloatParam(self, handle: Handle, parameter: int, value: Number) -> int:
         """Accept any number among an object's parameters and ignore it; return 1."""
-        return self._set("setObjectFloatParam", handle, _FLOAT, parameter)
+        return self._set("setObjectFloatParam", handle, _FLOAT, parameter, value)
 
     setObjectFloatParameter = setObjectFloatParam
 
@@ -107,9 +118,13 @@ class Dynamics:
         self._ignored.say(function, f"{names[0]} is not known here: {other} is returned")
         return other
 
-    def _set(self, function: str, handle: int, kinds: tuple[str, ...], parameter: int) -> int:
-        self._objects[handle]
-        self._ignored.say(function, f"{_names(kinds, parameter)[0]} is accepted and ignored")
+    def _set(self, function: str, handle: int, kinds: tuple[str, ...], parameter: int, value: float) -> int:
+        known, names = settable(self._objects[handle]), _names(kinds, parameter)
+        for name in names:
+            if name in known:
+                known[name](*numbers((value,), 1))
+                return 1
+        self._ignored.say(function, f"{names[0]} is accepted and ignored")
         return 1
 
 

@@ -25,10 +25,13 @@ _LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601
 
 @runtime_checkable
 class Eye(Protocol):
-    """A vision sensor of the scene: its near and far planes are in m."""
+    """A vision sensor of the scene: its picture in px, its near and far planes in m, the angle of its larger side."""
 
+    width: int
+    height: int
     near: float
     far: float
+    angle: float
 
     def picture(self, kind: str) -> np.ndarray:
         """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane."""
