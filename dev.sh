@@ -225,7 +225,7 @@ case "$command" in
   pythons) # shellcheck disable=SC2046 # one word each
     install_packages $(packages)
     test_pythons "$@" ;;
-  deb) install_packages python3-matplotlib python3-opencv python3-pil python3-tqdm
+  deb) install_packages python3-matplotlib python3-opencv python3-pil python3-tqdm python3-zmq
     setup; packaging/deb.sh "$wheels" ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
 esac

@@ -24,7 +24,7 @@ class Pacer:
         self._period = period
         self._clock = clock
         self._sleep = sleep
-        self.restart()
+        self._due = clock() + period
 
     def wait(self, interrupted: Callable[[], bool] = lambda: False) -> float:
         """Sleep until the next period begins, or until interrupted; return the lateness in seconds.
@@ -41,6 +41,10 @@ class Pacer:
             self._sleep(min(_SLICE, max(0.0, self._due - self._clock())))
         self._due += self._period
         return late
+
+    def excuse(self) -> None:
+        """Let a step that others have held up be due now, if it was before: it is not late."""
+        self._due = max(self._due, self._clock())
 
     def restart(self) -> None:
         """Begin to count anew, as after a pause: the next step is due one period from now."""
