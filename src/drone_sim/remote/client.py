@@ -20,6 +20,7 @@ from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.calls import Api, Function, contents, explain
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.types import Name
 from drone_sim.scripting.errors import ScriptError, UnknownName
 from drone_sim.wording import near_names
 
@@ -133,12 +134,12 @@ class Client:
             raise Refused(str(_unknown(self._modules[module], function_name)))
         raise Refused(f"no function '{name:.80}'; {near_names(name[:80], [*self._functions, *own])}")
 
-    def require(self, module: str) -> None:
+    def require(self, module: Name) -> None:
         """Raise ValueError for a module that there is not."""
         if module not in self._modules:
             raise ValueError(f"no module '{module}'; {near_names(str(module), self._modules)}")
 
-    def info(self, module: str) -> dict[str, Any]:
+    def info(self, module: Name) -> dict[str, Any]:
         """Return the functions and constants of a module. Raises ValueError."""
         self.require(module)
         _, functions, constants = contents(self._modules[module])

@@ -70,7 +70,7 @@ class Endpoint:
 
     def receive(self) -> Incoming | None:
         """Return the next message, None where none waits."""
-        if not self._socket.getsockopt(zmq.EVENTS) & zmq.POLLIN:  # an exception would take longer
+        if not _readable(self._socket):
             return None
         *envelope, payload = self._socket.recv_multipart(zmq.NOBLOCK, copy=False)
         return Incoming(tuple(one.bytes for one in envelope), payload.get(zmq.SRCFD), payload.bytes)
@@ -83,7 +83,7 @@ class Endpoint:
     def ended(self) -> list[int]:
         """Return the connections that have ended since the last call."""
         found = []
-        while self._ends.getsockopt(zmq.EVENTS) & zmq.POLLIN:
+        while _readable(self._ends):
             found.append(int(recv_monitor_message(self._ends, zmq.NOBLOCK)["value"]))
         return found
 
@@ -95,3 +95,8 @@ class Endpoint:
         self._context.term()
         self._awake.close()
         self._alarm.close()
+
+
+def _readable(one: zmq.Socket[bytes]) -> bool:
+    """Tell whether there is something to receive; an exception that there is nothing would take longer."""
+    return bool(int(one.getsockopt(zmq.EVENTS)) & zmq.POLLIN)

@@ -25,6 +25,7 @@ class Pacer:
         self._clock = clock
         self._sleep = sleep
         self._due = clock() + period
+        self._excused = False
 
     def wait(self, interrupted: Callable[[], bool] = lambda: False) -> float:
         """Sleep until the next period begins, or until interrupted; return the lateness in seconds.
@@ -33,18 +34,20 @@ class Pacer:
         a step took longer than its period, the following ones are put off by as much.
         """
         late = max(0.0, self._clock() - self._due) if self._period else 0.0
+        self._due += late
+        if self._excused:
+            late, self._excused = 0.0, False
         if late:
             self.overruns += 1
             self.worst = max(self.worst, late)
-            self._due += late
         while self._due > self._clock() and not interrupted():
             self._sleep(min(_SLICE, max(0.0, self._due - self._clock())))
         self._due += self._period
         return late
 
     def excuse(self) -> None:
-        """Let a step that others have held up be due now, if it was before: it is not late."""
-        self._due = max(self._due, self._clock())
+        """Let the next step not count as late: others have held it up."""
+        self._excused = True
 
     def restart(self) -> None:
         """Begin to count anew, as after a pause: the next step is due one period from now."""
