@@ -47,7 +47,8 @@ class Stage:
         values = {"script": str(script), "vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}}}
         self.simulation = Simulation(parameters.load(values), drawings=self.drawings, backend=self.radio, started=False)
         self.player = Player(self.simulation, self.simulation.step, lambda _state: None, simulated_time=False)
-        self.server = Server(self.player, "127.0.0.1", 0, self.radio)
+        self.now = 0.0  # s
+        self.server = Server(self.player, "127.0.0.1", 0, self.radio, lambda: self.now)
         self.clients = []
 
     def client(self, *arguments, **fields):
@@ -322,7 +323,10 @@ def test_waiting_for_simulated_time_steps(stage):
         stage.go()
     assert client.reply()["ret"] == [0.1]
     assert client.sim("getSimulationTime") == pytest.approx(0.1)
-    assert client.sim("wait", 0.001, False) == 0.001  # of real time
+    client.send("sim.wait", 5, False)  # of real time
+    assert not client.answered(looks=3)
+    stage.now += 5.0
+    assert client.reply()["ret"] == [5]
 
 
 @pytest.mark.parametrize("how", ["vanish", "goodbye", "silence"])
@@ -337,8 +341,7 @@ def test_who_has_gone_holds_nothing(stage, how):
     elif how == "goodbye":
         assert client.ask("_*end*_") == {"success": True, "ret": []}
     else:
-        stage.server._clients[client.fields["uuid"]].heard -= 61.0
-        stage.server._looked = 0.0
+        stage.now += 61.0
     assert stage.settled(lambda: not stage.server.holds)
     stage.go(2)
     assert stage.simulation.steps == 2

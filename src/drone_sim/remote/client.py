@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import time
 from collections.abc import Callable, Generator, Iterable
 from typing import Any
 
@@ -13,6 +12,7 @@ from drone_sim.remote.conversation import Call, ClientFunction, Refused, Task
 from drone_sim.remote.host import ClientHost, surroundings
 from drone_sim.remote.messages import Request
 from drone_sim.remote.stepping import Stepping
+from drone_sim.run.pacing import Stopwatch
 from drone_sim.run.player import Player
 from drone_sim.run.whereabouts import Diverged
 from drone_sim.scripting import script_log
@@ -38,15 +38,16 @@ class Client:
         arrangement: Arrangement,
         backend: Backend | None,
         everybody: Callable[[], Iterable[Stepping]],
+        clock: Callable[[], float],
     ):
-        """Take what plays the simulation, and what carries messages."""
+        """Take what plays the simulation, what carries messages, and a monotonic clock of real seconds."""
         self.stepping = Stepping()
         self.connections: set[int] = set()
-        self.heard = time.monotonic()
+        self.silence = Stopwatch(clock)
         self.patience = 0.0  # s
         self.tasks: dict[tuple[bytes, ...], list[Task]] = {}  # what is not answered yet, by the way back
         self._simulation = player.simulation
-        self._control = Control(player, arrangement, self.stepping, everybody)
+        self._control = Control(player, arrangement, self.stepping, everybody, clock)
         self._bus = MessageBus(self._simulation.drone.name, {})
         self._bus.backend = backend
         self._run = self._era = -1

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from drone_sim.remote.arrangement import Arrangement
 from drone_sim.remote.conversation import Call, ClientFunction, Refused, Task, Until
 from drone_sim.remote.stepping import Stepping
+from drone_sim.run.pacing import Stopwatch
 from drone_sim.run.player import Player
 from drone_sim.scripting.api.calls import Function, WrongValue, numbers
 from drone_sim.scripting.api.types import Number
@@ -37,8 +37,13 @@ class Control:
         arrangement: Arrangement,
         stepping: Stepping,
         everybody: Callable[[], Iterable[Stepping]],
+        clock: Callable[[], float],
     ):
-        """Take what plays the simulation, where objects are put, the client's say in the steps, and all clients'."""
+        """Take what plays the simulation, where objects are put, the client's say in the steps, and all clients'.
+
+        `clock` counts real seconds.
+        """
+        self._clock = clock
         self._player = player
         self._simulation = player.simulation
         self._arrangement = arrangement
@@ -97,8 +102,8 @@ class Control:
         (duration,) = numbers((seconds,), 1)
         simulation, run = self._simulation, self._simulation.run
         if not simulationTime:
-            end = time.monotonic() + duration
-            yield self._stepping.wait(Until(lambda: time.monotonic() >= end))
+            watch = Stopwatch(self._clock)
+            yield self._stepping.wait(Until(lambda: watch.seconds() >= duration))
         elif self._player.playing:
             ahead = simulation.time + duration - 1e-9  # which a number of steps adds up to
             yield self._stepping.wait(Until(lambda: simulation.run != run or simulation.time >= ahead))

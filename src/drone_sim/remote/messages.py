@@ -64,7 +64,8 @@ def success(values: Sequence[Any]) -> bytes:
 
 def failure(line: str) -> bytes:
     """Return the reply that a client raises as an exception."""
-    return _written({"success": False, "error": line, "err": line})
+    text = line.encode("utf-8", "replace").decode()
+    return _written({"success": False, "error": text, "err": text})
 
 
 def call(function: str, arguments: Sequence[Any]) -> bytes:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from drone_sim.remote import messages
 from drone_sim.remote.arrangement import Arrangement
 from drone_sim.remote.client import Client
-from drone_sim.remote.conversation import Refused, Until, returned
+from drone_sim.remote.conversation import Until, returned
 from drone_sim.remote.endpoint import Endpoint, Incoming
 from drone_sim.remote.messages import Request
 from drone_sim.remote.stepping import Stepping
+from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 from drone_sim.scripting.api.backend import Backend
 
@@ -32,14 +33,22 @@ class _Waiting(NamedTuple):
 class Server:
     """Serves the remote API. One thread owns it, that of the simulation; `wake` alone may be called from any."""
 
-    def __init__(self, player: Player, address: str, port: int, backend: Backend | None = None):
+    def __init__(
+        self,
+        player: Player,
+        address: str,
+        port: int,
+        backend: Backend | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ):
         """Listen; port 0 is a free one. `backend` carries clients' messages. Raises OSError."""
         self._player = player
         self._backend = backend
         self._arrangement = Arrangement(player.simulation)
         self._clients: dict[str, Client] = {}
         self._waiting: list[_Waiting] = []
-        self._looked = 0.0
+        self._clock = clock
+        self._seldom = Throttle(_SELDOM, clock)
         self._endpoint = Endpoint(address, port)
         self.address, self.port = self._endpoint.address, self._endpoint.port
         self.wake = self._endpoint.wake
@@ -97,6 +106,7 @@ class Server:
 
     def _go_on(self, client: Client, envelope: tuple[bytes, ...], value: Any) -> None:
         """Carry on with the newest task of a socket, and answer."""
+        client.silence.restart()
         tasks = client.tasks.get(envelope)
         if not tasks:
             self._endpoint.send(envelope, messages.failure("there is nothing that was to be executed"))
@@ -109,7 +119,7 @@ class Server:
             reply = messages.call(*asked)
         except StopIteration as done:
             reply = self._ended(tasks, done.value)
-        except (Refused, ValueError) as error:
+        except Exception as error:  # whatever it is, the flight goes on
             tasks.pop()
             reply = messages.failure(" ".join(str(error).split()))
         if not tasks:
@@ -141,10 +151,9 @@ class Server:
         if client is None:
             if len(self._clients) >= _MOST_CLIENTS:
                 raise ValueError(f"{_MOST_CLIENTS} clients are there already")
-            client = Client(self._player, self._arrangement, self._backend, self._everybody)
+            client = Client(self._player, self._arrangement, self._backend, self._everybody, self._clock)
             client.patience = request.patience
             self._clients[name] = client
-        client.heard = time.monotonic()
         client.connections.add(incoming.connection)
         return client
 
@@ -159,11 +168,10 @@ class Server:
                     client.connections.remove(number)
                     if not client.connections:
                         self._let_go(name)
-        now = time.monotonic()
-        if now - self._looked > _SELDOM:
-            self._looked = now
+        if self._seldom.passes():
+            waiting = [one.client for one in self._waiting]
             for name, client in list(self._clients.items()):
-                if now - client.heard > client.patience and not any(one.client is client for one in self._waiting):
+                if client.silence.seconds() > client.patience and client not in waiting:
                     self._let_go(name)
 
     def _let_go(self, name: str) -> None:

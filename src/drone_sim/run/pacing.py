@@ -54,6 +54,23 @@ class Pacer:
         self._due = self._clock() + self._period
 
 
+class Stopwatch:
+    """Says how long ago something was."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        """Take a monotonic clock, and start."""
+        self._clock = clock
+        self.restart()
+
+    def seconds(self) -> float:
+        """Return the real seconds since the start."""
+        return self._clock() - self._began
+
+    def restart(self) -> None:
+        """Start anew."""
+        self._began = self._clock()
+
+
 class Throttle:
     """Lets something pass, but not more often than once per period."""
 
