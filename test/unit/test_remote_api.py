@@ -21,6 +21,9 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
 
 SCRIPT = """
+def turned(text, *numbers):
+    return text[::-1], list(reversed(numbers))
+
 def sysCall_actuation():
     if sim.getInt32Signal('fail'):
         raise RuntimeError('as it was told')
@@ -329,6 +332,15 @@ def test_waiting_for_simulated_time_steps(stage):
     assert client.reply()["ret"] == [5]
 
 
+def test_waiting_for_a_signal(stage):
+    client, other = stage.client(), stage.client()
+    client.send("sim.waitForSignal", "go")
+    assert not client.answered(looks=3)
+    other.sim("setFloatSignal", "go", 1.5)
+    assert client.reply()["ret"] == [1.5]
+    assert client.sim("getSystemTime") == stage.now
+
+
 @pytest.mark.parametrize("how", ["vanish", "goodbye", "silence"])
 def test_who_has_gone_holds_nothing(stage, how):
     client = stage.client(timeout=60.0)
@@ -395,6 +407,15 @@ def test_what_a_client_leaves_behind_is_removed(stage, how):
         assert not stage.drawings.objects
         client.sim("getSimulationState")
     assert not stage.radio.heard
+
+
+def test_a_function_of_the_drones_script_is_called(stage):
+    client = stage.client()
+    client.sim("startSimulation")
+    script = client.sim("getScript", 1, client.sim("getObject", "/Quadcopter"))
+    assert client.sim("callScriptFunction", "turned", script, "abc", 1, 2) == ("cba", [2, 1])
+    with pytest.raises(Refusal, match="near names are turned"):
+        client.sim("callScriptFunction", "turnd", script)
 
 
 # ---- parameters, and the official client

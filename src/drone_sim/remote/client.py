@@ -9,7 +9,7 @@ from typing import Any
 from drone_sim.remote.arrangement import Arrangement
 from drone_sim.remote.control import STATES, Control
 from drone_sim.remote.conversation import Call, ClientFunction, Refused, Task
-from drone_sim.remote.host import ClientHost, surroundings
+from drone_sim.remote.host import ClientHost
 from drone_sim.remote.messages import Request
 from drone_sim.remote.stepping import Stepping
 from drone_sim.run.pacing import Stopwatch
@@ -19,7 +19,7 @@ from drone_sim.scripting import script_log
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.calls import Api, Function, contents, explain
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
 from drone_sim.scripting.api.types import Name
 from drone_sim.scripting.errors import ScriptError, UnknownName
 from drone_sim.wording import near_names
@@ -100,16 +100,17 @@ class Client:
             self._bus.close()
         if self._era != simulation.era:
             self._era = simulation.era
-            self._modules = {"sim": self._sim(), "simROS": make_sim_ros(self._bus)}
+            host = ClientHost(simulation)
+            ros = make_sim_ros(self._bus, simulation.shared.time)
+            self._modules = {"sim": self._sim(host), "simROS": ros, **make_plugins(host)}
             self._functions = {
                 f"{name}.{function}": one
                 for name, api in self._modules.items()
                 for function, one in contents(api)[1].items()
             }
 
-    def _sim(self) -> Api:
-        host = ClientHost(self._simulation)
-        name, functions, constants = contents(make_sim(host, surroundings(self._simulation, host)))
+    def _sim(self, host: ClientHost) -> Api:
+        name, functions, constants = contents(make_sim(host, host.surroundings()))
         drawing = {one: self._recorded(functions[one]) for one in ("addDrawingObject",)}
         return Api(name, {**functions, **drawing, **self._control.functions()}, {**constants, **STATES})
 

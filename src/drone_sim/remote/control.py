@@ -11,7 +11,7 @@ from drone_sim.remote.stepping import Stepping
 from drone_sim.run.pacing import Stopwatch
 from drone_sim.run.player import Player
 from drone_sim.scripting.api.calls import Function, WrongValue, numbers
-from drone_sim.scripting.api.types import Number
+from drone_sim.scripting.api.types import Name, Number
 
 STATES = {  # CoppeliaSim's values (simConst.h)
     "simulation_stopped": 0,
@@ -109,6 +109,22 @@ class Control:
             yield self._stepping.wait(Until(lambda: simulation.run != run or simulation.time >= ahead))
             self._raise_failure(run)
         return duration
+
+    def waitForSignal(self, name: Name) -> Task:
+        """Return the value of a signal of any kind, as soon as it is set; nothing where the simulation stops before."""
+        simulation, run, signals = self._simulation, self._simulation.run, self._simulation.drone.signals
+        kinds = (signals.getInt32Signal, signals.getFloatSignal, signals.getStringSignal)
+
+        def value() -> Any:
+            return next((one for one in (get(name) for get in kinds) if one is not None), None)
+
+        if value() is None:
+            yield self._stepping.wait(Until(lambda: simulation.run != run or value() is not None))
+        return value()
+
+    def getSystemTime(self) -> float:
+        """Return the real time in seconds, from any beginning."""
+        return self._clock()
 
     def acquireLock(self) -> None:
         """Let the simulation stand until releaseLock."""

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
-
-import numpy as np
+from typing import Any
 
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import Readable, ScriptParameters, Surroundings
+from drone_sim.scripting.api.host import Readable, Surroundings
+from drone_sim.scripting.api.registry import Attachment, Callee, Scripts
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.turns import Turns
+from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.vehicles.child_script import surroundings
 from drone_sim.vehicles.vehicle import Vehicle
 
 
@@ -21,8 +23,13 @@ class ClientHost:
 
     def __init__(self, simulation: Simulation):
         """Take the simulation as it is in this era."""
+        self._shared = simulation.shared
         self._vehicles = list(simulation.vehicles.values())
         self._first = self._vehicles[0]
+
+    def surroundings(self) -> Surroundings:
+        """Return clock, cameras and the rest; no client's call is ended after a time."""
+        return surroundings(self._vehicles, self._shared, TimeLimit(0.0), Turns())
 
     @property
     def sensors(self) -> Mapping[str, Readable]:
@@ -32,17 +39,17 @@ class ClientHost:
     @property
     def objects(self) -> ObjectTree:
         """The objects of the scene."""
-        return self._first.objects
+        return self._shared.objects
 
     @property
-    def script_parameters(self) -> Mapping[str, ScriptParameters]:
-        """The parameters of the scripts of all vehicles, those of the first before others."""
-        return {name: values for one in self._vehicles for name, values in one.script_parameters.items()}
+    def scripts(self) -> Scripts:
+        """The scripts of the simulation."""
+        return _FromOutside(self._shared.scripts)
 
     @property
     def signals(self) -> Signals:
         """The signals of all scripts."""
-        return self._first.signals
+        return self._shared.signals
 
     @property
     def own_script(self) -> str:
@@ -52,7 +59,7 @@ class ClientHost:
     @property
     def drawings(self) -> Drawings:
         """What is drawn, by all together."""
-        return self._first.drawings
+        return self._shared.drawings
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m)."""
@@ -62,19 +69,18 @@ class ClientHost:
         """Turn a propeller's blades to an angle (rad), unless None; return the angle."""
         return self._of(joint).turn_joint(joint, angle)
 
-    def pictures(self) -> dict[str, Callable[[], np.ndarray]]:
-        """Return what takes a picture now, by the name of the camera's object."""
-        return {
-            one.parameters.cameras[name].object + one.suffix: partial(one.look, camera)
-            for one in self._vehicles
-            for name, camera in one.cameras.items()
-        }
-
     def _of(self, name: str) -> Vehicle:
         """Return the vehicle whose objects end in the same suffix; the first for an object of the scene."""
         return next((one for one in self._vehicles if one.suffix and name.endswith(one.suffix)), self._first)
 
 
-def surroundings(simulation: Simulation, host: ClientHost) -> Surroundings:
-    """Return the clock and the cameras."""
-    return Surroundings(lambda: simulation.time, simulation.parameters.time_step, host.pictures())
+class _FromOutside(Scripts):
+    """The scripts of a simulation, called by somebody who is none of them."""
+
+    _NOBODY = Attachment(-1, "", {}, is_law=False)
+
+    def __init__(self, scripts: Scripts):
+        self.__dict__ = scripts.__dict__
+
+    def call(self, _caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
+        return super().call(self._NOBODY, callee, call)
