@@ -45,7 +45,7 @@ class Endpoint:
             self._socket.bind(f"tcp://{address}:{port or '*'}")
         except zmq.ZMQError as error:
             self.close()
-            raise OSError(f"remote_api: cannot listen on {address}:{port}: {zmq.strerror(error.errno)}") from None
+            raise OSError(f"remote_api: cannot listen on {address}:{port}: {zmq.strerror(error.errno or 0)}") from None
         self.address = self._socket.getsockopt_string(zmq.LAST_ENDPOINT).removeprefix("tcp://")
 
     @property
