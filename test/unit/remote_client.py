@@ -30,7 +30,7 @@ class Client:
     def send_bytes(self, payload):
         self._socket.send(payload)
 
-    def answered(self, looks=200):
+    def answered(self, looks=5000):
         """Serve until there is an answer, or for so many looks; return whether there is."""
         for _ in range(looks):
             if self._socket.poll(0):

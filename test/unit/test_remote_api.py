@@ -64,9 +64,15 @@ class Stage:
             if self.player.playing and not self.server.holds:
                 self.player.step()
 
+    def waits(self, client, function, *arguments):
+        """Let a client ask for something that is not answered at once."""
+        before = len(self.server._waiting)
+        client.send(function, *arguments)
+        assert self.settled(lambda: len(self.server._waiting) > before)
+
     def settled(self, condition):
         """Serve until it is so."""
-        for _ in range(500):
+        for _ in range(5000):
             if condition():
                 return True
             self.server.wait(0.001)
@@ -237,8 +243,7 @@ def test_a_script_that_fails_is_an_exception_where_the_client_steps(stage):
     client.sim("setStepping", True)
     client.sim("startSimulation")
     client.sim("setInt32Signal", "fail", 1)
-    client.send("sim.step")
-    assert not client.answered(looks=3)
+    stage.waits(client, "sim.step")
     stage.go()
     reply = client.reply()
     assert reply["err"].startswith("[actuation]") and reply["err"].endswith("as it was told")
@@ -265,8 +270,7 @@ def test_a_stepping_client_is_asked_before_every_step(stage):
     stage.go(3)
     assert client.sim("getSimulationTime") == 0
     for count in (1, 2, 3):
-        client.send("sim.step", True)
-        assert not client.answered(looks=3)
+        stage.waits(client, "sim.step", True)
         stage.go(5)
         assert client.reply()["ret"] == []
         assert client.sim("getSimulationTime") == pytest.approx(0.05 * count)
@@ -277,18 +281,15 @@ def test_the_simulation_steps_when_every_stepping_client_has_asked(stage):
     first.sim("setStepping", True)
     second.sim("setStepping", True)
     first.sim("startSimulation")
-    first.send("sim.step")
-    assert not first.answered(looks=3)
+    stage.waits(first, "sim.step")
     stage.go()
     assert reader.sim("getSimulationTime") == 0
-    second.send("sim.step")
-    assert not second.answered(looks=3)
+    stage.waits(second, "sim.step")
     stage.go()
     assert first.reply()["ret"] == second.reply()["ret"] == []
     assert reader.sim("getSimulationTime") == pytest.approx(0.05)
     second.sim("setStepping", False)
-    first.send("sim.step")
-    assert not first.answered(looks=3)
+    stage.waits(first, "sim.step")
     stage.go()
     assert first.answered()
 
@@ -320,14 +321,11 @@ def test_waiting_for_simulated_time_steps(stage):
     client = stage.client()
     client.sim("setStepping", True)
     client.sim("startSimulation")
-    client.send("sim.wait", 0.1)
-    for _ in range(4):
-        client.answered(looks=2)
-        stage.go()
+    stage.waits(client, "sim.wait", 0.1)
+    stage.go(4)
     assert client.reply()["ret"] == [0.1]
     assert client.sim("getSimulationTime") == pytest.approx(0.1)
-    client.send("sim.wait", 5, False)  # of real time
-    assert not client.answered(looks=3)
+    stage.waits(client, "sim.wait", 5, False)  # of real time
     stage.now += 5.0
     assert client.reply()["ret"] == [5]
 
