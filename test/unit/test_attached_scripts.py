@@ -1,6 +1,7 @@
 """Scripts on any object: each with its own state and API, called in the order of the tree."""
 
 import math
+import re
 import struct
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
 
 SCRIPTS = Path(__file__).parent / "scripts"
+DOCS = Path(__file__).parents[2] / "docs" / "scripts.md"
 PROPELLERS = [f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4)]
 TELL_LUA = """
 local function tell(phase)
@@ -285,3 +287,17 @@ def test_without_scripts_nothing_is_otherwise(build):
     assert struct.pack("600d", *sum(flown(build({})), ())) == struct.pack(
         "600d", *sum(flown(build({"Floor": TELL_LUA})), ())
     )
+
+
+# ---- docs/scripts.md
+
+
+def test_the_example_leads_the_drone_along_a_circle(tmp_path):
+    scene, circle = re.findall(r"```(?:yaml|lua)\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "scene.yaml").write_text(scene, encoding="utf-8")
+    (tmp_path / "circle.lua").write_text(circle, encoding="utf-8")
+    (tmp_path / "gate.py").write_text("def sysCall_init(): pass", encoding="utf-8")
+    simulation = Simulation(parameters.load({"scene_file": str(tmp_path / "scene.yaml")}), script="target")
+    path = flown(simulation, 240)
+    simulation.close()
+    assert max(x for x, _, _ in path) > 0.4 and path[-1][1] > 0.5

@@ -11,6 +11,7 @@ from attacks import HANGS, SOURCE, Attacker
 
 STOPPED = "without returning (script_time_limit)"
 QUICK = (STOPPED, "", "which cannot be shown")  # with a short time limit
+PHASE = {".lua": "\nfunction sysCall_cleanup() end", ".py": "\ndef sysCall_cleanup(): pass"}
 PROLOGUE = {"5.1": "local _ = function() simGetSimulationTime() end\n", "newest": "local _ = sim.getSimulationTime\n"}
 
 
@@ -20,7 +21,7 @@ def _attack():
 
     def attack(path, source, words, where="main"):
         """Fly the source; its message has to hold the words. What is not stopped may take its time."""
-        path.write_text(source, encoding="utf-8")
+        path.write_text(source + PHASE[path.suffix], encoding="utf-8")
         found = attacker.fly(path, 0.5 if words in QUICK else 20, where)
         assert found["second"] == [], "the next start works"
         assert found["lines"] < 5000 and found["bytes"] < 5_000_000
@@ -172,6 +173,20 @@ IN_PYTHON = [
 @pytest.mark.parametrize("source, words", IN_PYTHON, ids=[source[:60] for source, _ in IN_PYTHON])
 def test_python_stays_in_hand(attack, tmp_path, source, words):
     attack(tmp_path / "script.py", source, words)
+
+
+THREADS = [
+    ("lua", "function sysCall_thread() string.find(('x'):rep(250000), '.-.-.-.-.-y') end", STOPPED),
+    ("lua", PROLOGUE["5.1"] + "function sysCall_thread() local function f() pcall(f) end f() end", ""),
+    ("lua", "function sysCall_thread() x = {} while true do x[#x + 1] = coroutine.create(sim.step) end end", ""),
+    ("py", "def sysCall_thread():\n  while True:\n    try: sim.step()\n    except BaseException: pass", ""),
+    ("py", "def sysCall_thread():\n  try:\n    while True: sim.step()\n  finally:\n    while True: pass", ""),
+]
+
+
+@pytest.mark.parametrize("ending, source, words", THREADS, ids=[source[:60] for _, source, _ in THREADS])
+def test_threads_stay_in_hand(attack, tmp_path, ending, source, words):
+    attack(tmp_path / f"script.{ending}", source, words)
 
 
 @pytest.mark.parametrize(

@@ -167,11 +167,14 @@ def test_it_waits_for_a_signal(fly):
         ("function sysCall_thread() while true do end end", "stopped after 0.2 s"),
         ("def sysCall_thread():\n  while True: pass", "script.py:2: stopped after 0.2 s"),
         ("def sysCall_thread():\n  yield", "sysCall_thread would not run: it has a `yield`"),
-        ("function sysCall_init() c = coroutine.create(f) end function f()\n sim.wait(0.01)\n error('oh')\nend\n"
-         "function sysCall_actuation()\nlocal _, e = coroutine.resume(c) if e then error(debug.traceback(c, e), 2) end end",
-         r"script.lua:3: oh$"),
+        (
+            "function sysCall_init() c = coroutine.create(f) end function f()\n sim.wait(0.01)\n error('oh') end\n"
+            "function sysCall_actuation()\n local _, e = coroutine.resume(c)\n"
+            "if e then error(debug.traceback(c, e), 2) end end",
+            r"script.lua:3: oh$",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_goes_wrong_in_it_gets_one_line(fly, text, words):
     with pytest.raises(ScriptError, match=words):
         fly(text, 3, script_time_limit=0.2)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import difflib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from drone_sim.config.types import PATTERNS, Key, Location, ParameterError, readable_key
+from drone_sim.config.types import PATTERNS, Key, Location, ParameterError, Word, readable_key, word_of
 from drone_sim.files.yaml_files import Lines
 from drone_sim.wording import shown
 
@@ -110,6 +110,8 @@ class _Choice(NamedTuple):
 
     key: str
     models: dict[str, Any]  # by that word
+    or_key: str = ""  # under which the word may stand, too
+    others: tuple[str, ...] = ()  # the words that stand under that one
 
 
 def _choice(annotation: Any) -> _Choice:
@@ -120,10 +122,17 @@ def _choice(annotation: Any) -> _Choice:
             if isinstance(key, str):
                 models = get_args(_bare(first))
                 return _Choice(key, {word: one for one in models for word in _words(one, key)})
+            if isinstance(key, Word):
+                return _choice_of_either(key, [_bare(one) for one in get_args(_bare(first))])
         return _choice(first)
     if get_origin(annotation) in _UNIONS and not others:
         return _choice(first)
     return _Choice("", {})
+
+
+def _choice_of_either(word: Word, models: Sequence[Any]) -> _Choice:
+    others = tuple(word_of(one, word.or_key) for one in models if word.or_key in one.model_fields)
+    return _Choice(word.key, {word_of(one, word.key, word.or_key): one for one in models}, word.or_key, others)
 
 
 def _words(model: Any, key: str) -> tuple[str, ...]:
@@ -161,20 +170,27 @@ def _missing(places: list[_Place]) -> Problem:
 def _problem(error: Any, place: _Place) -> Problem:
     raised = error.get("ctx", {}).get("error")
     if isinstance(raised, ParameterError):  # of several keys at once: it names them itself
-        return Problem(raised.location or place.location, str(raised))
+        if raised.location:
+            return Problem(raised.location, str(raised))
+        return Problem(place.location, f"parameter {readable_key((*place.location, str(raised)))}")
     location, value = place.location, error["input"]
+    if error["type"] in ("union_tag_invalid", "union_tag_not_found") and isinstance(value, Mapping):
+        return _wrong_choice(_choice(place.annotation), location, value)
     if error["type"] == "missing":  # a number of a list
         location = location[:-1]
-    choice = _choice(place.annotation)
-    if error["type"] == "union_tag_not_found":
-        location = (*location, choice.key)
-        return Problem(location, f"parameter {readable_key(location)}: missing; {_must_be_one_of(choice)}", True)
-    if error["type"] == "union_tag_invalid":
-        location, value = (*location, choice.key), value[choice.key]
     key = f"parameter {readable_key(location)}"
     if error["type"] == "extra_forbidden":
         return Problem(location, f"{key}: unknown key{_near(str(location[-1]), place.known)}")
     return Problem(location, f"{key} = {shown(value)}: {_reason(error, place)}")
+
+
+def _wrong_choice(choice: _Choice, location: Location, value: Mapping[str, Any]) -> Problem:
+    """Return what is wrong where no model is chosen: no word, or a wrong one."""
+    key = choice.or_key if choice.or_key in value else choice.key
+    said = f"parameter {readable_key((*location, key))}"
+    if key in value:
+        return Problem((*location, key), f"{said} = {shown(value[key])}: {_must_be_one_of(choice, key)}")
+    return Problem((*location, key), f"{said}: missing; {_must_be_one_of(choice)}", True)
 
 
 def _reason(error: Any, place: _Place) -> str:
@@ -186,7 +202,7 @@ def _reason(error: Any, place: _Place) -> str:
     plain = {
         "model_type": f"must hold `key: value` lines with {', '.join(fields)}",
         "model_attributes_type": f"must hold `key: value` lines, of which one is `{choice.key}`",
-        "union_tag_invalid": _must_be_one_of(choice),
+        "union_tag_not_found": f"must hold `key: value` lines, of which one is `{choice.key}`",
         "bool_type": "must be true or false",
         "string_pattern_mismatch": PATTERNS.get(error.get("ctx", {}).get("pattern"), message),
     }
@@ -198,8 +214,12 @@ def _must(place: _Place, verb: str) -> str:
     return f"{verb} {what}" if what else ""
 
 
-def _must_be_one_of(choice: _Choice) -> str:
-    return f"must be one of {', '.join(map(repr, choice.models))}"
+def _must_be_one_of(choice: _Choice, key: str = "") -> str:
+    if key and key == choice.or_key:
+        return f"must be one of {', '.join(map(repr, choice.others))}"
+    words = [word for word in choice.models if word not in choice.others]
+    or_other = f"; or `{choice.or_key}`: one of {', '.join(map(repr, choice.others))}"
+    return f"must be one of {', '.join(map(repr, words))}{or_other if choice.others and not key else ''}"
 
 
 def _near(key: str, known: Sequence[str]) -> str:

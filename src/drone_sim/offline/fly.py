@@ -27,6 +27,7 @@ from drone_sim.run import parameters as parameters_module
 from drone_sim.run.guardian import Guardian
 from drone_sim.run.parameters import ParameterError, Parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
 from drone_sim.wording import near_names, shown
@@ -175,6 +176,8 @@ def _fly(
             simulation.step()
             recording.add(simulation)
             bar.update()
+            if simulation.asked == STOP:
+                break
     return 0
 
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import itertools
 
+import numpy as np
+
 from drone_sim.config.types import ParameterError
+from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.run.cast import Cast, tell
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
@@ -13,6 +17,7 @@ from drone_sim.scripting.api.control import Control
 from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.tubes import Tubes
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.shared import Shared
 from drone_sim.vehicles.vehicle import Vehicle
@@ -33,8 +38,7 @@ class Setting:
         self._blades_shown = -1  # the world's changes, when they were
         try:
             self._empty_tree()
-            self.scene = Scene(parameters.scene, self.world)
-            shared.names.update(self.scene.names())
+            self.scene = Scene(parameters.scene, self.world, self._look, shared.names)
             for one in parameters.fleet:
                 self._put(one)
             self._name_objects()
@@ -92,8 +96,8 @@ class Setting:
 
     def _empty_tree(self) -> None:
         self.shared.objects, self.shared.signals, self.shared.scripts = ObjectTree(), Signals(), Scripts()
-        self.shared.control, self.shared.data = Control(), CustomData()
-        self.shared.objects.add("Floor", also=("ResizableFloor_5_25",))
+        self.shared.control, self.shared.data, self.shared.tubes = Control(), CustomData(), Tubes()
+        self.shared.objects.add("Floor", also=("ResizableFloor_5_25",), kind="shape")
 
     def _name_objects(self) -> None:
         try:
@@ -108,6 +112,11 @@ class Setting:
         if overlaps > MAX_OVERLAPS:
             said = f"{overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may"
             raise ParameterError(f"scene/objects: {said}")
+
+    def _look(self, kind: str, camera: Intrinsics, pose: Matrix) -> np.ndarray:
+        """Take a picture for a vision sensor of the scene; see scene.kinds.kind.Look."""
+        self._show_blades()
+        return self.shared.vision.picture(kind, camera, np.reshape((*pose, 0, 0, 0, 1), (4, 4)))
 
     def _show_blades(self) -> None:
         """Turn the blades of all vehicles in the world's pictures to where they are, once for all cameras."""

@@ -10,7 +10,7 @@ For example:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -276,23 +276,37 @@ class Simulation:
     def step(self) -> None:
         """Run one simulation step: threads, actuation, dynamics, vision, sensing. Raises ScriptError and Diverged."""
         vehicles = self._flying
-        for thread in self._threaded:
-            if thread.script.threaded:
-                thread.script.take_turn()
+        if self._threaded:
+            self._take_turns()
         for actor in vehicles if self._alone else self._setting.cast.all():
             actor.actuation()
-        wrenches = {}
-        for vehicle in vehicles:
-            wrenches[vehicle.body.number] = vehicle.wrench()
-        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
-        for vehicle in vehicles:
-            vehicle.body.refresh()
+        self._advance(vehicles)
         self.steps += 1
         self._whereabouts.check(vehicles)
         for vehicle in vehicles:
             vehicle.take_pictures(self.steps)
         for actor in vehicles if self._alone else self._setting.cast.all():
             actor.script.call("sensing")
+
+    def _take_turns(self) -> None:
+        """Let each thread of a script run for its turn."""
+        for thread in self._threaded:
+            if thread.script.threaded:
+                thread.script.take_turn()
+
+    def _advance(self, vehicles: Sequence[Vehicle]) -> None:
+        """Let the dynamics go on by a step, and what hangs on other things follow."""
+        wrenches = {}
+        for vehicle in vehicles:
+            wrenches[vehicle.body.number] = vehicle.wrench()
+        scene = self.scene
+        if scene.carries:
+            scene.follow()
+        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
+        for vehicle in vehicles:
+            vehicle.body.refresh()
+        if scene.carries:
+            scene.follow()
 
     def _between(self, count: int) -> None:
         """Do what is due after so many sub-steps of the step: instruments look, and forces follow."""
@@ -313,8 +327,8 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        attached = self._setting.cast.attached
-        parts: list[Any] = [shared.objects, shared.signals, shared.data, self._drawings, *self._flying, *attached]
+        kept = (shared.objects, shared.signals, shared.data, shared.tubes, self._drawings)
+        parts: list[Any] = [*kept, *self._flying, *self._setting.cast.attached, self.scene]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

@@ -61,6 +61,7 @@ def surroundings(seen: Sequence[Seen], shared: Shared, limit: TimeLimit, turns: 
         masses=lambda: _together(one.masses() for one in seen),
         control=shared.control,
         data=shared.data,
+        tubes=shared.tubes,
     )
 
 

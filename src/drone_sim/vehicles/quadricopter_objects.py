@@ -11,6 +11,7 @@
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
       DronePosition                              /target                 the green sphere
 
+Each name that begins with Quadricopter_ stands there with Quadcopter_, too, as in CoppeliaSim 4.0.
 The names of the second vehicle end in #0, those of the third in #1, and so on, as those of V-REP's copies do.
 Cameras and vision sensors look along their z axis, with y up and x to the left, as V-REP's do.
 """
@@ -27,6 +28,7 @@ from drone_sim.mechanics.object_tree import Body, ObjectTree
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.parameters import SensorParameters
 
+_V_REPS, _COPPELIASIMS = "Quadricopter", "Quadcopter"  # what names begin with in 3.x, and in 4.0 to 4.2
 DRONE = "Drone"
 TARGET = "DronePosition"  # the green sphere
 TRACK_BASE = "Track_base"
@@ -71,14 +73,26 @@ class QuadricopterObjects:
         self._add(TRACK_BASE, DRONE, BASE)
         for number, link in enumerate(propellers, start=1):
             name = f"Quadricopter_propeller{number}"
-            self._add(name, DRONE, link, alias="propeller")
-            self._add(respondable(number), name, alias="respondable")
-            self._add(joint(number), name, alias="joint")
+            self._add(name, DRONE, link, alias="propeller", kind="force_sensor")
+            self._add(respondable(number), name, alias="respondable", kind="shape")
+            self._add(joint(number), name, alias="joint", kind="joint")
         down = frames.from_rpy((0.0, 0.0, -0.01), (0.0, math.pi / 2, 0.0))
-        self._add("Quadricopter_floorCamera", DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera")
+        self._add(
+            "Quadricopter_floorCamera",
+            DRONE,
+            frames.multiply(down, _ALONG_X),
+            alias="floorCamera",
+            kind="vision_sensor",
+        )
         front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self._add("Quadricopter_frontCamera", DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera")
-        self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
+        self._add(
+            "Quadricopter_frontCamera",
+            DRONE,
+            frames.multiply(front, _ALONG_X),
+            alias="frontCamera",
+            kind="vision_sensor",
+        )
+        self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"), kind="shape")
         for camera in cameras.values():
             self._add_camera(links, camera)
         for name, sensor in sensors.items():
@@ -93,12 +107,14 @@ class QuadricopterObjects:
         body: Body | None = None,
         alias: str = "",
         also: Sequence[str] = (),
+        kind: str = "",
     ) -> None:
+        also = (*also, *(one.replace(_V_REPS, _COPPELIASIMS) for one in (name, *also) if one.startswith(f"{_V_REPS}_")))
         own = None if parent is None else f"{parent}{self._suffix}"
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
         names = [f"{one}{self._suffix}" for one in (name, *also)]
         try:
-            handle = self._objects.add(names[0], above, local, body, alias=alias or name, also=names[1:])
+            handle = self._objects.add(names[0], above, local, body, alias=alias or name, also=names[1:], kind=kind)
         except ValueError as error:  # one of the scene has that name
             raise ParameterError(str(error)) from None
         self._handles.append(handle)
@@ -108,7 +124,8 @@ class QuadricopterObjects:
         if sensor.mount is not None and sensor.frame in links:
             raise ParameterError(f"sensor {name}: the URDF says where {sensor.frame} is; `mount` needs another frame")
         parent, matrix = sensor.placed(links)
-        self._mount(f"sensor {name}", sensor.object or name, parent or DRONE, sensor.object_in(matrix))
+        kind = "proximity_sensor" if sensor.kind == "range" else ""
+        self._mount(f"sensor {name}", sensor.object or name, parent or DRONE, sensor.object_in(matrix), kind)
 
     def _add_camera(self, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
         said = f"camera frame {camera.frame}"
@@ -118,11 +135,11 @@ class QuadricopterObjects:
             parent, optical = DRONE, links[camera.frame]
         else:
             parent, optical = camera.mount.parent or DRONE, camera.mount.optical
-        self._mount(said, camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR))
+        self._mount(said, camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR), "vision_sensor")
 
-    def _mount(self, said: str, name: str, parent: str, local: Matrix) -> None:
+    def _mount(self, said: str, name: str, parent: str, local: Matrix, kind: str) -> None:
         if f"{parent}{self._suffix}" not in self._objects and parent not in self._objects:
             raise ParameterError(f"{said}: no object is named {parent}")
         if f"{name}{self._suffix}" in self._objects:
             raise ParameterError(f"{said}: an object named '{name}' is there already")
-        self._add(name, parent, local)
+        self._add(name, parent, local, kind=kind)

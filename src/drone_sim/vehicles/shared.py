@@ -14,13 +14,14 @@ from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.tubes import Tubes
 from drone_sim.sensors.camera import Vision
 from drone_sim.world import World
 
 
 @dataclass
 class Shared:
-    """World, objects, signals, scripts, drawings, messages, eyes and clock.
+    """World, objects, signals, scripts, custom data, tubes, drawings, messages, eyes and clock.
 
     `time` returns the simulated time in s; `time_step` and `sub_step` in s; `script_time_limit` in s of real time;
     `gravity` in m/s² along z; `magnetic_field` in T. `names` has for each body in the world what a person calls it,
@@ -43,5 +44,6 @@ class Shared:
     scripts: Scripts = field(default_factory=Scripts)
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
+    tubes: Tubes = field(default_factory=Tubes)
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are

@@ -15,6 +15,7 @@ from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.tubes import Tubes
 from drone_sim.scripting.api.turns import Turns
 
 
@@ -81,3 +82,4 @@ class Surroundings:
     masses: Callable[[], Mapping[str, float]] = dict  # kg, of the shapes that the dynamics move, by object name
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
+    tubes: Tubes = field(default_factory=Tubes)

@@ -111,6 +111,11 @@ _ORDER = Group(
         "isRealTimeSimulationStepNeeded": 1,
         **_nothing("adjustRealTimeTimer", "setThreadIsFree"),
         **_nothing("resumeThreads", "launchThreadedChildScripts", "setSimulationTimeStep"),
+        **dict.fromkeys(("handleCustomizationScripts", "handleAddOnScripts", "handleSandboxScript"), 0),
+        **dict.fromkeys(("openModule", "handleModule", "closeModule"), 0),
+        **_nothing("handleSimulationStart", "handleSensingStart", "handleVarious", "handleJoint", "handlePath"),
+        **_nothing("handleIkGroup", "handleMechanism", "handleCollision", "handleDistance", "handleMill"),
+        **_nothing("resetCollision", "resetDistance", "resetMill", "resetMilling"),
     },
 )
 _RIGID = Group(

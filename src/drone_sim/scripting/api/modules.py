@@ -19,13 +19,16 @@ from drone_sim.scripting.api.drawing import Drawing
 from drone_sim.scripting.api.dynamics import Dynamics
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
+from drone_sim.scripting.api.joints import Joints
 from drone_sim.scripting.api.matrices import Matrices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.names import Names
 from drone_sim.scripting.api.object_kinds import ObjectKinds
 from drone_sim.scripting.api.objects import Objects
 from drone_sim.scripting.api.packing import Packing
+from drone_sim.scripting.api.paths import Paths
 from drone_sim.scripting.api.poses import Poses
+from drone_sim.scripting.api.proximity import ProximitySensors
 from drone_sim.scripting.api.ros_functions import RosFunctions
 from drone_sim.scripting.api.script_calls import ScriptCalls
 from drone_sim.scripting.api.scripts import Scripts
@@ -40,7 +43,10 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
     names, ignored = Names(host), _ignored(host)
     parts = (
         Objects(host),
-        ObjectKinds(host, surroundings),
+        Joints(host),
+        ProximitySensors(host),
+        Paths(host),
+        ObjectKinds(host),
         Dynamics(host, surroundings, ignored),
         Matrices(),
         Poses(),
@@ -54,7 +60,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
     )
     data = CustomDataFunctions(host, surroundings.data)
     threads = Threads(surroundings, host.signals)
-    others = (names, host.signals, data, Packing(), threads, Drawing(host, ignored))
+    others = (names, host.signals, surroundings.tubes, data, Packing(), threads, Drawing(host, ignored))
     functions = {name: f for one in others for name, f in one.functions().items()}
     return Api("sim", {**ignored.functions(), **public_functions(parts), **functions}, CONSTANTS, names.remember)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 HANDLES: dict[str, int] = dict(  # what stands for a handle, and what is added to one
     handle_all=-2, handle_all_except_explicit=-3, handle_self=-4, handle_main_script=-5, handle_tree=-6,
     handle_single=-8, handle_default=-9, handle_all_except_self=-10, handle_parent=-11, handle_scene=-12,
-    handle_app=-13,
     handle_world=-1, handle_mainscript=-5, handle_inverse=-14, handle_sceneobject=-16, handle_sandbox=-17,
     handle_mesh=-18, handleflag_assembly=4194304, handleflag_togglevisibility=4194304, handleflag_extended=4194304,
     handleflag_greyscale=4194304, handleflag_codedstring=4194304, handleflag_depthbuffermeters=8388608,
@@ -14,7 +13,7 @@ HANDLES: dict[str, int] = dict(  # what stands for a handle, and what is added t
     handleflag_model=8388608, handleflag_rawvalue=16777216, handleflag_silenterror=33554432,
     handleflag_wxyzquaternion=4194304, handleflag_reljointbaseframe=4194304, handleflag_setmultiple=4194304,
     handleflag_abscoords=8388608, handleflag_depthbuffer=8388608, handleflag_wxyzquat=16777216,
-    handleflag_addmultiple=16777216, handle_chain=-7,
+    handleflag_addmultiple=16777216, handle_chain=-7, handle_app=-13,
 )  # fmt: skip
 
 KINDS: dict[str, int] = dict(  # what getObjectType returns
@@ -80,7 +79,7 @@ PARAMETERS: dict[str, int] = dict(  # of objects of any kind, shapes and sensors
     visionintparam_windowed_pos_x=1011, visionintparam_windowed_pos_y=1012, visionintparam_render_mode=1017,
     visionintparam_perspective_operation=1018, visionfloatparam_near_clipping=1000,
     visionfloatparam_far_clipping=1001, visionfloatparam_perspective_angle=1004, visionfloatparam_ortho_size=1005,
-    proxintparam_ray_invisibility=4000, proxintparam_entity_to_detect=4002,
+    proxintparam_ray_invisibility=4000, proxintparam_volume_type=4001, proxintparam_entity_to_detect=4002,
 )  # fmt: skip
 
 PROPERTIES: dict[str, int] = dict(  # flags of objects and models
@@ -105,4 +104,22 @@ COLORS: dict[str, int] = dict(  # parts of a colour
     colorcomponent_emission=3, colorcomponent_transparency=4, colorcomponent_auxiliary=5,
 )  # fmt: skip
 
-ALL: dict[str, int] = {**HANDLES, **KINDS, **KINDS_OF_KINDS, **JOINTS, **PARAMETERS, **PROPERTIES, **COLORS}
+LOOKS: dict[str, int] = dict(  # how things are drawn
+    displayattribute_renderpass=1, displayattribute_depthpass=2, displayattribute_pickpass=4,
+    displayattribute_selected=8, displayattribute_mainselection=32, displayattribute_forcewireframe=64,
+    displayattribute_forbidwireframe=128, displayattribute_forbidedges=256, displayattribute_originalcolors=512,
+    displayattribute_ignorelayer=1024, displayattribute_forvisionsensor=2048,
+    displayattribute_colorcodedpickpass=4096, displayattribute_colorcoded=8192,
+    displayattribute_trianglewireframe=16384, displayattribute_inertiaonly=32768, displayattribute_thickEdges=65536,
+    displayattribute_dynamiccontentonly=131072, displayattribute_mirror=262144,
+    displayattribute_useauxcomponent=524288, displayattribute_ignorerenderableflag=1048576,
+    displayattribute_noopenglcallbacks=2097152, displayattribute_noghosts=8388608,
+    displayattribute_nopointclouds=16777216, displayattribute_nodrawingobjects=33554432,
+    displayattribute_noparticles=67108864, displayattribute_colorcodedtriangles=134217728, banner_left=1,
+    banner_right=2, banner_nobackground=4, banner_overlay=8, banner_followparentvisibility=16,
+    banner_clickselectsparent=32, banner_clicktriggersevent=64, banner_facingcamera=128,
+    banner_fullyfacingcamera=256, banner_backfaceculling=512, banner_keepsamesize=1024, banner_bitmapfont=2048,
+    texturemap_plane=0, texturemap_cylinder=1, texturemap_sphere=2, texturemap_cube=3,
+)  # fmt: skip
+
+ALL: dict[str, int] = {**HANDLES, **KINDS, **KINDS_OF_KINDS, **JOINTS, **PARAMETERS, **PROPERTIES, **COLORS, **LOOKS}

@@ -7,22 +7,19 @@ from collections.abc import Iterator
 from drone_sim.mechanics.object_tree import SceneObject
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.handles import bare
-from drone_sim.scripting.api.host import Host, Surroundings
+from drone_sim.scripting.api.host import Host
 from drone_sim.scripting.api.types import Handle
 
 _ALL, _SCENE = CONSTANTS["handle_all"], CONSTANTS["handle_scene"]
 _WITHOUT_ROOT, _CHILDREN_ALONE = 1, 2  # options of getObjectsInTree
-_KINDS = {"joint": "joint", "base": "dummy"}  # of the parts of a quadricopter, by the end of their names
 
 
 class ObjectKinds:
     """The functions on kinds of objects and on the tree."""
 
-    def __init__(self, host: Host, surroundings: Surroundings):
-        """Take the drone whose objects they are, and its cameras."""
+    def __init__(self, host: Host):
+        """Take the drone whose objects they are."""
         self._objects = host.objects
-        self._sensors = host.sensors
-        self._pictures = surroundings.pictures
 
     def getObjectType(self, handle: Handle) -> int:
         """Return what an object is: sim.object_shape_type (4.x: sim.sceneobject_shape), _joint_type and so on."""
@@ -75,12 +72,4 @@ class ObjectKinds:
         return [handle for handle in handles if kind == _ALL or self._kind(self._objects[handle]) == kind]
 
     def _kind(self, found: SceneObject) -> int:
-        """Return the kind of an object: a sensor's, that of a quadricopter's part, else a shape's."""
-        name = found.name
-        if name in self._pictures:
-            kind = "visionsensor"
-        elif name in self._sensors:
-            kind = "proximitysensor" if hasattr(self._sensors[name], "detected") else "dummy"
-        else:
-            kind = getattr(found, "kind", "") or _KINDS.get(found.alias.lower(), "shape")
-        return CONSTANTS[f"object_{kind}_type"]
+        return CONSTANTS[f"object_{found.kind.replace('_', '')}_type"]

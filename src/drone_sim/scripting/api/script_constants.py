@@ -24,6 +24,17 @@ CALLS: dict[str, int] = dict(  # why a script is called (sim_call_type)
     syscb_thread=43, syscb_selchange=44, syscb_data=45,
 )  # fmt: skip
 
+OLD_CALLS: dict[str, int] = dict(  # the same of main and customization scripts, in 3.x
+    mainscriptcall_initialization=2, mainscriptcall_cleanup=1, mainscriptcall_regular=6,
+    customizationscriptcall_initialization=2, customizationscriptcall_cleanup=1,
+    customizationscriptcall_nonsimulation=3, customizationscriptcall_lastbeforesimulation=4,
+    customizationscriptcall_firstaftersimulation=5, customizationscriptcall_simulationactuation=6,
+    customizationscriptcall_simulationsensing=7, customizationscriptcall_simulationpause=8,
+    customizationscriptcall_simulationpausefirst=9, customizationscriptcall_simulationpauselast=10,
+    customizationscriptcall_lastbeforeinstanceswitch=11, customizationscriptcall_firstafterinstanceswitch=12,
+    customizationscriptcall_beforecopy=13, customizationscriptcall_aftercopy=14,
+)  # fmt: skip
+
 SCRIPTS: dict[str, int] = dict(  # kinds and attributes of scripts
     scripttype_mainscript=0, scripttype_childscript=1, scripttype_addonscript=2, scripttype_addonfunction=3,
     scripttype_customizationscript=6, scripttype_sandboxscript=8, scripttype_threaded=240, scripttype_main=0,
@@ -52,10 +63,11 @@ MESSAGES: dict[str, int] = dict(  # of getSimulatorMessage, and how much is logg
 PARAMETERS: dict[str, int] = dict(  # of the simulator
     intparam_error_report_mode=0, intparam_program_version=1, intparam_compilation_version=4,
     intparam_current_page=5, intparam_flymode_camera_handle=6, intparam_dynamic_step_divider=7,
-    intparam_dynamic_engine=8, intparam_visible_layers=11, intparam_infotext_style=12, intparam_edit_mode_type=14,
-    intparam_platform=19, intparam_scene_unique_id=20, intparam_work_thread_count=21, intparam_mouse_x=22,
-    intparam_mouse_y=23, intparam_core_count=24, intparam_work_thread_calc_time_ms=25, intparam_idle_fps=26,
-    intparam_stop_request_counter=29, intparam_program_revision=30, intparam_mouse_buttons=31,
+    intparam_dynamic_engine=8, intparam_server_port_start=9, intparam_server_port_range=10,
+    intparam_visible_layers=11, intparam_infotext_style=12, intparam_edit_mode_type=14,
+    intparam_server_port_next=15, intparam_platform=19, intparam_scene_unique_id=20, intparam_work_thread_count=21,
+    intparam_mouse_x=22, intparam_mouse_y=23, intparam_core_count=24, intparam_work_thread_calc_time_ms=25,
+    intparam_idle_fps=26, intparam_stop_request_counter=29, intparam_program_revision=30, intparam_mouse_buttons=31,
     intparam_dynamic_warning_disabled_mask=32, intparam_simulation_warning_disabled_mask=33,
     intparam_scene_index=34, intparam_motionplanning_seed=35, intparam_speedmodifier=36,
     intparam_dynamic_iteration_count=37, intparam_job_count=38, intparam_program_full_version=39,
@@ -107,4 +119,4 @@ WINDOWS: dict[str, int] = dict(  # dialogs and 3.x custom user interfaces
     buttonproperty_closeaction=4096, buttonproperty_verticallycentered=8192, buttonproperty_downupevent=16384,
 )  # fmt: skip
 
-ALL: dict[str, int] = {**SIMULATION, **CALLS, **SCRIPTS, **MESSAGES, **PARAMETERS, **BUFFERS, **WINDOWS}
+ALL: dict[str, int] = {**SIMULATION, **CALLS, **OLD_CALLS, **SCRIPTS, **MESSAGES, **PARAMETERS, **BUFFERS, **WINDOWS}

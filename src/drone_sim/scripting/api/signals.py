@@ -47,6 +47,8 @@ class Signals:
         """Forget a number, or all of them."""
         self._clear(float, name)
 
+    setDoubleSignal, getDoubleSignal, clearDoubleSignal = setFloatSignal, getFloatSignal, clearFloatSignal
+
     def setInt32Signal(self, name: Name, value: int) -> None:
         """Set a whole number."""
         if not abs(value) <= _LARGEST:  # so written, it refuses NaN

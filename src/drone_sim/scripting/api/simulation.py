@@ -15,6 +15,7 @@ from drone_sim.wording import near_names
 
 VERSION, REVISION = 40600, 0  # the CoppeliaSim whose API this is nearest to
 _LINUX = 2
+_PLUGINS = ("RosInterface", "ROSInterface", "ROS", "simROS", "CustomUI", "simUI")  # by every name that they had
 
 
 class SimulationFunctions:
@@ -86,6 +87,10 @@ class SimulationFunctions:
         return now if since < 0 else now - int(since)
 
     getSystemTimeInMilliseconds = getSystemTimeInMs
+
+    def getModuleName(self, index: int) -> tuple[str | None, int]:
+        """Return name and version of a plugin, from 0, as scripts ask whether there is one; nothing beyond the last."""
+        return (_PLUGINS[int(index)], 1) if 0 <= index < len(_PLUGINS) else (None, 0)
 
     def getRandom(self, seed: Number | None = None) -> float:
         """Return a random number from 0 to 1, the same ones in every run; a seed begins another series."""

@@ -53,7 +53,7 @@ ABSENT: dict[str, str] = {
     ),
     r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
     r"sim\.\w*(?:LinkDummy|DummyLink)\w*": "dummies are not linked to each other",
-    r"sim\.\w*(?:WorkThread|Module|Plugin)\w*": "plugins are not loaded from scripts",
+    r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
     r"simROS\.(?:advertiseService|shutdownServiceServer|serviceServerTreat\w+)": (
         "a child script offers no services: subscribe to a topic"
     ),

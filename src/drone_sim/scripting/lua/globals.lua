@@ -26,6 +26,7 @@ for _, name in pairs{'_VERSION', 'assert', 'collectgarbage', 'error', 'getmetata
   env[name] = _G[name]
 end
 env._G = env
+env.package = {path = '', cpath = '', loaded = {}} -- which changes nothing: what a script requires lies beside it
 env.debug = {traceback = sandbox.debug.traceback}
 env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.difftime}
 for _, name in pairs{'math', 'string', 'table', 'coroutine', 'os', 'utf8'} do modules[name] = env[name] end
@@ -137,6 +138,12 @@ env.unpack, table.unpack = unpack, unpack
 math.mod = math.mod or math.fmod
 math.fmod = math.fmod or math.mod
 math.pow = math.pow or function(x, y) return x ^ y end
+math.atan2 = math.atan2 or math.atan
+math.log10 = math.log10 or function(x) return math.log(x, 10) end
+math.ldexp = math.ldexp or function(x, exponent) return x * 2.0 ^ exponent end
+math.sinh = math.sinh or function(x) return (math.exp(x) - math.exp(-x)) / 2 end
+math.cosh = math.cosh or function(x) return (math.exp(x) + math.exp(-x)) / 2 end
+math.tanh = math.tanh or function(x) return 1 - 2 / (math.exp(2 * x) + 1) end
 table.getn = table.getn or function(t) return #t end
 string.gfind = string.gmatch and (string.gfind or string.gmatch)
 math.randomseed(1) -- the same flight every time

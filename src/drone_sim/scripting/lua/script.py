@@ -119,7 +119,7 @@ class LuaScript:
     @property
     def threaded(self) -> bool:
         """Whether it has a thread that has not ended."""
-        return bool(self._phases & _THREAD)
+        return bool(self._phases & _THREAD) and not self._end
 
     def take_turn(self) -> None:
         """Let its thread run until it is left; raises ScriptError."""

@@ -1,0 +1,334 @@
+"""An example of every function of the script API: a call, written as Lua writes it, and what it returns.
+
+`NAME` stands for each of the function's names, one after the other. Tables are lists in Python; a call that Python
+writes in another way has its text beside it. What a call returns is a list: of one value, of several, or of none.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from pytest import approx
+
+HALF, QUARTER = 2**0.5 / 2, math.pi / 2
+TURNED = "{0,-1,0,1, 1,0,0,2, 0,0,1,3}"  # at (1, 2, 3), turned by 90 degrees about z
+BACK = [0, 1, 0, -2, -1, 0, 0, 1, 0, 0, 1, -3]
+POSE = f"{{1,2,3, 0,0,{HALF},{HALF}}}"
+POSE_BACK = [-2, 1, -3, 0, 0, -HALF, HALF]
+STRING = "'\\1\\0\\0\\0\\2\\0\\0\\0'"
+NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
+CALLED = "it waits for this call to end"
+ANY = object()  # whatever comes
+
+
+class Example(NamedTuple):
+    """A call, what it returns, and the call in Python where that is not what Lua's becomes."""
+
+    call: str
+    returns: list[Any]
+    python: str = ""
+
+
+def near(*values: float) -> Any:
+    """Return a list of numbers that is compared within rounding."""
+    return approx(list(values), abs=1e-9)
+
+
+def _packed(count: int, size: int, name: str) -> list[Example]:
+    """Return examples of the functions that pack numbers of so many bytes each."""
+    return [
+        Example(f"sim.pack{name}({{1,2,3}}, 1, 1)", [ANY]),
+        Example(f"sim.unpack{name}(sim.pack{name}({{1,2,3}}))", [[1, 2, 3]]),
+        Example(f"sim.unpack{name}(sim.pack{name}({{1,2,3}}), 1, {count}, {size})", [[3]]),
+    ]
+
+
+SIM: dict[str, list[Example]] = {
+    # ---- names and the tree
+    "getObject": [Example("NAME('/Quadcopter/base') == BASE", [True]), Example("NAME('/nothing', NOERROR)", [-1])],
+    "getObjectHandle": [
+        Example("NAME('Quadricopter_base') == BASE", [True]),
+        Example("NAME(sim.handle_self) == DRONE", [True]),
+        Example("NAME('nothing@silentError')", [-1]),
+    ],
+    "getObjectName": [Example("NAME(BASE)", ["Quadricopter_base"])],
+    "getObjectAlias": [
+        Example("NAME(BASE)", ["base"]),
+        Example("NAME(BASE, 0)", ["base[0]"]),
+        Example("NAME(BASE, 1)", ["/Quadcopter/base"]),
+    ],
+    "getNameSuffix": [Example("NAME('Drone#2')", [2, "Drone"])],
+    "setNameSuffix": [Example("NAME(-1)", [])],
+    "getObjectParent": [Example("NAME(BASE) == DRONE", [True]), Example("NAME(DRONE)", [-1])],
+    "setObjectParent": [Example("NAME(TARGET, -1, true)", []), Example("sim.getObjectParent(TARGET)", [-1])],
+    "getObjectChild": [Example("NAME(DRONE, 0) == BASE", [True]), Example("NAME(JOINT, 0)", [-1])],
+    "getObjectType": [Example("NAME(DRONE) == sim.object_shape_type", [True]), Example("NAME(CAMERA)", [9])],
+    "getObjects": [Example("NAME(0, sim.handle_all)", [0]), Example("NAME(1000)", [-1])],
+    "getObjectsInTree": [
+        Example("NAME(BASE) [FIRST] == BASE", [True]),
+        Example("NAME(JOINT, sim.handle_all, 1)", [[]]),
+    ],
+    "isHandle": [Example("NAME(BASE)", [True]), Example("NAME(1000)", [False])],
+    "isHandleValid": [Example("NAME(BASE)", [1]), Example("NAME(1000)", [0])],
+    "getObjectUid": [Example("NAME(BASE) == BASE", [True])],
+    # ---- where objects are
+    "setObjectPosition": [Example("NAME(TARGET, -1, {1,2,3})", []), Example("NAME(TARGET, {4,5,6}, -1)", [])],
+    "getObjectPosition": [Example("NAME(TARGET, -1)", [near(4, 5, 6)])],
+    "setObjectOrientation": [Example("NAME(TARGET, -1, {0,0,0.5})", [])],
+    "getObjectOrientation": [Example("NAME(TARGET, -1)", [near(0, 0, 0.5)])],
+    "setObjectQuaternion": [Example("NAME(TARGET, -1, {0,0,0,1})", [])],
+    "getObjectQuaternion": [Example("NAME(TARGET, -1)", [near(0, 0, 0, 1)])],
+    "setObjectPose": [Example(f"NAME(TARGET, {POSE}, -1)", [])],
+    "getObjectPose": [Example("NAME(TARGET)", [near(1, 2, 3, 0, 0, HALF, HALF)])],
+    "setObjectMatrix": [Example(f"NAME(TARGET, -1, {TURNED})", [])],
+    "getObjectMatrix": [Example("NAME(TARGET, -1)", [near(0, -1, 0, 1, 1, 0, 0, 2, 0, 0, 1, 3)])],
+    "getObjectSizeFactor": [Example("NAME(BASE)", [1])],
+    "getObjectSizeValues": [Example("NAME(BASE)", [[1, 1, 1]])],
+    # ---- how they move
+    "getObjectVelocity": [Example("NAME(DRONE + sim.handleflag_axis)", [near(0, 0, 0), near(0, 0, 0)])],
+    "getVelocity": [Example("NAME(DRONE)", [near(0, 0, 0), near(0, 0, 0)])],
+    "addForce": [Example("NAME(DRONE, {0,0,0}, {0,0,0})", [])],
+    "addForceAndTorque": [Example("NAME(DRONE, {0,0,0}, {0,0,0})", [])],
+    "setJointPosition": [Example("NAME(JOINT, 0.5)", [])],
+    "getJointPosition": [Example("NAME(JOINT)", [0.5])],
+    # ---- joints and paths of the scene
+    "getJointType": [Example("NAME(HINGE) == sim.joint_revolute_subtype", [True])],
+    "setJointMode": [Example("NAME(HINGE, sim.jointmode_kinematic)", [])],
+    "getJointMode": [Example("NAME(HINGE)", [0, 0])],
+    "setJointInterval": [Example("NAME(HINGE, false, {-1, 3})", [])],
+    "getJointInterval": [Example("NAME(HINGE)", [False, [-1, 3]])],
+    "setJointTargetPosition": [Example("NAME(HINGE, 0.5)", [])],
+    "getJointTargetPosition": [Example("NAME(HINGE)", [0.5])],
+    "setJointTargetVelocity": [Example("NAME(HINGE, 0.1)", [])],
+    "getJointTargetVelocity": [Example("NAME(HINGE)", [0.1])],
+    "setJointTargetForce": [Example("NAME(HINGE, 2)", [])],
+    "getJointTargetForce": [Example("NAME(HINGE)", [2])],
+    "setJointForce": [Example("NAME(HINGE, 4)", [])],
+    "setJointMaxForce": [Example("NAME(HINGE, 5)", [])],
+    "getJointMaxForce": [Example("NAME(HINGE)", [5])],
+    "getJointForce": [Example("NAME(HINGE)", [0])],
+    "getJointVelocity": [Example("NAME(HINGE)", [0])],
+    "setSphericalJointMatrix": [Example(f"NAME(BALL, {TURNED})", [])],
+    "getJointMatrix": [Example("NAME(BALL)", [near(0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0)])],
+    "getPathLength": [Example("NAME(LINE)", [2])],
+    "getPositionOnPath": [Example("NAME(LINE, 0.25)", [near(0.5, 0, 0)])],
+    "getOrientationOnPath": [Example("NAME(LINE, 0.25)", [near(0, 0, 0)])],
+    "setPathPosition": [Example("NAME(LINE, 1.5)", [])],
+    "getPathPosition": [Example("NAME(LINE)", [1.5])],
+    "getPathLengths": [Example("NAME({0,0,0, 3,4,0}, 3)", [[0, 5], 5])],
+    "getPathInterpolatedConfig": [Example("NAME({0,0,0, 3,4,0}, {0,5}, 2.5)", [near(1.5, 2, 0)])],
+    # ---- the dynamics
+    "resetDynamicObject": [Example("NAME(BASE)", [])],
+    "isDynamicallyEnabled": [Example("NAME(BASE)", [True]), Example("NAME(FLOOR)", [False])],
+    "getShapeMass": [Example("NAME(DRONE)", [approx(0.12)]), Example("NAME(FLOOR)", [0])],
+    "getShapeMassAndInertia": [
+        Example("NAME(FLOOR, {1,0,0,5, 0,1,0,0, 0,0,1,0})", [0, [0.0] * 9, near(-5, 0, 0)]),
+    ],
+    "getObjectInt32Param": [Example("NAME(DRONE, sim.shapeintparam_static)", [0])],
+    "setObjectInt32Param": [Example("NAME(DRONE, sim.shapeintparam_respondable, 1)", [1])],
+    "getObjectFloatParam": [Example("NAME(DRONE, sim.shapefloatparam_mass)", [approx(0.12)])],
+    "setObjectFloatParam": [Example("NAME(DRONE, sim.shapefloatparam_mass, 2)", [1])],
+    # ---- matrices and poses
+    "multiplyVector": [
+        Example(f"NAME({TURNED}, {{1,0,0}})", [near(1, 3, 3)]),
+        Example(f"NAME({TURNED}, {{1,0,0, 0,1,0}})", [near(1, 3, 3, 0, 2, 3)]),
+    ],
+    "multiplyMatrices": [Example(f"NAME({TURNED}, sim.getMatrixInverse({TURNED}))", [ANY])],
+    "buildIdentityMatrix": [Example("NAME()", [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]])],
+    "copyMatrix": [Example(f"NAME({TURNED})", [[0, -1, 0, 1, 1, 0, 0, 2, 0, 0, 1, 3]])],
+    "buildMatrix": [Example("NAME({1,2,3}, {0,0,0})", [[1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3]])],
+    "buildMatrixQ": [Example("NAME({1,2,3}, {0,0,0,2})", [[1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3]])],
+    "getEulerAnglesFromMatrix": [Example(f"NAME({TURNED})", [near(0, 0, QUARTER)])],
+    "getQuaternionFromMatrix": [Example(f"NAME({TURNED})", [near(0, 0, HALF, HALF)])],
+    "getMatrixInverse": [Example(f"NAME({TURNED})", [near(*BACK)])],
+    "invertMatrix": [Example(f"NAME({TURNED})", [near(*BACK)]), Example("INVERTED()", [near(*BACK)])],
+    "interpolateMatrices": [
+        Example(
+            f"sim.getEulerAnglesFromMatrix(NAME(sim.buildIdentityMatrix(), {TURNED}, 0.5))",
+            [near(0, 0, 0.7853981633974483)],
+        ),
+    ],
+    "getRotationAxis": [
+        Example(f"NAME(sim.buildIdentityMatrix(), {TURNED})", [near(0, 0, 1), approx(1.5707963267948966)])
+    ],
+    "rotateAroundAxis": [
+        Example(
+            "NAME({1,0,0,2, 0,1,0,0, 0,0,1,0}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
+            [near(0, -1, 0, 1, 1, 0, 0, 1, 0, 0, 1, 0)],
+        ),
+    ],
+    "alphaBetaGammaToYawPitchRoll": [Example("NAME(0.1, 0, 0)", [approx(0), approx(0), approx(0.1)])],
+    "yawPitchRollToAlphaBetaGamma": [Example("NAME(0.3, 0, 0)", [approx(0), approx(0), approx(0.3)])],
+    "buildPose": [Example("NAME({1,2,3}, {0,0,0})", [near(1, 2, 3, 0, 0, 0, 1)])],
+    "multiplyPoses": [Example(f"NAME({POSE}, {{1,0,0, 0,0,0,1}})", [near(1, 3, 3, 0, 0, HALF, HALF)])],
+    "invertPose": [Example(f"NAME({POSE})", [near(*POSE_BACK)])],
+    "interpolatePoses": [Example("NAME({0,0,0,0,0,0,1}, {2,4,6,0,0,0,1}, 0.5)", [near(1, 2, 3, 0, 0, 0, 1)])],
+    "poseToMatrix": [Example(f"NAME({POSE})", [near(0, -1, 0, 1, 1, 0, 0, 2, 0, 0, 1, 3)])],
+    "matrixToPose": [Example(f"NAME({TURNED})", [near(1, 2, 3, 0, 0, HALF, HALF)])],
+    # ---- numbers and strings
+    "boolOr32": [Example("NAME(5, 3)", [7])],
+    "boolAnd32": [Example("NAME(5, 3)", [1])],
+    "boolXor32": [Example("NAME(5, 3)", [6])],
+    "packFloatTable": _packed(1, 4, "FloatTable"),
+    "packDoubleTable": _packed(1, 8, "DoubleTable"),
+    "packInt32Table": [*_packed(1, 4, "Int32Table"), Example("#NAME({1,2})", [8], "len(NAME([1,2]))")],
+    "packUInt32Table": _packed(1, 4, "UInt32Table"),
+    "packUInt16Table": _packed(1, 2, "UInt16Table"),
+    "packUInt8Table": [*_packed(1, 1, "UInt8Table"), Example("NAME({65,66})", ["AB"])],
+    "unpackFloatTable": [Example("NAME(sim.packFloatTable({0.5}))", [[0.5]])],
+    "unpackDoubleTable": [Example("NAME(sim.packDoubleTable({0.1}))", [[0.1]])],
+    "unpackInt32Table": [Example(f"NAME({STRING})", [[1, 2]])],
+    "unpackUInt32Table": [Example(f"NAME({STRING})", [[1, 2]])],
+    "unpackUInt16Table": [Example(f"NAME({STRING})", [[1, 0, 2, 0]])],
+    "unpackUInt8Table": [Example("NAME('AB')", [[65, 66]])],
+    "packTable": [Example("sim.unpackTable(NAME({1,{2,'x'},true}))", [[1, [2, "x"], True]])],
+    "unpackTable": [Example("NAME(sim.packTable({1.5}))", [[1.5]])],
+    "transformBuffer": [
+        Example("sim.unpackFloatTable(NAME('AB', sim.buffer_uint8, 2, 1, sim.buffer_float))", [[131, 133]]),
+    ],
+    # ---- scripts
+    "addLog": [Example("NAME(sim.verbosity_scriptinfos, 'a line')", [])],
+    "addStatusbarMessage": [Example("NAME('a line')", [])],
+    "getScriptHandle": [Example("NAME('Drone') == NAME()", [True])],
+    "getObjectAssociatedWithScript": [Example("NAME(sim.handle_self) == DRONE", [True])],
+    "setScriptSimulationParameter": [Example("NAME(sim.handle_self, 'gain', '0.5')", [])],
+    "getScriptSimulationParameter": [Example("NAME(sim.handle_self, 'gain')", [0.5])],
+    "setUserParameter": [Example("NAME(DRONE, 'gain', 0.25)", [])],
+    "getUserParameter": [Example("NAME(DRONE, 'gain')", [0.25])],
+    "getScript": [Example("NAME(1, DRONE) == sim.getScriptHandle()", [True]), Example("NAME(1, FLOOR)", [-1])],
+    "getScriptAssociatedWithObject": [Example("NAME(DRONE) == sim.getScriptHandle()", [True])],
+    "getCustomizationScriptAssociatedWithObject": [Example("NAME(DRONE)", [-1])],
+    "getScriptName": [Example("NAME(sim.handle_self)", ["Drone"])],
+    "getScriptExecutionCount": [Example("NAME()", [0])],
+    "callScriptFunction": [Example("REFUSED(NAME, 'nothing', sim.handle_self)", [CALLED])],
+    "getScriptFunctions": [Example("NAME(sim.handle_self) ~= nil", [True], "NAME(sim.handle_self) is not None")],
+    # ---- threads, of a script that has none
+    "switchThread": [Example("REFUSED(NAME)", [NO_THREAD])],
+    "step": [Example("REFUSED(NAME)", [NO_THREAD])],
+    "wait": [Example("NAME(0)", [0]), Example("REFUSED(NAME, 1)", [NO_THREAD])],
+    "waitForSignal": [Example("NAME('there')", [1])],
+    "setThreadSwitchTiming": [Example("NAME(2)", [])],
+    "setThreadAutomaticSwitch": [Example("NAME(true)", [0])],
+    "getThreadAutomaticSwitch": [Example("NAME()", [True])],
+    "setAutoYield": [Example("NAME(true)", [0])],
+    "getAutoYield": [Example("NAME()", [True])],
+    "setStepping": [Example("NAME(false)", [0])],
+    "acquireLock": [Example("NAME()", []), Example("sim.getAutoYield()", [False])],
+    "releaseLock": [Example("NAME()", []), Example("sim.getAutoYield()", [True])],
+    "getThreadId": [Example("NAME()", [1])],
+    "getThreadExitRequest": [Example("NAME()", [False])],
+    "getThreadExistRequest": [Example("NAME()", [False])],
+    "setThreadResumeLocation": [Example("NAME(0, 0)", [1])],
+    "delegateChildScriptExecution": [Example("NAME()", [1])],
+    # ---- the simulation
+    "getSimulationState": [Example("NAME() == sim.simulation_advancing_firstafterstop", [True])],
+    "stopSimulation": [Example("NAME()", [1])],
+    "getSimulationStopping": [Example("NAME()", [True])],
+    "pauseSimulation": [Example("NAME()", [1])],
+    "startSimulation": [Example("NAME()", [1]), Example("sim.getSimulationStopping()", [False])],
+    "getSimulationTime": [Example("NAME()", [0])],
+    "getSimulationTimeStep": [Example("NAME()", [0.05])],
+    "getSystemTime": [Example("NAME()", [0])],
+    "getSystemTimeInMs": [Example("NAME()", [0]), Example("NAME(-1)", [0])],
+    "getModuleName": [Example("NAME(0)", ["RosInterface", 1])],
+    "getRandom": [Example("NAME(3) == NAME(3)", [True])],
+    "getInt32Param": [Example("NAME(sim.intparam_program_version)", [40600])],
+    "setInt32Param": [Example("NAME(sim.intparam_visible_layers, 1)", [])],
+    "getFloatParam": [Example("NAME(sim.floatparam_simulation_time_step)", [0.05])],
+    "setFloatParam": [Example("NAME(sim.floatparam_simulation_time_step, 1)", [])],
+    "getBoolParam": [Example("NAME(sim.boolparam_dynamics_handling_enabled)", [True])],
+    "setBoolParam": [Example("NAME(sim.boolparam_display_enabled, false)", [])],
+    "getStringParam": [Example("NAME(sim.stringparam_scene_path)", [""])],
+    "setStringParam": [Example("NAME(sim.stringparam_video_filename, 'x')", [])],
+    "getArrayParam": [Example("NAME(sim.arrayparam_gravity)", [[0, 0, -9.81]])],
+    "setArrayParam": [Example("NAME(sim.arrayparam_gravity, {0,0,0})", [])],
+    # ---- signals and custom data
+    "setFloatSignal": [Example("NAME('f', 1.5)", [])],
+    "getFloatSignal": [Example("NAME('f')", [1.5])],
+    "clearFloatSignal": [Example("NAME('f')", []), Example("sim.getFloatSignal('f')", [])],
+    "setInt32Signal": [Example("NAME('i', 2)", [])],
+    "getInt32Signal": [Example("NAME('i')", [2])],
+    "clearInt32Signal": [Example("NAME('i')", []), Example("sim.getInt32Signal('i')", [])],
+    "setStringSignal": [Example("NAME('s', 'text')", [])],
+    "getStringSignal": [Example("NAME('s')", ["text"])],
+    "clearStringSignal": [Example("NAME('s')", []), Example("sim.getStringSignal('s')", [])],
+    "tubeOpen": [Example("NAME(0, 'a', 1)", [1]), Example("NAME(0, 'a', 1)", [2])],
+    "tubeWrite": [Example("NAME(1, 'x')", [1]), Example("NAME(1, 'y')", [1])],
+    "tubeStatus": [Example("NAME(1)", [1, 0, 1])],
+    "tubeRead": [Example("NAME(2)", ["y"]), Example("NAME(2)", [])],
+    "tubeClose": [Example("NAME(2)", []), Example("sim.tubeStatus(1)", [0, 0, 0])],
+    "writeCustomDataBlock": [Example("NAME(DRONE, 'tag', 'text')", [])],
+    "readCustomDataBlock": [Example("NAME(DRONE, 'tag')", ["text"]), Example("NAME(BASE, 'tag')", [])],
+    "readCustomDataBlockTags": [Example("NAME(DRONE)", [["tag"]])],
+    "writeCustomTableData": [Example("NAME(BASE, 'table', {1,2})", [])],
+    "readCustomTableData": [Example("NAME(BASE, 'table')", [[1, 2]])],
+    "persistentDataWrite": [Example("NAME('tag', 'text')", [])],
+    "persistentDataRead": [Example("NAME('tag')", ["text"])],
+    "getPersistentDataTags": [Example("NAME()", [["tag"]])],
+    "setProperty": [Example("NAME(DRONE, 'customData.x', 3)", [])],
+    "getProperty": [Example("NAME(DRONE, 'customData.x')", [3]), Example("NAME(DRONE, 'signal.y', NOERROR)", [])],
+    "removeProperty": [Example("NAME(DRONE, 'customData.x')", [])],
+    # ---- what one sees
+    "addDrawingObject": [Example("NAME(sim.drawing_spherepts, 0.1, 0, BASE, 10) > 0", [True])],
+    "addDrawingObjectItem": [Example("NAME(DRAWN, {1,2,3})", [])],
+    "removeDrawingObject": [Example("NAME(DRAWN)", [])],
+    "displayDialog": [Example("NAME('title', 'text', sim.dlgstyle_ok, false) > 0", [True])],
+    "getDialogResult": [Example("NAME(1) == sim.dlgret_ok", [True])],
+    "getDialogInput": [Example("NAME(1)", [""])],
+    "auxiliaryConsoleOpen": [Example("NAME('title', 10, 0) > 0", [True])],
+    "auxiliaryConsolePrint": [Example("NAME(1, 'a line')", [1])],
+    "getVisionSensorCharImage": [
+        Example("NAME(CAMERA)", ["\0\1\2\3\4\5", 1, 2]),
+        Example("NAME(CAMERA + sim.handleflag_greyscale, 0, 1, 1, 1)", ["\3", 1, 1]),
+    ],
+    "getVisionSensorImg": [
+        Example("NAME(CAMERA)", ["\0\1\2\3\4\5", [1, 2]]),
+        Example("NAME(CAMERA, 1)", ["\0\3", [1, 2]]),
+    ],
+    "getVisionSensorImage": [Example("NAME(CAMERA, 0, 0, 1, 1)", [approx([0, 1 / 255, 2 / 255])])],
+    "getVisionSensorDepth": [Example("NAME(DEPTH, 1)", [ANY, [2, 1]])],
+    "getVisionSensorDepthBuffer": [
+        Example("NAME(DEPTH + sim.handleflag_depthbuffermeters)", [[2, 4]]),
+        Example("NAME(DEPTH)", [near(0.25, 0.75)]),
+    ],
+    "getVisionSensorResolution": [Example("NAME(CAMERA)", [[1, 2]])],
+    "handleVisionSensor": [Example("NAME(CAMERA)", [0])],
+    "readVisionSensor": [Example("NAME(DEPTH)", [0, near(0, 0, 0, 0, 2, 0, 0, 0, 0, 4, 0, 0, 0, 0, 3)])],
+    "readProximitySensor": [Example("NAME(RANGE)", [-1, 0, [0, 0, 0], -1, [0, 0, 0]])],
+    "handleProximitySensor": [Example("NAME(FEELER)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
+    "checkProximitySensor": [Example("NAME(FEELER, FLOOR)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
+    "checkProximitySensorEx": [Example("NAME(FEELER, FLOOR, 0, 1, 0)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
+    "resetProximitySensor": [Example("NAME(FEELER)", [])],
+    "readSensor": [Example("NAME(RANGE)", [])],
+}
+
+ROS: dict[str, list[Example]] = {
+    "subscribe": [Example("NAME('in', 'std_msgs/String', 'heard')", [1])],
+    "subscriberTreatUInt8ArrayAsString": [Example("NAME(1)", [])],
+    "shutdownSubscriber": [Example("NAME(1)", [])],
+    "advertise": [Example("NAME('out', 'std_msgs/String')", [2])],
+    "publisherTreatUInt8ArrayAsString": [Example("NAME(2)", [])],
+    "getNumSubscribers": [Example("NAME(2)", [0])],
+    "publish": [Example("NAME(2, MESSAGE)", [])],
+    "shutdownPublisher": [Example("NAME(2)", [])],
+    "imageTransportAdvertise": [Example("NAME('image')", [3])],
+    "imageTransportPublish": [Example("NAME(3, '123456', 1, 2, 'camera')", [])],
+    "imageTransportShutdownPublisher": [Example("NAME(3)", [])],
+    "getTime": [Example("NAME()", [0])],
+    "sendTransform": [Example("NAME(MESSAGE)", [])],
+    "sendTransforms": [Example("NAME({MESSAGE})", [])],
+    "setParamString": [Example("NAME('s', 'text')", [])],
+    "getParamString": [Example("NAME('s')", [True, "text"]), Example("NAME('none', 'x')", [False, "x"])],
+    "setParamInt": [Example("NAME('i', 2)", [])],
+    "getParamInt": [Example("NAME('i')", [True, 2])],
+    "setParamDouble": [Example("NAME('d', 2.5)", [])],
+    "getParamDouble": [Example("NAME('d')", [True, 2.5])],
+    "setParamBool": [Example("NAME('b', true)", [])],
+    "getParamBool": [Example("NAME('b')", [True, True])],
+    "hasParam": [Example("NAME('b')", [True])],
+    "searchParam": [Example("NAME('b')", [True, "/drone/b"]), Example("NAME('none')", [False, ""])],
+    "deleteParam": [Example("NAME('b')", []), Example("simROS.hasParam('b')", [False])],
+    "serviceClient": [Example("NAME('reset', 'std_srvs/Trigger')", [1])],
+    "serviceClientTreatUInt8ArrayAsString": [Example("NAME(1)", [])],
+    "call": [Example("REFUSED(NAME, 1)", ["there is no ROS here, and no service"])],
+    "shutdownServiceClient": [Example("NAME(1)", [])],
+}

@@ -1,0 +1,225 @@
+"""Every function of docs/api.md, called in Lua and in Python under each of its names, and what it returns."""
+
+import logging
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from api_examples import ANY, ROS, SIM
+
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting import load
+from drone_sim.scripting.api import ignored
+from drone_sim.scripting.api.calls import Api, contents
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
+from drone_sim.scripting.time_limit import TimeLimit
+
+DOCS = Path(__file__).parents[2] / "docs"
+sys.path.insert(0, str(DOCS))
+import make_api  # noqa: E402
+
+EXAMPLES = {"sim": SIM, "simROS": ROS}
+COLORS = np.array([[[3, 4, 5]], [[0, 1, 2]]], np.uint8)  # the top row first
+DISTANCES = np.array([[2.0, 4.0]], np.float32)
+PICTURES = {"FrontVision": lambda: COLORS, "TrackCam": lambda: DISTANCES}
+OBJECTS = {
+    "DRONE": "/Quadcopter",
+    "BASE": "/Quadcopter/base",
+    "TARGET": "/target",
+    "FLOOR": "/Floor",
+    "JOINT": "/Quadcopter/propeller[0]/joint",
+    "CAMERA": "/FrontVision",
+    "DEPTH": "/TrackCam",
+    "RANGE": "/height",
+    "HINGE": "/Hinge",
+    "BALL": "/Ball",
+    "LINE": "/Line",
+    "FEELER": "/Feeler",
+}
+SCENE = {
+    "objects": [
+        {"name": "Hinge", "kind": "joint", "type": "revolute", "limits": [-1, 2], "max_force": 3},
+        {"name": "Ball", "kind": "joint", "type": "spherical"},
+        {"name": "Line", "kind": "path", "points": [[0, 0, 0], [2, 0, 0]]},
+        {"name": "Feeler", "kind": "proximity_sensor", "type": "ray", "range": 1.0, "position": [50, 0, 1]},
+    ]
+}
+LUA = """
+function sysCall_init()
+local function check(number, ...) out.take(number, {...}) end
+sim.setInt32Signal('there', 1)
+local NOERROR, MESSAGE, FIRST = {noError = true}, {data = 'x'}, 1
+local IDENTITY = sim.buildIdentityMatrix()
+local function INVERTED()
+  local m = {0,-1,0,1, 1,0,0,2, 0,0,1,3}
+  sim.invertMatrix(m)
+  return m
+end
+local function REFUSED(f, ...)
+  local _, why = pcall(f, ...)
+  return (string.match(why, '[^:]+$'):sub(2))
+end
+local DRAWN = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 1)
+"""
+PYTHON = """
+def check(number, result): out.take(number, list(result) if isinstance(result, tuple) else [result])
+sim.setInt32Signal('there', 1)
+NOERROR, MESSAGE, FIRST = {"noError": True}, {"data": "x"}, 0
+IDENTITY = sim.buildIdentityMatrix()
+def INVERTED():
+    m = [0,-1,0,1, 1,0,0,2, 0,0,1,3]
+    sim.invertMatrix(m)
+    return m
+DRAWN = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 1)
+def REFUSED(f, *values):
+    try:
+        f(*values)
+    except ValueError as error:
+        return str(error).rpartition(': ')[2]
+"""
+
+
+@pytest.fixture(name="simulation", scope="module")
+def _simulation(tmp_path_factory):
+    script = tmp_path_factory.mktemp("api") / "still.py"
+    script.write_text("def sysCall_init(): pass\n", encoding="utf-8")
+    mount = {"position": [0.0, 0.0, 0.0], "rpy": [0.0, 1.57, 0.0]}
+    height = {"kind": "range", "rate": 20.0, "min_range": 0.1, "max_range": 4.0, "mount": mount}
+    own = {"script_parameters": {"gain": 1.0}, "sensors": {"height": height}, "scene": SCENE}
+    simulation = Simulation(parameters.load({"gravity": 0.0, **own}), script=str(script), drawings=Drawings())
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture(name="modules")
+def _modules(simulation):
+    drone = simulation.drone
+    around = Surroundings(lambda: 0.0, 0.05, PICTURES, planes={"TrackCam": (1.0, 5.0)}, masses=drone.masses)
+    return {
+        "sim": make_sim(drone, around),
+        "simROS": make_sim_ros(MessageBus("drone"), around.clock),
+        **make_plugins(drone),
+    }
+
+
+def names_of(modules):
+    """Return the names of each function that does something, by module and by the name that its example has."""
+    found = {}
+    for module, examples in EXAMPLES.items():
+        for function, names in make_api.same(contents(modules[module])[1]):
+            if not make_api.is_ignored(function):
+                found[module, next((name for name in names if name in examples), names[0])] = names
+    return found
+
+
+def calls(modules, flat):
+    """Return every call of the examples, with what it returns: under its module's names, or under 3.x's."""
+    found = []
+    all_names = names_of(modules)
+    for module, known in ((module, known) for module, examples in EXAMPLES.items() for known in examples):
+        names = all_names[module, known]
+        for name in [known, *(one for one in names if one != known)]:
+            full = make_api.flat_name(module, name) if flat else f"{module}.{name}"
+            for example in EXAMPLES[module][known]:
+                found.append(
+                    (example.call.replace("NAME", full), example.returns, example.python.replace("NAME", full))
+                )
+    return found
+
+
+def in_python(call, python):
+    text = (python or call.replace("{", "[").replace("}", "]")).replace("sim.yield", "getattr(sim, 'yield')")
+    return re.sub(r"\b(true|false)\b", lambda match: match.group().capitalize(), text)
+
+
+def run(path, text, modules):
+    """Run a script; return what it handed to `check`, by number."""
+    taken = {}
+    modules = {**modules, "out": Api("out", {"take": lambda number, values: taken.update({number: values})}, {})}
+    path.write_text(text, encoding="utf-8")
+    script = load.load(str(path), modules, TimeLimit(10.0))
+    script.call("init")
+    script.close()
+    return taken
+
+
+def plain(value):
+    if isinstance(value, bytes):
+        return value.decode("latin-1")
+    return [plain(one) for one in value] if isinstance(value, (list, tuple)) else value
+
+
+def is_as(value, expected):
+    if expected is ANY:
+        return True
+    if isinstance(expected, list) and isinstance(value, list):
+        return len(value) == len(expected) and all(map(is_as, value, expected))
+    return value == expected
+
+
+def assert_all(taken, expected):
+    assert len(taken) == len(expected)
+    wrong = []
+    for number, (call, returns, _) in enumerate(expected):
+        value = plain(taken[number])
+        while value and value[-1] is None:
+            value.pop()
+        if not is_as(value, returns):
+            wrong.append(f"{call}: {value}, not {returns}")
+    assert not wrong
+
+
+def test_every_function_has_an_example(modules):
+    missing = [f"{module}.{name}" for module, name in names_of(modules) if name not in EXAMPLES[module]]
+    assert not missing, "see api_examples.py"
+
+
+@pytest.mark.parametrize("flat", [False, True], ids=["sim.", "sim"])
+def test_in_lua(tmp_path, modules, flat):
+    expected = calls(modules, flat)
+    finding = [f"local {name} = sim.getObject('{path}')\n" for name, path in OBJECTS.items()]
+    body = [f"check({number}, {call})\n" for number, (call, _, _) in enumerate(expected)]
+    taken = run(tmp_path / "all.lua", LUA + "".join([*finding, *body, "end"]), modules)
+    assert_all(taken, expected)
+
+
+def test_in_python(tmp_path, modules):
+    expected = calls(modules, flat=False)
+    finding = [f"{name} = sim.getObject('{path}')\n" for name, path in OBJECTS.items()]
+    body = [f"check({i}, {in_python(call, python)})\n" for i, (call, _, python) in enumerate(expected)]
+    taken = run(tmp_path / "all.py", PYTHON + "".join(finding) + "".join(body), modules)
+    assert_all(taken, expected)
+
+
+@pytest.mark.parametrize("suffix", [".lua", ".py"])
+def test_what_is_ignored_says_so_once(tmp_path, modules, caplog, suffix):
+    does_nothing = [
+        (f"{module}.{name}", gives)
+        for module, groups in {"sim": ignored.SIM, **ignored.MODULES}.items()
+        for group in groups
+        for name, gives in group.functions.items()
+        if make_api.is_ignored(contents(modules[module])[1][name])
+    ]
+    check, end = (LUA, "end") if suffix == ".lua" else (PYTHON, "")
+    body = [f"check({number}, {name}(1, 'x'))\n" for number, (name, _) in enumerate([*does_nothing, *does_nothing])]
+    with caplog.at_level(logging.INFO):
+        taken = run(tmp_path / f"ignored{suffix}", check + "".join(body) + end, modules)
+    for number, (name, gives) in enumerate(does_nothing):
+        values = plain(taken[number])
+        expected = [gives] if not isinstance(gives, tuple) else plain(gives)
+        if gives is ignored.HANDLE:
+            assert values[0] > 0, name
+        else:
+            assert values == expected or (gives is None and not values), name
+        said = [one for one in caplog.messages if one.startswith(f"{name}: ")]
+        assert len(said) == 1 and said[0].endswith("accepted and ignored (in the script of Drone)"), name
+
+
+def test_the_page_is_made_from_the_code():
+    assert make_api.PAGE.read_text(encoding="utf-8") == make_api.text(), "PYTHONPATH=src python docs/make_api.py"
