@@ -28,7 +28,17 @@ from case import Case
 from hypothesis import HealthCheck, Phase, given, settings
 from pool import Trier
 
-KINDS = ("messages", "parameters", "scenes", "meshes", "urdfs", "timelines", "lua_scripts", "python_scripts")
+KINDS = (
+    "messages",
+    "requests",
+    "parameters",
+    "scenes",
+    "meshes",
+    "urdfs",
+    "timelines",
+    "lua_scripts",
+    "python_scripts",
+)
 _CHUNK = 50  # cases of one run of hypothesis; a new kind of fault ends it
 _SHRINKING = 30.0  # s
 OUT = Path(__file__).parents[2] / "build" / "fuzz"

@@ -13,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cbor2
+import zmq
 from case import Case
 
 from drone_sim.config.types import ParameterError
@@ -20,8 +22,10 @@ from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.mechanics.urdf import UrdfError
 from drone_sim.offline import fly
 from drone_sim.offline.timeline import TimelineError
+from drone_sim.remote.server import Server
 from drone_sim.render.renderer import Renderer
 from drone_sim.run import parameters
+from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.sensors import camera as vision
@@ -230,6 +234,37 @@ def _messages(case: Case, folder: Path) -> str:
     return "; ".join(one_line(line, folder) for line in log.lines)
 
 
+# ---- requests
+
+
+def _requests(case: Case, folder: Path) -> str:
+    """Let a client send its messages, one after the other, while the simulation steps; each must be answered."""
+    simulation = Simulation(parameters.load(_with_small_pictures({"script_time_limit": _SCRIPT_LIMIT})), started=False)
+    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    server = Server(player, "127.0.0.1", 0)
+    with zmq.Context() as context, context.socket(zmq.DEALER) as client:
+        client.setsockopt(zmq.LINGER, 0)
+        client.connect(f"tcp://127.0.0.1:{server.port}")
+        try:
+            said = [_asked(client, message, player, server) for message in case.data]
+        finally:
+            server.close()
+            simulation.close()
+    return next((one_line(one, folder) for one in said if one), "")
+
+
+def _asked(client: zmq.Socket[bytes], message: bytes, player: Player, server: Server) -> str:
+    """Return the error in the answer, '' where there is none; a step or a signal may be waited for without an end."""
+    client.send_multipart([b"", message])
+    for _ in range(20):
+        server.wait(0.005)
+        if client.poll(0):
+            return str(cbor2.loads(client.recv_multipart()[-1]).get("err", ""))
+        if player.playing and not server.holds:
+            player.step()
+    return ""
+
+
 class _Log(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
@@ -248,4 +283,5 @@ _TRIALS: dict[str, Callable[[Case, Path], Any]] = {
     "script": _script,
     "fly": _fly,
     "messages": _messages,
+    "requests": _requests,
 }

@@ -159,6 +159,11 @@ class Simulation:
         return self._flying[0]
 
     @property
+    def shared(self) -> Shared:
+        """What all that flies, and every script, has in common."""
+        return self._setting.shared
+
+    @property
     def era(self) -> int:
         """Another number after every start, every stop, and whenever a vehicle has come or gone."""
         return self._era

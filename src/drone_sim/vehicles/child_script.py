@@ -40,7 +40,16 @@ class Seen(Protocol):
 def load_child_script(path: str, host: Host, bus: MessageBus, seen: Sequence[Seen], shared: Shared) -> load.Script:
     """Load a script ('' for the tutorial's) on the object that `host` names. Raises ScriptError."""
     limit, turns = TimeLimit(shared.script_time_limit), Turns()
-    surroundings = Surroundings(
+    around = surroundings(seen, shared, limit, turns)
+    modules = {"sim": make_sim(host, around), "simROS": make_sim_ros(bus, shared.time), **make_plugins(host)}
+    script = load.load(path, modules, limit, turns)
+    host.scripts.attached_to(host.own_script).loaded(script, shared.time())
+    return script
+
+
+def surroundings(seen: Sequence[Seen], shared: Shared, limit: TimeLimit, turns: Turns) -> Surroundings:
+    """Return what the API finds around a script that is called within a limit."""
+    return Surroundings(
         clock=shared.time,
         time_step=shared.time_step,
         pictures=_together(one.pictures for one in seen),
@@ -54,10 +63,6 @@ def load_child_script(path: str, host: Host, bus: MessageBus, seen: Sequence[See
         data=shared.data,
         tubes=shared.tubes,
     )
-    modules = {"sim": make_sim(host, surroundings), "simROS": make_sim_ros(bus, shared.time), **make_plugins(host)}
-    script = load.load(path, modules, limit, turns)
-    host.scripts.attached_to(host.own_script).loaded(script, shared.time())
-    return script
 
 
 def _together(mappings: Iterable[Mapping[str, _Value]]) -> dict[str, _Value]:

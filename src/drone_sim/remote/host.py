@@ -1,0 +1,86 @@
+"""The simulation, as the script API sees it where a client calls: all vehicles together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.host import Readable, Surroundings
+from drone_sim.scripting.api.registry import Attachment, Callee, Scripts
+from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.turns import Turns
+from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.vehicles.child_script import surroundings
+from drone_sim.vehicles.vehicle import Vehicle
+
+
+class ClientHost:
+    """Names without a suffix mean the first vehicle's objects, as in its script."""
+
+    def __init__(self, simulation: Simulation):
+        """Take the simulation as it is in this era."""
+        self._shared = simulation.shared
+        self._vehicles = list(simulation.vehicles.values())
+        self._first = self._vehicles[0]
+
+    def surroundings(self) -> Surroundings:
+        """Return clock, cameras and the rest; no client's call is ended after a time."""
+        return surroundings(self._vehicles, self._shared, TimeLimit(0.0), Turns())
+
+    @property
+    def sensors(self) -> Mapping[str, Readable]:
+        """The sensors of all vehicles."""
+        return {name: sensor for one in self._vehicles for name, sensor in one.sensors.items()}
+
+    @property
+    def objects(self) -> ObjectTree:
+        """The objects of the scene."""
+        return self._shared.objects
+
+    @property
+    def scripts(self) -> Scripts:
+        """The scripts of the simulation."""
+        return _FromOutside(self._shared.scripts)
+
+    @property
+    def signals(self) -> Signals:
+        """The signals of all scripts."""
+        return self._shared.signals
+
+    @property
+    def own_script(self) -> str:
+        """Name of the object whose script `sim.handle_self` means: the first vehicle's."""
+        return self._first.own_script
+
+    @property
+    def drawings(self) -> Drawings:
+        """What is drawn, by all together."""
+        return self._shared.drawings
+
+    def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
+        """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m)."""
+        self._of(shape).add_force(shape, force, torque, offset)
+
+    def turn_joint(self, joint: str, angle: float | None) -> float:
+        """Turn a propeller's blades to an angle (rad), unless None; return the angle."""
+        return self._of(joint).turn_joint(joint, angle)
+
+    def _of(self, name: str) -> Vehicle:
+        """Return the vehicle whose objects end in the same suffix; the first for an object of the scene."""
+        return next((one for one in self._vehicles if one.suffix and name.endswith(one.suffix)), self._first)
+
+
+class _FromOutside(Scripts):
+    """The scripts of a simulation, called by somebody who is none of them."""
+
+    _NOBODY = Attachment(-1, "", {}, is_law=False)
+
+    def __init__(self, scripts: Scripts):
+        self.__dict__ = scripts.__dict__
+
+    def call(self, _caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
+        return super().call(self._NOBODY, callee, call)
