@@ -16,6 +16,7 @@ KEYS = {
     "PIL": "python3-pil",
     "annotated_types": "python3-pydantic-pip",
     "cv2": "python3-opencv",
+    "greenlet": "python3-greenlet-pip",
     "moderngl": "python3-moderngl-pip",
     "pybullet": "python3-pybullet-pip",
     "pydantic": "python3-pydantic-pip",
