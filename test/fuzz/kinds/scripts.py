@@ -7,7 +7,8 @@ from case import Case
 from hypothesis import strategies as st
 
 _API = Path(__file__).parents[3] / "src" / "drone_sim" / "scripting" / "api"
-_SOURCES = [_API / f"{part}.py" for part in ("drawing", "matrices", "names", "objects", "scripts", "signals", "vision")]
+_PARTS = ("drawing", "matrices", "names", "objects", "script_calls", "scripts", "signals", "threads", "vision")
+_SOURCES = [_API / f"{part}.py" for part in _PARTS]
 # Read from the text, so that whoever only makes cases needs nothing of drone_sim.
 FUNCTIONS = sorted({name for path in _SOURCES for name in re.findall(r"^    def ([a-z]\w*)\(", path.read_text(), re.M)})
 ROS_FUNCTIONS = (
@@ -15,7 +16,7 @@ ROS_FUNCTIONS = (
     *("imageTransportPublish", "imageTransportShutdownPublisher"),
 )
 OBJECTS = ("Drone", "Quadricopter_base", "DronePosition", "FrontVision", "Quadricopter_propeller_respondable1", "no")
-PHASES = ("", "init", "actuation", "sensing", "cleanup")
+PHASES = ("", "init", "actuation", "sensing", "cleanup", "thread")
 
 
 def scripts(suffix, fragments, put):
