@@ -11,6 +11,8 @@ import struct
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import numpy as np
+
 from drone_sim.vrep_files.errors import VrepFileError
 
 _MARKERS = (b"EOO", b"NXT", b"EOF")
@@ -65,7 +67,7 @@ class Level:
         if data is not None:
             return unpack(f"<{count}d", data, double)
         data = self.find(single)
-        return None if data is None else unpack(f"<{count}f", data, single)
+        return None if data is None else singles(f"<{count}f", data, single)
 
     def text(self, tag: str) -> str:
         """Return a text, '' where there is none. Raises VrepFileError."""
@@ -112,6 +114,11 @@ def unpack(form: str, data: bytes, tag: str) -> tuple:
     except struct.error:
         need = struct.calcsize(form)
         raise VrepFileError(f"{tag}: {len(data)} bytes where {need} are needed") from None
+
+
+def singles(form: str, data: bytes, tag: str) -> tuple[float, ...]:
+    """Return what `unpack` does, each float32 as the shortest decimal that stands for it: 0.1, not 0.10000000149."""
+    return tuple(float(str(np.float32(value))) for value in unpack(form, data, tag))
 
 
 def finite(values: tuple[float, ...], tag: str) -> tuple[float, ...]:

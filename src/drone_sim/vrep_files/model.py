@@ -10,7 +10,8 @@ from drone_sim.mechanics.state import Pose
 
 Rgba = tuple[float, float, float, float]
 ORIGIN = Pose((0.0, 0.0, 0.0))
-_NOT_DYNAMIC, _NOT_RESPONDABLE, _INVISIBLE, _NO_SCRIPTS = 0x20, 0x40, 0x100, 0x200
+# What a model says of itself and all below it.
+NOT_DYNAMIC, NOT_RESPONDABLE, INVISIBLE, WITHOUT_SCRIPTS = 0x20, 0x40, 0x100, 0x200
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Joint:
     position: float
     limits: tuple[float, float] | None
     turn: Pose  # of a spherical one
-    lead: float  # m per rad, of a screw
+    lead: float  # m per turn, of a screw
     is_dynamic: bool
     target_velocity: float
     max_force: float

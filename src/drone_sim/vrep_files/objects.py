@@ -82,7 +82,7 @@ def _joint(own: Level) -> Kind:
     low, span = own.numbers("_mr", "Pmr", 2) or (0.0, 0.0)
     position = own.numbers("_rt", "Prt", 1) or (0.0,)
     turn = own.numbers("_st", "Jst", 4)
-    lead = own.numbers("Sld", "Jsp", 1) or (0.0,)
+    lead = own.numbers("Sld", "", 1) or [math.tau * per_radian for per_radian in own.numbers("", "Jsp", 1) or (0.0,)]
     target, force = own.numbers("_mp", "Dmp", 2) or (0.0, 0.0)
     return Joint(
         kind="screw" if kind == "revolute" and lead[0] else kind,

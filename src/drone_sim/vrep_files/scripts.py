@@ -32,7 +32,7 @@ def read_script(data: bytes, owner: int | None = None) -> Script:
         is_enabled=not switches & _DISABLED,
         language="python" if "python" in language or text.startswith("#python") else "lua",
         parameters=read_parameters(own.find("Prm")),
-        is_stock_main=kind == "main" and not switches & _OWN_MAIN,
+        is_stock_main=kind == "main" and (not switches & _OWN_MAIN or "defaultMainScript" in text),
     )
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drone_sim.vrep_files.chunks import finite, level, unpack
+import numpy as np
+
+from drone_sim.vrep_files.chunks import finite, level, singles, unpack
 from drone_sim.vrep_files.model import Settings
 
 _PRESET_STEPS = (0.2, 0.1, 0.05, 0.025, 0.01)  # s, of `Spi` 0 to 4
@@ -27,7 +29,7 @@ def with_simulation(settings: Settings, data: bytes) -> Settings:
         return replace(settings, time_step=unpack("<Q", micro, "St2")[0] / 1e6)
     seconds = own.find("Sts")
     if seconds is not None:
-        return replace(settings, time_step=finite(unpack("<f", seconds, "Sts"), "Sts")[0])
+        return replace(settings, time_step=finite(singles("<f", seconds, "Sts"), "Sts")[0])
     return settings
 
 
@@ -41,7 +43,7 @@ def with_dynamics(settings: Settings, data: bytes) -> Settings:
     engine, x, y, z, mode = unpack(f"<i3{width}i", found, "_n3")
     if own.find("_n3", "En3") is None:
         mode += 1
-    gravity = finite((x, y, z), "_n3")
+    gravity = finite((x, y, z) if width == "d" else tuple(float(str(np.float32(one))) for one in (x, y, z)), "_n3")
     step = own.numbers("_tp", "Stp", 1)
     seconds = step[0] if step is not None else _PRESET_DYNAMICS_STEP if mode < _PRESETS else None
     return replace(
