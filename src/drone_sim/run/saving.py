@@ -12,6 +12,7 @@ from drone_sim.config.types import Checked, FoundFile, ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics import frames
 from drone_sim.run.parameters import Parameters
+from drone_sim.scene import state_now
 from drone_sim.scene.scene import Scene
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -59,13 +60,7 @@ def _named(said: Any, folder: Path) -> dict[str, Any]:
 
 
 def _objects(scene: Scene, folder: Path) -> list[dict[str, Any]]:
-    saved = []
-    for one, body in zip(scene.parameters.objects, scene.bodies):
-        values = _plain(one, folder)
-        values["position"] = list(body.state.position)
-        values["rpy"] = list(frames.to_rpy(body.matrix))
-        saved.append(values)
-    return saved
+    return [{**_plain(one, folder), **now} for one, now in zip(scene.parameters.objects, state_now.of_all(scene))]
 
 
 def _plain(values: Checked, folder: Path) -> dict[str, Any]:
@@ -74,6 +69,8 @@ def _plain(values: Checked, folder: Path) -> dict[str, Any]:
     for key in ("file", "texture"):
         if plain.get(key):
             plain[key] = _file_name(getattr(values, key), folder)
+    if "parts" in plain:  # of a compound
+        plain["parts"] = [_plain(one, folder) for one in getattr(values, "parts")]  # noqa: B009
     return plain
 
 

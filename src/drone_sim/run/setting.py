@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import itertools
 
+import numpy as np
+
 from drone_sim.config.types import ParameterError
+from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting.api.signals import Signals
@@ -31,8 +35,7 @@ class Setting:
         self._blades_shown = -1  # the world's changes, when they were
         try:
             self._empty_tree()
-            self.scene = Scene(parameters.scene, self.world)
-            shared.names.update(self.scene.names())
+            self.scene = Scene(parameters.scene, self.world, self._look, shared.names)
             for one in parameters.fleet:
                 self._put(one)
             self._name_objects()
@@ -108,6 +111,11 @@ class Setting:
         if overlaps > MAX_OVERLAPS:
             said = f"{overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may"
             raise ParameterError(f"scene/objects: {said}")
+
+    def _look(self, kind: str, camera: Intrinsics, pose: Matrix) -> np.ndarray:
+        """Take a picture for a vision sensor of the scene; see scene.kinds.kind.Look."""
+        self._show_blades()
+        return self.shared.vision.picture(kind, camera, np.reshape((*pose, 0, 0, 0, 1), (4, 4)))
 
     def _show_blades(self) -> None:
         """Turn the blades of all vehicles in the world's pictures to where they are, once for all cameras."""

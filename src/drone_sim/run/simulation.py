@@ -256,9 +256,14 @@ class Simulation:
         wrenches = {}
         for vehicle in vehicles:
             wrenches[vehicle.body.number] = vehicle.wrench()
+        scene = self.scene
+        if scene.carries:
+            scene.follow()
         self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
         for vehicle in vehicles:
             vehicle.body.refresh()
+        if scene.carries:
+            scene.follow()
         self.steps += 1
         self._whereabouts.check(vehicles)
         for vehicle in vehicles:
@@ -285,7 +290,7 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying]
+        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying, self.scene]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:
