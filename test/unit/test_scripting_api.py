@@ -222,7 +222,9 @@ def test_what_cannot_be_drawn_is_refused(drawings, sim):
 
 def test_the_next_run_begins_with_nothing_drawn(tmp_path):
     script = tmp_path / "draws.py"
-    script.write_text("p = sim.addDrawingObject(sim.drawing_points, 1)\nsim.addDrawingObjectItem(p, [1, 2, 3])")
+    script.write_text(
+        "def sysCall_init():\n    sim.addDrawingObjectItem(sim.addDrawingObject(sim.drawing_points, 1), [1, 2, 3])"
+    )
     drawings = Drawings()
     simulation = Simulation(parameters.load(), script=str(script), drawings=drawings)
     assert len(drawings.objects) == 1

@@ -23,6 +23,8 @@ from drone_sim.config.types import (
     readable_key,
 )
 from drone_sim.files.resources import resolve
+from drone_sim.scene import attached_scripts
+from drone_sim.scene.attached_scripts import AttachedScripts
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.kinds import KINDS
 from drone_sim.scene.object_parameters import SHAPES
@@ -53,6 +55,7 @@ class SceneParameters(Checked):
     magnetic_field: MagneticField
     floor: FloorParameters
     objects: Annotated[list[_Object], Field(max_length=MAX_OBJECTS)]
+    scripts: AttachedScripts
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several objects at once."""
@@ -64,6 +67,7 @@ class SceneParameters(Checked):
         for index, one in enumerate(self.objects):
             if _is_above_itself(one, entries):
                 raise _refused(index, "parent", one.parent, f"'{one.name}' would be its own ancestor")
+        attached_scripts.check(self.scripts)
 
 
 def _refused(index: int, key: str, value: str, why: str) -> ParameterError:
@@ -105,7 +109,8 @@ def from_content(content: dict[str, Any], folder: Path) -> dict[str, Any]:
 def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
     """Let the file names among `scene` and `drone` lead to files in a folder."""
     scene = values.get("scene")
-    places = [scene.get("floor"), *_listed(scene.get("objects"))] if isinstance(scene, dict) else []
+    inside = scene if isinstance(scene, dict) else {}
+    places = [inside.get("floor"), *_listed(inside.get("objects")), *_listed(inside.get("scripts"))]
     vehicles = values.get("vehicles")
     entries = vehicles.values() if isinstance(vehicles, dict) else ()
     for place in (values.get("drone"), *places, *entries):

@@ -65,12 +65,50 @@ _PARTICLES = {
     "particle_water": 0x8000,
     "particle_painttag": 0x10000,
 }
-_CALL_TYPES = {
-    "childscriptcall_initialization": 0,
-    "childscriptcall_actuation": 1,
-    "childscriptcall_sensing": 2,
-    "childscriptcall_cleanup": 3,
+_CALLBACKS = {
+    "syscb_threadmain": -1,
+    "syscb_thread": -1,
+    "syscb_cleanup": 1,
+    "syscb_init": 2,
+    "syscb_nonsimulation": 3,
+    "syscb_beforesimulation": 4,
+    "syscb_aftersimulation": 5,
+    "syscb_actuation": 6,
+    "syscb_sensing": 7,
+    "syscb_suspended": 8,
+    "syscb_suspend": 9,
+    "syscb_resume": 10,
 }
+_CALL_TYPES = {  # V-REP 3.5 has made the older names mean the same
+    "childscriptcall_initialization": _CALLBACKS["syscb_init"],
+    "childscriptcall_actuation": _CALLBACKS["syscb_actuation"],
+    "childscriptcall_sensing": _CALLBACKS["syscb_sensing"],
+    "childscriptcall_cleanup": _CALLBACKS["syscb_cleanup"],
+    "childscriptcall_threaded": _CALLBACKS["syscb_threadmain"],
+}
+_SCRIPTS = {
+    "scripttype_mainscript": 0,
+    "scripttype_childscript": 1,
+    "scripttype_addonscript": 2,
+    "scripttype_customizationscript": 6,
+    "scripttype_main": 0,
+    "scripttype_simulation": 1,
+    "scripttype_customization": 6,
+}
+_STATES = {
+    "simulation_stopped": 0,
+    "simulation_paused": 8,
+    "simulation_advancing": 16,
+    "simulation_advancing_firstafterstop": 16,
+    "simulation_advancing_running": 17,
+    "simulation_advancing_lastbeforepause": 18,
+    "simulation_advancing_firstafterpause": 19,
+    "simulation_advancing_abouttostop": 20,
+    "simulation_advancing_lastbeforestop": 21,
+}
+RUNNING = _STATES["simulation_advancing_running"]
+ABOUT_TO_STOP = _STATES["simulation_advancing_abouttostop"]
+LAST_BEFORE_STOP = _STATES["simulation_advancing_lastbeforestop"]
 _OTHERS = {
     "intparam_program_version": 9,
     "dlgstyle_message": 0,
@@ -84,5 +122,14 @@ _OTHERS = {
     "verbosity_scriptinfos": 440,
 }
 
-CONSTANTS: dict[str, int] = {**_HANDLES, **_DRAWING, **_PARTICLES, **_CALL_TYPES, **_OTHERS}
-CALL_TYPES: dict[str, int] = dict(zip(PHASES, _CALL_TYPES.values()))  # of sim_call_type, by phase
+CONSTANTS: dict[str, int] = {
+    **_HANDLES,
+    **_DRAWING,
+    **_PARTICLES,
+    **_CALLBACKS,
+    **_CALL_TYPES,
+    **_SCRIPTS,
+    **_STATES,
+    **_OTHERS,
+}
+CALL_TYPES = {phase: _CALLBACKS[f"syscb_{phase}"] for phase in (*PHASES, "thread")}  # of sim_call_type, by phase

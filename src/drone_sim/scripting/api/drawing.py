@@ -27,8 +27,6 @@ _OTHERS = (
     "endDialog",
     "setObjectColor",
     "setShapeColor",
-    "setThreadSwitchTiming",
-    "setThreadAutomaticSwitch",
 )
 _IGNORED = "there is nothing to draw on; accepted and ignored"
 _GREY = (0.5, 0.5, 0.5)

@@ -33,9 +33,9 @@ class MessageBus:
     """
 
     def __init__(self, namespace: str, own_topics: Mapping[str, str] | None = None):
-        """Take the drone's namespace, such as 'drone', and topics that the drone posts itself, with their types."""
+        """Take the drone's namespace, such as 'drone' ('' is none), and topics that the drone posts itself, with their types."""
         self.backend: Backend | None = None
-        self._namespace = namespace
+        self._prefix = f"/{namespace}" if namespace else ""
         own = _OWN_TOPICS if own_topics is None else own_topics
         self._own_topics = {self._resolve(topic): kind for topic, kind in own.items()}
         self._subscriptions = Subscriptions()
@@ -126,6 +126,11 @@ class MessageBus:
 
     # ---- what the simulation calls
 
+    @property
+    def is_subscribed(self) -> bool:
+        """Whether there is any subscription."""
+        return len(self._subscriptions) > 0
+
     def post(self, topic: str, message: Any) -> None:
         """Leave a message for the next step; any thread may call it."""
         self._subscriptions.post(self._resolve(topic), message)
@@ -166,7 +171,7 @@ class MessageBus:
         return self._last_handle
 
     def _resolve(self, topic: str) -> str:
-        return topic if topic.startswith("/") else f"/{self._namespace}/{topic}"
+        return topic if topic.startswith("/") else f"{self._prefix}/{topic}"
 
 
 def _nothing() -> None:

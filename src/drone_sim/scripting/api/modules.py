@@ -16,17 +16,20 @@ from drone_sim.scripting.api.matrices import Matrices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.names import Names
 from drone_sim.scripting.api.objects import Objects
+from drone_sim.scripting.api.script_calls import ScriptCalls
 from drone_sim.scripting.api.scripts import Scripts
 from drone_sim.scripting.api.sensors import Sensors
+from drone_sim.scripting.api.threads import Threads
 from drone_sim.scripting.api.vision import VisionSensors
 
 
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
-    """Return `sim` for the script that flies a drone."""
+    """Return `sim` for a script, on what it is attached to."""
     names = Names(host)
     vision, sensors = VisionSensors(host, surroundings), Sensors(host)
-    parts = (Objects(host), Matrices(), Scripts(host, surroundings, names), vision, sensors)
-    others = (names, host.signals, Drawing(host))
+    scripts = (Scripts(host, surroundings, names), ScriptCalls(host, surroundings, names))
+    parts = (Objects(host), Matrices(), *scripts, vision, sensors)
+    others = (names, host.signals, Threads(surroundings, host.signals), Drawing(host))
     functions = {**public_functions(parts), **{name: f for one in others for name, f in one.functions().items()}}
     return Api("sim", functions, CONSTANTS, names.remember)
 

@@ -9,6 +9,7 @@ local error, type, select, next, rawget, rawset = error, type, select, next, raw
 local rawlen = rawlen or function(t) return #t end -- which knows no __len in 5.1
 local unpack = table.unpack or unpack
 local place_in_script, stop, shortcuts = sandbox.place_in_script, sandbox.stop, sandbox.shortcuts
+local api, own, counted = sandbox.api, sandbox.own, sandbox.counted
 local fresh, put = bridge.fresh, bridge.put
 local OPEN_LIST, OPEN_FIELDS, CLOSE = bridge.open_list, bridge.open_fields, bridge.close
 local DEEPEST, MOST_VALUES, MOST_BYTES = bridge.deepest, bridge.most_values, bridge.most_bytes
@@ -134,10 +135,19 @@ local function with_lists(f, name, kind_a, kind_b, kind_c, a, b, c)
   return hand_over(f, name, a, b, c)
 end
 
+-- Hand values over that nobody has asked for by a function of the API.
+function sandbox.hand_back(name, ...)
+  local write, flush = stream(name)
+  fresh()
+  for index = 1, select('#', ...) do write((select(index, ...)), 1) end
+  flush()
+  return true
+end
+
 -- Put a function of the API into a table; `name` is what messages call it.
 function sandbox.define(place, key, name, f)
   local shortcut = shortcuts[name]
-  rawset(place, key, function(a, b, c, ...)
+  api[name] = function(a, b, c, ...)
     if shortcut and c == nil then
       local result = shortcut(a, b)
       if result then return result end
@@ -157,5 +167,6 @@ function sandbox.define(place, key, name, f)
     if b ~= nil then return results(f(how, a, b)) end
     if a ~= nil then return results(f(how, a)) end
     return results(f(0))
-  end)
+  end
+  rawset(place, key, own[name] or counted(api[name]))
 end
