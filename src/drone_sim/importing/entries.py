@@ -16,6 +16,7 @@ from drone_sim.vrep_files.model import Camera, Dummy, Inertia, Joint, ProximityS
 
 _LARGEST_PICTURE = 4096  # px, of a side
 _NEAREST, _FARTHEST = 1e-4, 1e5  # m
+_LARGEST_FORCE = 1e9  # N m or N
 _LEAST_MASS, _LEAST_MOMENT = 1e-6, 1e-12
 
 
@@ -97,8 +98,11 @@ class Entries:
         if joint.limits is not None and joint.limits[0] < joint.limits[1]:
             keys["limits"] = numbers(joint.limits)
         keys["value"] = number(_between(joint.position, joint.limits))
-        if joint.is_dynamic:
-            self._report.add(one.name, "a joint that the dynamics moved: scripts can move it, nothing else does")
+        if joint.mode == "kinematic":
+            return keys
+        keys["mode"] = joint.mode
+        if joint.mode != "passive":
+            keys.update(target=number(joint.target), max_force=number(min(joint.max_force, _LARGEST_FORCE)))
         return keys
 
     def _camera(self, one: Placed) -> dict[str, Any]:

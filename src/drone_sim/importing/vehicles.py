@@ -140,7 +140,7 @@ class ImportedVehicle:
         if one.object.alias:
             keys["alias"] = one.object.alias
         if ours != DRONE:
-            keys.update(pose_keys(frames.relative(self._above(ours), one.matrix)))
+            keys.update({"position": [0.0, 0.0, 0.0], **pose_keys(frames.relative(self._above(ours), one.matrix))})
         return keys
 
     def _above(self, ours: str) -> Matrix:

@@ -61,9 +61,9 @@ class Joint:
     limits: tuple[float, float] | None
     turn: Pose  # of a spherical one
     lead: float  # m per turn, of a screw
-    is_dynamic: bool
-    target_velocity: float
-    max_force: float
+    mode: str  # kinematic, passive, velocity or position
+    target: float  # rad/s or m/s, rad or m, as the mode needs it
+    max_force: float  # N m or N
 
 
 @dataclass(frozen=True)

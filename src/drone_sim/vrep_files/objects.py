@@ -30,6 +30,7 @@ _OTHERS = {
 }  # fmt: skip
 _USED = {"pyramid": (0, 1, 2, 3), "cylinder": (0, 1, 6), "disc": (0, 1, 6, 8), "cone": (0, 1, 6, 8), "ray": (0, 1)}
 _DYNAMIC_MODE = 5
+_CYCLIC, _MOTOR, _POSITION_CONTROL = 0x01, 0x10, 0x20  # bits of a joint's `Va9`
 _DETECTABLE = 0x1F0
 SCRIPT = "SCT"
 
@@ -83,17 +84,27 @@ def _joint(own: Level) -> Kind:
     position = own.numbers("_rt", "Prt", 1) or (0.0,)
     turn = own.numbers("_st", "Jst", 4)
     lead = own.numbers("Sld", "", 1) or [math.tau * per_radian for per_radian in own.numbers("", "Jsp", 1) or (0.0,)]
-    target, force = own.numbers("_mp", "Dmp", 2) or (0.0, 0.0)
+    velocity, force = own.numbers("_mp", "Dmp", 2) or (0.0, 0.0)
+    mode, (target,) = _mode(own), own.numbers("_tp", "Dtp", 1) or (0.0,)
     return Joint(
         kind="screw" if kind == "revolute" and lead[0] else kind,
         position=position[0],
-        limits=None if own.bits("Va9") & 1 or kind == "spherical" else (low, low + span),
+        limits=None if own.bits("Va9") & _CYCLIC or kind == "spherical" else (low, low + span),
         turn=ORIGIN if turn is None else quaternion_first((*turn, 0.0, 0.0, 0.0), "_st"),
         lead=lead[0],
-        is_dynamic=own.integer("Jmd") == _DYNAMIC_MODE,
-        target_velocity=target,
-        max_force=force,
+        mode=mode,
+        target=velocity if mode == "velocity" else target,
+        max_force=abs(force),
     )
+
+
+def _mode(own: Level) -> str:
+    if own.integer("Jmd") != _DYNAMIC_MODE:
+        return "kinematic"
+    switches = own.bits("Va9")
+    if not switches & _MOTOR:
+        return "passive"
+    return "position" if switches & _POSITION_CONTROL else "velocity"
 
 
 def _dummy(own: Level) -> Kind:
