@@ -58,7 +58,9 @@ class Entries:
         assert shape is not None  # for mypy: the table says so
         moves = one.is_dynamic and not _hangs_on_a_body(one)
         if one.is_dynamic and not moves:
-            self._report.add(one.name, "hangs on another body by a joint or a force sensor: carried by it, with no mass")
+            self._report.add(
+                one.name, "hangs on another body by a joint or a force sensor: carried by it, with no mass"
+            )
         try:
             keys = form(one.name, shape, self._writer, is_solid=moves)
         except TooLarge as error:
@@ -82,7 +84,9 @@ class Entries:
         of = one.object.of
         if isinstance(of, Dummy) and of.linked >= 0:
             self._report.add(one.name, "its link to another dummy is not brought")
-        return {"kind": "dummy", "size": number(of.size)} if isinstance(of, Dummy) and of.size > 0 else {"kind": "dummy"}
+        return (
+            {"kind": "dummy", "size": number(of.size)} if isinstance(of, Dummy) and of.size > 0 else {"kind": "dummy"}
+        )
 
     def _joint(self, one: Placed) -> dict[str, Any]:
         joint = one.object.of

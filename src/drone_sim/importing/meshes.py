@@ -70,7 +70,7 @@ def _materials(surfaces: Sequence[Surface]) -> dict[Rgba, str]:
 def _obj(surfaces: Sequence[Surface], materials: dict[Rgba, str]) -> str:
     lines, first = [], 1
     for number, (rgba, material) in enumerate(materials.items()):
-        if 1 < len(materials) and number < MAX_PARTS:  # what comes after the last one that may be is of its colour
+        if len(materials) > 1 and number < MAX_PARTS:  # what comes after the last one that may be is of its colour
             lines.append(f"usemtl {material}")
         for mesh, matrix in (one for one in surfaces if one[0].color == rgba):
             vertices = moved(mesh.vertices, matrix)

@@ -1,4 +1,4 @@
-"""The scripts of a quadricopter's propellers: V-REP's own are what the built-in law does, others are brought as they are."""
+"""The scripts of a quadricopter's propellers: for V-REP's own the built-in law stands in, others are brought."""
 
 from __future__ import annotations
 

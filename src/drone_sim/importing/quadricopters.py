@@ -73,7 +73,10 @@ def _bodies(link: Placed) -> list[Placed]:
 
 
 def _says_propeller(one: Placed, scripts: Mapping[int, Sequence[Script]]) -> bool:
-    own = [*one.object.parameters, *(pair for script in scripts.get(one.object.handle, ()) for pair in script.parameters)]
+    own = [
+        *one.object.parameters,
+        *(pair for script in scripts.get(one.object.handle, ()) for pair in script.parameters),
+    ]
     return bool(_PROPELLER.search(one.object.name)) or any(name == "particleVelocity" for name, _ in own)
 
 
@@ -89,7 +92,7 @@ def _are_equal(bodies: Sequence[Placed]) -> bool:
 
 
 def _by_number(root: Placed, chosen: Sequence[tuple[Placed, Placed]]) -> dict[int, tuple[Placed, Placed]] | None:
-    """Return them as propellers 1 to 4: by the numbers in their names, or by where they are; None where neither tells."""
+    """Return them as propellers 1 to 4: by the numbers in their names, or by where they are; None for neither."""
     for which in (1, 0):
         numbers = [_NUMBER.search(plain_name(pair[which])) for pair in chosen]
         by_name = {int(match.group(1)): pair for match, pair in zip(numbers, chosen) if match}

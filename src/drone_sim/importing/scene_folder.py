@@ -87,7 +87,8 @@ class _Import:
     # ---- the world
 
     def _world(self) -> dict[str, Any]:
-        settings, world = self._file.settings, {}
+        settings = self._file.settings
+        world: dict[str, Any] = {}
         step = settings.time_step or _STEP
         step = number(min(max(step, 1e-3), 1.0))
         if step != _STEP:

@@ -26,7 +26,11 @@ from drone_sim.vrep_files.model import Camera, Joint, Script
 
 _OWN_CAMERAS = {"FrontVision": "front", "DepthVision": "depth", "TrackCam": "track", "FloorVision": "floor"}
 _FROM_SENSOR = (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # x forward, y left, z up, in its axes
-_BY_NAME = {"track_base": TRACK_BASE, "floorcamera": "Quadricopter_floorCamera", "frontcamera": "Quadricopter_frontCamera"}
+_BY_NAME = {
+    "track_base": TRACK_BASE,
+    "floorcamera": "Quadricopter_floorCamera",
+    "frontcamera": "Quadricopter_frontCamera",
+}
 
 
 class ImportedVehicle:
@@ -68,7 +72,9 @@ class ImportedVehicle:
     def _sorted(self) -> tuple[list[Placed], list[Placed], list[Placed]]:
         """Return further bodies tied to it, what is only seen, and its vision sensors."""
         own = {id(one) for one in self.objects.values()}
-        parts, looks, cameras = [], [], []
+        parts: list[Placed] = []
+        looks: list[Placed] = []
+        cameras: list[Placed] = []
         for one in self.quadricopter.inside():
             if id(one) in own or not self.carries(one):
                 continue
@@ -85,7 +91,11 @@ class ImportedVehicle:
         here: Placed | None = one
         while here is not None and here is not self.root:
             above = here.above
-            if here.is_dynamic and above is not None and not (above.is_force_sensor or isinstance(above.object.of, Joint)):
+            if (
+                here.is_dynamic
+                and above is not None
+                and not (above.is_force_sensor or isinstance(above.object.of, Joint))
+            ):
                 return False
             here = above
         return one is not self.quadricopter.target and self.quadricopter.target not in one.between(self.root)
@@ -183,7 +193,11 @@ def suffixes(found: Sequence[Quadricopter]) -> list[int]:
     given: list[int] = []
     for one in found:
         wanted = split(one.root.object.name)[1]
-        given.append(wanted if wanted not in given else next(free for free in range(len(found) + max(given) + 2) if free not in given))
+        given.append(
+            wanted
+            if wanted not in given
+            else next(free for free in range(len(found) + max(given) + 2) if free not in given)
+        )
     return given
 
 

@@ -12,8 +12,7 @@ from drone_sim.config.types import Checked, FoundFile, ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics import frames
 from drone_sim.run.parameters import Parameters
-from drone_sim.scene import state_now
-from drone_sim.scene import scene_parameters
+from drone_sim.scene import scene_parameters, state_now
 from drone_sim.scene.scene import Scene
 from drone_sim.vehicles.vehicle import Vehicle
 

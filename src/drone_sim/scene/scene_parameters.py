@@ -99,9 +99,7 @@ def read(file: str) -> dict[str, Any]:
 
 def from_content(content: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return what `read` does, of a scene file's content."""
-    scene = {
-        key: value for key, value in content.items() if key not in BESIDE
-    }  # the unknown are refused with the rest
+    scene = {key: value for key, value in content.items() if key not in BESIDE}  # the unknown are refused with the rest
     found = {"scene": scene, **{key: content[key] for key in BESIDE if key in content}}
     find_files_beside(folder, found)
     return found

@@ -7,7 +7,7 @@ from drone_sim.mechanics.frames import Matrix, from_rpy
 
 
 class ObjectPlace(Checked):
-    """Another name and alias (without a suffix being added), parent ('' is the world) and place (m, rad) in its frame."""
+    """Another name, to which no suffix is added, alias, parent ('' is the world), and place (m, rad) in its frame."""
 
     name: Label = ""
     alias: Label = ""

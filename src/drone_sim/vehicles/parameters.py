@@ -92,7 +92,7 @@ class PlaceParameters(Checked):
     yaw: Angle
     tilt: Annotated[tuple[Angle, Angle], Field(description="2 numbers, [roll, pitch] in rad")] = (0.0, 0.0)
     suffix: Annotated[int, Within(NO_SUFFIX, 1_000_000)] | None = None
-    objects: Annotated[dict[Label, ObjectPlace], AfterValidator(_own)] = {}
+    objects: Annotated[dict[Label, ObjectPlace], AfterValidator(_own)] = Field(default_factory=dict)
 
 
 class DroneParameters(PlaceParameters):

@@ -48,7 +48,15 @@ def joint(number: int) -> str:
 
 
 _PROPELLERS = [name(n) for n in (1, 2, 3, 4) for name in ("Quadricopter_propeller{}".format, respondable, joint)]
-OWN_NAMES = (DRONE, "Quadricopter_base", TRACK_BASE, TARGET, FLOOR_CAMERA, FRONT_CAMERA, *_PROPELLERS)  # of every vehicle
+OWN_NAMES = (
+    DRONE,
+    "Quadricopter_base",
+    TRACK_BASE,
+    TARGET,
+    FLOOR_CAMERA,
+    FRONT_CAMERA,
+    *_PROPELLERS,
+)  # of every vehicle
 
 
 class QuadricopterObjects:
