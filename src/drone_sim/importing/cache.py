@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 from drone_sim.files.resources import read_bytes
-from drone_sim.importing.naming import word
+from drone_sim.importing.labels import word
 from drone_sim.importing.scene_folder import LIST, SCENE, import_file
 from drone_sim.vrep_files.container import MAX_SIZE
 from drone_sim.vrep_files.errors import VrepFileError

@@ -39,8 +39,8 @@ class Entries:
         """Return the entry of an object that hangs on `parent` ('' the world) at `local` in its frame."""
         own = self._readers.get(type(one.object.of), self._other)(one)
         keys: dict[str, Any] = {"name": one.name}
-        if one.object.alias and one.object.alias != one.name:
-            keys["alias"] = one.object.alias
+        if one.alias:
+            keys["alias"] = one.alias
         if parent:
             keys["parent"] = parent
         place = pose_keys(local)
@@ -48,7 +48,7 @@ class Entries:
 
     def frame(self, one: Placed, parent: str) -> dict[str, Any]:
         """Return an entry that is only a place on `parent`, for what is seen as a part of that."""
-        alias = {"alias": one.object.alias} if one.object.alias and one.object.alias != one.name else {}
+        alias = {"alias": one.alias} if one.alias else {}
         return {"name": one.name, **alias, "parent": parent, "kind": "dummy"}
 
     # ---- shapes

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from drone_sim.files import writing
-from drone_sim.importing.naming import word
+from drone_sim.importing.labels import word
 
 
 class Folder:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from drone_sim.importing.labels import label
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.vrep_files.model import (
@@ -32,6 +33,12 @@ class Placed:
     visible_layers: int
     name: str = ""  # in the scene that is written
     children: list[Placed] = field(default_factory=list)
+
+    @property
+    def alias(self) -> str:
+        """Its alias where that says more than its name, '' otherwise."""
+        alias = label(self.object.alias)
+        return alias if alias != self.name else ""
 
     @property
     def local(self) -> Matrix:

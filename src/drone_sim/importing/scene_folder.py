@@ -29,6 +29,7 @@ from drone_sim.vrep_files.reading import read_file
 
 SCENE, LIST = "scene.yaml", "IMPORT.txt"
 _STEP, _SUB_STEP, _GRAVITY = 0.05, 0.005, -9.81  # which a scene file need not say
+_FARTHEST = 1e5  # m
 _ONLY_LOOKED_THROUGH = ("light", "graph")
 
 
@@ -96,7 +97,7 @@ class _Import:
         wanted = settings.dynamics_step or _SUB_STEP
         sub_step = step / max(1, round(step / min(max(wanted, 1e-4), step)))
         if abs(sub_step - _SUB_STEP) > 1e-9:
-            world["sub_step"] = sub_step
+            world["sub_step"] = number(sub_step, 12)
         if settings.gravity is not None and abs(settings.gravity[2] - _GRAVITY) > 1e-6:
             world["gravity"] = number(settings.gravity[2])
         if settings.gravity is not None and any(settings.gravity[:2]):
@@ -178,6 +179,9 @@ class _Import:
         kept: set[int] = set()
         for one in reversed(self._objects):  # children first
             if id(one) in without:
+                continue
+            if not all(abs(value) < _FARTHEST for value in frames.position(one.matrix)):
+                self._report.add(one.name, f"is left out: it is more than {_FARTHEST / 1e3:g} km away")
                 continue
             has_kept = any(id(child) in kept for child in one.children)
             is_asked_for = self._is_mentioned(one) or bool(self._scripts.get(one.object.handle))

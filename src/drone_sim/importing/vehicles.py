@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from drone_sim.importing.folder import Folder
+from drone_sim.importing.labels import label, word
 from drone_sim.importing.meshes import MeshWriter
-from drone_sim.importing.naming import word
 from drone_sim.importing.numbers import number, numbers, pose_keys
 from drone_sim.importing.placing import Placed
 from drone_sim.importing.propeller_scripts import built_in_law
@@ -148,7 +148,7 @@ class ImportedVehicle:
         """Return how one of its objects is called, and where it is on what it hangs on in ours."""
         keys: dict[str, Any] = {"name": one.name}
         if one.object.alias:
-            keys["alias"] = one.object.alias
+            keys["alias"] = label(one.object.alias)
         if ours != DRONE:
             keys.update({"position": [0.0, 0.0, 0.0], **pose_keys(frames.relative(self._above(ours), one.matrix))})
         return keys
