@@ -12,10 +12,13 @@ from drone_sim.scripting.api.calls import Api, public_functions
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.drawing import Drawing
 from drone_sim.scripting.api.host import Host, Surroundings
+from drone_sim.scripting.api.joints import Joints
 from drone_sim.scripting.api.matrices import Matrices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.names import Names
 from drone_sim.scripting.api.objects import Objects
+from drone_sim.scripting.api.paths import Paths
+from drone_sim.scripting.api.proximity import ProximitySensors
 from drone_sim.scripting.api.script_calls import ScriptCalls
 from drone_sim.scripting.api.scripts import Scripts
 from drone_sim.scripting.api.sensors import Sensors
@@ -26,9 +29,10 @@ from drone_sim.scripting.api.vision import VisionSensors
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
     """Return `sim` for a script, on what it is attached to."""
     names = Names(host)
+    of_the_scene = (Joints(host), ProximitySensors(host), Paths(host))
     vision, sensors = VisionSensors(host, surroundings), Sensors(host)
     scripts = (Scripts(host, surroundings, names), ScriptCalls(host, surroundings, names))
-    parts = (Objects(host), Matrices(), *scripts, vision, sensors)
+    parts = (Objects(host), *of_the_scene, Matrices(), *scripts, vision, sensors)
     others = (names, host.signals, Threads(surroundings, host.signals), Drawing(host))
     functions = {**public_functions(parts), **{name: f for one in others for name, f in one.functions().items()}}
     return Api("sim", functions, CONSTANTS, names.remember)

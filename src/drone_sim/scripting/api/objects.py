@@ -9,7 +9,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import WrongValue, numbers
 from drone_sim.scripting.api.host import Host
-from drone_sim.scripting.api.types import FourNumbers, Handle, Number, SevenNumbers, ThreeNumbers, TwelveNumbers
+from drone_sim.scripting.api.types import FourNumbers, Handle, SevenNumbers, ThreeNumbers, TwelveNumbers
 
 
 class Objects:
@@ -112,14 +112,6 @@ class Objects:
         shape = self._objects[handle]
         x, y, z = frames.rotate(shape.matrix(), _vector(force))
         self._host.add_force(shape.name, (x, y, z), (0.0, 0.0, 0.0), _vector(position))
-
-    def setJointPosition(self, handle: Handle, position: Number) -> None:
-        """Turn the blades of a propeller to an angle (rad): looks only."""
-        self._host.turn_joint(self._objects[handle].name, float(position))
-
-    def getJointPosition(self, handle: Handle) -> float:
-        """Return the angle of a propeller's blades (rad)."""
-        return self._host.turn_joint(self._objects[handle].name, None)
 
 
 def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[float, ...]]:

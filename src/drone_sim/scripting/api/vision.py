@@ -7,13 +7,24 @@ step, or as of now where nobody has looked since.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.types import Handle
+
+
+@runtime_checkable
+class Eye(Protocol):
+    """A vision sensor of the scene."""
+
+    def picture(self, kind: str) -> np.ndarray:
+        """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane."""
 
 
 class VisionSensors:
@@ -51,11 +62,18 @@ class VisionSensors:
         return 0
 
     def _picture(self, handle: int) -> np.ndarray:
-        name = self._objects[handle].name
+        found = self._objects[handle]
+        name = found.name
+        if isinstance(found, Eye):  # of the scene
+            return self._outside(partial(found.picture, "color"))
         if name not in self._pictures:
-            known = ", ".join(self._pictures) or "none"
+            known = ", ".join([*self._pictures, *_eyes(self._objects)]) or "none"
             raise WrongValue(f"'{name}' is not a vision sensor; there are: {known}")
         picture = self._outside(self._pictures[name])  # not the script's time; the first picture compiles shaders
         if picture.ndim != 3 or picture.dtype != np.uint8:
             raise WrongValue(f"'{name}' sees no colours")
         return picture
+
+
+def _eyes(objects: ObjectTree) -> Iterator[str]:
+    return (objects[handle].name for handle in objects if isinstance(objects[handle], Eye))
