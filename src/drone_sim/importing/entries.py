@@ -143,7 +143,7 @@ class Entries:
 
     def _other(self, one: Placed) -> dict[str, Any]:
         kind = getattr(one.object.of, "kind", "object")
-        if kind not in ("force sensor", "light"):
+        if kind not in ("force sensor", "light", "script"):
             self._report.add(one.name, f"a {kind}: only its place is brought")
         return {"kind": "dummy"}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from drone_sim.importing.labels import label
@@ -72,11 +72,12 @@ class Placed:
         """Whether it is a rigid link."""
         return isinstance(self.object.of, Other) and self.object.of.kind == "force sensor"
 
-    def subtree(self) -> Iterator[Placed]:
-        """Yield it and all that hangs on it."""
+    def subtree(self, without: Collection[Placed] = ()) -> Iterator[Placed]:
+        """Yield it and all that hangs on it, but for some objects and what hangs on those."""
         yield self
         for child in self.children:
-            yield from child.subtree()
+            if child not in without:
+                yield from child.subtree(without)
 
     def between(self, ancestor: Placed) -> list[Placed]:
         """Return what lies between an ancestor and this, from below upwards, without the two."""

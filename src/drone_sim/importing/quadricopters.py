@@ -41,21 +41,22 @@ class Quadricopter:
     propellers: tuple[Propeller, ...]
     base: Placed | None
     target: Placed | None
+    others: frozenset[Placed]  # bodies of other quadricopters, which may hang on this one
 
     def inside(self) -> Iterator[Placed]:
-        """Yield it and all that hangs on it, in the order of the tree."""
-        return self.root.subtree()
+        """Yield it and all that hangs on it, other quadricopters aside, in the order of the tree."""
+        return self.root.subtree(without=self.others)
 
 
 def find(objects: Sequence[Placed], scripts: Mapping[int, Sequence[Script]]) -> list[Quadricopter]:
     """Return the quadricopters, in the order of the file; `scripts` are by the handle of their object."""
-    found: list[Quadricopter] = []
-    for one in objects:
-        if one.is_dynamic and not any(one in other.inside() for other in found):
-            propellers = _propellers(one, scripts)
-            if propellers is not None:
-                found.append(Quadricopter(one, propellers, _base(one), _target(one)))
-    return found
+    built = {one: _propellers(one, scripts) for one in objects if one.is_dynamic}
+    roots = frozenset(one for one, propellers in built.items() if propellers is not None)
+    return [
+        Quadricopter(one, propellers, _base(one), _target(one, roots - {one}), roots - {one})
+        for one, propellers in built.items()
+        if propellers is not None
+    ]
 
 
 def _propellers(root: Placed, scripts: Mapping[int, Sequence[Script]]) -> tuple[Propeller, ...] | None:
@@ -121,9 +122,11 @@ def _base(root: Placed) -> Placed | None:
     return next((one for one in dummies if plain_name(one).lower().endswith("base")), None)
 
 
-def _target(root: Placed) -> Placed | None:
+def _target(root: Placed, others: frozenset[Placed]) -> Placed | None:
     """Return the target that hangs on it."""
-    below = [one for one in root.subtree() if one is not root and _TARGET.search(one.object.alias or one.object.name)]
+    below = [
+        one for one in root.subtree(others) if one is not root and _TARGET.search(one.object.alias or one.object.name)
+    ]
     return next((one for one in below if not one.is_dynamic), None)
 
 

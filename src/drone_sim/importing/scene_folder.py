@@ -57,6 +57,7 @@ class _Import:
         self._writer = MeshWriter(folder)
         self._script_files = ScriptFiles(folder)
         self._objects = placed(file)
+        self._by_handle = {one.object.handle: one for one in self._objects}
         self._floor = floor_parts(self._objects)
         self._scripts = self._child_scripts()
         found = find(self._objects, self._scripts)
@@ -115,10 +116,9 @@ class _Import:
 
     def _child_scripts(self) -> Mapping[int, list[Script]]:
         """Return the child scripts that run, by the handle of their object."""
-        by_handle = {one.object.handle: one for one in self._objects}
         found: dict[int, list[Script]] = defaultdict(list)
         for script in self._file.scripts:
-            on = by_handle.get(script.object)
+            on = self._by_handle.get(script.object)
             if on in self._floor:
                 continue
             name = on.object.name if on is not None else ""
@@ -150,10 +150,17 @@ class _Import:
             if own and id(one) not in kept:
                 self._report.add(one.name, "its child script is not brought: neither is the object")
                 continue
-            for script in own[1:] if id(one) in roots else own:
-                entry = {"object": one.name, "script": self._script_files.write(one.name, script)}
-                parameters = values(script.parameters or one.object.parameters)
-                yield {**entry, "parameters": parameters} if parameters else entry
+            for index, script in enumerate(own):
+                on = one if index == 0 else self._by_handle.get(script.own_object)
+                if on is None:
+                    self._report.add(one.name, "has a second child script: not brought")
+                elif index > 0 or id(one) not in roots:
+                    yield self._entry_of(script, on)
+
+    def _entry_of(self, script: Script, on: Placed) -> dict[str, Any]:
+        entry = {"object": on.name, "script": self._script_files.write(on.name, script)}
+        parameters = values(script.parameters or on.object.parameters)
+        return {**entry, "parameters": parameters} if parameters else entry
 
     # ---- objects
 
@@ -176,6 +183,7 @@ class _Import:
         without = {id(one) for one in self._floor} | self._of_vehicles
         without |= {id(one) for vehicle in self._vehicles for one in vehicle.cameras}
         seen = {id(one) for vehicle in self._vehicles for one in (*vehicle.parts, *vehicle.looks)}
+        seconds = {self._by_handle.get(two.own_object) for several in self._scripts.values() for two in several[1:]}
         kept: set[int] = set()
         for one in reversed(self._objects):  # children first
             if id(one) in without:
@@ -184,7 +192,7 @@ class _Import:
                 self._report.add(one.name, f"is left out: it is more than {_FARTHEST / 1e3:g} km away")
                 continue
             has_kept = any(id(child) in kept for child in one.children)
-            is_asked_for = self._is_mentioned(one) or bool(self._scripts.get(one.object.handle))
+            is_asked_for = self._is_mentioned(one) or bool(self._scripts.get(one.object.handle)) or one in seconds
             if has_kept or is_asked_for or not (id(one) in seen or self._is_idle(one)):
                 kept.add(id(one))
         return self._as_many_as_may_be(kept)

@@ -104,9 +104,12 @@ class ImportedVehicle:
         camera = one.object.of
         if not isinstance(camera, Camera) or camera.resolution is None or not camera.is_perspective:
             return False
-        is_rigid = not any(isinstance(each.object.of, Joint) for each in one.between(self.root))
+        if one.object.handle in self._scripts or one.above not in (self.root, self.quadricopter.base):
+            return False  # paths, or scripts, find it in another place of the tree than a vehicle's cameras have
         plain, suffix = split(one.object.name)
-        return is_rigid and suffix == self.suffix and re.fullmatch(r"[A-Za-z]\w{0,50}", plain, re.ASCII) is not None
+        if one.object.alias not in ("", plain):
+            return False
+        return suffix == self.suffix and re.fullmatch(r"[A-Za-z]\w{0,50}", plain, re.ASCII) is not None
 
     # ---- the entry
 

@@ -110,7 +110,7 @@ Kind = Shape | Joint | Dummy | Camera | ProximitySensor | Other
 
 @dataclass(frozen=True)
 class Script:
-    """A script on an object (its handle; -1 for the main script)."""
+    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own."""
 
     object: int
     kind: str  # main, child or customization, or another's number
@@ -120,6 +120,7 @@ class Script:
     language: str = "lua"
     parameters: tuple[tuple[str, str], ...] = ()
     is_stock_main: bool = False
+    own_object: int = -1  # handle of the script as an object, -1 where it is none
 
 
 @dataclass(frozen=True)

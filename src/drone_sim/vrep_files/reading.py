@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 from drone_sim.files.resources import read_bytes
@@ -67,7 +68,7 @@ def _script_in(tag: str, data: bytes, one: SceneObject) -> list[Script]:
     if found is None:
         return []
     with within(f"object {one.name}"):
-        return [read_script(found, owner=one.parent)]
+        return [replace(read_script(found, owner=one.parent), own_object=one.handle)]
 
 
 def _tree(objects: list[SceneObject]) -> tuple[SceneObject, ...]:
