@@ -9,6 +9,7 @@ from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.time_limit import TimeLimit
 
@@ -20,6 +21,7 @@ class Scene:
 
     def __init__(self, shown=True):
         self.objects, self.signals, self.drawings = ObjectTree(), Signals(), Drawings(shown)
+        self.scripts = Scripts()
         self.objects.add("Floor", also=("ResizableFloor_5_25",))
 
 
@@ -43,6 +45,9 @@ class Drone:
             self.own_script: {"gain": 2.0, **(own or {})},
             respondable: {"particleVelocity": 0.0},
         }
+        self.scripts = scene.scripts
+        for name, parameters in self.script_parameters.items():
+            self.scripts.add(name, parameters, is_law=name != self.own_script)
         self.forces = []
         self.bus = MessageBus(self.own_script)
 

@@ -109,7 +109,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: [", "scene.yaml: while parsing"),
         (
             "boxes: []",
-            "scene.yaml: line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, vehicles",
+            "line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, scripts, vehicles",
         ),
         ("1: 2", "key '1' must be a text (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
@@ -193,7 +193,7 @@ objects:
     first, *others = str(refused.value).split("; line ")
     assert first == f"{file}: line 1: parameter floor/size = 'a': input should be a valid number"
     assert others == [
-        "2: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, vehicles",
+        "2: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, scripts, vehicles",
         "4: parameter drone/position = [1, 2]: must be 3 numbers, [x, y, z] in m",
         "5: parameter drone/yam: unknown key; known are yaw",
         "9: parameter objects/0/color = [1, 0]: must be 3 or 4 numbers from 0 to 1, "

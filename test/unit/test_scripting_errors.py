@@ -203,7 +203,7 @@ def test_memory_is_limited(tmp_path):
 
 def test_the_limit_can_be_switched_off(tmp_path):
     path = tmp_path / "script.py"
-    path.write_text("import time\ntime.sleep(0.3)", encoding="utf-8")
+    path.write_text("import time\ntime.sleep(0.3)\ndef sysCall_init(): pass", encoding="utf-8")
     simulation = Simulation(parameters.load({"script_time_limit": 0}), script=str(path))
     simulation.close()
 

@@ -192,6 +192,7 @@ def test_python_packages_and_names_within(write, simulate, printed):
 @pytest.mark.parametrize("first", ["", "from __future__ import annotations\n"])
 def test_dataclasses_work_in_a_script(write, simulate, printed, first):
     text = "from dataclasses import dataclass\n@dataclass\nclass Gain:\n    value: float = 7\nprint(Gain(8).value)\n"
+    text += "def sysCall_init():\n    pass\n"
     simulate(write("script.py", f"{first}{text}"))
     assert printed() == ["8"]
 

@@ -111,7 +111,8 @@ def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue):
         "sim.setScriptSimulationParameter(sim.handle_self, 'product', sim.multiplyVector(m, v))\n"
         "sim.setScriptSimulationParameter(sim.handle_self, 'inverse', sim.getMatrixInverse(m))\n"
         "assert(not pcall(sim.multiplyVector, m, {1, 2, 0/0}) and not pcall(sim.getMatrixInverse, {}))\n"
-        "assert(sim.multiplyVector({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, {1, 2, 3})[3] == 3)"
+        "assert(sim.multiplyVector({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, {1, 2, 3})[3] == 3)\n"
+        "function sysCall_init() end"
     )
     path = tmp_path / "script.lua"
     path.write_text(source, encoding="utf-8")

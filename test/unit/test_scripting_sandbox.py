@@ -64,7 +64,7 @@ def _run(tmp_path, caplog):
     def run(source):
         caplog.clear()
         path = tmp_path / "script.lua"
-        path.write_text(source, encoding="utf-8")
+        path.write_text(f"{source}\nfunction sysCall_init() end", encoding="utf-8")
         with caplog.at_level(logging.INFO):
             Simulation(parameters.load(), script=str(path)).close()
         return [record.getMessage() for record in caplog.records if record.name == "drone_sim.script"]

@@ -122,8 +122,10 @@ def test_scripts_are_the_own_drones(drones):
     assert propeller == sim.getScriptHandle("Quadricopter_propeller_respondable1#0")
     assert sim.getObjectName(sim.getObjectAssociatedWithScript(propeller)) == "Quadricopter_propeller_respondable1#0"
     assert sim.getObjectName(sim.getObjectAssociatedWithScript(sim.handle_self)) == "Drone#0"
-    with pytest.raises(ValueError, match="no script is attached to 'Quadricopter_propeller_respondable1'"):
-        sim.getScriptHandle("Quadricopter_propeller_respondable1#")
+    other = sim.getScriptHandle("Quadricopter_propeller_respondable1#")
+    assert sim.getObjectName(sim.getObjectAssociatedWithScript(other)) == "Quadricopter_propeller_respondable1"
+    with pytest.raises(ValueError, match="no script is attached to 'Floor'; known are Drone"):
+        sim.getScriptHandle("Floor")
 
 
 def test_forces_act_on_the_own_drone(drones):

@@ -133,9 +133,9 @@ def test_a_stopped_script_has_no_snapshots(tmp_path):
 
 
 def test_the_time_between_calls_is_not_the_scripts(tmp_path):
-    """A script without phases, and a snapshot after a pause, have no old deadline over them."""
+    """A script with nothing to do in a step, and a snapshot after a pause, have no old deadline over them."""
     path = tmp_path / "script.lua"
-    path.write_text("x = {} for i = 1, 20000 do x[i] = {i} end", encoding="utf-8")
+    path.write_text("x = {} for i = 1, 20000 do x[i] = {i} end function sysCall_init() end", encoding="utf-8")
     simulation = Simulation(parameters.load({"script_time_limit": 5}), script=str(path))
     simulation.drone.script._limit._deadline = 0.0  # as after a long pause
     for _ in range(5):

@@ -65,11 +65,11 @@ def test_a_name_of_the_scripts_own_is_its_own(load, caplog, ending, name):
 
 @ENDINGS
 def test_what_coppeliasim_calls_and_nobody_here_is_said_once(load, caplog, ending):
-    said, path = load(ending, "".join(define(ending, f"sysCall_{name}") for name in ("init", "thread", "joint")))
+    said, path = load(ending, "".join(define(ending, f"sysCall_{name}") for name in ("init", "vision", "joint")))
     assert said == ""
     phases = "sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup are"
     assert [record.getMessage() for record in caplog.records] == [
-        f"{path}: sysCall_{name} is not called here; {phases}" for name in ("joint", "thread")
+        f"{path}: sysCall_{name} is not called here; {phases}" for name in ("joint", "vision")
     ]
 
 
@@ -82,14 +82,24 @@ def test_an_old_version_beside_the_phase_is_left_alone_but_told(load, caplog, en
     ]
 
 
+IDLE = (
+    "has none of sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup, sysCall_thread: "
+    "nothing flies the drone"
+)
+
+
 @ENDINGS
-@pytest.mark.parametrize("name, more", [("", ""), ("actuation", "; actuation would have to be sysCall_actuation")])
-def test_a_script_without_phases_says_so(load, caplog, ending, name, more):
-    said, path = load(ending, define(ending, name) if name else "")
+@pytest.mark.parametrize("name, more", [("fly", ""), ("actuation", "; actuation would have to be sysCall_actuation")])
+def test_a_script_without_phases_is_refused(load, ending, name, more):
+    said, path = load(ending, define(ending, name))
+    assert said == f"[load] {path}: {IDLE}{more}"
+
+
+@ENDINGS
+def test_an_empty_script_says_that_nothing_flies(load, caplog, ending):
+    said, path = load(ending, "")
     assert said == ""
-    (record,) = caplog.records
-    listed = "sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup"
-    assert record.getMessage() == f"{path}: has none of {listed}: nothing flies the drone{more}"
+    assert [record.getMessage() for record in caplog.records] == [f"{path}: {IDLE}"]
 
 
 @pytest.mark.parametrize("source", ["def sysCall_actuation():\n    yield", "async def sysCall_actuation():\n    pass"])

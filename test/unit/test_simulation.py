@@ -272,7 +272,7 @@ def test_a_world_with_a_window_is_filled_anew_and_flies_alike(simulate, tmp_path
 
 def test_what_a_script_held_goes_back_to_the_system(tmp_path):
     script = tmp_path / "eats.lua"
-    script.write_text("t = {}\nfor i = 1, 500000 do t[i] = {i} end\n")
+    script.write_text("t = {}\nfor i = 1, 500000 do t[i] = {i} end\nfunction sysCall_init() end\n")
     simulation = Simulation(parameters.load({"script_time_limit": 0.0}))
     simulation.start()
     before = resources()[0]

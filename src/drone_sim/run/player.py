@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.whereabouts import Diverged
+from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.errors import ScriptError
 
 _LOG = logging.getLogger(__name__)
@@ -101,7 +102,16 @@ class Player:
             self.attempt(self._step)
         except (ScriptError, Diverged):
             return False
-        return True
+        return not self.simulation.asked or self._obey(self.simulation.take_asked())
+
+    def _obey(self, asked: str) -> bool:
+        """Stop or pause, as a script asked for; return whether the simulation still runs."""
+        _LOG.info(f"a script asks to {asked}")
+        try:
+            self.stop() if asked == STOP else self.pause(True)
+        except ScriptError as error:
+            _LOG.error(f"script error: {error}")
+        return self.simulation.running
 
     def attempt(self, action: Callable[[], None]) -> None:
         """Start or step. When script or dynamics fails, log its one line, run cleanup, and raise it again."""

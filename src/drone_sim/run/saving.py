@@ -29,6 +29,8 @@ def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Ve
     content["floor"] = _plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))
     content["objects"] = _objects(scene, path.parent)
+    if own.scripts:
+        content["scripts"] = [_plain(one, path.parent) for one in own.scripts]
     text = _UNITS + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     try:
         parameters.check_scene(yaml_files.parse(text), path)
@@ -71,7 +73,7 @@ def _objects(scene: Scene, folder: Path) -> list[dict[str, Any]]:
 def _plain(values: Checked, folder: Path) -> dict[str, Any]:
     """Return them as YAML has them, their files named as a scene file in `folder` can name them."""
     plain = values.model_dump(mode="json", exclude_defaults=True)
-    for key in ("file", "texture"):
+    for key in ("file", "texture", "script"):
         if plain.get(key):
             plain[key] = _file_name(getattr(values, key), folder)
     return plain

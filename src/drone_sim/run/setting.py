@@ -6,11 +6,13 @@ import itertools
 
 from drone_sim.config.types import ParameterError
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.run.cast import Cast, tell
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
+from drone_sim.scripting.api.control import Control
+from drone_sim.scripting.api.custom_values import CustomData
+from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
-from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.shared import Shared
 from drone_sim.vehicles.vehicle import Vehicle
@@ -36,6 +38,8 @@ class Setting:
             for one in parameters.fleet:
                 self._put(one)
             self._name_objects()
+            self.cast = Cast(parameters, self.vehicles, shared)
+            self.cast.begin_anew()
             self._check()
         except BaseException:
             self.world.close()
@@ -49,34 +53,29 @@ class Setting:
         for vehicle in self.vehicles.values():
             vehicle.reset()
         self._name_objects()
+        self.cast.begin_anew()
 
     def end_scripts(self, clean_up: bool) -> None:
-        """Let go of every script; `clean_up`: call its cleanup before, whatever the others' do.
+        """Let go of every script; `clean_up`: let its thread end and call its cleanup before, whatever the others' do.
 
         Raises the first ScriptError.
         """
-        errors: list[ScriptError] = []
-        for vehicle in self.vehicles.values():
-            try:
-                if clean_up:
-                    vehicle.script.call("cleanup")
-            except ScriptError as error:
-                errors.append(error)
-            finally:
-                vehicle.close()
-        for second in errors[1:]:
-            LOG.error("%s", second)
-        if errors:
-            raise errors[0]
+        actors = self.cast.all()
+        errors = self.cast.clean_up(actors) if clean_up else []
+        for one in actors:
+            one.close()
+        tell(errors)
 
     def add(self, parameters: VehicleParameters) -> Vehicle:
         """Put one more vehicle into the world, without a script. Raises ParameterError and UrdfError."""
         vehicle = self._put(parameters)
+        self.cast.attach()
         self.world.keep_beginning_of(vehicle.body.number)
         return vehicle
 
     def remove(self, name: str) -> None:
         """Take a vehicle out of the world, and its objects out of the tree."""
+        self.cast.detach(name)
         self.vehicles.pop(name).leave()
 
     def _put(self, parameters: VehicleParameters) -> Vehicle:
@@ -92,7 +91,8 @@ class Setting:
         return next(one for one in itertools.chain([""], map("#{}".format, itertools.count())) if one not in taken)
 
     def _empty_tree(self) -> None:
-        self.shared.objects, self.shared.signals = ObjectTree(), Signals()
+        self.shared.objects, self.shared.signals, self.shared.scripts = ObjectTree(), Signals(), Scripts()
+        self.shared.control, self.shared.data = Control(), CustomData()
         self.shared.objects.add("Floor", also=("ResizableFloor_5_25",))
 
     def _name_objects(self) -> None:

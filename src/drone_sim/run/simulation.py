@@ -10,11 +10,12 @@ For example:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from drone_sim.run import memory, saving
+from drone_sim.run.cast import Actor, tell
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.setting import Setting
 from drone_sim.run.whereabouts import Whereabouts
@@ -74,6 +75,8 @@ class Simulation:
         self._era = 0  # another one whenever what is in the world has become something else
         for one in parameters.fleet:  # a script that is not there needs no world
             load.script_path(self._script_of(one))
+        for attached in parameters.scene.scripts:
+            load.script_path(attached.script)
         world = World(parameters.sub_step, parameters.gravity, gui)
         self.vision = Vision(world, parameters.samples)
         self._take(self._built(parameters, world))
@@ -137,6 +140,11 @@ class Simulation:
         self._era += 1
         self._flying = tuple(self.vehicles.values())
         self._any_between = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self._flying)
+        self._changed_scripts()
+
+    def _changed_scripts(self) -> None:
+        self._alone = not self._setting.cast.attached  # no scripts but the vehicles'
+        self._threaded = tuple(one for one in self._setting.cast.all() if one.script.threaded)
 
     # ---- what flies
 
@@ -178,7 +186,7 @@ class Simulation:
         vehicle = self._setting.add(parameters)
         try:
             if self.running:
-                vehicle.load_script(self._script_of(parameters))
+                self._load(self._setting.cast.in_order([vehicle, *self._setting.cast.of(parameters.name)]))
         except BaseException:
             self._setting.remove(parameters.name)
             raise
@@ -186,12 +194,11 @@ class Simulation:
             self._changed_vehicles()
 
     def _remove(self, name: str) -> None:
-        try:
-            if self.running:
-                self.vehicles[name].script.call("cleanup")
-        finally:
-            self._setting.remove(name)
-            self._changed_vehicles()
+        cast = self._setting.cast
+        errors = cast.clean_up(cast.in_order([self.vehicles[name], *cast.of(name)])) if self.running else []
+        self._setting.remove(name)
+        self._changed_vehicles()
+        tell(errors)
 
     # ---- start and stop
 
@@ -209,8 +216,12 @@ class Simulation:
     def _run(self) -> None:
         """Load the scripts and run their init."""
         self.running = True
-        for vehicle in self._flying:
-            vehicle.load_script(self._script_of(vehicle.parameters))
+        self._load(self._setting.cast.all())
+        self._changed_scripts()
+
+    def _load(self, actors: Iterable[Actor]) -> None:
+        for one in actors:
+            one.load_script(self._script_of(one.parameters) if isinstance(one, Vehicle) else one.file)
 
     def _script_of(self, vehicle: VehicleParameters) -> str:
         has_own = vehicle.script != self.parameters.script
@@ -239,6 +250,15 @@ class Simulation:
     # ---- stepping
 
     @property
+    def asked(self) -> str:
+        """What a script asked for since it was last taken: 'stop', 'pause' or nothing. Whoever plays this obeys."""
+        return self._setting.shared.control.asked
+
+    def take_asked(self) -> str:
+        """Return what a script asked for, and forget it."""
+        return self._setting.shared.control.take()
+
+    @property
     def run(self) -> int:
         """Number of the run: another one after every start and every stop."""
         return self._runs
@@ -249,10 +269,13 @@ class Simulation:
         return self.steps * self.parameters.time_step
 
     def step(self) -> None:
-        """Run one simulation step: actuation, dynamics, vision, sensing. Raises ScriptError and Diverged."""
+        """Run one simulation step: threads, actuation, dynamics, vision, sensing. Raises ScriptError and Diverged."""
         vehicles = self._flying
-        for vehicle in vehicles:
-            vehicle.actuation()
+        for thread in self._threaded:
+            if thread.script.threaded:
+                thread.script.take_turn()
+        for actor in vehicles if self._alone else self._setting.cast.all():
+            actor.actuation()
         wrenches = {}
         for vehicle in vehicles:
             wrenches[vehicle.body.number] = vehicle.wrench()
@@ -263,8 +286,8 @@ class Simulation:
         self._whereabouts.check(vehicles)
         for vehicle in vehicles:
             vehicle.take_pictures(self.steps)
-        for vehicle in vehicles:
-            vehicle.script.call("sensing")
+        for actor in vehicles if self._alone else self._setting.cast.all():
+            actor.script.call("sensing")
 
     def _between(self, count: int) -> None:
         """Do what is due after so many sub-steps of the step: instruments look, and forces follow."""
@@ -285,7 +308,8 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying]
+        attached = self._setting.cast.attached
+        parts: list[Any] = [shared.objects, shared.signals, shared.data, self._drawings, *self._flying, *attached]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

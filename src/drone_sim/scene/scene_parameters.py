@@ -32,6 +32,8 @@ from drone_sim.config.types import (
 from drone_sim.files.resources import resolve
 from drone_sim.mechanics.frames import from_rpy, to_quaternion
 from drone_sim.mechanics.state import Pose
+from drone_sim.scene import attached_scripts
+from drone_sim.scene.attached_scripts import AttachedScripts
 from drone_sim.shapes import SCENE_SHAPES
 from drone_sim.shapes.shape import SceneShape
 from drone_sim.wording import shown
@@ -93,6 +95,7 @@ class SceneParameters(Checked):
     magnetic_field: MagneticField
     floor: FloorParameters
     objects: Annotated[list[_Object], Field(max_length=MAX_OBJECTS)]
+    scripts: AttachedScripts
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several objects at once."""
@@ -102,6 +105,7 @@ class SceneParameters(Checked):
                 location = ("scene", "objects", index, "name")
                 raise ParameterError(f"parameter scene/objects/{index}/name = '{one.name}': comes twice", location)
             names.add(one.name)
+        attached_scripts.check(self.scripts)
 
 
 def read(file: str) -> dict[str, Any]:
@@ -129,7 +133,8 @@ def from_content(content: dict[str, Any], folder: Path) -> dict[str, Any]:
 def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
     """Let the file names among `scene` and `drone` lead to files in a folder."""
     scene = values.get("scene")
-    places = [scene.get("floor"), *_listed(scene.get("objects"))] if isinstance(scene, dict) else []
+    inside = scene if isinstance(scene, dict) else {}
+    places = [inside.get("floor"), *_listed(inside.get("objects")), *_listed(inside.get("scripts"))]
     vehicles = values.get("vehicles")
     entries = vehicles.values() if isinstance(vehicles, dict) else ()
     for place in (values.get("drone"), *places, *entries):

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from drone_sim.files.resources import resolve
 from drone_sim.scripting import source_files
 from drone_sim.scripting.api.calls import Api
+from drone_sim.scripting.api.turns import Turns
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.python.script import PythonScript
@@ -22,8 +23,21 @@ DEFAULT = "tutorial"
 class Script(Protocol):
     """A child script that is loaded."""
 
+    idle: str  # why none of its phases is ever called, '' where one is
+    is_empty: bool
+
+    @property
+    def threaded(self) -> bool:
+        """Whether it has a thread that has not ended."""
+
     def call(self, phase: str) -> None:
         """Run a phase: init, actuation, sensing or cleanup. Raises ScriptError."""
+
+    def take_turn(self) -> None:
+        """Let its thread run until it is left; raises ScriptError."""
+
+    def call_function(self, name: str, arguments: list[Any]) -> Any:
+        """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message. Raises ScriptError."""
@@ -41,8 +55,17 @@ class Script(Protocol):
 class NoScript:
     """What a drone has before a script is loaded."""
 
+    idle, is_empty, threaded = "", True, False
+
     def call(self, _phase: str) -> None:
         """Do nothing."""
+
+    def take_turn(self) -> None:
+        """Do nothing."""
+
+    def call_function(self, name: str, _arguments: list[Any]) -> Any:
+        """Raise ScriptError: there is none."""
+        raise ScriptError(name, "", 0, "no script is loaded")
 
     def callback(self, _callback: Callback, _message: Any) -> None:
         """Do nothing."""
@@ -77,15 +100,19 @@ def script_path(script: str) -> str:
         raise ScriptError("load", name, 0, str(error)) from None
 
 
-def load(script: str, modules: Mapping[str, Api], limit: TimeLimit) -> Script:
-    """Load a child script; raises ScriptError."""
+def load(script: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns | None = None) -> Script:
+    """Load a child script, whose thread has those `turns`; raises ScriptError."""
     path = script_path(script)
     try:
         source = source_files.read(path)
     except (OSError, ValueError) as error:
         raise ScriptError("load", path, 0, getattr(error, "strerror", None) or str(error)) from None
+    return _made(path, source, modules, limit, turns or Turns())
+
+
+def _made(path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns) -> Script:
     if path.endswith(".py"):
-        return PythonScript(path, source, modules, limit)
+        return PythonScript(path, source, modules, limit, turns)
     try:
         from drone_sim.scripting.lua.script import LuaScript  # whoever flies Python needs no lupa
 

@@ -11,6 +11,7 @@ from drone_sim.scripting.api.constants import PHASES
 _LOG = logging.getLogger(__name__)  # not the script's own words
 _PREFIX = "sysCall_"
 FUNCTIONS = {phase: f"{_PREFIX}{phase}" for phase in PHASES}
+THREADS = (f"{_PREFIX}thread", f"{_PREFIX}threadmain")  # of 4.3 and newer; of 4.0 to 4.2
 _PLAIN = {name.replace("_", "").lower(): name for name in FUNCTIONS.values()}
 _NEAR, _NEAR_WITHOUT_SYS = 0.75, 0.9  # of difflib's ratio
 _LONGEST = 60  # characters of a name that is looked at
@@ -20,8 +21,6 @@ _ELSEWHERE = frozenset(
     _PREFIX + name
     for name in (
         *(
-            "thread",
-            "threadmain",
             "nonSimulation",
             "realTimeIdle",
             "info",
@@ -54,20 +53,25 @@ def never_called(name: str, meant: str) -> str:
 
 
 def warn(path: str, functions: Collection[str]) -> None:
-    """Say in the log which of a script's functions are not called here, and whether any is."""
+    """Say in the log which of a script's functions are not called here."""
     for name in sorted(functions):
         if name in _ELSEWHERE:
             _LOG.warning("%s: %s is not called here; %s are", path, name, _listed())
         elif _meant(name) is not None:
             _LOG.warning("%s: %s is not called; %s is", path, name, _meant(name))
-    if not any(name in functions for name in FUNCTIONS.values()):
-        bare = [f"{name} would have to be {FUNCTIONS[name]}" for name in PHASES if name in functions]
-        _LOG.warning("%s: %s", path, "; ".join([f"has none of {_listed()}: nothing flies the drone", *bare]))
+
+
+def idle(functions: Collection[str]) -> str:
+    """Return what to say of a script none of whose functions is called, '' for any other."""
+    if any(name in functions for name in (*FUNCTIONS.values(), *THREADS)):
+        return ""
+    bare = [f"{name} would have to be {FUNCTIONS[name]}" for name in PHASES if name in functions]
+    return "; ".join([f"has none of {_listed()}, {THREADS[0]}: nothing flies the drone", *bare])
 
 
 def _meant(name: str) -> str | None:
     """Return the phase function that a name comes near to, None for one that is known or is none of ours."""
-    if name in FUNCTIONS.values() or name in _ELSEWHERE or len(name) > _LONGEST:
+    if name in FUNCTIONS.values() or name in THREADS or name in _ELSEWHERE or len(name) > _LONGEST:
         return None
     plain = name.replace("_", "").lower()
     cutoff = 0.0 if plain.startswith("syscall") else _NEAR if plain.startswith("sys") else _NEAR_WITHOUT_SYS

@@ -9,6 +9,7 @@ LOG = logging.getLogger("drone_sim.script")
 LOG.setLevel(logging.INFO)  # a script's print is wanted, whatever the level of the rest
 
 LONGEST = 1000  # characters of a line
+THREAD_GOES_ON = "{}: its thread goes on where it is: a coroutine cannot be brought back"
 MOST = 500  # lines of one call of the script: of a phase, a callback, or its top level
 
 

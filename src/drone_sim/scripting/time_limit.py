@@ -111,6 +111,17 @@ class TimeLimit:
         with self.paused():
             return function()
 
+    def inside(self, function: Callable[[], Any]) -> Any:
+        """Do what `outside` does, for another script that this one calls: its time is this one's, too."""
+        deadline = self._deadline
+        try:
+            return self.outside(function)
+        finally:
+            self._deadline = deadline
+            if self.armed and self.seconds and get_ident() == _MAIN:  # the timer was the other one's
+                _timer.limit = self
+                _timer.set(max(0.0, self.left()) + _LATER)
+
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a Python function; raises Stopped where it does not return in time."""
         self._deadline = monotonic() + self.seconds

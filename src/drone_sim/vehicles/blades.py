@@ -26,6 +26,10 @@ class Blades:
         self._said: dict[str, float] = {}
         self.turned = True  # by a script, since they were shown
 
+    def has(self, name: str) -> bool:
+        """Tell whether that is the name of one of the joints."""
+        return name in self._names
+
     def turn(self, name: str, angle: float | None = None) -> float:
         """Turn a propeller's blades, by the name of their joint, to an angle (rad), unless None; return it.
 

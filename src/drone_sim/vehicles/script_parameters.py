@@ -29,6 +29,12 @@ def script_parameters(vehicle: VehicleParameters, suffix: str) -> dict[str, dict
     }
 
 
+def propeller_script_parameters() -> dict[str, Any]:
+    """Return what V-REP's own script of a propeller reads besides what the built-in law does."""
+    seen = {"particlesAreVisible": True, "simulateParticles": True}
+    return {**seen, "particleScatteringAngle": 30.0, "particleLifeTime": 0.5, "maxParticleCount": 50.0}
+
+
 def bring_back(values: Mapping[str, dict[str, Any]], kept: Mapping[str, dict[str, Any]]) -> None:
     """Give every script's parameters the values that were kept of them; the mappings stay the same ones."""
     for name, one in copy.deepcopy(dict(kept)).items():

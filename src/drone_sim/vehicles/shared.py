@@ -9,7 +9,10 @@ from drone_sim.config.place import DatumParameters
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.backend import Backend
+from drone_sim.scripting.api.control import Control
+from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.sensors.camera import Vision
 from drone_sim.world import World
@@ -17,7 +20,7 @@ from drone_sim.world import World
 
 @dataclass
 class Shared:
-    """World, objects, signals, drawings, messages, eyes and clock.
+    """World, objects, signals, scripts, drawings, messages, eyes and clock.
 
     `time` returns the simulated time in s; `time_step` and `sub_step` in s; `script_time_limit` in s of real time;
     `gravity` in m/s² along z; `magnetic_field` in T. `names` has for each body in the world what a person calls it,
@@ -37,5 +40,8 @@ class Shared:
     backend: Backend | None = None
     objects: ObjectTree = field(default_factory=ObjectTree)
     signals: Signals = field(default_factory=Signals)
+    scripts: Scripts = field(default_factory=Scripts)
+    control: Control = field(default_factory=Control)
+    data: CustomData = field(default_factory=CustomData)
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are

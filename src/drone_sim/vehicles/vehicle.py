@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -12,21 +13,20 @@ from drone_sim.forces.force import Force
 from drone_sim.forces.pushes import Push, Pushes
 from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector
-from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.object_tree import ObjectTree, SceneObject
 from drone_sim.mechanics.state import Pose, State, Twist
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.scripting import load
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
-from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.sensor import Instrument
 from drone_sim.vehicles.blades import Blades
 from drone_sim.vehicles.body import Body
+from drone_sim.vehicles.child_script import Pictures, call_init, load_child_script, refuse_if_idle
 from drone_sim.vehicles.instruments import Carrying, Instruments
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.quadricopter_objects import (
@@ -70,6 +70,7 @@ class Vehicle:
         self.script: load.Script = load.NoScript()
         self._tree: ObjectTree | None = None  # the one that its objects are in
         self._handles: list[int] = []  # of its objects
+        self.script_parameters: dict[str, dict[str, Any]] = {}  # of its scripts, by their objects
         self.cameras = {
             name: Camera(one, partial(self.optical, one), shared.vision) for name, one in parameters.cameras.items()
         }
@@ -104,7 +105,11 @@ class Vehicle:
         objects.add(self.body, links, self._rotors.links, own.cameras, own.sensors)
         self._track = self.objects[self.objects.handle(TRACK_BASE + self.suffix)]
         self.script_parameters = script_parameters(self.parameters, self.suffix)
+        for name, values in self.script_parameters.items():
+            self.scripts.add(name, values, is_law=name != self.own_script)
         self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in NUMBERS]
+        self._driven = list(self._commanded)
+        self.listening: list[MessageBus] = []  # of scripts on its parts
         for camera in self.cameras.values():
             camera.reset()
         self.instruments.reset()
@@ -113,6 +118,8 @@ class Vehicle:
         """Take its objects out of the tree that they are in, if that is still the simulation's."""
         if self._tree is self.objects:
             self._tree.remove(self._handles)
+            for name in self.script_parameters:
+                self.scripts.remove(name)
             self._tree = None
 
     # ---- what scripts and topics see
@@ -121,6 +128,20 @@ class Vehicle:
     def own_script(self) -> str:
         """Name of the object that the child script is attached to."""
         return DRONE + self.suffix
+
+    @property
+    def own_object(self) -> SceneObject:
+        """The object that the child script is attached to: the root of all of its own."""
+        return self.objects[self._handles[0]]
+
+    def owns(self, handle: int) -> bool:
+        """Tell whether an object is one of its own, which come and go with it."""
+        return handle in self._handles
+
+    @property
+    def scripts(self) -> Scripts:
+        """The scripts of the simulation."""
+        return self._shared.scripts
 
     @property
     def objects(self) -> ObjectTree:
@@ -160,11 +181,22 @@ class Vehicle:
     @property
     def particle_velocities(self) -> tuple[float, ...]:
         """What the script commands: m/s, propellers 1 to 4."""
-        return self._velocities()
-
-    def _velocities(self) -> tuple[float, ...]:
         (first, second, third, fourth), key = self._commanded, PARTICLE_VELOCITY
         return first[key], second[key], third[key], fourth[key]
+
+    def _velocities(self) -> tuple[float, ...]:
+        (first, second, third, fourth), key = self._driven, PARTICLE_VELOCITY
+        return first[key], second[key], third[key], fourth[key]
+
+    def give_way(self, name: str) -> dict[str, Any] | None:
+        """Let a script of its own drive a propeller, in the place of the built-in law.
+
+        Return its parameters; None for the name of what is no propeller.
+        """
+        numbers = [number for number in NUMBERS if respondable(number) + self.suffix == name]
+        for number in numbers:
+            self._driven[number - 1] = {PARTICLE_VELOCITY: 0.0}
+        return self._commanded[numbers[0] - 1] if numbers else None
 
     @property
     def blade_angles(self) -> dict[str, float]:
@@ -180,13 +212,19 @@ class Vehicle:
         sensor = self.objects.matrix(self.objects.handle(camera.object + self.suffix))
         return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
 
+    def masses(self) -> dict[str, float]:
+        """Return the mass (kg) of each of its shapes, by object name; they are one body."""
+        of_propellers = {respondable(number) + self.suffix: one for number, one in zip(NUMBERS, self._rotors.masses)}
+        return {self.own_script: self.body.mass - sum(of_propellers.values()), **of_propellers}
+
     # ---- commands
 
     def receive(self, twist: Twist) -> None:
         """Take a command for the next step; held until the next one, or for cmd_vel_timeout."""
         self.command = twist
         self._command_age = 0.0
-        self.bus.post("cmd_vel", twist)
+        for bus in (self.bus, *self.listening):
+            bus.post("cmd_vel", twist)
 
     def move(self, pose: Pose) -> None:
         """Put it somewhere else, at rest."""
@@ -199,6 +237,10 @@ class Vehicle:
     def push(self, force: Vector, torque: Vector, duration: float) -> None:
         """Push with a force (N) at the centre of mass and a torque (N m), fixed in the world, for `duration` s."""
         self._pushes.add(Push(force, torque, duration))
+
+    def has_shape(self, name: str) -> bool:
+        """Tell whether that is the name of a dynamic shape of it."""
+        return name in self._shapes
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m, world).
@@ -214,15 +256,20 @@ class Vehicle:
     def load_script(self, path: str) -> None:
         """Load a child script ('' for the tutorial's) and call its init. Raises ScriptError."""
         self.close()
-        limit = TimeLimit(self._shared.script_time_limit)
+        self.script = load_child_script(path, self, self.bus, [self], self._shared)
+        refuse_if_idle(self.script, path, self.bus)
+        call_init(self.script, self.bus)
+
+    @property
+    def pictures(self) -> Pictures:
+        """What its cameras see now, by the name of their object."""
         cameras = self.parameters.cameras
-        pictures = {cameras[name].object + self.suffix: partial(self.look, one) for name, one in self.cameras.items()}
-        surroundings = Surroundings(self._shared.time, self._time_step, pictures, limit.outside)
-        modules = {"sim": make_sim(self, surroundings), "simROS": make_sim_ros(self.bus)}
-        self.script = load.load(path, modules, limit)
-        self.script.call("init")
-        for callback in self.bus.new_callbacks():  # whose function the script may not have
-            self.script.check(callback)
+        return {cameras[name].object + self.suffix: partial(self.look, one) for name, one in self.cameras.items()}
+
+    @property
+    def planes(self) -> dict[str, tuple[float, float]]:
+        """The near and far plane (m) of its cameras, by the name of their object."""
+        return {one.object + self.suffix: (one.near, one.far) for one in self.parameters.cameras.values()}
 
     def leave(self) -> None:
         """Go out of the world, without a word to the script."""

@@ -1,4 +1,4 @@
-"""What the script API needs from the drone that the script flies."""
+"""What the script API needs from the object that a script is attached to, and from the drone that has it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ import numpy as np
 
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.scripting.api.control import Control
+from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
-
-ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
+from drone_sim.scripting.api.turns import Turns
 
 
 def _call(function: Callable[[], Any]) -> Any:
@@ -28,7 +30,7 @@ class Readable(Protocol):
 
 
 class Host(Protocol):
-    """The drone, as the API sees it."""
+    """The drone, or what else a script is attached to, as the API sees it."""
 
     @property
     def sensors(self) -> Mapping[str, Readable]:
@@ -39,8 +41,8 @@ class Host(Protocol):
         """The objects of the scene, which several drones share."""
 
     @property
-    def script_parameters(self) -> Mapping[str, ScriptParameters]:
-        """Simulation parameters of the script that is attached to each object of the drone, by the object's name."""
+    def scripts(self) -> Scripts:
+        """The scripts of the simulation, this one among them."""
 
     @property
     def signals(self) -> Signals:
@@ -72,3 +74,10 @@ class Surroundings:
     time_step: float
     pictures: Mapping[str, Callable[[], np.ndarray]] = field(default_factory=dict)
     outside: Callable[[Callable[[], Any]], Any] = _call  # calls a function where OpenGL is, on nobody's time limit
+    inside: Callable[[Callable[[], Any]], Any] = _call  # the same, on this script's time limit
+    turns: Turns = field(default_factory=Turns)  # of the script's thread
+    planes: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # m: the near and far plane of each
+    gravity: float = -9.81  # m/s² along z
+    masses: Callable[[], Mapping[str, float]] = dict  # kg, of the shapes that the dynamics move, by object name
+    control: Control = field(default_factory=Control)
+    data: CustomData = field(default_factory=CustomData)

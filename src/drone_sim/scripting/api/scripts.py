@@ -1,17 +1,18 @@
-"""`sim`: time, the simulation parameters of scripts, and the log."""
+"""`sim`: the simulation parameters of scripts, and the log."""
 
 from __future__ import annotations
 
 import difflib
 import logging
-from collections.abc import Iterable
+from collections.abc import Collection
 from math import isfinite
 from typing import Any
 
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Host, ScriptParameters, Surroundings
+from drone_sim.scripting.api.host import Host
 from drone_sim.scripting.api.names import Names
+from drone_sim.scripting.api.registry import Attachment, ScriptParameters
 from drone_sim.scripting.api.script_values import refuse_if_too_large
 from drone_sim.scripting.api.types import Handle, Name
 from drone_sim.scripting.script_log import say
@@ -19,7 +20,6 @@ from drone_sim.wording import near_names
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
 
-_VERSION = 40600  # the CoppeliaSim whose API this is nearest to
 _MOST = 1000  # parameters of one script
 _NEAR = 0.8  # of difflib's ratio
 _LONGEST = 80  # characters of a name that is looked at
@@ -27,58 +27,35 @@ _SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
 
 
 class Scripts:
-    """The functions on scripts and time."""
+    """The functions on scripts."""
 
-    def __init__(self, host: Host, surroundings: Surroundings, names: Names):
-        """Take the drone whose scripts they are, the clock, and how a name is understood."""
+    def __init__(self, host: Host, names: Names):
+        """Take the drone whose scripts they are, and how a name is understood."""
         self._objects = host.objects
         self._find = names.getObject
-        self._names = list(host.script_parameters)
-        self._parameters: dict[int, ScriptParameters] = dict(enumerate(host.script_parameters.values()))
-        self._own = self._names.index(host.own_script)
-        self._read = [set(parameters) for parameters in self._parameters.values()]  # names that something reads
-        self._clock = surroundings.clock
-        self._time_step = surroundings.time_step
-
-    # ---- time
-
-    def getSimulationTime(self) -> float:
-        """Return the simulated time in seconds."""
-        return self._clock()
-
-    def getSimulationTimeStep(self) -> float:
-        """Return the simulation step in seconds."""
-        return self._time_step
-
-    def getInt32Parameter(self, parameter: int) -> int:
-        """Return sim.intparam_program_version; there is no other."""
-        if parameter != CONSTANTS["intparam_program_version"]:
-            raise ValueError(f"no integer parameter {parameter}; known is sim.intparam_program_version")
-        return _VERSION
-
-    def getInt32Param(self, parameter: int) -> int:
-        """Return sim.intparam_program_version; there is no other."""
-        return self.getInt32Parameter(parameter)
+        self._scripts = host.scripts
+        self._parameters = host.scripts.parameters
+        self._own = host.scripts.attached_to(host.own_script)
 
     # ---- scripts
 
     def getScriptHandle(self, name: Name | None = None) -> int:
         """Return the handle of the script that is attached to an object; of this one without a name."""
-        if name is None:
-            return self._own
+        if name is None or name == _SELF:
+            return self._own.handle
         try:
             found = self._objects[self._find(name)].name
         except ValueError:
             found = name
-        return self._attached(found)
+        return self._scripts.attached_to(found).handle
 
     def getObjectAssociatedWithScript(self, script: Handle) -> int:
         """Return the handle of the object that a script is attached to."""
-        return self._objects.handle(self._names[self._index(script)])
+        return self._objects.handle(self._script(script).name)
 
     def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
         """Return a simulation parameter of a script."""
-        parameters = self._parameters[self._index(script)]
+        parameters = self._script(script).parameters
         if name not in parameters:
             raise ValueError(f"no script parameter '{name}'; {near_names(name, parameters)}")
         value = parameters[name]
@@ -87,47 +64,44 @@ class Scripts:
     def setScriptSimulationParameter(self, script: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of a script: `particleVelocity` (m/s) drives a propeller.
 
-        With sim.handle_tree it is set in this script and those below. A name that a propeller does not have is
+        With sim.handle_tree it is set in this script and those below. A name that a propeller's law does not have is
         refused where it comes near to one that it has; of any other the log says once that nothing reads it.
         """
         known = self._parameters.get(script)
         if known and name in known and type(value) is float and isfinite(value):  # four times a step, so at once
             known[name] = value
             return
-        scripts = [*self._parameters] if script == _TREE else [self._index(script)]
-        if script == _TREE or name not in self._parameters[scripts[0]]:
+        scripts = self._tree() if script == _TREE else [self._script(script)]
+        if script == _TREE or name not in scripts[0].parameters:
             self._check_name(scripts, name)
         for one in scripts:
-            _set(self._parameters[one], name, value)
+            _set(one.parameters, name, value)
 
     def getUserParameter(self, handle: Handle, name: Name, _options: Any = None) -> Any:
         """Return a simulation parameter of the script that is attached to an object (4.x)."""
-        return self.getScriptSimulationParameter(self._script_of(handle), name)
+        return self.getScriptSimulationParameter(self._script_of(handle).handle, name)
 
     def setUserParameter(self, handle: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of the script that is attached to an object (4.x)."""
-        self.setScriptSimulationParameter(self._script_of(handle), name, value)
+        self.setScriptSimulationParameter(self._script_of(handle).handle, name, value)
 
-    def _script_of(self, handle: int) -> int:
-        return self._own if handle == _SELF else self._attached(self._objects[handle].name)
+    def _script_of(self, handle: int) -> Attachment:
+        return self._own if handle == _SELF else self._scripts.attached_to(self._objects[handle].name)
 
-    def _attached(self, name: str) -> int:
-        if name not in self._names:
-            raise ValueError(f"no script is attached to '{name}'; {near_names(name, self._names)}")
-        return self._names.index(name)
+    def _tree(self) -> list[Attachment]:
+        """Return this script and those below it."""
+        whole = self._objects[self._objects.handle(self._own.name)]
+        return [one for one in self._scripts if self._objects[self._objects.handle(one.name)].is_part_of(whole)]
 
-    def _check_name(self, scripts: Iterable[int], name: Any) -> None:
+    def _check_name(self, scripts: Collection[Attachment], name: Any) -> None:
         """Raise ValueError for a misspelt parameter of a propeller; say of one that nothing reads that it is so."""
-        of_propellers = set().union(*(names for number, names in enumerate(self._read) if number != self._own))
+        of_propellers = self._scripts.law_parameters()
         if list(scripts) == [self._own]:
             if name in of_propellers:
-                _LOG.warning(
-                    "'%s' is a parameter of the propellers; in the script of %s nothing reads it",
-                    name,
-                    self._names[self._own],
-                )
+                said = "'%s' is a parameter of the propellers; in the script of %s nothing reads it"
+                _LOG.warning(said, name, self._own.name)
             return
-        if name in of_propellers or name in self._read[self._own]:
+        if name in of_propellers or name in self._own.read or not any(one.is_law for one in scripts):
             return
         plain = {known.lower(): known for known in sorted(of_propellers)}
         near = difflib.get_close_matches(str(name)[:_LONGEST].replace("_", "").lower(), plain, cutoff=_NEAR)
@@ -136,14 +110,12 @@ class Scripts:
             raise ValueError(f"a propeller has no script parameter '{name}'; near names are {known}")
         _LOG.warning("nothing reads '%.80s' of a propeller; particleVelocity drives it", name)
 
-    def _index(self, script: int) -> int:
-        if script == _SELF:
+    def _script(self, handle: int) -> Attachment:
+        if handle == _SELF:
             return self._own
-        if not isinstance(script, (int, float)):
+        if not isinstance(handle, (int, float)):
             raise WrongValue("the handle of a script is expected")
-        if not 0 <= script < len(self._parameters):
-            raise ValueError(f"no script has the handle {script}")
-        return int(script)
+        return self._scripts[int(handle)]
 
     # ---- log
 

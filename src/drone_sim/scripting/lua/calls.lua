@@ -6,20 +6,31 @@ local error, type, next, rawget, rawset = error, type, next, rawget, rawset
 local match, concat = string.match, table.concat
 local getinfo = sandbox.debug.getinfo
 local within_limits, take_snapshot = sandbox.within_limits, sandbox.take_snapshot
+local take_turn, thread_has_ended, hand_back = sandbox.take_turn, sandbox.thread_has_ended, sandbox.hand_back
 local env, callbacks, sources = sandbox.globals, sandbox.callbacks, sandbox.sources
 
-local PHASES = {bridge.phases()}
+local PHASES, CALL_TYPES = {bridge.phases()}, {bridge.call_types()}
+local THREADS = {'sysCall_thread', 'sysCall_threadmain'}
+local INIT, ACTUATION, SENSING, CLEANUP, THREAD = 1, 2, 4, 8, 16 -- bits of what a script has
 local MISSING = 3 -- beside the numbers of the limits
-local chunk -- the script, where it runs once for each phase
+local chunk, chunk_has -- the script, where it runs as a whole; in which phases it does
 
--- Tell which phases the script has: the sum of 1 for the first of them, 2 for the second, ...
+local function thread_function()
+  for _, name in next, THREADS do
+    local f = rawget(env, name)
+    if type(f) == 'function' then return f end
+  end
+end
+
+-- Tell which phases the script has, and whether it has a thread that has not ended: the sum of their bits.
 local function phases()
-  if chunk then return 15 end
-  local found, bit = 0, 1
-  for number = 1, 4 do
+  local found, bit = chunk_has or 0, INIT
+  for number = 1, chunk and 0 or 4 do
     if type(rawget(env, PHASES[number])) == 'function' then found = found + bit end
     bit = bit + bit
   end
+  if not chunk and thread_function() then found = found + THREAD end
+  if found >= THREAD and thread_has_ended() then found = found - THREAD end
   return found
 end
 
@@ -31,21 +42,34 @@ local function run(f, ...)
   return after_phases(within_limits(f, ...))
 end
 
--- Compile the script; run it, unless it is to run in every phase.
-function sandbox.open(text, per_phase)
+local WHOLE = { -- the forms of a script that is run as a whole
+  phases = INIT + ACTUATION + SENSING + CLEANUP,
+  phases_and_thread = INIT + ACTUATION + SENSING + CLEANUP + THREAD,
+  steps = ACTUATION + CLEANUP,
+  thread = THREAD,
+}
+
+-- Compile the script; run it, unless it has a form that is run as a whole later.
+function sandbox.open(text, form)
   return run(function()
     local f, message = sandbox.compile(text, sandbox.source)
     if not f then error(message, 0) end
-    if per_phase then chunk, sandbox.chunk = f, f else f() end
+    chunk_has = WHOLE[form]
+    if chunk_has then chunk, sandbox.chunk = f, f else f() end
   end)
 end
 
 function sandbox.phase(number)
-  if chunk then
-    rawset(env, 'sim_call_type', number - 1)
-    return run(chunk)
-  end
-  return run(rawget(env, PHASES[number]))
+  if chunk then rawset(env, 'sim_call_type', CALL_TYPES[number]) end
+  if number == 5 then return run(take_turn, chunk or thread_function()) end
+  return run(chunk or rawget(env, PHASES[number]))
+end
+
+-- Call a function, whose results are handed over.
+function sandbox.called(name, ...)
+  local f = rawget(env, name)
+  if type(f) ~= 'function' then return phases(), MISSING, 0 end
+  return run(function(...) return hand_back(name, f(...)) end, ...)
 end
 
 function sandbox.called_back(name, message)

@@ -10,7 +10,7 @@ local rawget, setmetatable = rawget, setmetatable
 local unpack = table.unpack or unpack
 local concat, byte, sub = table.concat, string.byte, string.sub
 local load, loadstring, setfenv = load, loadstring, setfenv
-local create, resume, close = coroutine.create, coroutine.resume, coroutine.close
+local create, resume, close = coroutine.create, sandbox.resume, coroutine.close
 local getmeta = sandbox.debug.getmetatable
 local log, caught, protected, limit = bridge.log, sandbox.caught, sandbox.protected, sandbox.limit
 local env, modules = sandbox.globals, sandbox.modules
@@ -26,6 +26,7 @@ for _, name in pairs{'_VERSION', 'assert', 'collectgarbage', 'error', 'getmetata
   env[name] = _G[name]
 end
 env._G = env
+env.debug = {traceback = sandbox.debug.traceback}
 env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.difftime}
 for _, name in pairs{'math', 'string', 'table', 'coroutine', 'os', 'utf8'} do modules[name] = env[name] end
 string.dump = nil

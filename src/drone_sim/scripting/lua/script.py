@@ -2,8 +2,8 @@
 
 V-REP 3.x scripts run in Lua 5.1, with flat names (simGetObjectPosition, simExtRosInterface_subscribe,
 sim_handle_self); the file's text is run once for each phase with `sim_call_type` set, where it asks for
-that. CoppeliaSim 4.x scripts run in the newest Lua that lupa has, with `sim` and `simROS` and functions
-sysCall_init, ... Both forms of the API are there in either.
+that, or as a whole in another form (source.py). CoppeliaSim 4.x scripts run in the newest Lua that lupa
+has, with `sim` and `simROS` and functions sysCall_init, ... Both forms of the API are there in either.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api, remember
 from drone_sim.scripting.api.constants import CONSTANTS, PHASES
 from drone_sim.scripting.api.types import Callback
+from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.helpers import LuaHelpers
@@ -29,9 +30,10 @@ from drone_sim.wording import near_names
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
 _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
-_NUMBERS = {phase: number for number, phase in enumerate(PHASES, start=1)}
+_NUMBERS = {phase: number for number, phase in enumerate((*PHASES, "thread"), start=1)}
 _EVERY_STEP = ("actuation", "sensing")
-_CALLS = ("open", "phase", "called_back", "has", "functions", "remember", "recall")  # in calls.lua
+_THREAD = 1 << _NUMBERS["thread"] - 1
+_CALLS = ("open", "phase", "called", "called_back", "has", "functions", "remember", "recall")  # in calls.lua
 _ABOUT_MEMORY = f"not enough memory: the script uses more than {MEMORY // MIB} MiB"
 
 
@@ -42,9 +44,11 @@ class LuaScript:
         """Compile the file's text; run its top level unless it is to run in every phase. Raises ScriptError."""
         self._path = path
         self._limit = limit
+        self.is_empty = not source.strip()
         self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0
+        self.idle = ""  # why nothing of it is ever called
         self._helpers = LuaHelpers(path)
         text = LuaSource(source)
         self._check_call_types(text)
@@ -52,10 +56,11 @@ class LuaScript:
             raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
         self._thread: Door = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
-            dialect = state.OLDEST if text.per_phase or text.flat else state.newest()
+            dialect = state.OLDEST if text.flat or "phases" in text.form else state.newest()
+            self._may_switch = text.threads
             self._lua = self._thread.run(self._build, dialect)
-            self._run("load", self._lua["open"], text.text, text.per_phase)
-            if not text.per_phase:
+            self._run("load", self._lua["open"], text.text, text.form.encode())
+            if text.form == "functions":
                 self._check_names()
         except BaseException:
             self._thread.close()
@@ -66,7 +71,7 @@ class LuaScript:
         runtime = state.new_runtime(dialect)
         self._values = Values(runtime)
         self._finalizer = weakref.finalize(self, _free, self._thread, self._values)
-        sandbox = state.make_sandbox(runtime, self._thread, self._limit, self._values, self._helpers)
+        sandbox = state.make_sandbox(runtime, self._thread, self._limit, self._values, self._helpers, self._may_switch)
         self._known = functions.define(runtime, sandbox, self._modules, self._values, self._thread)
         _LOG.debug("%s runs in %s", self._path, dialect)
         return {name: sandbox[name.encode()] for name in _CALLS}
@@ -87,6 +92,7 @@ class LuaScript:
         for name, meant in phase_names.misspelt(places):
             raise ScriptError("load", *places[name], phase_names.never_called(name, meant))
         phase_names.warn(self._path, places)
+        self.idle = phase_names.idle(places)
 
     def _named_functions(self) -> dict[str, tuple[str, int]]:
         """Return file and line of the script's global functions, by name."""
@@ -110,6 +116,23 @@ class LuaScript:
                 return
             self._run(phase, self._lua.get("phase"), number, near=phase in _EVERY_STEP)
 
+    @property
+    def threaded(self) -> bool:
+        """Whether it has a thread that has not ended."""
+        return bool(self._phases & _THREAD)
+
+    def take_turn(self) -> None:
+        """Let its thread run until it is left; raises ScriptError."""
+        self._run("thread", self._lua.get("phase"), _NUMBERS["thread"], near=True)
+
+    def call_function(self, name: str, arguments: list[Any]) -> Any:
+        """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
+        self._run(name, self._call_function, name, arguments)
+        return self._values.handed_back()
+
+    def _call_function(self, name: str, arguments: list[Any]) -> Any:
+        return self._lua["called"](name.encode(), *self._values.to_lua(arguments, unpacked=True))
+
     def callback(self, callback: Callback, message: Any) -> None:
         """Call the script's function of that name with a message; raises ScriptError."""
         name = callback if isinstance(callback, str) else "callback"
@@ -125,6 +148,8 @@ class LuaScript:
         recalls = remember(self._modules.values())
 
         def recall() -> None:
+            if self._may_switch:
+                script_log.say(script_log.THREAD_GOES_ON.format(self._path))
             self._run("restore", self._lua.get("recall"), snapshot)
             for one in recalls:
                 one()
@@ -178,7 +203,7 @@ class LuaScript:
         return ScriptError(phase, self._helpers.path(chunk.decode("utf-8", "replace")), int(line), message)
 
     def _error_with_line(self, phase: str, message: bytes) -> ScriptError:
-        text = message.decode("utf-8", "replace")
+        text = message.decode("utf-8", "replace").partition("\nstack traceback:")[0]
         if text == "not enough memory":
             return self._error(phase, _ABOUT_MEMORY)
         path, line, text = self._helpers.placed(text)
@@ -190,6 +215,8 @@ class LuaScript:
         if match is None:
             return ""
         name = match.group(1)
+        if name in PLUGINS:
+            return f"; {not_there('', name, ())}"
         near = near_names(name, [known for known in self._known if known.startswith("sim") == name.startswith("sim")])
         return f"; {near}" if near.startswith("near") else ""
 

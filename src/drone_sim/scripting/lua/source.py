@@ -14,13 +14,35 @@ _LOOP_IN_C = (
 _LOOPS_IN_C = re.compile(rb"\b(?:" + "|".join(_LOOP_IN_C).encode() + rb")\b")
 _REQUIRE = re.compile(rb"\brequire\b")  # a helper may name what it likes; these cannot
 _REQUIRE_OWN = re.compile(rb"\brequire[ \t]{0,9}\(?[ \t]{0,9}['\"](?:sim|simROS|math|string|table|coroutine|os)['\"]")
+_PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|thread|threadmain)\b")
+_THREAD_TYPE = re.compile(rb"\b(?:syscb_thread(?:main)?|childscriptcall_threaded)\b")
+_THREAD_CALLS = (
+    *(
+        "SetThreadSwitchTiming",
+        "SetThreadAutomaticSwitch",
+        "SwitchThread",
+        "SetThreadIsFree",
+        "SetThreadResumeLocation",
+    ),
+    *("DelegateChildScriptExecution", "GetThreadId", "Wait", "WaitForSignal", "GetThreadExi(?:s?)tRequest"),
+)
+_IN_THREAD = re.compile(
+    rb"\bsim(?:" + b"|".join(rf"{name}|\.{name[0].lower()}{name[1:]}".encode() for name in _THREAD_CALLS) + rb")\b"
+    rb"|\bsim[._]simulation_advancing_abouttostop\b|\bthreadFunction\b"
+)
+_THREADS = re.compile(rb"\bcoroutine\b|\bsysCall_thread")
+_STEPS = re.compile(
+    rb"\bsim(?:GetScriptExecutionCount|\.getScriptExecutionCount|HandleChildScripts?|\.handleChildScripts?)\b"
+)
 _CALL_TYPE = re.compile(rb"\bsim[._](childscriptcall_\w{0,60})")
 _FLAT_CALL = re.compile(rb"(?<![.:\w])sim[A-Z]\w{0,200}[ \t\r\n]{0,200}\(")
 
 
 class LuaSource:
-    """A script's text; `per_phase` if it looks at sim_call_type, `flat` if it calls V-REP 3.x's functions.
+    """A script's text; `flat` if it calls V-REP 3.x's functions, `threads` if it may be left before it has ended.
 
+    `form` is how it is run: `functions` of its own for the phases; as a whole, in all `phases` if it looks at
+    sim_call_type, in the `steps` if it counts them (3.0), as a `thread` (3.x).
     `loops_in_c` if it names a function of Lua's that may not come back, or requires a file.
     `call_types` are the constants that it compares sim_call_type with, without `sim_`.
     """
@@ -29,7 +51,8 @@ class LuaSource:
         """Take the file's contents, which may begin with a #! line."""
         self.text = b"--" + text if text.startswith(b"#") else text
         bare = _without_comments(self.text)
-        self.per_phase = _PER_PHASE.search(bare) is not None
+        self.form = _form(bare)
+        self.threads = "thread" in self.form or _THREADS.search(bare) is not None
         self.call_types = sorted({name.decode() for name in _CALL_TYPE.findall(bare)})
         self.flat = _FLAT_CALL.search(bare) is not None
         helpers = len(_REQUIRE.findall(bare)) > len(_REQUIRE_OWN.findall(bare))
@@ -38,6 +61,16 @@ class LuaSource:
     def line(self, word: str) -> int:
         """Return the first line with a word in it."""
         return self.text.count(b"\n", 0, self.text.find(word.encode())) + 1
+
+
+def _form(bare: bytes) -> str:
+    if _PER_PHASE.search(bare):
+        return "phases_and_thread" if _THREAD_TYPE.search(bare) else "phases"
+    if _PHASE_FUNCTION.search(bare):
+        return "functions"
+    if _IN_THREAD.search(bare):
+        return "thread"
+    return "steps" if _STEPS.search(bare) else "functions"
 
 
 def _without_comments(text: bytes) -> bytes:

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.scripting import script_log
+from drone_sim.scripting.api.constants import CALL_TYPES
+from drone_sim.scripting.api.turns import CALLS_PER_MS, DEFAULT_MS, LONGEST_MS, NO_THREAD, SHORTEST_MS, SOON
 from drone_sim.scripting.errors import LONGEST_MESSAGE
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.thread import Door, SameThread
@@ -23,7 +25,18 @@ from drone_sim.scripting.time_limit import TimeLimit
 
 OLDEST = "lua51"  # V-REP 3.x's
 _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", OLDEST)
-_FILES = ("limits", "matrices", "values", "code", "snapshots", "calls", "globals")  # each uses those before it
+_FILES = (
+    "limits",
+    "matrices",
+    "threads",
+    "others",
+    "values",
+    "code",
+    "unknown",
+    "snapshots",
+    "calls",
+    "globals",
+)  # each uses those before it
 _CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
 
 TIME, OVER_MEMORY = 1, 2  # why Lua stops a script (limits.lua)
@@ -49,8 +62,8 @@ def new_runtime(dialect: str) -> Any:
     )
 
 
-def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaHelpers) -> Any:
-    """Run the .lua files in a new state; return their `sandbox`.
+def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaHelpers, threads: bool) -> Any:
+    """Run the .lua files in a new state; return their `sandbox`. `threads`: the script may have some.
 
     What Lua gets of Python must not lead back to the script's object, or neither is ever freed.
     """
@@ -62,6 +75,14 @@ def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, hel
         "longest_message": 4 * LONGEST_MESSAGE,
         "longest_line": 4 * script_log.LONGEST,
         "phases": _phase_functions,
+        "call_types": _call_types,
+        "threads": threads,
+        "no_thread": NO_THREAD.encode(),
+        "soon": SOON,
+        "calls_per_ms": CALLS_PER_MS,
+        "default_ms": DEFAULT_MS,
+        "shortest_ms": SHORTEST_MS,
+        "longest_ms": LONGEST_MS,
         "module": _reader(door, helpers),
     }
     table, sandbox = runtime.table_from({key.encode(): value for key, value in bridge.items()}), runtime.table()
@@ -100,6 +121,10 @@ def _reader(door: Door, helpers: LuaHelpers) -> Callable[[bytes], tuple[bool, by
 
 def _phase_functions() -> tuple[bytes, ...]:
     return tuple(name.encode() for name in FUNCTIONS.values())
+
+
+def _call_types() -> tuple[int, ...]:
+    return tuple(CALL_TYPES.values())
 
 
 def _nothing_of_python(_object: Any, name: Any, _is_setting: bool) -> Any:

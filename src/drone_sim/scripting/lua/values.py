@@ -82,6 +82,11 @@ class Values:
     def _put(self, *values: Any) -> None:
         self._stream.extend(values)
 
+    def handed_back(self) -> Any:
+        """Return what a function has handed over: None, a value, or a tuple of several."""
+        found = self._from_stream(())
+        return tuple(found) if len(found) > 1 else found[0] if found else None
+
     def _from_stream(self, _given: tuple[Any, ...]) -> list[Any]:
         found, self._stream = _from_stream(self._stream), []
         while found and found[-1] is None:  # nil at the end is as good as left out

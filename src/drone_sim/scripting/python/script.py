@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import copy
 import inspect
 import reprlib
 import traceback
 from collections.abc import Callable, Mapping
 from types import CodeType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api, mistake, remember
+from drone_sim.scripting.api.turns import Turns
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError, UnknownName, no_function
-from drone_sim.scripting.phase_names import FUNCTIONS
+from drone_sim.scripting.phase_names import FUNCTIONS, THREADS
 from drone_sim.scripting.python.helpers import Helpers
 from drone_sim.scripting.python.process import process_kept
-from drone_sim.scripting.script_log import say, shown
+from drone_sim.scripting.script_log import THREAD_GOES_ON, say, shown
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
 from drone_sim.wording import near_names
+
+if TYPE_CHECKING:
+    from drone_sim.scripting.python.thread import PythonThread
 
 __all__ = ["PythonScript", "ScriptError"]
 
 _STOPPED = "__stopped__"  # Stopped, among a script's globals
+_NAMES_THREAD = b"sysCall_thread"
 _RARE = frozenset(("init", "cleanup"))
 _NOT_COPIED = ("__builtins__", "__loader__", "__spec__")
 
@@ -45,12 +51,15 @@ class PythonScript:
     CoppeliaSim's Python scripts do; so do the modules beside it that it imports. What it prints goes to the log.
     """
 
-    def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
-        """Run the file's top level; raises ScriptError."""
+    def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns):
+        """Run the file's top level; its thread has those turns. Raises ScriptError."""
         self._path = path
         self._limit = limit
+        self.is_empty = not source.strip()
         self._modules = modules
-        found = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: Stopped, **modules}
+        self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
+        self._found = {name: self._thread.counted(one) for name, one in modules.items()} if self._thread else modules
+        found = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: Stopped, **self._found}
         self._helpers = Helpers(path, found, _compiled)
         self._globals: dict[str, Any] = {
             "__name__": self._helpers.package,
@@ -66,16 +75,25 @@ class PythonScript:
             self.close()
             raise
 
+    def _new_thread(self, turns: Turns) -> PythonThread:
+        try:
+            from drone_sim.scripting.python.thread import PythonThread  # whoever has no thread needs no greenlet
+        except ImportError as error:
+            said = f"threads of Python scripts need greenlet (pip install greenlet): {error}"
+            raise ScriptError("load", self._path, 0, said) from None
+        return PythonThread(turns)
+
     def _check_names(self) -> None:
         """Raise ScriptError for a function that was meant to be a phase, but would not be called as one."""
         functions = {name: one for name, one in self._globals.items() if callable(one) and not name.startswith("__")}
         for name, meant in phase_names.misspelt(functions):
             raise self._error_at(functions[name], phase_names.never_called(name, meant))
-        for name in FUNCTIONS.values():
+        for name in (*FUNCTIONS.values(), *THREADS):
             one = functions.get(name)
             if inspect.isgeneratorfunction(one) or inspect.iscoroutinefunction(one) or inspect.isasyncgenfunction(one):
                 raise self._error_at(one, f"{name} would not run: it has a `yield` or is `async`")
         phase_names.warn(self._path, functions)
+        self.idle = phase_names.idle(functions)
 
     def _error_at(self, function: Any, message: str) -> ScriptError:
         code = getattr(function, "__code__", None)
@@ -92,6 +110,24 @@ class PythonScript:
                 self._run(phase, function)
         else:
             self._run(phase, function)
+
+    @property
+    def threaded(self) -> bool:
+        """Whether it has a thread that has not ended."""
+        return self._thread is not None and not self._thread.has_ended and self._thread_function() is not None
+
+    def _thread_function(self) -> Any:
+        return next((self._globals[name] for name in THREADS if name in self._globals), None)
+
+    def take_turn(self) -> None:
+        """Let its thread run until it is left; raises ScriptError."""
+        if self._thread is not None:
+            self._run("thread", self._thread.take_turn, self._thread_function())
+
+    def call_function(self, name: str, arguments: list[Any]) -> Any:
+        """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
+        self.check(name)
+        return self._run(name, self._globals[name], *arguments)
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call the script's function (or that of this name) with a message; raises ScriptError."""
@@ -117,6 +153,8 @@ class PythonScript:
         kept, recalls = _copied(self._globals, *map(vars, modules.values())), remember(self._modules.values())
 
         def recall() -> None:
+            if self.threaded:
+                script_log.say(THREAD_GOES_ON.format(self._path))
             for name in set(self._helpers.modules()) - set(modules):
                 self._helpers.forget(name)
             for variables, fresh in zip((self._globals, *map(vars, modules.values())), _copied(*kept)):
@@ -130,23 +168,27 @@ class PythonScript:
 
     def close(self) -> None:
         """Forget the script; it cannot be called after that."""
+        if self.threaded and self._thread is not None:
+            with contextlib.suppress(ScriptError):
+                self._run("cleanup", self._thread.end)
         self._globals.clear()
         self._helpers.close()
 
-    def _run(self, phase: str, function: Any, *arguments: Any) -> None:
-        failed = None
+    def _run(self, phase: str, function: Any, *arguments: Any) -> Any:
+        failed = result = None
         try:
-            self._limit.run(function, *arguments)
+            result = self._limit.run(function, *arguments)
         except BaseException as error:  # KeyboardInterrupt, too: whose it is cannot be told
             failed = self._error(phase, error)
         script_log.end_call()
         if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive
             raise failed
+        return result
 
     def _require(self, name: str) -> Api:
-        if name not in self._modules:
-            raise UnknownName(f"no module '{name}'; {near_names(str(name), self._modules)}")
-        return self._modules[name]
+        if name not in self._found:
+            raise UnknownName(f"no module '{name}'; {near_names(str(name), self._found)}")
+        return self._found[name]
 
     def _error(self, phase: str, error: BaseException) -> ScriptError:
         if self._limit.struck:

@@ -1,0 +1,110 @@
+"""The scripts of a simulation, by handle and by the object that each is attached to.
+
+A propeller has one, too, where the built-in law takes the place of V-REP's: nothing can be called in it, but it has
+parameters.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
+
+from drone_sim.wording import near_names
+
+ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
+
+DEEPEST = 8  # scripts that wait for each other
+
+
+class Callee(Protocol):
+    """A script whose functions others may call."""
+
+    def call_function(self, name: str, arguments: list[Any]) -> Any:
+        """Return what a global function returns: None, a value, or a tuple of several. Raises ScriptError."""
+
+
+class Attachment:
+    """A script on an object; `script` is set while it is loaded."""
+
+    def __init__(self, handle: int, name: str, parameters: ScriptParameters, is_law: bool):
+        """Take its handle, the name of its object, and its parameters, which stay the same mapping.
+
+        `is_law`: it stands for a built-in law, which reads these parameters and no others.
+        """
+        self.handle = handle
+        self.name = name
+        self.parameters = parameters
+        self.read: frozenset[str] = frozenset(parameters)
+        self.is_law = is_law
+        self.began = 0.0  # s, simulated, when it was loaded
+        self.script: Callee | None = None
+
+    def loaded(self, script: Callee, time: float) -> None:
+        """Take the script, which begins at a simulated time (s)."""
+        self.script, self.began = script, time
+
+
+class Scripts:
+    """Attachments by handle (a small number that no other one of the run has had) and by object."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self.parameters: dict[int, ScriptParameters] = {}  # by handle, for what is asked several times a step
+        self._by_handle: dict[int, Attachment] = {}
+        self._by_name: dict[str, Attachment] = {}
+        self._numbers = itertools.count()
+        self._waiting: list[Attachment] = []  # callers, and what they called
+
+    def add(self, name: str, parameters: ScriptParameters, *, is_law: bool = False) -> Attachment:
+        """Attach a script to an object, in the place of a law; return what stands for it."""
+        before = self._by_name.get(name)
+        handle = next(self._numbers) if before is None else before.handle
+        made = Attachment(handle, name, parameters, is_law)
+        self._by_handle[handle] = self._by_name[name] = made
+        self.parameters[handle] = parameters
+        return made
+
+    def remove(self, name: str) -> None:
+        """Forget the script of an object, if there is one."""
+        gone = self._by_name.pop(name, None)
+        if gone is not None:
+            del self._by_handle[gone.handle], self.parameters[gone.handle]
+
+    def __iter__(self) -> Iterator[Attachment]:
+        """Yield all, in the order of their handles."""
+        return iter(self._by_handle.values())
+
+    def __contains__(self, name: str) -> bool:
+        """Tell whether a script is attached to an object."""
+        return name in self._by_name
+
+    def __getitem__(self, handle: int) -> Attachment:
+        """Return what has a handle; raises ValueError."""
+        if handle not in self._by_handle:
+            raise ValueError(f"no script has the handle {handle}")
+        return self._by_handle[handle]
+
+    def attached_to(self, name: str) -> Attachment:
+        """Return the script of an object; raises ValueError that lists the near names."""
+        if name not in self._by_name:
+            raise ValueError(f"no script is attached to '{name}'; {near_names(name, self._by_name)}")
+        return self._by_name[name]
+
+    def law_parameters(self) -> Mapping[str, Any]:
+        """Return the parameters that built-in laws read, by name."""
+        return {name: None for one in self if one.is_law for name in one.read}
+
+    def call(self, caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
+        """Let one script call another. Raises ValueError for one that waits for this call itself, or is too deep."""
+        if callee.script is None:
+            raise ValueError(f"the script of '{callee.name}' has no functions to call")
+        if callee is caller or callee in self._waiting:
+            raise ValueError(f"the script of '{callee.name}' is being called already: it waits for this call to end")
+        if len(self._waiting) >= DEEPEST:
+            raise ValueError(f"scripts call each other more than {DEEPEST} deep")
+        self._waiting.append(caller)
+        try:
+            return call(callee.script)
+        finally:
+            self._waiting.pop()

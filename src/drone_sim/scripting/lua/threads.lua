@@ -1,0 +1,151 @@
+-- Threads: coroutines that the simulation resumes once a step. One is left where it waits or switches, or at a call of
+-- the API once it has made many of them in its turn: never at a moment that depends on how fast the computer is.
+local bridge, sandbox = ...
+
+local error, type, next = error, type, next
+local create, resume, yield, status = coroutine.create, coroutine.resume, coroutine.yield, coroutine.status
+local running, isyieldable = coroutine.running, coroutine.isyieldable
+local upper = string.upper
+local limit, caught = sandbox.limit, sandbox.caught
+
+local api, own = {}, {} -- functions of the API; those that stand here, in the place of some of them
+local called, forbidden, most = 0, 0, bridge.default_ms * bridge.calls_per_ms
+sandbox.api, sandbox.own = api, own
+
+-- Tell whether a coroutine runs, and may be left.
+local function in_thread()
+  local thread, is_main = running()
+  return thread ~= nil and not is_main and (isyieldable == nil or isyieldable())
+end
+
+local function switch(name)
+  if not in_thread() then error(name .. ': ' .. bridge.no_thread, 3) end
+  yield()
+end
+
+-- Return a function of the API that counts its calls in threads.
+function sandbox.counted(f)
+  if not bridge.threads then return f end
+  return function(...)
+    called = called + 1
+    if called > most and forbidden == 0 and in_thread() then
+      yield()
+      called = 1
+    end
+    return f(...)
+  end
+end
+
+local function after_turn(before, ...)
+  called = before
+  return ...
+end
+
+-- Resume a coroutine, whose turn begins.
+local function resumed(thread, ...)
+  local before = called
+  called = 0
+  return after_turn(before, resume(thread, ...))
+end
+sandbox.resume = resumed
+
+---- the script's own thread
+
+local thread, has_ended = nil, false
+
+function sandbox.thread_has_ended() return has_ended end
+
+-- Let the thread, which begins with f, have its turn.
+function sandbox.take_turn(f)
+  if thread == nil then
+    thread = create(function() f() end)
+    limit(thread)
+  end
+  local ok, message = resumed(thread)
+  has_ended = status(thread) == 'dead'
+  if not caught(ok, message) then error(message, 0) end
+end
+
+-- In Lua 5.1 no coroutine can be left through a pcall: there it is another coroutine.
+if bridge.threads and _VERSION == 'Lua 5.1' then
+  local protected = sandbox.protected
+  function sandbox.protected(f, ...)
+    if not in_thread() then return protected(f, ...) end
+    local inner = create(function(...) return f(...) end)
+    limit(inner)
+    local function go(ok, ...)
+      if ok and status(inner) ~= 'dead' then return go(resume(inner, yield(...))) end
+      return caught(ok, ...)
+    end
+    return go(resume(inner, ...))
+  end
+end
+
+---- what a thread calls
+
+local functions = {}
+
+function functions.switchThread() switch('sim.switchThread') end
+function functions.step() switch('sim.step') end
+functions['yield'] = function() switch('sim.yield') end
+
+function functions.wait(seconds)
+  if type(seconds) ~= 'number' or seconds ~= seconds then error('sim.wait: a number of seconds is expected', 2) end
+  local time, is_ending = api['sim.getSimulationTime'], api['sim.getThreadExitRequest']
+  local finish = time() + seconds
+  while time() < finish - bridge.soon do
+    switch('sim.wait')
+    if is_ending() then break end
+  end
+  return time() - finish
+end
+
+local KINDS = {'sim.getInt32Signal', 'sim.getFloatSignal', 'sim.getStringSignal'}
+
+function functions.waitForSignal(name)
+  while true do
+    for index = 1, 3 do
+      local value = api[KINDS[index]](name)
+      if value ~= nil then return value end
+    end
+    switch('sim.waitForSignal')
+    if api['sim.getThreadExitRequest']() then return nil end
+  end
+end
+
+function functions.setThreadSwitchTiming(milliseconds)
+  if type(milliseconds) ~= 'number' or milliseconds ~= milliseconds then
+    error('sim.setThreadSwitchTiming: a number of milliseconds is expected', 2)
+  end
+  if milliseconds < bridge.shortest_ms then milliseconds = bridge.shortest_ms end
+  if milliseconds > bridge.longest_ms then milliseconds = bridge.longest_ms end
+  most = milliseconds * bridge.calls_per_ms
+end
+
+local function set_automatic(allowed)
+  local before = forbidden
+  if type(allowed) == 'number' and allowed >= 0 then
+    forbidden = allowed
+  elseif allowed == true then
+    forbidden = before > 0 and before - 1 or 0
+  elseif allowed == false then
+    forbidden = before + 1
+  else
+    error('true, false, or a level of 0 or more is expected', 3)
+  end
+  return before
+end
+
+local function is_automatic() return forbidden == 0 end
+
+function functions.setThreadAutomaticSwitch(allowed) return set_automatic(allowed) end
+function functions.setAutoYield(allowed) return set_automatic(allowed) end
+function functions.setStepping(enabled) return set_automatic(not enabled) end
+function functions.acquireLock() set_automatic(false) end
+function functions.releaseLock() set_automatic(true) end
+functions.getThreadAutomaticSwitch, functions.getAutoYield = is_automatic, is_automatic
+
+for name, f in next, functions do
+  own['sim.' .. name] = f
+  own['sim' .. upper(name:sub(1, 1)) .. name:sub(2)] = f
+end

@@ -1,0 +1,76 @@
+"""The thread of a Python child script: a greenlet, a function that can be left and gone on with later.
+
+It runs in the simulation's own thread, under the script's time limit, as every other function of the script.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import greenlet
+
+from drone_sim.scripting.api.calls import Api, contents
+from drone_sim.scripting.api.turns import NO_THREAD, Turns
+from drone_sim.scripting.time_limit import Stopped
+
+_abandoned: list[greenlet.greenlet] = []  # that would not end: kept, or Python would run them once more to free them
+
+
+class PythonThread:
+    """A thread that takes turns with the simulation."""
+
+    def __init__(self, turns: Turns):
+        """Take what decides when it is left; it has not begun."""
+        self._turns = turns
+        self._greenlet: greenlet.greenlet | None = None
+        self.has_ended = False
+        turns.leave = self._leave
+
+    def counted(self, api: Api) -> Api:
+        """Return a module of the API that counts what the thread calls."""
+        name, functions, constants = contents(api)
+        return Api(name, {key: self._counted(one) for key, one in functions.items()}, constants)
+
+    def _counted(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def call(*arguments: Any, **named: Any) -> Any:
+            if greenlet.getcurrent() is self._greenlet:
+                self._turns.count()
+            return function(*arguments, **named)
+
+        return call
+
+    def take_turn(self, function: Callable[[], Any]) -> None:
+        """Begin a function, or go on with it, until it is left or has ended. Raises what it raises."""
+        if self._greenlet is None:
+            self._greenlet = greenlet.greenlet(function)
+        self._turns.begin()
+        self._greenlet.parent = greenlet.getcurrent()
+        try:
+            self._greenlet.switch()
+        finally:
+            self.has_ended = self._greenlet.dead
+
+    def _leave(self) -> None:
+        if greenlet.getcurrent() is not self._greenlet or self._greenlet.parent is None:
+            raise ValueError(NO_THREAD)
+        self._greenlet.parent.switch()
+
+    def end(self) -> None:
+        """End it where it is: its `finally` runs, and no handler of the script sees why."""
+        self.has_ended = True
+        if self._greenlet is None or self._greenlet.dead:
+            return
+        self._turns.leave = _stop
+        self._greenlet.parent = greenlet.getcurrent()
+        try:
+            self._greenlet.throw(Stopped)
+        finally:
+            if not self._greenlet.dead:
+                _abandoned.append(self._greenlet)
+
+
+def _stop() -> None:
+    raise Stopped

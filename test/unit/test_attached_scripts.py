@@ -1,0 +1,287 @@
+"""Scripts on any object: each with its own state and API, called in the order of the tree."""
+
+import math
+import struct
+from pathlib import Path
+
+import pytest
+
+from drone_sim.config.types import ParameterError
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.errors import ScriptError
+
+SCRIPTS = Path(__file__).parent / "scripts"
+PROPELLERS = [f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4)]
+TELL_LUA = """
+local function tell(phase)
+    local order = sim.getStringSignal('order') or ''
+    sim.setStringSignal('order', order .. sim.getObjectName(sim.getObject('.')) .. ':' .. phase .. ' ')
+end
+for _, phase in ipairs{'init', 'actuation', 'sensing', 'cleanup'} do
+    _G['sysCall_' .. phase] = function() tell(phase) end
+end
+"""
+TELL_PYTHON = """
+def tell(phase):
+    name = sim.getObjectName(sim.getObjectAssociatedWithScript(sim.handle_self))
+    sim.setStringSignal("order", (sim.getStringSignal("order") or "") + f"{name}:{phase} ")
+
+def sysCall_init(): tell("init")
+def sysCall_actuation(): tell("actuation")
+def sysCall_sensing(): tell("sensing")
+"""
+
+
+@pytest.fixture(name="build")
+def _build(tmp_path):
+    """Give a function that builds a simulation with scripts, a text for each object's name."""
+    built = []
+
+    def build(scripts, own="", values=None, **overrides):
+        entries = []
+        for name, text in scripts.items():
+            path = text if isinstance(text, Path) else tmp_path / f"{len(entries)}.{'py' if 'def ' in text else 'lua'}"
+            if not isinstance(text, Path):
+                path.write_text(text, encoding="utf-8")
+            entries.append({"object": name, "script": str(path), "parameters": (values or {}).get(name, {})})
+        script = tmp_path / "own.lua"
+        if own:
+            script.write_text(own, encoding="utf-8")
+        given = {**overrides, "scene": {**overrides.get("scene", {}), "scripts": entries}}
+        built.append(Simulation(parameters.load(given), script=str(script) if own else ""))
+        return built[-1]
+
+    yield build
+    for one in built:
+        one.close()
+
+
+def order(simulation):
+    found = simulation.drone.signals.getStringSignal("order").split()
+    simulation.drone.signals.clearStringSignal("order")
+    return found
+
+
+# ---- order, and what each of them is
+
+
+def test_they_are_called_from_the_root_to_the_leaves(build):
+    target, first, last = "DronePosition", PROPELLERS[0], "Box"
+    scripts = {last: TELL_PYTHON, target: TELL_LUA, first: TELL_LUA}
+    box = {"shape": "box", "size": [1, 1, 1], "position": [3, 0, 0.5], "name": "Box"}
+    simulation = build(scripts, TELL_LUA, scene={"objects": [box]})
+    expected = ["Drone", first, target, last]
+    assert order(simulation) == [f"{name}:init" for name in expected]
+    simulation.step()
+    assert order(simulation) == [f"{name}:{phase}" for phase in ("actuation", "sensing") for name in expected]
+    objects = simulation.drone.objects
+    objects.set_parent(objects.handle(target), objects.handle("Floor"), True)
+    simulation.step()
+    assert order(simulation)[:4] == [f"{name}:actuation" for name in (target, "Drone", first, last)]
+
+
+def test_each_has_parameters_names_and_a_state_of_its_own(build):
+    text = """
+    count = 0
+    function sysCall_actuation()
+        count = count + sim.getScriptSimulationParameter(sim.handle_self, 'step')
+        sim.setFloatSignal(sim.getScriptName(sim.handle_self), count)
+        assert(sim.getObjectName(sim.getObjectHandle('Quadricopter_base')) == 'Quadricopter_base#0')
+        assert(sim.getScriptExecutionCount() == count / 2)
+    end
+    """.replace("count + sim", "sim.getScriptExecutionCount() * 2 + 0 * sim")
+    simulation = build(
+        {"DronePosition#0": text},
+        values={"DronePosition#0": {"step": 2.0}},
+        vehicles={"a": {}, "b": {"position": [0, 2, 1]}},
+    )
+    for _ in range(3):
+        simulation.step()
+    assert simulation.drone.signals.getFloatSignal("DronePosition#0") == 4
+    handle = next(one for one in simulation.drone.scripts if one.name == "DronePosition#0")
+    assert handle.parameters == {"step": 2.0}
+
+
+def test_an_error_names_file_line_and_phase(build, tmp_path):
+    simulation = build({"Floor": "function sysCall_sensing()\n  sim.getObject('/Nobody')\nend"})
+    with pytest.raises(ScriptError, match=rf"\[sensing\] {tmp_path}/0.lua:2: sim.getObject: no object '/Nobody'"):
+        simulation.step()
+
+
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        ("Quadricopter", "'Quadricopter' has the script that the key `script` of its vehicle names"),
+        ("DronePositon", "no object named 'DronePositon'; near names are DronePosition"),
+    ],
+)
+def test_a_wrong_object_gets_one_line(build, name, words):
+    with pytest.raises(ParameterError, match=f"^scene: scripts/0/object: {words}"):
+        build({name: TELL_LUA})
+
+
+def test_an_object_has_one_script(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("scripts:\n- {object: Floor, script: a.lua}\n- {object: Floor, script: b.lua}\n")
+    with pytest.raises(ParameterError, match=r"scene.yaml: line 3: parameter scripts/1/object = 'Floor': comes twice"):
+        parameters.load({"scene_file": str(scene)})
+
+
+# ---- start, stop, snapshots, vehicles that come and go, files
+
+
+def test_they_take_part_in_restarts_snapshots_and_saving(build, tmp_path):
+    own = "n = 0 function sysCall_actuation() n = n + 1 sim.setFloatSignal('n', n) end"
+    simulation = build(
+        {
+            "Floor": own,
+            "DronePosition": "x = 0\ndef sysCall_sensing():\n    global x\n    x += 1\n    sim.setFloatSignal('x', x)",
+        }
+    )
+
+    def signals():
+        return [simulation.drone.signals.getFloatSignal(name) for name in "nx"]
+
+    simulation.step()
+    snapshot = simulation.snapshot()
+    simulation.step()
+    assert signals() == [2, 2]
+    simulation.restore(snapshot)
+    simulation.step()
+    assert signals() == [2, 2]
+    simulation.start()
+    simulation.step()
+    assert signals() == [1, 1]
+    simulation.save_scene(tmp_path / "saved.yaml")
+    again = parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.scripts
+    assert [(one.object, Path(one.script).name) for one in again] == [("Floor", "0.lua"), ("DronePosition", "1.py")]
+
+
+def test_a_vehicles_scripts_come_and_go_with_it(build):
+    simulation = build({"DronePosition#0": TELL_LUA}, vehicles={"a": {}})
+    simulation.step()
+    there = {"a": {}, "b": {"position": [0, 2, 1]}}
+    simulation.set_vehicles(there)
+    simulation.step()
+    assert order(simulation) == [f"DronePosition#0:{phase}" for phase in ("init", "actuation", "sensing")]
+    simulation.set_vehicles({"a": {}})
+    simulation.step()
+    assert order(simulation) == ["DronePosition#0:cleanup"]
+    simulation.set_vehicles(there)
+    assert order(simulation) == ["DronePosition#0:init"]
+
+
+def test_a_command_reaches_the_scripts_on_a_vehicles_parts(build):
+    text = """
+    function sysCall_init() simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'heard') end
+    function heard(m) sim.setFloatSignal('x', m.linear.x) end
+    """
+    simulation = build({"Quadricopter_base": text})
+    simulation.drone.receive(Twist(Vector3(0.5)))
+    simulation.step()
+    assert simulation.drone.signals.getFloatSignal("x") == 0.5
+
+
+# ---- from one script to another
+
+
+CALLED = """
+function sysCall_init() seen = {} end
+function add(a, b, list) seen[#seen + 1] = list.x return a + b, {sum = {a, b}}, 'x' end
+function fails() error('no') end
+function back() return sim.callScriptFunction('ask', sim.getScriptHandle('Drone')) end
+function hangs() while true do end end
+"""
+ASKS = {
+    "lua": """
+    function sysCall_init() end
+    function sysCall_actuation()
+        local a, b, c = sim.callScriptFunction('add@DronePosition', sim.scripttype_childscript, 1, 2.5, {x = {1}})
+        assert(a == 3.5 and b.sum[2] == 2.5 and c == 'x')
+        local handle = sim.getScript(sim.scripttype_childscript, sim.getObject('/target'))
+        assert(handle == sim.getScriptAssociatedWithObject(sim.getObject('/target')))
+        assert(sim.callScriptFunction('add', handle, 1, 2, {}) == 3)
+        assert(sim.getScriptFunctions(handle):add(1, 2, {}) == 3)
+        sim.setFloatSignal('done', 1)
+    end
+    """,
+    "py": """
+def sysCall_actuation():
+    a, b, c = sim.callScriptFunction("add@DronePosition", sim.scripttype_childscript, 1, 2.5, {"x": [1]})
+    assert a == 3.5 and b["sum"][1] == 2.5 and c == "x"
+    handle = sim.getScript(sim.scripttype_childscript, "/target")
+    assert sim.getScriptFunctions(handle).add(1, 2, {})[0] == 3
+    sim.setFloatSignal("done", 1)
+""",
+}
+ANSWERS = {
+    "lua": CALLED,
+    "py": """
+def sysCall_init(): pass
+def add(a, b, more): return a + b, {"sum": [a, b]}, "x"
+""",
+}
+
+
+@pytest.mark.parametrize("answering", ["lua", "py"])
+@pytest.mark.parametrize("asking", ["lua", "py"])
+def test_scripts_call_each_other_by_value(build, asking, answering):
+    simulation = build({"Floor": ASKS[asking], "DronePosition": ANSWERS[answering]})
+    simulation.step()
+    assert simulation.drone.signals.getFloatSignal("done") == 1
+
+
+@pytest.mark.parametrize(
+    "call, words",
+    [
+        ("'fails@DronePosition', 1", r"1.lua:4: no"),
+        ("'nothing@DronePosition', 1", "the script has no function 'nothing' to call"),
+        ("'add@Drone_Position', 1", "no object named 'Drone_Position'; near names are DronePosition"),
+        ("'f@Quadricopter_propeller_respondable1', 1", "has no functions to call"),
+        ("'back@DronePosition', 1", "is being called already: it waits for this call to end"),
+        ("'add', 99", "no script has the handle 99"),
+        ("'hangs@DronePosition', 1", "stopped after 0.2 s"),
+    ],
+)
+def test_a_call_that_fails_gets_one_line(build, call, words):
+    own = f"function ask() end function sysCall_actuation() sim.callScriptFunction({call}) end"
+    simulation = build({"Floor": "function sysCall_init() end", "DronePosition": CALLED}, own, script_time_limit=0.2)
+    with pytest.raises(ScriptError, match=words) as caught:
+        simulation.step()
+    assert "\n" not in str(caught.value)
+
+
+# ---- propellers
+
+
+def flown(simulation, steps=200):
+    path = []
+    for step in range(steps):
+        if step == 5:
+            simulation.drone.receive(Twist(Vector3(1, -0.5, 0.2), Vector3(0, 0, 0.7)))
+        simulation.step()
+        path.append(simulation.drone.state.position)
+    return path
+
+
+def test_propellers_with_v_reps_script_fly_as_the_law_does(build):
+    expected = flown(build({}))
+    found = flown(build({name: SCRIPTS / "propeller_v3.lua" for name in PROPELLERS}))
+    assert max(math.dist(one, other) for one, other in zip(expected, found)) < 1e-9
+
+
+def test_a_propellers_script_takes_the_laws_place(build):
+    still = "function sysCall_actuation() end"
+    simulation = build(dict.fromkeys(PROPELLERS, still))
+    for _ in range(10):
+        simulation.step()
+    assert simulation.drone.state.position[2] < 0.1
+    assert min(simulation.drone.particle_velocities) > 3, "the drone's script wants to fly"
+
+
+def test_without_scripts_nothing_is_otherwise(build):
+    assert struct.pack("600d", *sum(flown(build({})), ())) == struct.pack(
+        "600d", *sum(flown(build({"Floor": TELL_LUA})), ())
+    )
