@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import difflib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from drone_sim.config.types import PATTERNS, Key, Location, ParameterError, readable_key
+from drone_sim.config.types import PATTERNS, Key, Location, ParameterError, Word, readable_key, word_of
 from drone_sim.files.yaml_files import Lines
 from drone_sim.wording import shown
 
@@ -110,6 +110,8 @@ class _Choice(NamedTuple):
 
     key: str
     models: dict[str, Any]  # by that word
+    or_key: str = ""  # under which the word may stand, too
+    others: tuple[str, ...] = ()  # the words that stand under that one
 
 
 def _choice(annotation: Any) -> _Choice:
@@ -120,6 +122,10 @@ def _choice(annotation: Any) -> _Choice:
             if isinstance(key, str):
                 models = get_args(_bare(first))
                 return _Choice(key, {word: one for one in models for word in _words(one, key)})
+            if isinstance(key, Word):
+                models = [_bare(one) for one in get_args(_bare(first))]
+                others = tuple(word_of(one, key.or_key) for one in models if key.or_key in one.model_fields)
+                return _Choice(key.key, {word_of(one, key.key, key.or_key): one for one in models}, key.or_key, others)
         return _choice(first)
     if get_origin(annotation) in _UNIONS and not others:
         return _choice(first)
@@ -161,16 +167,22 @@ def _missing(places: list[_Place]) -> Problem:
 def _problem(error: Any, place: _Place) -> Problem:
     raised = error.get("ctx", {}).get("error")
     if isinstance(raised, ParameterError):  # of several keys at once: it names them itself
-        return Problem(raised.location or place.location, str(raised))
+        if raised.location:
+            return Problem(raised.location, str(raised))
+        return Problem(place.location, f"parameter {readable_key((*place.location, str(raised)))}")
     location, value = place.location, error["input"]
     if error["type"] == "missing":  # a number of a list
         location = location[:-1]
     choice = _choice(place.annotation)
-    if error["type"] == "union_tag_not_found":
-        location = (*location, choice.key)
+    if error["type"] == "union_tag_not_found" and isinstance(value, Mapping):
+        key = _key_of(choice, value)
+        if key in value:
+            return Problem((*location, key), _wrong_word(choice, key, location, value))
+        location = (*location, key)
         return Problem(location, f"parameter {readable_key(location)}: missing; {_must_be_one_of(choice)}", True)
     if error["type"] == "union_tag_invalid":
-        location, value = (*location, choice.key), value[choice.key]
+        key = _key_of(choice, value)
+        return Problem((*location, key), _wrong_word(choice, key, location, value))
     key = f"parameter {readable_key(location)}"
     if error["type"] == "extra_forbidden":
         return Problem(location, f"{key}: unknown key{_near(str(location[-1]), place.known)}")
@@ -186,7 +198,7 @@ def _reason(error: Any, place: _Place) -> str:
     plain = {
         "model_type": f"must hold `key: value` lines with {', '.join(fields)}",
         "model_attributes_type": f"must hold `key: value` lines, of which one is `{choice.key}`",
-        "union_tag_invalid": _must_be_one_of(choice),
+        "union_tag_not_found": f"must hold `key: value` lines, of which one is `{choice.key}`",
         "bool_type": "must be true or false",
         "string_pattern_mismatch": PATTERNS.get(error.get("ctx", {}).get("pattern"), message),
     }
@@ -198,8 +210,21 @@ def _must(place: _Place, verb: str) -> str:
     return f"{verb} {what}" if what else ""
 
 
-def _must_be_one_of(choice: _Choice) -> str:
-    return f"must be one of {', '.join(map(repr, choice.models))}"
+def _key_of(choice: _Choice, value: Mapping[str, Any]) -> str:
+    return choice.or_key if choice.or_key in value else choice.key
+
+
+def _wrong_word(choice: _Choice, key: str, location: Location, value: Mapping[str, Any]) -> str:
+    must = _must_be_one_of(choice, key)
+    return f"parameter {readable_key((*location, key))} = {shown(value[key])}: {must}"
+
+
+def _must_be_one_of(choice: _Choice, key: str = "") -> str:
+    if key and key == choice.or_key:
+        return f"must be one of {', '.join(map(repr, choice.others))}"
+    words = [word for word in choice.models if word not in choice.others]
+    or_other = f"; or `{choice.or_key}`: one of {', '.join(map(repr, choice.others))}"
+    return f"must be one of {', '.join(map(repr, words))}{or_other if choice.others and not key else ''}"
 
 
 def _near(key: str, known: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, ClassVar, Union, get_args
 
 from annotated_types import Ge, GroupedMetadata, Le
 from pydantic import (
@@ -16,9 +16,11 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     PlainSerializer,
     PlainValidator,
+    Tag,
 )
 
 from drone_sim.files import yaml_files
@@ -217,11 +219,40 @@ class Checked(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def one_of(*models: type[Checked], key: str = "kind") -> Any:
-    """Return the type of a value that is one of these, which the word under `key` tells apart."""
+@dataclass(frozen=True)
+class Word:
+    """Which of several models a value is one of: the word that stands under a key, or under another one."""
+
+    key: str
+    or_key: str
+    __name__: ClassVar[str] = "word"  # by which pydantic speaks of it
+
+    def __call__(self, value: Any) -> str | None:
+        """Return the word; None where there is none."""
+        if not isinstance(value, Mapping):
+            return next((str(getattr(value, key)) for key in (self.key, self.or_key) if hasattr(value, key)), None)
+        word = value.get(self.used_in(value))
+        return word if isinstance(word, str) else None
+
+    def used_in(self, value: Any) -> str:
+        """Return the key under which a value has its word, or should have."""
+        return self.or_key if isinstance(value, Mapping) and self.or_key in value else self.key
+
+
+def one_of(*models: type[Checked], key: str = "kind", or_key: str = "") -> Any:
+    """Return the type of a value that is one of these, which the word under `key`, or `or_key`, tells apart."""
     if len(models) == 1:
         return models[0]
-    return Annotated[Union[models], Field(discriminator=key)]  # noqa: UP007 -- of a tuple
+    if not or_key:
+        return Annotated[Union[models], Field(discriminator=key)]  # noqa: UP007 -- of a tuple
+    tagged = tuple(Annotated[one, Tag(word_of(one, key, or_key))] for one in models)
+    return Annotated[Union[tagged], Discriminator(Word(key, or_key))]  # noqa: UP007
+
+
+def word_of(model: type[Checked], *keys: str) -> str:
+    """Return the word under the first of some keys that a model has, by which it is chosen."""
+    (key, *_) = (key for key in keys if key in model.model_fields)
+    return str(get_args(model.model_fields[key].annotation)[0])
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:

@@ -81,7 +81,7 @@ class Parameters(EquipmentParameters):
 
     @property
     def in_scene_file(self) -> Mapping[str, Any]:
-        """What the scene file says of `drone` and `vehicles`."""
+        """What the scene file says beside the scene: `drone`, `vehicles`, `time_step`, ..."""
         return self._in_scene_file
 
     @property
@@ -203,7 +203,7 @@ def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str
         found = [one for one in problems(error, Parameters) if _is_given(one, given, scene)]
         raise ParameterError(_told(found, named, bool(scene))) from None
     parameters._given = given
-    parameters._in_scene_file = {key: scene[key] for key in ("drone", "vehicles") if key in scene}
+    parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
     return parameters
 
 

@@ -12,6 +12,8 @@ from drone_sim.config.types import Checked, FoundFile, ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics import frames
 from drone_sim.run.parameters import Parameters
+from drone_sim.scene import state_now
+from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene import Scene
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -25,7 +27,9 @@ def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Ve
     floor, and OSError; what was in the file is then still there.
     """
     own = scene.parameters
-    content: dict[str, Any] = {"datum": own.datum.model_dump(), "magnetic_field": list(own.magnetic_field)}
+    said = parameters.in_scene_file
+    content: dict[str, Any] = {key: said[key] for key in scene_parameters.WORLD if key in said}
+    content.update(datum=own.datum.model_dump(), magnetic_field=list(own.magnetic_field))
     content["floor"] = _plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))
     content["objects"] = _objects(scene, path.parent)
@@ -52,7 +56,9 @@ def _flying(parameters: Parameters, vehicles: Iterable[Vehicle], folder: Path) -
 
 
 def _place(vehicle: Vehicle) -> dict[str, Any]:
-    return {"position": list(frames.position(vehicle.matrix)), "yaw": frames.to_rpy(vehicle.matrix)[2]}
+    roll, pitch, yaw = frames.to_rpy(vehicle.matrix)
+    place: dict[str, Any] = {"position": list(frames.position(vehicle.matrix)), "yaw": yaw}
+    return {**place, "tilt": [roll, pitch]} if any(vehicle.parameters.tilt) else place
 
 
 def _named(said: Any, folder: Path) -> dict[str, Any]:
@@ -61,13 +67,7 @@ def _named(said: Any, folder: Path) -> dict[str, Any]:
 
 
 def _objects(scene: Scene, folder: Path) -> list[dict[str, Any]]:
-    saved = []
-    for one, body in zip(scene.parameters.objects, scene.bodies):
-        values = _plain(one, folder)
-        values["position"] = list(body.state.position)
-        values["rpy"] = list(frames.to_rpy(body.matrix))
-        saved.append(values)
-    return saved
+    return [{**_plain(one, folder), **now} for one, now in zip(scene.parameters.objects, state_now.of_all(scene))]
 
 
 def _plain(values: Checked, folder: Path) -> dict[str, Any]:
@@ -76,6 +76,8 @@ def _plain(values: Checked, folder: Path) -> dict[str, Any]:
     for key in ("file", "texture", "script"):
         if plain.get(key):
             plain[key] = _file_name(getattr(values, key), folder)
+    if "parts" in plain:  # of a compound
+        plain["parts"] = [_plain(one, folder) for one in getattr(values, "parts")]  # noqa: B009
     return plain
 
 

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import itertools
 
+import numpy as np
+
 from drone_sim.config.types import ParameterError
+from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.object_names import suffixed
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.run.cast import Cast, tell
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
@@ -33,8 +38,7 @@ class Setting:
         self._blades_shown = -1  # the world's changes, when they were
         try:
             self._empty_tree()
-            self.scene = Scene(parameters.scene, self.world)
-            shared.names.update(self.scene.names())
+            self.scene = Scene(parameters.scene, self.world, self._look, shared.names)
             for one in parameters.fleet:
                 self._put(one)
             self._name_objects()
@@ -79,15 +83,23 @@ class Setting:
         self.vehicles.pop(name).leave()
 
     def _put(self, parameters: VehicleParameters) -> Vehicle:
-        vehicle = Vehicle(parameters, self._free_suffix(), self.shared)
+        vehicle = Vehicle(parameters, self._suffix(parameters), self.shared)
         self.vehicles[vehicle.name] = vehicle
         if vehicle.instruments:
             self.world.solve_contacts_for_instruments()
         return vehicle
 
-    def _free_suffix(self) -> str:
-        """Return what the names of V-REP's copies end in: nothing for the first, then #0, #1, ..."""
+    def _suffix(self, parameters: VehicleParameters) -> str:
+        """Return what the names of V-REP's copies end in: nothing for the first, then #0, #1, ..., or as it is given.
+
+        Raises ParameterError for one that another vehicle has.
+        """
         taken = {vehicle.suffix for vehicle in self.vehicles.values()}
+        if parameters.suffix is not None:
+            wanted = suffixed("", parameters.suffix)
+            if wanted in taken:
+                raise ParameterError(f"vehicle {parameters.name}: suffix = {parameters.suffix}: another vehicle has it")
+            return wanted
         return next(one for one in itertools.chain([""], map("#{}".format, itertools.count())) if one not in taken)
 
     def _empty_tree(self) -> None:
@@ -108,6 +120,11 @@ class Setting:
         if overlaps > MAX_OVERLAPS:
             said = f"{overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may"
             raise ParameterError(f"scene/objects: {said}")
+
+    def _look(self, kind: str, camera: Intrinsics, pose: Matrix) -> np.ndarray:
+        """Take a picture for a vision sensor of the scene; see scene.kinds.kind.Look."""
+        self._show_blades()
+        return self.shared.vision.picture(kind, camera, np.reshape((*pose, 0, 0, 0, 1), (4, 4)))
 
     def _show_blades(self) -> None:
         """Turn the blades of all vehicles in the world's pictures to where they are, once for all cameras."""

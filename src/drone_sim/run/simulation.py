@@ -279,9 +279,14 @@ class Simulation:
         wrenches = {}
         for vehicle in vehicles:
             wrenches[vehicle.body.number] = vehicle.wrench()
+        scene = self.scene
+        if scene.carries:
+            scene.follow()
         self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
         for vehicle in vehicles:
             vehicle.body.refresh()
+        if scene.carries:
+            scene.follow()
         self.steps += 1
         self._whereabouts.check(vehicles)
         for vehicle in vehicles:
@@ -309,7 +314,8 @@ class Simulation:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
         attached = self._setting.cast.attached
-        parts: list[Any] = [shared.objects, shared.signals, shared.data, self._drawings, *self._flying, *attached]
+        held = (shared.objects, shared.signals, shared.data, self._drawings, self.scene)
+        parts: list[Any] = [*held, *self._flying, *attached]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

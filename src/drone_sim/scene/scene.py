@@ -1,77 +1,209 @@
-"""The scene around the vehicles: floor and objects in the world."""
+"""The scene around the vehicles: floor and objects in the world, and in the tree of objects."""
 
 from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from drone_sim.config.types import ParameterError
-from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.frames import IDENTITY, multiply, position, to_quaternion
+from drone_sim.mechanics.joint import Joint
 from drone_sim.mechanics.object_tree import ObjectTree
-from drone_sim.mechanics.state import Pose, State
-from drone_sim.scene import scene_files
-from drone_sim.scene.scene_parameters import ObjectParameters, SceneParameters
+from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.mechanics.state import Pose
+from drone_sim.scene import building, chains, order, scene_files
+from drone_sim.scene.bodies import Carried, LinkBody, SceneBody, StaticShape, bodies_above
+from drone_sim.scene.drive import JointDrive
+from drone_sim.scene.kinds.kind import Around, KindParameters, Look, Place
+from drone_sim.scene.object_parameters import ObjectParameters
+from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.shapes.visual import Visual
+from drone_sim.wording import near_names
 from drone_sim.world import World
 
-
-class SceneBody:
-    """One object of the scene, as the object tree sees it."""
-
-    def __init__(self, world: World, body: int):
-        """Take the world and the number of the body in it."""
-        self._world = world
-        self._body = body
-
-    @property
-    def state(self) -> State:
-        """Pose and velocity."""
-        return self._world.state(self._body)
-
-    @property
-    def matrix(self) -> Matrix:
-        """World from its frame."""
-        return self.state.matrix
-
-    def move(self, pose: Pose) -> None:
-        """Put it there, at rest."""
-        self._world.set_pose(self._body, pose)
+_LOG = logging.getLogger(__name__)
 
 
 class Scene:
     """What stands in the world besides the vehicles."""
 
-    def __init__(self, parameters: SceneParameters, world: World):
-        """Put floor and objects into an empty world. Raises ParameterError for a file that cannot be used."""
+    def __init__(self, parameters: SceneParameters, world: World, look: Look, names: dict[int, tuple[str, str]]):
+        """Put floor and objects into an empty world. Raises ParameterError for a file that cannot be used.
+
+        `look` takes pictures; `names` has for each body in the world what a person calls it, and its name among the
+        objects of scripts, or '': those of the scene are added.
+        """
         self.parameters = parameters
         scene_files.check(parameters)
-        self._world = world
+        self._world, self._names = world, names
         floor = parameters.floor
         self.floor = world.add_floor(floor.size, floor.texture, ground=not floor.edge)
+        self._entries = parameters.objects
+        found = chains.found(self._entries)
+        _warn(self._entries, found.reasons)
+        self._chains = found.chains
         try:
-            self._numbers = [_add(world, one) for one in parameters.objects]
+            built = building.build(world, self._entries, self._chains, order.matrices(self._entries))
         except ValueError as error:
             raise ParameterError(str(error)) from None
-        self.bodies = [SceneBody(world, number) for number in self._numbers]  # in the order of the parameters
+        self._places, self._bases = built.places, built.chains
+        self._around = Around(world, look, self._name_of, self.follow)
+        self.bodies = [self._body(index) for index in sorted(self._places)]  # of the shapes, as the file has them
+        self._add_names()
+        self._is_placed = False
+        self._forget_objects()
+
+    def _body(self, index: int) -> SceneBody | LinkBody:
+        number, link = self._places[index]
+        one = self._entries[index]
+        if link == -1:
+            return SceneBody(self._world, number)
+        says = f"'{one.name}' is held by the joint '{one.parent}': set that, or move what it hangs on"
+        return LinkBody(self._world, number, link, one.local, says)
+
+    def _add_names(self) -> None:
+        self._link_names = {place: self._entries[index].name for index, place in self._places.items()}
+        self._names[self.floor] = ("Floor", "Floor")
+        for index, (number, link) in self._places.items():
+            name = self._entries[index].name
+            if link == -1 or number not in self._names:
+                self._names[number] = (name or f"objects/{index}", name)
+
+    def _name_of(self, body: int, link: int) -> str:
+        """Return what scripts call a body's link (-1: its root), ''  for what they do not know."""
+        name = self._link_names.get((body, link))
+        return self._names.get(body, ("", ""))[1] if name is None else name
+
+    # ---- the tree
 
     def name_objects(self, objects: ObjectTree) -> None:
-        """Let scripts find the objects that have a name. Raises ParameterError, with its place, for a taken one."""
-        for index, (one, body) in enumerate(zip(self.parameters.objects, self.bodies)):
-            if one.name in objects:
-                raise ParameterError(f"an object named '{one.name}' is there already", ("objects", index, "name"))
-            if one.name:
-                objects.add(one.name, body=body)
+        """Let scripts find the objects that have a name, as they were at the beginning.
 
-    def names(self) -> dict[int, tuple[str, str]]:
-        """Return, by body in the world, what a person calls it, and its name among the objects of scripts, or ''."""
-        named = {self.floor: ("Floor", "Floor")}
-        for index, (one, number) in enumerate(zip(self.parameters.objects, self._numbers)):
-            named[number] = (one.name or f"objects/{index}", one.name)
-        return named
+        Raises ParameterError, with its place, for a name that is taken, or a parent that is not there.
+        """
+        self._forget_objects()
+        for index in order.parents_first(self._entries):
+            if self._entries[index].name:
+                self._objects[index] = self._add(objects, index)
+        self._hold_chains()
+        if not self._is_placed:
+            self._place_loose_ones()
+            self._is_placed = True
+        self.follow()
+
+    def _forget_objects(self) -> None:
+        for one in getattr(self, "_objects", {}).values():
+            if isinstance(one, StaticShape):
+                one.parent = None  # collides again with what carried it
+        self._objects: dict[int, SceneObject] = {}  # by entry
+        self._hanging: dict[int, Carried] = {}  # static shapes that have a parent, by body
+        self._carried_bases: list[Carried] = []  # those of chains whose first joint has one
+
+    def _add(self, objects: ObjectTree, index: int) -> SceneObject:
+        one = self._entries[index]
+        parent = self._parent(objects, index)
+        place = Place((one.name,), one.alias or one.name, parent, one.local)
+        added = self._object(index, place)
+        try:
+            objects.insert(added)
+        except ValueError as error:
+            raise ParameterError(str(error), ("objects", index, "name")) from None
+        return added
+
+    def _parent(self, objects: ObjectTree, index: int) -> SceneObject | None:
+        name = self._entries[index].parent
+        if not name:
+            return None
+        if name in objects:
+            return objects[objects.handle(name)]
+        if self._is_placed:  # a vehicle that has gone
+            return None
+        raise ParameterError(
+            f"no object is named '{name}', the parent of '{self._entries[index].name}'; "
+            f"{near_names(name, objects.names)}",
+            ("objects", index, "parent"),
+        )
+
+    def _object(self, index: int, place: Place) -> SceneObject:
+        one = self._entries[index]
+        if isinstance(one, KindParameters):
+            return one.make(place, self._around)
+        number, link = self._places[index]
+        if isinstance(one, ObjectParameters) and not one.mass:
+            return StaticShape(*place, world=self._world, number=number, hangs=self._hang)
+        return SceneObject(*place[:3], IDENTITY, self._body(index), kind="shape")
+
+    def _hang(self, shape: StaticShape) -> None:
+        if shape.parent is None:
+            self._hanging.pop(shape.number, None)
+        else:
+            self._hanging[shape.number] = shape.carried
+
+    def _hold_chains(self) -> None:
+        """Let the dynamics move the joints of chains."""
+        for chain, body in zip(self._chains, self._bases):
+            for hung in chain.hung:
+                joint = self._objects[hung.joint]
+                assert isinstance(joint, Joint), "a chain hangs on joints"
+                joint.drive = JointDrive(self._world, *self._places[hung.shape])
+                joint.drive.command(joint.control)
+            first = self._objects[chain.hung[0].joint]
+            if chain.root is None and first.parent is not None:
+                self._carried_bases.append(Carried(self._world, body, first.parent.below))
+                for above in bodies_above(first):
+                    self._world.let_pass(body, above)
+
+    def _place_loose_ones(self) -> None:
+        """Put what hangs on vehicles where they are, now that they are there."""
+        for index, one in self._objects.items():
+            if isinstance(one.body, SceneBody) and one.parent is not None:
+                matrix = multiply(one.parent.below(), self._entries[index].local)
+                self._world.set_pose(one.body.number, Pose(position(matrix), to_quaternion(matrix)))
+
+    # ---- what is carried
+
+    @property
+    def carries(self) -> bool:
+        """Whether there is anything to `follow`."""
+        return bool(self._hanging or self._carried_bases)
+
+    def follow(self) -> None:
+        """Put every body without mass to where what carries it has gone."""
+        for base in self._carried_bases:
+            base.follow()
+        for shape in self._hanging.values():
+            shape.follow()
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that puts bodies without mass back where the tree has them."""
+
+        def recall() -> None:
+            statics = [one.carried for one in self._objects.values() if isinstance(one, StaticShape)]
+            for one in (*self._carried_bases, *statics):
+                one.renew()
+
+        return recall
+
+    # ---- what it looks like
+
+    def objects_now(self) -> Mapping[int, SceneObject]:
+        """Return the objects that scripts find, by entry of the scene file."""
+        return self._objects
+
+    def bodies_by_entry(self) -> Mapping[int, SceneBody | LinkBody]:
+        """Return the bodies of the shapes, by entry of the scene file."""
+        return dict(zip(sorted(self._places), self.bodies))
 
     def visuals(self) -> tuple[list[Visual], np.ndarray]:
         """Return how the objects look, the floor aside, and the poses world from visual, (N, 4, 4)."""
-        return self._world.visuals(self._numbers), self._world.visual_poses(self._numbers)
+        numbers = list(dict.fromkeys(self._places[index][0] for index in sorted(self._places)))
+        return self._world.visuals(numbers), self._world.visual_poses(numbers)
 
 
-def _add(world: World, one: ObjectParameters) -> int:
-    return world.add_object(one.to_shape(), one.pose, mass=one.mass, color=one.color, texture=one.texture)
+def _warn(entries: Sequence[object], reasons: Mapping[int, str]) -> None:
+    """Say in one line for each reason which joints the dynamics does not move."""
+    for reason in sorted({*reasons.values()}):
+        names = [getattr(entries[index], "name", "") for index, one in reasons.items() if one == reason]
+        _LOG.warning("moved by scripts alone, as %s: %s", reason, ", ".join(names[:12]) + (" …" if names[12:] else ""))

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import Field, create_model
+from pydantic import Field
 
 from drone_sim.config.errors import Problem
 from drone_sim.config.place import DatumParameters, MagneticField
 from drone_sim.config.types import (
-    Angles,
     Checked,
-    Color,
     File,
     Finite,
-    Label,
-    Mass,
-    OptionalFile,
     ParameterError,
-    Point,
     Switch,
     Within,
     named_in,
@@ -30,16 +23,16 @@ from drone_sim.config.types import (
     readable_key,
 )
 from drone_sim.files.resources import resolve
-from drone_sim.mechanics.frames import from_rpy, to_quaternion
-from drone_sim.mechanics.state import Pose
 from drone_sim.scene import attached_scripts
 from drone_sim.scene.attached_scripts import AttachedScripts
-from drone_sim.shapes import SCENE_SHAPES
-from drone_sim.shapes.shape import SceneShape
+from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.kinds import KINDS
+from drone_sim.scene.object_parameters import SHAPES
 from drone_sim.wording import shown
 
 MAX_OBJECTS = 1000
-_BESIDE = ("drone", "vehicles")  # what a scene file holds besides the scene
+WORLD = ("time_step", "sub_step", "gravity")  # what a scene file may say of these comes before the parameters
+BESIDE = ("drone", "vehicles", *WORLD)  # what a scene file holds besides the scene
 
 
 class FloorParameters(Checked):
@@ -50,42 +43,10 @@ class FloorParameters(Checked):
     edge: Switch
 
 
-class ObjectParameters(Checked):
-    """An object of the scene: what all have in common; each shape brings its own keys. A mass of 0 stands still."""
-
-    name: Label = ""
-    position: Point
-    rpy: Angles = (0.0, 0.0, 0.0)
-    mass: Mass = 0.0
-    color: Color
-    texture: OptionalFile = ""
-    shape: str
-
-    @property
-    def pose(self) -> Pose:
-        """Where it stands."""
-        x, y, z = self.position
-        return Pose((x, y, z), to_quaternion(from_rpy((0, 0, 0), self.rpy)))
-
-    def to_shape(self) -> SceneShape:
-        """Return its shape, of the keys that this brings."""
-        shape = SCENE_SHAPES[self.shape]
-        return shape(**{field.name: getattr(self, field.name) for field in fields(shape)})
-
-
-def _with_keys_of(shape: type[SceneShape]) -> type[ObjectParameters]:
-    """Return what a scene file may say of an object of this shape."""
-    keys: dict[str, Any] = {"color": (Color, shape.default_color), "shape": (Literal[shape.word], ...)}
-    types = get_type_hints(shape, include_extras=True)
-    for field in fields(shape):
-        keys[field.name] = (types[field.name], ... if field.default is MISSING else field.default)
-    return create_model(f"{shape.__name__}Parameters", __base__=ObjectParameters, **keys)
-
-
 if TYPE_CHECKING:
-    _Object = ObjectParameters
+    _Object = EntryParameters
 else:
-    _Object = one_of(*map(_with_keys_of, SCENE_SHAPES.values()), key="shape")
+    _Object = one_of(*SHAPES, *KINDS, key="shape", or_key="kind")
 
 
 class SceneParameters(Checked):
@@ -99,13 +60,29 @@ class SceneParameters(Checked):
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several objects at once."""
-        names = set()
+        entries = {}
         for index, one in enumerate(self.objects):
-            if one.name and one.name in names:
-                location = ("scene", "objects", index, "name")
-                raise ParameterError(f"parameter scene/objects/{index}/name = '{one.name}': comes twice", location)
-            names.add(one.name)
+            if one.name and one.name in entries:
+                raise _refused(index, "name", one.name, "comes twice")
+            entries[one.name] = index, one
+        for index, one in enumerate(self.objects):
+            if _is_above_itself(one, entries):
+                raise _refused(index, "parent", one.parent, f"'{one.name}' would be its own ancestor")
         attached_scripts.check(self.scripts)
+
+
+def _refused(index: int, key: str, value: str, why: str) -> ParameterError:
+    return ParameterError(f"parameter scene/objects/{index}/{key} = '{value}': {why}", ("scene", "objects", index, key))
+
+
+def _is_above_itself(one: EntryParameters, entries: Mapping[str, tuple[int, EntryParameters]]) -> bool:
+    above, passed = one.parent, set()
+    while above and above in entries and above not in passed:
+        if above == one.name:
+            return True
+        passed.add(above)
+        above = entries[above][1].parent
+    return False
 
 
 def read(file: str) -> dict[str, Any]:
@@ -123,9 +100,9 @@ def read(file: str) -> dict[str, Any]:
 def from_content(content: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return what `read` does, of a scene file's content."""
     scene = {
-        key: value for key, value in content.items() if key not in _BESIDE
+        key: value for key, value in content.items() if key not in BESIDE
     }  # the unknown are refused with the rest
-    found = {"scene": scene, **{key: content[key] for key in _BESIDE if key in content}}
+    found = {"scene": scene, **{key: content[key] for key in BESIDE if key in content}}
     find_files_beside(folder, found)
     return found
 
@@ -143,13 +120,13 @@ def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
 
 def problem_in_file(problem: Problem) -> Problem | None:
     """Return a problem as the scene file has it, where they stand beside the drone; None for any other."""
-    if problem.location[:1] in (("drone",), ("vehicles",)):
+    if problem.location[:1] in [(key,) for key in BESIDE]:
         return problem
     if problem.location[:1] != ("scene",):
         return None
     location, text = problem.location[1:], problem.text.replace("parameter scene/", "parameter ", 1)
     if len(location) == 1 and "unknown key" in text:
-        known = ", ".join(sorted([*SceneParameters.model_fields, *_BESIDE]))
+        known = ", ".join(sorted([*SceneParameters.model_fields, *BESIDE]))
         text = f"unknown key {readable_key(location)}; known are {known}"
     return problem._replace(location=location, text=text)
 
@@ -159,6 +136,8 @@ def _listed(objects: Any) -> list[Any]:
 
 
 def _find_beside(folder: Path, place: Any) -> None:
+    for part in _listed(place.get("parts")) if isinstance(place, dict) else []:
+        _find_beside(folder, part)
     for key in ("file", "texture", "urdf", "script"):
         name = place.get(key) if isinstance(place, dict) else None
         if key == "script" and not Path(str(name)).suffix:  # tutorial and target have none

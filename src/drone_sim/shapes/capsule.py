@@ -1,26 +1,35 @@
-"""A capsule, as URDFs may hold one."""
+"""A capsule."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import trimesh
+from pydantic import Field
 
+from drone_sim.config.types import Length
 from drone_sim.mechanics.frames import from_rpy
+from drone_sim.shapes.bullet import Files, Geometry
 from drone_sim.shapes.primitive import Primitive
-from drone_sim.shapes.shape import ReportedShape
+from drone_sim.shapes.shape import ReportedShape, SceneShape
 from drone_sim.shapes.triangles import SECTIONS, Triangles, corners_of, outer
 
 
 @dataclass(frozen=True)
-class Capsule(ReportedShape):
+class Capsule(SceneShape, ReportedShape):
     """A cylinder along its z axis with half a sphere on each end; `size` is radius and length without them, m."""
 
     word = "capsule"
     bullet_type = "GEOM_CAPSULE"
 
-    size: tuple[float, float]
+    size: Annotated[tuple[Length, Length], Field(description="2 numbers, [radius, length without the caps] in m")]
+
+    def for_bullet(self, files: Files, moves: bool) -> Geometry:
+        """Return a capsule, whose length PyBullet names in two ways."""
+        radius, length = self.size
+        return Geometry(self.bullet_type, {"radius": radius, "height": length}, {"radius": radius, "length": length})
 
     @classmethod
     def from_bullet(cls, dimensions: Sequence[float], file: str) -> Capsule:

@@ -34,6 +34,8 @@ class Pictures:
         self._floor = -1
         self._shapes: dict[int, DrawnShape] = {}
         self._textures: dict[int, str] = {}
+        self._looks: dict[int, Mapping[int, Sequence[tuple[DrawnShape, str]]]] = {}
+        self._hidden: set[tuple[int, int]] = set()
         self._parts: dict[int, list[_Placed]] = {}
         self._standing: dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
 
@@ -45,6 +47,15 @@ class Pictures:
     def set_shape(self, body: int, shape: DrawnShape) -> None:
         """Say of what shape a body is: PyBullet tells only of those that it has a word for."""
         self._shapes[body] = shape
+
+    def set_looks(self, body: int, looks: Mapping[int, Sequence[tuple[DrawnShape, str]]]) -> None:
+        """Say of which shapes a body's links (-1: the root) are, in their order, and what image covers each, or ''."""
+        self._looks[body] = looks
+
+    def hide(self, body: int, link: int) -> None:
+        """Leave a link (-1: the root) out of all pictures."""
+        self._hidden.add((body, link))
+        self.forget(body)
 
     def set_texture(self, body: int, texture: str) -> None:
         """Say which image covers a body: PyBullet does not tell."""
@@ -67,6 +78,8 @@ class Pictures:
         """Forget all about a body: it is gone, and PyBullet may give its number to another."""
         self.forget(body)
         self._shapes.pop(body, None)
+        self._looks.pop(body, None)
+        self._hidden = {one for one in self._hidden if one[0] != body}
         self._textures.pop(body, None)
         if body == self._floor:
             self._floor = -1
@@ -118,16 +131,27 @@ class Pictures:
     def _of(self, body: int) -> list[_Placed]:
         if body not in self._parts:
             rows = pybullet.getVisualShapeData(body, physicsClientId=self._client)
-            self._parts[body] = [self._part((body, index), row) for index, row in enumerate(rows)]
+            if self._hidden:
+                rows = [row for row in rows if (body, row[1]) not in self._hidden]
+            looks = self._looks_of(body, rows)
+            self._parts[body] = [self._part((body, n), row, *look) for n, (row, look) in enumerate(zip(rows, looks))]
         return self._parts[body]
 
-    def _part(self, key: tuple[int, int], row: Sequence[Any]) -> _Placed:
-        _, link, kind, dimensions, file, position, orientation, rgba = row[:8]
-        shape = self._shapes.get(key[0])
-        if shape is None:
-            shape = _TYPES[kind].from_bullet(dimensions, self._origin(file.decode()))
+    def _looks_of(self, body: int, rows: Sequence[Sequence[Any]]) -> list[tuple[DrawnShape, str]]:
+        """Return shape and texture of each visual."""
+        if body in self._looks:  # a link without any has none but what PyBullet makes up
+            left = {link: list(looks) for link, looks in self._looks[body].items()}
+            return [left[row[1]].pop(0) for row in rows]
+        texture = self._textures.get(body, "")
+        return [(self._shapes.get(body) or self._reported(row), texture) for row in rows]
+
+    def _reported(self, row: Sequence[Any]) -> DrawnShape:
+        return _TYPES[row[2]].from_bullet(row[3], self._origin(row[4].decode()))
+
+    def _part(self, key: tuple[int, int], row: Sequence[Any], shape: DrawnShape, texture: str) -> _Placed:
+        link, position, orientation, rgba = row[1], *row[5:8]
         floor, ground = key == (self._floor, 0), key == (self._floor, 1)
-        texture = "" if ground else self._textures.get(key[0], "")
+        texture = "" if ground else texture
         visual = Visual(
             key=key,
             shape=shape,

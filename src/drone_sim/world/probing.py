@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from math import dist
 from typing import Any, NamedTuple
 
@@ -18,6 +18,15 @@ class RayHit(NamedTuple):
 
     body: int
     distance: float
+    normal: Vector
+
+
+class Met(NamedTuple):
+    """A point of a body's link (-1: the root): where it is (m), and the unit normal of the surface there."""
+
+    body: int
+    link: int
+    point: Vector
     normal: Vector
 
 
@@ -52,6 +61,44 @@ def _all_hits(client: int, start: Vector, end: Vector) -> Iterator[Any]:
             return
         yield hit
         number += 1
+
+
+def rays(client: int, ends: Sequence[tuple[Vector, Vector]], counts: Callable[[int, int], bool]) -> list[Met]:
+    """Return what each of several rays meets first of the bodies and links that count; those that meet none are none."""
+    starts, stops = zip(*ends)
+    found = []
+    for start, stop, hit in zip(starts, stops, pybullet.rayTestBatch(starts, stops, physicsClientId=client)):
+        if hit[0] != _NOTHING and not counts(hit[0], hit[1]):
+            others = [one for one in _all_hits(client, start, stop) if counts(one[0], one[1])]
+            hit = min(others, key=lambda one: one[2], default=(_NOTHING,))
+        if hit[0] != _NOTHING:
+            found.append(Met(hit[0], hit[1], hit[3], hit[4]))
+    return found
+
+
+def nearest_points(
+    client: int, probe: int, point: Vector, reach: float, counts: Callable[[int, int], bool]
+) -> list[Met]:
+    """Return the points that are nearest to a point (m) and within `reach` (m), of every body and link that counts.
+
+    `probe` is a collision shape as good as a point.
+    """
+    low, high = [one - reach for one in point], [one + reach for one in point]
+    around = pybullet.getOverlappingObjects(low, high, physicsClientId=client) or ()
+    found = []
+    for body, link in sorted(set(around)):
+        if counts(body, link):
+            rows = pybullet.getClosestPoints(
+                bodyA=-1,
+                bodyB=body,
+                linkIndexB=link,
+                distance=reach,
+                collisionShapeA=probe,
+                collisionShapePositionA=point,
+                physicsClientId=client,
+            )
+            found += [Met(body, link, row[6], row[7]) for row in rows if row[8] > 0]
+    return found
 
 
 def contacts(client: int, body: int) -> list[Touch]:

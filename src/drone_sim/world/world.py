@@ -18,8 +18,10 @@ from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.shape import DrawnShape, SceneShape
 from drone_sim.shapes.visual import Visual
-from drone_sim.world import bodies, floor, probing
+from drone_sim.world import assemblies, bodies, floor, probing
+from drone_sim.world.assemblies import Link
 from drone_sim.world.beginning import Beginning
+from drone_sim.world.joints import Joints
 from drone_sim.world.own_files import OwnFiles
 from drone_sim.world.pictures import Pictures
 from drone_sim.world.textures import Textures
@@ -29,6 +31,7 @@ _NO_TURN = (0.0, 0.0, 0.0, 1.0)
 # (N s)², the square of the last change of an impulse after which Bullet holds the contacts for solved. With PyBullet's
 # 1e-7 what lies still rattles at some 1e-3 m/s², which only an accelerometer feels; this is less than 1e-6 m/s².
 _SOLVED = 1e-18
+_PROBE = 1e-6  # m, radius
 
 
 class World:
@@ -62,10 +65,16 @@ class World:
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: dict[int, tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
         self._beginning = Beginning(self._client)
+        self._permeable: set[tuple[int, int]] = set()  # bodies and links that nothing meets
+        self._probe: int | None = None  # a collision shape as good as a point
         self._poses: tuple[int, np.ndarray] | None = None  # of all visuals, and the changes that they are of
         self._files.clear()
         self._pictures = Pictures(self._client, self._files.origin)
         self._textures = Textures(self._client, self._files)
+        self.joints = Joints(self._client, self._look_anew)
+
+    def _look_anew(self) -> None:
+        self.changes = next(_changes)
 
     def close(self) -> None:
         """Free the world; may be called twice."""
@@ -111,6 +120,37 @@ class World:
             self._pictures.set_texture(body, texture)
         return body
 
+    def add_assembly(self, links: Sequence[Link], pose: Pose, textures: Sequence[str]) -> tuple[int, list[int]]:
+        """Add a body of several links, its first one's frame at `pose`; return its id and the number of each link.
+
+        `textures` has for each link the path of an image, or ''. Raises ValueError, in one line, for a file that
+        cannot be read.
+        """
+        body, numbers = assemblies.create(self._client, self._files, links, pose)
+        self._set_material(body)
+        self.set_pose(body, pose)  # again, for PyBullet reads a URDF's pose in single precision
+        looks = {
+            number: [(part.shape, texture) for part in link.parts if isinstance(part.shape, DrawnShape)]
+            for number, link, texture in zip(numbers, links, textures)
+        }
+        self._pictures.set_looks(body, looks)
+        return body, numbers
+
+    def let_everything_pass(self, body: int, link: int = -1) -> None:
+        """Let a link (-1: the root) be met by nothing, and by no ray."""
+        pybullet.setCollisionFilterGroupMask(body, link, 0, 0, self._client)
+        self._permeable.add((body, link))
+
+    def hide(self, body: int, link: int = -1) -> None:
+        """Let a link (-1: the root) be in no picture."""
+        self._pictures.hide(body, link)
+
+    def let_pass(self, body: int, other: int, passes: bool = True) -> None:
+        """Let two bodies go through each other, or, after that, collide again."""
+        links = [range(-1, pybullet.getNumJoints(one, self._client)) for one in (body, other)]
+        for link, another in itertools.product(*links):
+            pybullet.setCollisionFilterPair(body, other, link, another, int(not passes), self._client)
+
     def add_rigid_body(self, body: RigidBody, pose: Pose) -> int:
         """Add a merged URDF with its root link at `pose`, at rest; return its body id."""
         path = self._files.urdf(Xml.fromstring(body.xml))
@@ -135,6 +175,8 @@ class World:
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
         self._beginning.forget(body)
+        self.joints.forget(body)
+        self._permeable = {one for one in self._permeable if one[0] != body}
         self._textures.forget(body)
         self._centres.pop(body, None)
         self._pictures.remove(body)
@@ -302,6 +344,24 @@ class World:
     def ray(self, start: Vector, end: Vector, ignoring: int = -1) -> probing.RayHit | None:
         """Return the nearest body between two points (m), but for the one that is ignored; None where there is none."""
         return probing.ray(self._client, start, end, ignoring)
+
+    def rays(self, ends: Sequence[tuple[Vector, Vector]], counts: Callable[[int, int], bool]) -> list[probing.Met]:
+        """Return what each of several rays (from, to, m) meets first of the bodies and links that count."""
+        return probing.rays(self._client, ends, counts)
+
+    def nearest_points(self, point: Vector, reach: float, counts: Callable[[int, int], bool]) -> list[probing.Met]:
+        """Return the points within `reach` (m) that are nearest to a point (m), of all bodies and links that count."""
+        if self._probe is None:
+            self._probe = pybullet.createCollisionShape(
+                pybullet.GEOM_SPHERE, radius=_PROBE, physicsClientId=self._client
+            )
+        return probing.nearest_points(
+            self._client,
+            self._probe,
+            point,
+            reach,
+            lambda body, link: (body, link) not in self._permeable and counts(body, link),
+        )
 
     def contacts(self, body: int) -> list[probing.Touch]:
         """Return where others pushed a body in the last sub-step."""

@@ -1,0 +1,63 @@
+"""A path through points, as an object of the scene. Metres, in its own frame where nothing else is said."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import math
+from collections.abc import Sequence
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Matrix, Vector
+from drone_sim.mechanics.scene_object import SceneObject
+
+
+class Path(SceneObject):
+    """Straight pieces from point to point."""
+
+    def __init__(
+        self,
+        names: tuple[str, ...],
+        alias: str,
+        parent: SceneObject | None,
+        local: Matrix,
+        points: Sequence[Sequence[float]],
+        closed: bool = False,
+    ):
+        """Take at least two points (m); `closed`: the path goes on from the last one to the first."""
+        super().__init__(names, alias, parent, local, kind="path")
+        self.points: list[Vector] = [(x, y, z) for x, y, z in points]
+        self.closed = closed
+        if closed and self.points[0] != self.points[-1]:
+            self.points.append(self.points[0])
+        self.position_along = 0.0  # m, of who follows it, as V-REP 3.x keeps it
+        pieces = (math.dist(one, other) for one, other in itertools.pairwise(self.points))
+        self._ends = list(itertools.accumulate(pieces, initial=0.0))
+
+    @property
+    def length(self) -> float:
+        """From its beginning to its end, m."""
+        return self._ends[-1]
+
+    def at(self, along: float) -> Matrix:
+        """Return the frame of the path, in the path's own, so far (m) from its beginning: x ahead, z up.
+
+        Beyond its ends it is at them; where it is closed, it begins again.
+        """
+        along = along % self.length if self.closed and self.length else min(max(along, 0.0), self.length)
+        index = min(max(bisect.bisect_right(self._ends, along) - 1, 0), len(self.points) - 2)
+        one, other = self.points[index], self.points[index + 1]
+        piece = self._ends[index + 1] - self._ends[index]
+        share = (along - self._ends[index]) / piece if piece else 0.0
+        x, y, z = (a + share * (b - a) for a, b in zip(one, other))
+        ahead = tuple(b - a for a, b in zip(one, other))
+        return looking_along((x, y, z), (ahead[0], ahead[1], ahead[2]))
+
+
+def looking_along(position: Vector, ahead: Vector) -> Matrix:
+    """Return the frame at a position with x in a direction, y level and z upwards; upright where there is none."""
+    x, y, z = ahead
+    if not math.hypot(x, y, z):
+        return frames.from_rpy(position, (0.0, 0.0, 0.0))
+    level = math.hypot(x, y)
+    return frames.from_rpy(position, (0.0, math.atan2(-z, level), math.atan2(y, x) if level else 0.0))

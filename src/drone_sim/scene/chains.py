@@ -1,0 +1,140 @@
+"""Which joints of a scene the dynamics moves, and what hangs together by them.
+
+A joint that is not kinematic, revolute or prismatic, and has just one shape with a mass right below it, holds that shape
+to what is above: to the next such shape or joint upwards, else to its parent, which stands still or carries it. Shapes
+with a mass between which there is no such joint are free of each other: the tree does not weld.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from drone_sim.mechanics.frames import IDENTITY, Matrix, multiply
+from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.kinds.joint import JointParameters
+from drone_sim.scene.object_parameters import ObjectParameters
+
+
+class Hung(NamedTuple):
+    """A shape on a joint, both as indices among the entries.
+
+    above: index in the chain of what it is held to; local: that one's frame from the joint's, where the frame of a
+    root is the shape's (or the joint's parent's) and that of what is held is its joint's, as it has moved.
+    """
+
+    joint: int
+    shape: int
+    above: int
+    local: Matrix
+
+
+class Chain(NamedTuple):
+    """A root and what hangs on it, first what is nearest. `root` is the entry of a shape with a mass, or None."""
+
+    root: int | None
+    hung: list[Hung]
+
+
+class Chains(NamedTuple):
+    """All chains; and why other joints are moved by scripts alone, by their entry."""
+
+    chains: list[Chain]
+    reasons: dict[int, str]
+
+
+def found(entries: Sequence[EntryParameters]) -> Chains:
+    """Return the chains among the entries of a scene, whose parents come in any order, but not in a circle."""
+    return _Search(entries).run()
+
+
+class _Search:
+    def __init__(self, entries: Sequence[EntryParameters]):
+        self._entries = entries
+        self._index = {one.name: index for index, one in enumerate(entries) if one.name}
+        self._held: dict[int, int] = {}  # shape by joint
+        self._place: dict[int, tuple[Chain, int]] = {}  # of a shape or a joint: the chain, and the index in it
+
+    def run(self) -> Chains:
+        reasons = {}
+        joints = {index: one for index, one in enumerate(self._entries) if isinstance(one, JointParameters)}
+        below = self._shapes_below(joints)
+        for index, one in joints.items():
+            reason = self._reason(one, below[index])
+            if reason:
+                reasons[index] = reason
+            elif one.mode != "kinematic":
+                self._held[index] = below[index][0]
+        chains: list[Chain] = []
+        for joint in self._held:
+            self._put(joint, chains)
+        return Chains(chains, reasons)
+
+    def _shapes_below(self, joints: Mapping[int, JointParameters]) -> dict[int, list[int]]:
+        """Return the shapes with a mass right below each joint."""
+        below: dict[int, list[int]] = {index: [] for index in joints}
+        for index, one in enumerate(self._entries):
+            if one.parent and isinstance(one, ObjectParameters) and one.mass:
+                above = self._index.get(one.parent, -1)
+                if above in below:
+                    below[above].append(index)
+        return below
+
+    def _reason(self, joint: JointParameters, below: Sequence[int]) -> str:
+        """Return why the dynamics does not move a joint that should be; '' where it does, or should not."""
+        if joint.mode == "kinematic":
+            return ""
+        if joint.type == "spherical":
+            return "spherical ones are"
+        if not below:
+            return "no shape with a mass hangs right on it"
+        if len(below) > 1:
+            return f"{len(below)} shapes with a mass hang on it, not one"
+        if any(self._is_urdf(index) for index in (below[0], self._holder(joint)[0])):
+            return "a urdf is not held by joints"
+        return ""
+
+    def _is_urdf(self, index: int | None) -> bool:
+        one = self._entries[index] if index is not None else None
+        return isinstance(one, ObjectParameters) and one.shape == "urdf"
+
+    def _holder(self, joint: EntryParameters) -> tuple[int | None, Matrix]:
+        """Return the shape or joint that holds a joint, and its frame from the joint's.
+
+        None is the joint's parent, or the world.
+        """
+        local, above = joint.local, self._index.get(joint.parent)
+        while above is not None:
+            one = self._entries[above]
+            if above in self._held or (isinstance(one, ObjectParameters) and one.mass):
+                return above, local
+            if isinstance(one, JointParameters):
+                break  # scripts move it: what hangs on it is carried
+            local, above = multiply(one.local, local), self._index.get(one.parent)
+        return None, joint.local
+
+    def _put(self, joint: int, chains: list[Chain]) -> tuple[Chain, int]:
+        """Put a joint and its shape into a chain, unless they are in one; return the chain and their index there."""
+        if joint in self._place:
+            return self._place[joint]
+        shape = self._held[joint]
+        holder, local = self._holder(self._entries[joint])
+        chain, above, start = self._link_of(holder, chains)
+        chain.hung.append(Hung(joint, shape, above, multiply(start, local)))
+        self._place[joint] = self._place[shape] = chain, len(chain.hung)
+        return self._place[joint]
+
+    def _link_of(self, holder: int | None, chains: list[Chain]) -> tuple[Chain, int, Matrix]:
+        """Return chain and index of the link that holds something, and that link's frame from the holder's."""
+        if holder is None:
+            chains.append(Chain(None, []))
+            return chains[-1], 0, IDENTITY
+        if holder in self._held:
+            return *self._put(holder, chains), IDENTITY
+        parent = self._index.get(self._entries[holder].parent, -1)
+        if self._held.get(parent) == holder:
+            return *self._put(parent, chains), self._entries[holder].local
+        if holder not in self._place:
+            chains.append(Chain(holder, []))
+            self._place[holder] = chains[-1], 0
+        return *self._place[holder], IDENTITY

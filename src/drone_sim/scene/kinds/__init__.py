@@ -1,0 +1,17 @@
+"""What may stand in a scene beside shapes. A kind that is added is added here."""
+
+from __future__ import annotations
+
+from drone_sim.scene.kinds.dummy import DummyParameters
+from drone_sim.scene.kinds.joint import JointParameters
+from drone_sim.scene.kinds.path import PathParameters
+from drone_sim.scene.kinds.proximity_sensor import ProximitySensorParameters
+from drone_sim.scene.kinds.vision_sensor import VisionSensorParameters
+
+KINDS = (
+    DummyParameters,
+    JointParameters,
+    ProximitySensorParameters,
+    VisionSensorParameters,
+    PathParameters,
+)

@@ -1,0 +1,66 @@
+"""A vision sensor of the scene: a camera that looks when a script asks."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from drone_sim.config.types import Finite, Length, ParameterError, Within
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.scene.kinds.kind import Around, KindParameters, Place
+
+MAX_SIDE = 2048  # px
+_OPTICAL = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # from V-REP's axes: y down, x right
+
+
+class VisionSensorParameters(KindParameters):
+    """A camera, by its picture (px) and the angle of its larger side (rad); V-REP's axes: z ahead, y up, x left.
+
+    One with a `size` (m, of the larger side) is orthographic, of which no pictures can be made.
+    """
+
+    kind: Literal["vision_sensor"]
+    width: Annotated[int, Within(1, MAX_SIDE)] = 256
+    height: Annotated[int, Within(1, MAX_SIDE)] = 256
+    fov: Annotated[Finite, Within(0.01, 3.1)] = math.pi / 3
+    size: Length | None = None
+    near: Annotated[Finite, Within(1e-4, 1e4)] = 0.01
+    far: Annotated[Finite, Within(1e-3, 1e5)] = 100.0
+
+    def model_post_init(self, context: Any) -> None:
+        """Refuse planes between which there is nothing."""
+        super().model_post_init(context)
+        if not self.near < self.far:
+            raise ParameterError(f"near = {self.near:g}: must be less than far = {self.far:g}")
+
+    def make(self, place: Place, around: Around) -> SceneObject:
+        """Return the camera."""
+        return VisionSensor(place, self, around)
+
+
+class VisionSensor(SceneObject):
+    """Takes pictures when it is asked."""
+
+    def __init__(self, place: Place, parameters: VisionSensorParameters, around: Around):
+        """Take where it is, what it is like, and what is around it."""
+        super().__init__(*place, kind="vision_sensor")
+        self.width, self.height = parameters.width, parameters.height
+        self.near, self.far = parameters.near, parameters.far
+        self.angle = parameters.fov  # rad, of the larger side
+        self.orthographic_size = parameters.size  # m, of the larger side; None where it is perspective
+        self._around = around
+
+    def picture(self, kind: str) -> np.ndarray:
+        """Return what it sees: "color" or "depth", as sensors.camera.Vision has it. Raises ValueError."""
+        if self.orthographic_size is not None:
+            raise ValueError(f"'{self.name}' is orthographic: pictures are made of perspective vision sensors only")
+        wide = self.angle
+        if self.height > self.width:
+            wide = 2 * math.atan(math.tan(self.angle / 2) * self.width / self.height)
+        camera = Intrinsics(self.width, self.height, wide, self.near, self.far)
+        self._around.follow()
+        return self._around.look(kind, camera, frames.multiply(self.matrix(), _OPTICAL))

@@ -1,0 +1,116 @@
+"""What a scene file may say of a shape that stands in the scene."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, fields
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+
+from pydantic import Field, create_model
+
+from drone_sim.config.types import (
+    Angles,
+    Checked,
+    Color,
+    Finite,
+    Mass,
+    OptionalFile,
+    ParameterError,
+    Point,
+    Switch,
+    Within,
+    one_of,
+)
+from drone_sim.mechanics.frames import from_rpy
+from drone_sim.scene.entry import EntryParameters
+from drone_sim.shapes import SCENE_SHAPES
+from drone_sim.shapes.compound import MAX_PARTS, Compound, Part
+from drone_sim.shapes.mass import Inertia
+from drone_sim.shapes.shape import SceneShape
+
+_Moment = Annotated[Finite, Within(1e-12, 1e12)]  # kg m²
+_NO_PARTS = ("urdf",)  # shapes that are no part of a compound
+
+
+class InertiaParameters(Checked):
+    """How the mass lies: principal moments, and where centre of mass and axes are in the shape's frame."""
+
+    moments: Annotated[tuple[_Moment, _Moment, _Moment], Field(description="3 numbers, principal moments in kg m²")]
+    position: Point = (0.0, 0.0, 0.0)
+    rpy: Angles = (0.0, 0.0, 0.0)
+
+    @property
+    def inertia(self) -> Inertia:
+        """The same for the dynamics."""
+        return Inertia(self.moments, from_rpy(self.position, self.rpy))
+
+
+class ObjectParameters(EntryParameters):
+    """A shape in the scene: what all have in common; each brings its own keys. A mass of 0 stands still."""
+
+    mass: Mass = 0.0
+    inertia: InertiaParameters | None = None
+    respondable: Switch = True
+    visible: Switch = True
+    color: Color
+    texture: OptionalFile = ""
+    shape: str
+
+    def model_post_init(self, context: Any) -> None:
+        """Refuse an inertia where the URDF says it."""
+        super().model_post_init(context)
+        if self.inertia is not None and self.shape == "urdf":
+            raise ParameterError("inertia: a urdf says its own")
+
+    def to_shape(self) -> SceneShape | Compound:
+        """Return its shape, of the keys that this brings."""
+        return _shape_of(self)
+
+
+class PartParameters(Checked):
+    """A part of a compound, in its frame."""
+
+    position: Point = (0.0, 0.0, 0.0)
+    rpy: Angles = (0.0, 0.0, 0.0)
+    color: Color
+    shape: str
+
+    @property
+    def part(self) -> Part:
+        """The part itself."""
+        return Part(_shape_of(self), from_rpy(self.position, self.rpy), self.color)
+
+
+def _shape_of(said: ObjectParameters | PartParameters) -> SceneShape:
+    shape = SCENE_SHAPES[said.shape]
+    return shape(**{field.name: getattr(said, field.name) for field in fields(shape)})
+
+
+def _with_keys_of(shape: type[SceneShape], base: type[Checked]) -> type[Checked]:
+    """Return what a scene file may say of a shape, beside what `base` has."""
+    keys: dict[str, Any] = {"color": (Color, shape.default_color), "shape": (Literal[shape.word], ...)}
+    types = get_type_hints(shape, include_extras=True)
+    for field in fields(shape):
+        keys[field.name] = (types[field.name], ... if field.default is MISSING else field.default)
+    return create_model(f"{shape.__name__}{base.__name__}", __base__=base, **keys)
+
+
+if TYPE_CHECKING:
+    _Part = PartParameters
+else:
+    _PARTS = (shape for word, shape in SCENE_SHAPES.items() if word not in _NO_PARTS)
+    _Part = one_of(*(_with_keys_of(shape, PartParameters) for shape in _PARTS), key="shape")
+
+
+class CompoundParameters(ObjectParameters):
+    """Several shapes in one rigid body."""
+
+    shape: Literal["compound"]
+    color: Color = (1.0, 1.0, 1.0, 1.0)  # each part has its own
+    parts: Annotated[list[_Part], Field(min_length=1, max_length=MAX_PARTS)]
+
+    def to_shape(self) -> Compound:
+        """Return its parts."""
+        return Compound(tuple(one.part for one in self.parts))
+
+
+SHAPES = (*(_with_keys_of(shape, ObjectParameters) for shape in SCENE_SHAPES.values()), CompoundParameters)

@@ -1,0 +1,40 @@
+"""A shape of several: rigid, in one body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from drone_sim.mechanics.frames import IDENTITY, Matrix
+from drone_sim.shapes.shape import SceneShape, Shape
+from drone_sim.shapes.triangles import Rgba
+
+MAX_PARTS = 200
+
+
+class Part(NamedTuple):
+    """One of the shapes, in the frame of the whole, and its color."""
+
+    shape: SceneShape
+    local: Matrix
+    color: Rgba
+
+
+@dataclass(frozen=True)
+class Compound(Shape):
+    """Several shapes, each with a place and a color of its own."""
+
+    word = "compound"
+
+    of: tuple[Part, ...]
+
+    def meshes(self) -> Iterator[tuple[str, Sequence[float]]]:
+        """Yield path and scale (x, y, z) of the mesh files of its parts. Raises ValueError for one that cannot be read."""
+        for part in self.of:
+            yield from part.shape.meshes()
+
+
+def parts_of(shape: SceneShape | Compound, color: Rgba) -> tuple[Part, ...]:
+    """Return what a shape is made of: itself, unless it is a compound."""
+    return shape.of if isinstance(shape, Compound) else (Part(shape, IDENTITY, color),)
