@@ -38,7 +38,7 @@ def test_it_slides_over_the_rim_of_the_floor():
     )
     simulation.drone.move(Pose((0.0, 3.0, 0.8)))
     ball = simulation.scene.bodies[0]
-    pybullet.resetBaseVelocity(ball._body, [2, 0, 0], [0, 20, 0], simulation.world._client)
+    pybullet.resetBaseVelocity(ball.number, [2, 0, 0], [0, 20, 0], simulation.world._client)
     for _ in range(60):
         simulation.step()
         assert ball.state.position[2] == pytest.approx(0.1, abs=0.002)

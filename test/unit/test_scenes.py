@@ -187,7 +187,8 @@ objects:
   - {shape: sphere, size: 0.3, colour: [1, 0, 0]}
 """
     )
-    shapes = "'box', 'cylinder', 'sphere', 'mesh', 'urdf'"
+    shapes = "'box', 'cylinder', 'sphere', 'mesh', 'urdf', 'capsule', 'compound'"
+    kinds = "; or `kind`: one of 'dummy', 'joint', 'proximity_sensor', 'vision_sensor', 'path'"
     with pytest.raises(ParameterError) as refused:
         parameters.load({"scene_file": file, "gravity": "down"})
     first, *others = str(refused.value).split("; line ")
@@ -199,7 +200,7 @@ objects:
         "9: parameter objects/0/color = [1, 0]: must be 3 or 4 numbers from 0 to 1, "
         "[red, green, blue] or [red, green, blue, opacity]",
         f"11: parameter objects/1/shape = 'cone': must be one of {shapes}",
-        f"12: parameter objects/2/shape: missing; must be one of {shapes}",
+        f"12: parameter objects/2/shape: missing; must be one of {shapes}{kinds}",
         "13: parameter objects/3/size = 0.3: must be a list of 1 number, [radius] in m; and 3 more",
     ]
 

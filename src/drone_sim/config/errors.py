@@ -123,13 +123,16 @@ def _choice(annotation: Any) -> _Choice:
                 models = get_args(_bare(first))
                 return _Choice(key, {word: one for one in models for word in _words(one, key)})
             if isinstance(key, Word):
-                models = [_bare(one) for one in get_args(_bare(first))]
-                others = tuple(word_of(one, key.or_key) for one in models if key.or_key in one.model_fields)
-                return _Choice(key.key, {word_of(one, key.key, key.or_key): one for one in models}, key.or_key, others)
+                return _choice_of_either(key, [_bare(one) for one in get_args(_bare(first))])
         return _choice(first)
     if get_origin(annotation) in _UNIONS and not others:
         return _choice(first)
     return _Choice("", {})
+
+
+def _choice_of_either(word: Word, models: Sequence[Any]) -> _Choice:
+    others = tuple(word_of(one, word.or_key) for one in models if word.or_key in one.model_fields)
+    return _Choice(word.key, {word_of(one, word.key, word.or_key): one for one in models}, word.or_key, others)
 
 
 def _words(model: Any, key: str) -> tuple[str, ...]:
@@ -171,22 +174,23 @@ def _problem(error: Any, place: _Place) -> Problem:
             return Problem(raised.location, str(raised))
         return Problem(place.location, f"parameter {readable_key((*place.location, str(raised)))}")
     location, value = place.location, error["input"]
+    if error["type"] in ("union_tag_invalid", "union_tag_not_found") and isinstance(value, Mapping):
+        return _wrong_choice(_choice(place.annotation), location, value)
     if error["type"] == "missing":  # a number of a list
         location = location[:-1]
-    choice = _choice(place.annotation)
-    if error["type"] == "union_tag_not_found" and isinstance(value, Mapping):
-        key = _key_of(choice, value)
-        if key in value:
-            return Problem((*location, key), _wrong_word(choice, key, location, value))
-        location = (*location, key)
-        return Problem(location, f"parameter {readable_key(location)}: missing; {_must_be_one_of(choice)}", True)
-    if error["type"] == "union_tag_invalid":
-        key = _key_of(choice, value)
-        return Problem((*location, key), _wrong_word(choice, key, location, value))
     key = f"parameter {readable_key(location)}"
     if error["type"] == "extra_forbidden":
         return Problem(location, f"{key}: unknown key{_near(str(location[-1]), place.known)}")
     return Problem(location, f"{key} = {shown(value)}: {_reason(error, place)}")
+
+
+def _wrong_choice(choice: _Choice, location: Location, value: Mapping[str, Any]) -> Problem:
+    """Return what is wrong where no model is chosen: no word, or a wrong one."""
+    key = choice.or_key if choice.or_key in value else choice.key
+    said = f"parameter {readable_key((*location, key))}"
+    if key in value:
+        return Problem((*location, key), f"{said} = {shown(value[key])}: {_must_be_one_of(choice, key)}")
+    return Problem((*location, key), f"{said}: missing; {_must_be_one_of(choice)}", True)
 
 
 def _reason(error: Any, place: _Place) -> str:
@@ -208,15 +212,6 @@ def _reason(error: Any, place: _Place) -> str:
 def _must(place: _Place, verb: str) -> str:
     what = _description(place.annotation)
     return f"{verb} {what}" if what else ""
-
-
-def _key_of(choice: _Choice, value: Mapping[str, Any]) -> str:
-    return choice.or_key if choice.or_key in value else choice.key
-
-
-def _wrong_word(choice: _Choice, key: str, location: Location, value: Mapping[str, Any]) -> str:
-    must = _must_be_one_of(choice, key)
-    return f"parameter {readable_key((*location, key))} = {shown(value[key])}: {must}"
 
 
 def _must_be_one_of(choice: _Choice, key: str = "") -> str:

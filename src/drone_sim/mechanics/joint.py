@@ -47,6 +47,9 @@ class Drive(Protocol):
     def put(self, value: float) -> None:
         """Put it at a position, at rest."""
 
+    def limit(self, limits: tuple[float, float] | None) -> None:
+        """Let it have other limits, rad or m, or none."""
+
     def command(self, control: Control) -> None:
         """Let its motor do from now on what is told; in the mode kinematic it stands still."""
 
@@ -64,7 +67,7 @@ class Joint(SceneObject):
         motion: str = REVOLUTE,
         limits: tuple[float, float] | None = None,
         value: float = 0.0,
-        control: Control = Control(),  # noqa: B008 -- immutable
+        control: Control = Control(),
     ):
         """Stand at `local` in the parent's frame; `motion` is one of the three, without `limits` it has no end."""
         super().__init__(names, alias, parent, local, kind="joint")
@@ -72,6 +75,7 @@ class Joint(SceneObject):
         self.limits = limits
         self.drive: Drive | None = None  # where the dynamics moves it
         self.control = control
+        self.dynamic_mode = control.mode if control.mode != KINEMATIC else PASSIVE  # the last one
         self.turn = IDENTITY  # of a spherical one
         self._value = value
         self._frame = self._moved = IDENTITY
@@ -100,6 +104,14 @@ class Joint(SceneObject):
         if self.drive is not None:
             self.drive.put(value)
 
+    def limit(self, limits: tuple[float, float] | None) -> None:
+        """Let it have other limits, rad or m, or none."""
+        self.limits = limits
+        if self.drive is not None:
+            self.drive.limit(limits)
+        elif limits is not None:
+            self.place(self._value)
+
     def below(self) -> Matrix:
         """Return the transform world from the frame in which stands what hangs on it."""
         frame, moved_by = self.matrix(), (self.value, self.turn)
@@ -122,6 +134,7 @@ class Joint(SceneObject):
     def command(self, control: Control) -> None:
         """Let it be moved like that from now on; without a drive, a target position is where it goes at once."""
         before, self.control = self.control, control
+        self.dynamic_mode = control.mode if control.mode != KINEMATIC else self.dynamic_mode
         if self.drive is not None:
             self.drive.command(control)
         elif control.position != before.position:
@@ -140,6 +153,7 @@ class Joint(SceneObject):
             put_back()
             self._value, self.turn, self.control, self.limits = value, turn, control, limits
             if self.drive is not None:
+                self.drive.limit(limits)
                 self.drive.command(control)
 
         return recall

@@ -59,7 +59,7 @@ class ObjectTree:
         self._objects[handle] = added
         self._handles.update((one, handle) for one in added.names)
         self._copied.update(plain(one) for one in added.names if plain(one) != one)
-        if added.body is not None and added.parent is not None:
+        if added.is_loose:
             self._loose.append(added)
         return handle
 
@@ -75,8 +75,7 @@ class ObjectTree:
         self._look_for_loose_ones()
 
     def _look_for_loose_ones(self) -> None:
-        everything = self._objects.values()
-        self._loose = [one for one in everything if one.body is not None and one.parent is not None]
+        self._loose = [one for one in self._objects.values() if one.is_loose]
 
     def is_copied(self, name: str) -> bool:
         """Tell whether any object has, or had, that name with a suffix."""

@@ -66,6 +66,11 @@ class SceneObject:
         """Tell whether that is its alias or one of its names, with or without their suffix."""
         return name == self.alias or any(name in (one, plain(one)) for one in self.names)
 
+    @property
+    def is_loose(self) -> bool:
+        """Whether nothing but a script's moves take it along where its parent goes: a free body below another."""
+        return self.body is not None and self.parent is not None
+
     def is_part_of(self, whole: SceneObject) -> bool:
         """Tell whether it is that object or was added below it, whatever it hangs on now."""
         part: SceneObject | None = self

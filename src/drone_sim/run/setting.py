@@ -105,7 +105,7 @@ class Setting:
     def _empty_tree(self) -> None:
         self.shared.objects, self.shared.signals, self.shared.scripts = ObjectTree(), Signals(), Scripts()
         self.shared.control, self.shared.data = Control(), CustomData()
-        self.shared.objects.add("Floor", also=("ResizableFloor_5_25",))
+        self.shared.objects.add("Floor", also=("ResizableFloor_5_25",), kind="shape")
 
     def _name_objects(self) -> None:
         try:

@@ -37,21 +37,17 @@ class SceneBody:
 class LinkBody:
     """A shape that a joint holds."""
 
-    def __init__(self, world: World, number: int, link: int, local: Matrix, says: str):
-        """Take the world, the number of the body in it, of its link, and that link's frame from the shape's.
-
-        `says` is what to answer who wants to move it.
-        """
+    def __init__(self, world: World, number: int, link: int, local: Matrix):
+        """Take the world, the number of the body in it, of its link, and that link's frame from the shape's."""
         self._world = world
         self.number = number
-        self.link = link
+        self._link = link
         self._local = local
-        self._says = says
 
     @property
     def state(self) -> State:
         """Pose and velocity."""
-        link = self._world.joints.link_state(self.number, self.link)
+        link = self._world.joints.link_state(self.number, self._link)
         matrix = frames.multiply(link.matrix, self._local)
         arm = frames.rotate(link.matrix, frames.position(self._local))
         x, y, z = cross(link.angular_velocity, arm)
@@ -62,11 +58,22 @@ class LinkBody:
     @property
     def matrix(self) -> Matrix:
         """World from its frame."""
-        return frames.multiply(self._world.joints.link_state(self.number, self.link).matrix, self._local)
+        return frames.multiply(self._world.joints.link_state(self.number, self._link).matrix, self._local)
 
     def move(self, pose: Pose) -> None:
         """Refuse: its joint says where it is. Raises ValueError."""
-        raise ValueError(self._says)
+        raise ValueError("a shape that a joint holds is put nowhere else")
+
+
+class HeldShape(SceneObject):
+    """A shape that a joint holds: nobody puts it anywhere else."""
+
+    is_loose = False
+
+    def put(self, matrix: Matrix) -> None:
+        """Refuse. Raises ValueError."""
+        joint = self.parent.name if self.parent is not None else ""
+        raise ValueError(f"'{self.name}' is held by the joint '{joint}': set that, or move what it hangs on")
 
 
 class Carried:
@@ -106,12 +113,13 @@ class StaticShape(SceneObject):
         world: World,
         number: int,
         hangs: Callable[[StaticShape], None],
+        follow: Callable[[], None],
     ):
-        """Take the number of its body; `hangs` is told whenever it has another parent."""
+        """Take the number of its body; `hangs` is told whenever it has another parent, `follow` when it is put."""
         self.number = number
         self._world = world
         self._parent: SceneObject | None = None
-        self._hangs = hangs
+        self._hangs, self._follow = hangs, follow
         self._passing: set[int] = set()
         self.carried = Carried(world, number, self.matrix)
         super().__init__(names, alias, parent, local, kind="shape")
@@ -138,6 +146,7 @@ class StaticShape(SceneObject):
         """Put it there, and its body."""
         super().put(matrix)
         self.carried.follow()
+        self._follow()
 
 
 def bodies_above(one: SceneObject) -> set[int]:

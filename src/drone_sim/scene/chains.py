@@ -1,8 +1,8 @@
 """Which joints of a scene the dynamics moves, and what hangs together by them.
 
-A joint that is not kinematic, revolute or prismatic, and has just one shape with a mass right below it, holds that shape
-to what is above: to the next such shape or joint upwards, else to its parent, which stands still or carries it. Shapes
-with a mass between which there is no such joint are free of each other: the tree does not weld.
+A joint that is not kinematic, is revolute or prismatic, and has just one shape with a mass right below it, holds that
+shape to what is above: to the next such shape or joint upwards, else to its parent, which stands still or carries it.
+Shapes with a mass between which there is no such joint are free of each other: the tree does not weld.
 """
 
 from __future__ import annotations

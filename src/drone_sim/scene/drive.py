@@ -33,8 +33,8 @@ class JointDrive:
         if self._is_held:
             self._joints.hold(*self._at, value)
 
-    def limit(self, limits: tuple[float, float]) -> None:
-        """Let one that has limits have others."""
+    def limit(self, limits: tuple[float, float] | None) -> None:
+        """Let it have other limits, or none."""
         self._joints.limit(*self._at, limits)
 
     def command(self, control: Control) -> None:

@@ -14,7 +14,7 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
 from drone_sim.scene import building, chains, order, scene_files
-from drone_sim.scene.bodies import Carried, LinkBody, SceneBody, StaticShape, bodies_above
+from drone_sim.scene.bodies import Carried, HeldShape, LinkBody, SceneBody, StaticShape, bodies_above
 from drone_sim.scene.drive import JointDrive
 from drone_sim.scene.kinds.kind import Around, KindParameters, Look, Place
 from drone_sim.scene.object_parameters import ObjectParameters
@@ -57,11 +57,9 @@ class Scene:
 
     def _body(self, index: int) -> SceneBody | LinkBody:
         number, link = self._places[index]
-        one = self._entries[index]
         if link == -1:
             return SceneBody(self._world, number)
-        says = f"'{one.name}' is held by the joint '{one.parent}': set that, or move what it hangs on"
-        return LinkBody(self._world, number, link, one.local, says)
+        return LinkBody(self._world, number, link, self._entries[index].local)
 
     def _add_names(self) -> None:
         self._link_names = {place: self._entries[index].name for index, place in self._places.items()}
@@ -131,9 +129,11 @@ class Scene:
         if isinstance(one, KindParameters):
             return one.make(place, self._around)
         number, link = self._places[index]
+        if link != -1:
+            return HeldShape(*place[:3], IDENTITY, self._body(index))
         if isinstance(one, ObjectParameters) and not one.mass:
-            return StaticShape(*place, world=self._world, number=number, hangs=self._hang)
-        return SceneObject(*place[:3], IDENTITY, self._body(index), kind="shape")
+            return StaticShape(*place, world=self._world, number=number, hangs=self._hang, follow=self.follow)
+        return SceneObject(*place[:3], IDENTITY, self._body(index))
 
     def _hang(self, shape: StaticShape) -> None:
         if shape.parent is None:
@@ -148,6 +148,7 @@ class Scene:
                 joint = self._objects[hung.joint]
                 assert isinstance(joint, Joint), "a chain hangs on joints"
                 joint.drive = JointDrive(self._world, *self._places[hung.shape])
+                joint.drive.limit(joint.limits)
                 joint.drive.command(joint.control)
             first = self._objects[chain.hung[0].joint]
             if chain.root is None and first.parent is not None:

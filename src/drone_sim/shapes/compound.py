@@ -30,7 +30,7 @@ class Compound(Shape):
     of: tuple[Part, ...]
 
     def meshes(self) -> Iterator[tuple[str, Sequence[float]]]:
-        """Yield path and scale (x, y, z) of the mesh files of its parts. Raises ValueError for one that cannot be read."""
+        """Yield path and scale (x, y, z) of its parts' mesh files. Raises ValueError for one that cannot be read."""
         for part in self.of:
             yield from part.shape.meshes()
 

@@ -56,11 +56,10 @@ def _solid(part: Part) -> trimesh.Trimesh:
     corners = [one.corners for one in shape.triangles()] if isinstance(shape, DrawnShape) else []
     if not corners:
         raise ValueError(f"{shape}: its mass cannot be told from its form")
-    solid = trimesh.Trimesh(**trimesh.triangles.to_kwargs(np.concatenate(corners)))
-    solid.merge_vertices()
-    extents = np.maximum(solid.extents, 1e-4)
-    if isinstance(shape, Mesh):
-        solid = _hull(solid)
+    whole = trimesh.Trimesh(**trimesh.triangles.to_kwargs(np.concatenate(corners)))
+    whole.merge_vertices()
+    extents = np.maximum(whole.extents, 1e-4)
+    solid = _hull(whole) if isinstance(shape, Mesh) else whole
     if solid is None or not solid.volume > _THIN * np.prod(extents):
         solid = trimesh.creation.box(extents, trimesh.transformations.translation_matrix(np.mean(_bounds(corners), 0)))
     solid.apply_transform(np.reshape((*part.local, 0, 0, 0, 1), (4, 4)))

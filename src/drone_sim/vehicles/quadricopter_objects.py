@@ -89,14 +89,14 @@ class QuadricopterObjects:
         self._add(TRACK_BASE, DRONE, BASE)
         for number, link in enumerate(propellers, start=1):
             name = f"Quadricopter_propeller{number}"
-            self._add(name, DRONE, link, alias="propeller")
-            self._add(respondable(number), name, alias="respondable")
-            self._add(joint(number), name, alias="joint")
+            self._add(name, DRONE, link, alias="propeller", kind="force_sensor")
+            self._add(respondable(number), name, alias="respondable", kind="shape")
+            self._add(joint(number), name, alias="joint", kind="joint")
         down = frames.from_rpy((0.0, 0.0, -0.01), (0.0, math.pi / 2, 0.0))
-        self._add(FLOOR_CAMERA, DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera")
+        self._add(FLOOR_CAMERA, DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera", kind="camera")
         front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self._add(FRONT_CAMERA, DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera")
-        self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"))
+        self._add(FRONT_CAMERA, DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera", kind="camera")
+        self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"), kind="shape")
         for camera in cameras.values():
             self._add_camera(links, camera)
         for name, sensor in sensors.items():
@@ -111,6 +111,7 @@ class QuadricopterObjects:
         body: Body | None = None,
         alias: str = "",
         also: Sequence[str] = (),
+        kind: str = "",
     ) -> None:
         place = self._places.get(name, NOWHERE_ELSE)
         own = None if parent is None else f"{parent}{self._suffix}"
@@ -122,7 +123,9 @@ class QuadricopterObjects:
             names.append(place.name)
         alias = place.alias or alias or name
         try:
-            handle = self._objects.add(names[0], above, place.local(local), body, alias=alias, also=names[1:])
+            handle = self._objects.add(
+                names[0], above, place.local(local), body, alias=alias, also=names[1:], kind=kind
+            )
         except ValueError as error:  # one of the scene has that name
             raise ParameterError(str(error)) from None
         self._handles.append(handle)
@@ -132,7 +135,8 @@ class QuadricopterObjects:
         if sensor.mount is not None and sensor.frame in links:
             raise ParameterError(f"sensor {name}: the URDF says where {sensor.frame} is; `mount` needs another frame")
         parent, matrix = sensor.placed(links)
-        self._mount(f"sensor {name}", sensor.object or name, parent or DRONE, sensor.object_in(matrix))
+        kind = "proximity_sensor" if sensor.kind == "range" else ""
+        self._mount(f"sensor {name}", sensor.object or name, parent or DRONE, sensor.object_in(matrix), kind)
 
     def _add_camera(self, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
         said = f"camera frame {camera.frame}"
@@ -142,11 +146,11 @@ class QuadricopterObjects:
             parent, optical = DRONE, links[camera.frame]
         else:
             parent, optical = camera.mount.parent or DRONE, camera.mount.optical
-        self._mount(said, camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR))
+        self._mount(said, camera.object, parent, frames.multiply(optical, OPTICAL_FROM_SENSOR), "vision_sensor")
 
-    def _mount(self, said: str, name: str, parent: str, local: Matrix) -> None:
+    def _mount(self, said: str, name: str, parent: str, local: Matrix, kind: str) -> None:
         if f"{parent}{self._suffix}" not in self._objects and parent not in self._objects:
             raise ParameterError(f"{said}: no object is named {parent}")
         if f"{name}{self._suffix}" in self._objects:
             raise ParameterError(f"{said}: an object named '{name}' is there already")
-        self._add(name, parent, local)
+        self._add(name, parent, local, kind=kind)

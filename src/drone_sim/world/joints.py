@@ -9,6 +9,7 @@ import pybullet
 from drone_sim.mechanics.frames import cross, turned
 from drone_sim.mechanics.state import Pose, State, compose, inverse
 
+NO_LIMIT = 1e9  # rad or m
 _AT_ONCE = 1e9  # rad/s or m/s: a motor that is to get there gives all that it has, which is a force
 _STIFF = 1e6  # N m or N, of what holds a joint where a script has put it
 
@@ -21,6 +22,7 @@ class Joints:
         self._client = client
         self._changed = changed
         self._inertial: dict[tuple[int, int], Pose] = {}  # inertial frame from the link's
+        self._limits: dict[tuple[int, int], tuple[float, float]] = {}  # that a script has set
 
     def link_state(self, body: int, link: int) -> State:
         """Return pose and velocity of a link's frame."""
@@ -35,7 +37,9 @@ class Joints:
 
     def forget(self, body: int) -> None:
         """Forget a body that is gone."""
-        self._inertial = {key: one for key, one in self._inertial.items() if key[0] != body}
+        for known in (self._inertial, self._limits):
+            for key in [key for key in known if key[0] == body]:
+                del known[key]  # type: ignore[attr-defined]
 
     def state(self, body: int, link: int) -> tuple[float, float, float]:
         """Return position and velocity of the joint above a link, and what its motor gave in the last sub-step."""
@@ -68,9 +72,13 @@ class Joints:
         towards = _AT_ONCE if force >= 0 else -_AT_ONCE
         self._motor(body, link, pybullet.VELOCITY_CONTROL, targetVelocity=towards, force=abs(force))
 
-    def limit(self, body: int, link: int, limits: tuple[float, float]) -> None:
-        """Let a joint that has limits have others."""
-        low, high = limits
+    def limit(self, body: int, link: int, limits: tuple[float, float] | None) -> None:
+        """Let a joint have other limits, or none."""
+        low, high = limits or (-NO_LIMIT, NO_LIMIT)
+        known = self._limits.get((body, link)) or pybullet.getJointInfo(body, link, self._client)[8:10]
+        if known == (low, high) or (limits is None and known[0] > known[1]):  # PyBullet's word for none
+            return
+        self._limits[body, link] = low, high
         pybullet.changeDynamics(body, link, jointLowerLimit=low, jointUpperLimit=high, physicsClientId=self._client)
 
     def _motor(self, body: int, link: int, mode: int, **numbers: float) -> None:

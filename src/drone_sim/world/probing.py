@@ -64,7 +64,7 @@ def _all_hits(client: int, start: Vector, end: Vector) -> Iterator[Any]:
 
 
 def rays(client: int, ends: Sequence[tuple[Vector, Vector]], counts: Callable[[int, int], bool]) -> list[Met]:
-    """Return what each of several rays meets first of the bodies and links that count; those that meet none are none."""
+    """Return what each of several rays meets first of the bodies and links that count, but for those that meet none."""
     starts, stops = zip(*ends)
     found = []
     for start, stop, hit in zip(starts, stops, pybullet.rayTestBatch(starts, stops, physicsClientId=client)):

@@ -19,6 +19,7 @@ from drone_sim.scripting.api.drawing import Drawing
 from drone_sim.scripting.api.dynamics import Dynamics
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
+from drone_sim.scripting.api.joints import Joints
 from drone_sim.scripting.api.matrices import Matrices
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.names import Names
@@ -28,6 +29,8 @@ from drone_sim.scripting.api.packing import Packing
 from drone_sim.scripting.api.poses import Poses
 from drone_sim.scripting.api.ros_functions import RosFunctions
 from drone_sim.scripting.api.script_calls import ScriptCalls
+from drone_sim.scripting.api.paths import Paths
+from drone_sim.scripting.api.proximity import ProximitySensors
 from drone_sim.scripting.api.scripts import Scripts
 from drone_sim.scripting.api.sensors import Sensors
 from drone_sim.scripting.api.simulation import SimulationFunctions
@@ -49,6 +52,9 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         ScriptCalls(host, surroundings, names),
         SimulationFunctions(surroundings, ignored),
         Dialogs(host, ignored),
+        Joints(host),
+        ProximitySensors(host),
+        Paths(host),
         VisionSensors(host, surroundings),
         Sensors(host),
     )

@@ -126,14 +126,6 @@ class Objects:
         x, y, z = frames.rotate(shape.matrix(), _vector(force))
         self._host.add_force(shape.name, (x, y, z), (0.0, 0.0, 0.0), _vector(position))
 
-    def setJointPosition(self, handle: Handle, position: Number) -> None:
-        """Turn the blades of a propeller to an angle (rad): looks only."""
-        self._host.turn_joint(self._objects[handle].name, float(position))
-
-    def getJointPosition(self, handle: Handle) -> float:
-        """Return the angle of a propeller's blades (rad)."""
-        return self._host.turn_joint(self._objects[handle].name, None)
-
 
 def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[float, ...]]:
     """Tell a handle and values apart, which come in either order, or the values alone."""

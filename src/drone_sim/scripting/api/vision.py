@@ -7,11 +7,13 @@ step, or as of now where nobody has looked since. Depth is in m along the sensor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.calls import WrongValue, numbers
 from drone_sim.scripting.api.handles import CODED, GREYSCALE, METRES, bare, has
 from drone_sim.scripting.api.host import Host, Surroundings
@@ -19,6 +21,17 @@ from drone_sim.scripting.api.types import Handle, Number
 
 _GREY, _DEPTH_IN_METRES = 1, 1  # options of 4.x
 _LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601
+
+
+@runtime_checkable
+class Eye(Protocol):
+    """A vision sensor of the scene; its planes in m."""
+
+    near: float
+    far: float
+
+    def picture(self, kind: str) -> np.ndarray:
+        """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane."""
 
 
 class VisionSensors:
@@ -121,19 +134,23 @@ class VisionSensors:
 
     def _depths(self, handle: int, pos: Sequence[float], size: Sequence[float]) -> np.ndarray:
         """Return depths (height, width), the bottom row first; raises WrongValue for a sensor of colours."""
-        picture, name = self._picture(handle), self._objects[bare(handle)].name
+        found = self._objects[bare(handle)]
+        picture, name = self._picture(handle, "depth"), found.name
         if picture.ndim != 2:
             raise WrongValue(f"'{name}' sees colours, and no depth: a camera of the kind depth does")
         depths = np.nan_to_num(_part(picture, pos, size)[::-1].astype("<f4"), nan=np.inf)
         if has(handle, METRES):
             return depths
-        near, far = self._planes[name]
+        near, far = (found.near, found.far) if isinstance(found, Eye) else self._planes[name]
         return np.clip((depths - near) / max(far - near, 1e-9), 0.0, 1.0).astype("<f4")
 
-    def _picture(self, handle: int) -> np.ndarray:
-        name = self._objects[bare(handle)].name
+    def _picture(self, handle: int, kind: str = "color") -> np.ndarray:
+        found = self._objects[bare(handle)]
+        name = found.name
+        if isinstance(found, Eye):  # of the scene
+            return self._outside(partial(found.picture, kind))
         if name not in self._pictures:
-            known = ", ".join(self._pictures) or "none"
+            known = ", ".join([*self._pictures, *_eyes(self._objects)]) or "none"
             raise WrongValue(f"'{name}' is not a vision sensor; there are: {known}")
         return self._outside(self._pictures[name])  # not the script's time; the first picture compiles shaders
 
@@ -152,3 +169,7 @@ def _part(picture: np.ndarray, pos: Sequence[float], size: Sequence[float]) -> n
     if x < 0 or y < 0 or width <= 0 or height <= 0 or x + width > columns or y + height > rows:
         raise WrongValue(f"a part of a picture of {columns} x {rows} is expected")
     return picture[rows - y - height : rows - y, x : x + width]
+
+
+def _eyes(objects: ObjectTree) -> Iterator[str]:
+    return (objects[handle].name for handle in objects if isinstance(objects[handle], Eye))

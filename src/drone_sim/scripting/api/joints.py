@@ -1,0 +1,171 @@
+"""`sim`: joints. Revolute ones in rad, rad/s and N m, prismatic ones in m, m/s and N.
+
+A propeller's joint answers to getJointPosition and setJointPosition: how its blades look.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import IDENTITY
+from drone_sim.mechanics.joint import FORCE, KINEMATIC, PRISMATIC, REVOLUTE, SPHERICAL, Joint
+from drone_sim.scripting.api.calls import WrongValue, numbers
+from drone_sim.scripting.api.host import Host
+from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers
+
+_TYPES = {REVOLUTE: 10, PRISMATIC: 11, SPHERICAL: 12}  # sim.joint_revolute_subtype and so on
+_KINEMATIC_MODE, _DYNAMIC_MODE = 0, 5  # sim.jointmode_kinematic, _dynamic (3.x: _passive, _force)
+_WITHOUT_END = (-math.pi, math.tau)  # what V-REP says of a cyclic joint: from where, how far
+_UNIT = 1e-3  # by how much a rotation may miss
+
+
+class Joints:
+    """The functions on joints."""
+
+    def __init__(self, host: Host):
+        """Take the drone whose objects they are."""
+        self._host = host
+        self._objects = host.objects
+
+    # ---- where they are
+
+    def getJointPosition(self, handle: Handle) -> float:
+        """Return how far a joint is turned or slid; of a propeller's, the angle of the blades."""
+        found = self._objects[handle]
+        return found.value if isinstance(found, Joint) else self._host.turn_joint(found.name, None)
+
+    def setJointPosition(self, handle: Handle, position: Number) -> None:
+        """Put a joint somewhere, within its limits; of a propeller's, turn the blades: looks only."""
+        (value,) = numbers((position,), 1)
+        found = self._objects[handle]
+        if isinstance(found, Joint):
+            self._moving(handle).place(value)
+        else:
+            self._host.turn_joint(found.name, value)
+
+    def getJointVelocity(self, handle: Handle) -> float:
+        """Return how fast the dynamics moves a joint."""
+        return self._joint(handle).velocity_along
+
+    def getJointMatrix(self, handle: Handle) -> list[float]:
+        """Return the transform between a joint's own frame and what hangs on it."""
+        return list(self._joint(handle).motion_matrix())
+
+    def setSphericalJointMatrix(self, handle: Handle, matrix: TwelveNumbers) -> None:
+        """Turn a spherical joint; of the transform only the rotation counts."""
+        joint, m = self._joint(handle), numbers(matrix, 12)
+        if joint.motion != SPHERICAL:
+            raise WrongValue(f"'{joint.name}' is a {joint.motion} joint: a spherical one is expected")
+        turn = (*m[:3], 0.0, *m[4:7], 0.0, *m[8:11], 0.0)
+        product = frames.multiply(turn, frames.invert(turn))
+        if max(abs(a - b) for a, b in zip(product, IDENTITY)) > _UNIT:
+            raise WrongValue("the matrix of a rotation is expected")
+        joint.turn = frames.from_quaternion((0.0, 0.0, 0.0), frames.to_quaternion(turn))
+
+    getSphericalJointMatrix = getJointMatrix
+
+    # ---- what they are
+
+    def getJointType(self, handle: Handle) -> int:
+        """Return sim.joint_revolute_subtype (10), _prismatic_subtype (11) or _spherical_subtype (12)."""
+        return _TYPES[self._joint(handle).motion]
+
+    def getJointInterval(self, handle: Handle) -> tuple[bool, list[float]]:
+        """Return whether a joint has no end, and its lowest position and its range."""
+        limits = self._joint(handle).limits
+        return (True, list(_WITHOUT_END)) if limits is None else (False, [limits[0], limits[1] - limits[0]])
+
+    def setJointInterval(self, handle: Handle, cyclic: bool, interval: Numbers = ()) -> None:
+        """Give a joint its lowest position and its range, or, if cyclic, no end."""
+        joint = self._moving(handle)
+        if cyclic and joint.motion == PRISMATIC:
+            raise WrongValue(f"'{joint.name}' is prismatic: only revolute joints are cyclic")
+        low, extent = numbers(interval, 2) if not cyclic else _WITHOUT_END
+        if extent <= 0:
+            raise WrongValue(f"the range of a joint is greater than 0, not {extent:g}")
+        joint.limit(None if cyclic else (low, low + extent))
+
+    def getJointMode(self, handle: Handle) -> tuple[int, int]:
+        """Return 0 for a joint that scripts move, 5 for one that the dynamics moves, and no options."""
+        return (_KINEMATIC_MODE if self._joint(handle).control.mode == KINEMATIC else _DYNAMIC_MODE), 0
+
+    def setJointMode(self, handle: Handle, mode: int, _options: Any = 0) -> None:
+        """Let a joint be moved by scripts alone (0), or by the dynamics (5), as it was before."""
+        joint = self._joint(handle)
+        if mode not in (_KINEMATIC_MODE, _DYNAMIC_MODE):
+            raise WrongValue("sim.jointmode_kinematic (0) or sim.jointmode_dynamic (5) is expected")
+        if (joint.control.mode == KINEMATIC) != (mode == _KINEMATIC_MODE):
+            joint.change(mode=KINEMATIC if mode == _KINEMATIC_MODE else joint.dynamic_mode)
+
+    # ---- what moves them
+
+    def getJointTargetPosition(self, handle: Handle) -> float:
+        """Return where a joint is to go."""
+        return self._joint(handle).control.position
+
+    def setJointTargetPosition(self, handle: Handle, position: Number, _motion: Any = None) -> None:
+        """Let a joint go to a position; one that scripts move is there at once."""
+        (value,) = numbers((position,), 1)
+        self._moving(handle).change(position=value)
+
+    def getJointTargetVelocity(self, handle: Handle) -> float:
+        """Return how fast a joint is to move."""
+        return self._joint(handle).control.velocity
+
+    def setJointTargetVelocity(self, handle: Handle, velocity: Number, _motion: Any = None) -> None:
+        """Let a joint move at a velocity, in the mode for that."""
+        (value,) = numbers((velocity,), 1)
+        self._moving(handle).change(velocity=value)
+
+    def getJointForce(self, handle: Handle) -> float:
+        """Return what a joint's motor gave in the last sub-step."""
+        drive = self._joint(handle).drive
+        return 0.0 if drive is None else drive.force()
+
+    def getJointTargetForce(self, handle: Handle) -> float:
+        """Return the force that a joint in force mode is given, else the most that its motor gives."""
+        control = self._joint(handle).control
+        return control.force if control.mode == FORCE else control.max_force
+
+    def setJointTargetForce(self, handle: Handle, force: Number, signedValue: bool = True) -> None:
+        """Give a joint in force mode a force, signed or in the direction of before; else set the most of its motor."""
+        joint, (value,) = self._moving(handle), numbers((force,), 1)
+        if joint.control.mode != FORCE:
+            joint.change(max_force=abs(value))
+        elif signedValue:
+            joint.change(force=value)
+        else:
+            joint.change(force=math.copysign(value, joint.control.velocity or joint.control.force or 1.0))
+
+    def getJointMaxForce(self, handle: Handle) -> float:
+        """Return the most that a joint's motor gives (3.x)."""
+        return abs(self.getJointTargetForce(handle))
+
+    def setJointMaxForce(self, handle: Handle, force: Number) -> None:
+        """Set the most that a joint's motor gives (3.x)."""
+        self.setJointTargetForce(handle, force, False)
+
+    def setJointForce(self, handle: Handle, force: Number) -> None:
+        """Set the most that a joint's motor gives (3.x)."""
+        self.setJointTargetForce(handle, force, False)
+
+    def _joint(self, handle: int) -> Joint:
+        found = self._objects[handle]
+        if not isinstance(found, Joint):
+            known = ", ".join(_names(self._objects)) or "none"
+            raise WrongValue(f"'{found.name}' is not a joint of the scene; there are: {known}")
+        return found
+
+    def _moving(self, handle: int) -> Joint:
+        """Return a joint that has a position."""
+        joint = self._joint(handle)
+        if joint.motion == SPHERICAL:
+            raise WrongValue(f"'{joint.name}' is spherical: setSphericalJointMatrix turns it")
+        return joint
+
+
+def _names(objects: Any) -> Sequence[str]:
+    return [objects[handle].name for handle in objects if isinstance(objects[handle], Joint)][:20]

@@ -1,0 +1,110 @@
+"""`sim`: proximity sensors: those of the scene, and a vehicle's range sensors.
+
+One of the scene looks when it is read, at what is there at that moment; a range sensor has read when it was due.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, runtime_checkable
+
+from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.object_tree import WORLD
+from drone_sim.scripting.api.calls import WrongValue
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.host import Host
+from drone_sim.scripting.api.types import Handle, Number
+
+_NOT_YET, _NOTHING, _DETECTED = -1, 0, 1  # detection states of CoppeliaSim
+_EVERY_SENSOR = (CONSTANTS["handle_all"], CONSTANTS["handle_all_except_explicit"])
+_EVERYTHING = CONSTANTS["handle_all"]
+_Detection = tuple[int, float, list[float], int, list[float]]
+
+
+class Found(Protocol):
+    """What a sensor has found, in its own frame."""
+
+    distance: float  # m
+    point: Vector
+    name: str
+    normal: Vector
+
+
+@runtime_checkable
+class Detector(Protocol):
+    """A proximity sensor of the scene."""
+
+    def detect(self, wanted: Callable[[str], bool] = ...) -> Any:
+        """Return what is nearest (Found) of the objects whose names are wanted, or None."""
+
+
+class ProximitySensors:
+    """The functions on proximity sensors."""
+
+    def __init__(self, host: Host):
+        """Take the drone whose objects they are."""
+        self._objects = host.objects
+        self._sensors = host.sensors
+
+    def readProximitySensor(self, handle: Handle) -> _Detection:
+        """Return detection state, distance (m), point, object and normal.
+
+        The state is 1, 0 where nothing is within range, -1 before a range sensor's first reading. Point (m) and unit
+        normal are in the sensor's frame, which looks along z; the object is -1 where it has no name.
+        """
+        found = self._objects[handle]
+        return self._seen(found.detect()) if isinstance(found, Detector) else self._last(found.name)
+
+    def handleProximitySensor(self, handle: Handle) -> _Detection:
+        """Return what readProximitySensor does; of sim.handle_all, and _all_except_explicit, the nearest of all."""
+        if handle not in _EVERY_SENSOR:
+            return self.readProximitySensor(handle)
+        every = [self._objects[one] for one in self._objects]
+        seen = [one.detect() for one in every if isinstance(one, Detector)]
+        return self._seen(min((one for one in seen if one is not None), key=lambda one: one.distance, default=None))
+
+    def checkProximitySensor(self, handle: Handle, entity: Handle) -> _Detection:
+        """Return what readProximitySensor does of one object alone, or of sim.handle_all."""
+        sensor = self._objects[handle]
+        if not isinstance(sensor, Detector):
+            raise WrongValue(f"'{sensor.name}' is no proximity sensor of the scene: {self._known()}")
+        if entity == _EVERYTHING:
+            return self._seen(sensor.detect())
+        names = self._objects[entity].names
+        return self._seen(sensor.detect(names.__contains__))
+
+    def checkProximitySensorEx(
+        self, handle: Handle, entity: Handle, _mode: int = 0, threshold: Number = 0.0, _maxAngle: Number = 0.0
+    ) -> _Detection:
+        """Return what checkProximitySensor does, nothing beyond a distance (m) unless that is 0."""
+        found = self.checkProximitySensor(handle, entity)
+        return found if not threshold or found[1] <= threshold else self._seen(None)
+
+    def resetProximitySensor(self, handle: Handle) -> None:
+        """Forget what a sensor has read: there is nothing to forget, it looks when it is read."""
+        if handle not in _EVERY_SENSOR:
+            self._objects[handle]
+
+    def _seen(self, found: Found | None) -> _Detection:
+        if found is None:
+            return _NOTHING, 0.0, [0.0, 0.0, 0.0], WORLD, [0.0, 0.0, 0.0]
+        met = self._objects.handle(found.name) if found.name in self._objects else WORLD
+        return _DETECTED, found.distance, list(found.point), met, list(found.normal)
+
+    def _last(self, name: str) -> _Detection:
+        """Return what a vehicle's range sensor has read."""
+        sensor = self._sensors.get(name)
+        detected = getattr(sensor, "detected", None)
+        if sensor is None or detected is None:
+            raise WrongValue(f"'{name}' is no sensor of the kind range, and no proximity sensor: {self._known()}")
+        found = detected()
+        if found is None:
+            return _NOTHING if sensor.read() else _NOT_YET, 0.0, [0.0, 0.0, 0.0], WORLD, [0.0, 0.0, 0.0]
+        distance, what, normal = found
+        met = self._objects.handle(what) if what in self._objects else WORLD
+        return _DETECTED, distance, [0.0, 0.0, distance], met, list(normal)
+
+    def _known(self) -> str:
+        ranges = [name for name, one in self._sensors.items() if hasattr(one, "detected")]
+        every = [self._objects[one] for one in self._objects]
+        return f"there are: {', '.join([*ranges, *(one.name for one in every if isinstance(one, Detector))]) or 'none'}"

@@ -1,0 +1,151 @@
+"""Joints in the dynamics, against closed forms; and the script functions on them."""
+
+import itertools
+import math
+
+import pytest
+
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.modules import make_sim
+
+SCENE = """
+objects:
+  # a pendulum of 1 m, which swings about the world's y axis
+  - {name: Bob, shape: sphere, size: [0.1], mass: 2, parent: Pivot, position: [0, -1, 0],
+     inertia: {moments: [0.1, 0.1, 0.1]}}
+  - {name: Pivot, kind: joint, type: revolute, mode: passive, value: 0.1, parent: Beam,
+     rpy: [1.5707963267948966, 0, 0]}
+  - {name: Beam, shape: box, size: [0.1, 0.1, 0.1], position: [4, 0, 3]}
+  # a lift, held at a height by a motor
+  - {name: Lift, kind: joint, type: prismatic, mode: position, limits: [0, 2], target: 0.5, max_force: 100,
+     position: [8, 0, 1]}
+  - {name: Cabin, shape: box, size: [0.2, 0.2, 0.2], mass: 3, parent: Lift, position: [0, 0, 0]}
+  # a flywheel about the vertical, the axis through its centre
+  - {name: Axle, kind: joint, type: revolute, mode: force, target: 0.5, position: [12, 0, 1]}
+  - {name: Flywheel, shape: cylinder, size: [0.5, 0.1], mass: 8, parent: Axle, position: [0, 0, 0],
+     inertia: {moments: [0.5, 0.5, 1]}}
+  # a cart on one driven wheel and a skid without friction to speak of: a free root
+  - {name: Cart, shape: box, size: [0.6, 0.1, 0.1], mass: 1, position: [16, 0, 0.25]}
+  - {name: Left, kind: joint, type: revolute, mode: velocity, target: 2, max_force: 20, parent: Cart,
+     position: [0, 0.3, -0.05], rpy: [-1.5707963267948966, 0, 0]}
+  - {name: Right, kind: joint, type: revolute, mode: velocity, target: 2, max_force: 20, parent: Cart,
+     position: [0, -0.3, -0.05], rpy: [-1.5707963267948966, 0, 0]}
+  - {name: LeftWheel, shape: cylinder, size: [0.2, 0.05], mass: 1, parent: Left, position: [0, 0, 0]}
+  - {name: RightWheel, shape: cylinder, size: [0.2, 0.05], mass: 1, parent: Right, position: [0, 0, 0]}
+  - {name: Lamp, kind: dummy, parent: LeftWheel, position: [0.2, 0, 0]}
+  - {name: Loose, shape: box, size: [0.1, 0.1, 0.1], mass: 1, parent: Bob, position: [2, 0, 0]}
+"""
+
+
+@pytest.fixture(name="simulation")
+def _simulation(tmp_path):
+    file = tmp_path / "scene.yaml"
+    file.write_text(SCENE, encoding="utf-8")
+    simulation = Simulation(parameters.load({"scene_file": str(file), "drone": {"position": [-5, 0, 1]}}))
+    yield simulation
+    simulation.close()
+
+
+def found(simulation, name):
+    objects = simulation.drone.objects
+    return objects[objects.handle(name)]
+
+
+def run(simulation, seconds):
+    """Run, and return the joints' positions after each step, by name."""
+    joints = {name: found(simulation, name) for name in ("Pivot", "Lift", "Axle", "Left", "Right")}
+    told = {name: [] for name in joints}
+    for _ in range(round(seconds / 0.05)):
+        simulation.step()
+        for name, joint in joints.items():
+            told[name].append(joint.value)
+    return told
+
+
+def zeros(values, step):
+    """Return when values cross 0 upwards."""
+    pairs = itertools.pairwise(values)
+    return [
+        step * (index + before / (before - after)) for index, (before, after) in enumerate(pairs) if before < 0 <= after
+    ]
+
+
+def test_joints_move_as_mechanics_says(simulation):
+    assert found(simulation, "Axle").velocity_along == 0
+    told = run(simulation, 6)
+    first, *_, last = crossings = zeros(told["Pivot"], 0.05)
+    period = 2 * math.pi * math.sqrt((2 * 1 + 0.1) / (2 * 9.81)) * (1 + 0.1**2 / 16)
+    assert (last - first) / (len(crossings) - 1) == pytest.approx(period, rel=0.002), "a physical pendulum"
+    assert told["Lift"][-1] == pytest.approx(0.5, abs=1e-6), "held against gravity"
+    assert found(simulation, "Lift").drive.force() == pytest.approx(3 * 9.81, rel=1e-3)
+    assert found(simulation, "Axle").velocity_along == pytest.approx(0.5 * 6 / 1.0, rel=1e-6), "0.5 N m on 1 kg m2"
+    assert found(simulation, "Left").velocity_along == pytest.approx(2, abs=0.01)
+    velocity, _ = found(simulation, "Cart").velocity()
+    assert velocity[0] == pytest.approx(2 * 0.2, rel=0.05), "it rolls"
+    assert found(simulation, "Loose").matrix()[11] < 0.1, "the tree does not weld"
+    wheel, lamp = (found(simulation, name).matrix()[3::4] for name in ("LeftWheel", "Lamp"))
+    assert math.dist(wheel, lamp) == pytest.approx(0.2), "what hangs on it turns with it"
+    _, turning = found(simulation, "LeftWheel").velocity()
+    assert turning[1] == pytest.approx(2, abs=0.2)
+
+
+def test_scripts_command_joints(simulation):
+    sim, handle = make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05)), simulation.drone.objects.handle
+    lift, axle, pivot = handle("Lift"), handle("Axle"), handle("Pivot")
+    assert sim.getJointType(lift) == 11 and sim.getJointType(axle) == 10
+    assert sim.getJointInterval(lift) == (False, [0, 2]) and sim.getJointInterval(axle)[0] is True
+    assert sim.getJointMode(lift) == (5, 0)
+    sim.setJointTargetPosition(lift, 1.5)
+    sim.setJointTargetForce(axle, -0.25)
+    sim.setJointMode(pivot, 0)
+    sim.setJointPosition(pivot, 0.7)
+    run(simulation, 3)
+    assert sim.getJointPosition(lift) == pytest.approx(1.5, abs=1e-3)
+    assert sim.getJointVelocity(axle) == pytest.approx(-0.75, rel=1e-6)
+    assert sim.getJointPosition(pivot) == pytest.approx(0.7, abs=1e-3), "held where it was put"
+    assert sim.getJointForce(lift) == pytest.approx(3 * 9.81, rel=1e-2)
+    sim.setJointMaxForce(lift, 20)
+    sim.setJointInterval(lift, False, [0.2, 1.8])
+    sim.setJointMode(pivot, 5)
+    run(simulation, 3)
+    assert sim.getJointTargetPosition(lift) == 1.5 and sim.getJointMaxForce(lift) == 20
+    assert sim.getJointPosition(lift) == pytest.approx(0.2, abs=0.01), "too weak, it lies on its new lower end"
+    assert abs(sim.getJointPosition(pivot) - 0.7) > 0.01, "free again"
+    with pytest.raises(ValueError, match=r"'Cabin' is held by the joint 'Lift'"):
+        sim.setObjectPosition(handle("Cabin"), -1, [0, 0, 0])
+    with pytest.raises(TypeError, match="'Cabin' is not a joint of the scene; there are: Pivot, Lift"):
+        sim.getJointType(handle("Cabin"))
+    with pytest.raises(TypeError, match="finite"):
+        sim.setJointTargetVelocity(axle, math.inf)
+    blades = handle("Quadricopter_propeller_joint1")
+    sim.setJointPosition(blades, 0.5)
+    assert sim.getJointPosition(blades) == 0.5, "looks only"
+
+
+def test_it_goes_on_from_a_snapshot_and_begins_anew_to_the_last_bit(simulation):
+    first = run(simulation, 1)
+    sim, handle = make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05)), simulation.drone.objects.handle
+    snapshot = simulation.snapshot()
+    then = run(simulation, 1)
+    sim.setJointTargetVelocity(handle("Left"), -5)
+    sim.setJointMode(handle("Axle"), 0)
+    sim.setJointInterval(handle("Lift"), False, [0, 0.1])
+    run(simulation, 0.5)
+    simulation.restore(snapshot)
+    assert run(simulation, 1) == then
+    sim.setJointInterval(handle("Lift"), False, [0, 0.1])
+    simulation.start()
+    assert run(simulation, 1) == first
+
+
+def test_moving_the_root_takes_all_along(simulation):
+    sim, handle = make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05)), simulation.drone.objects.handle
+    before = [found(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
+    for name in ("Beam", "Cart"):
+        x, y, z = sim.getObjectPosition(handle(name), -1)
+        sim.setObjectPosition(handle(name), -1, [x, y + 2, z])
+    after = [found(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
+    for (x, y, z), there in zip(before, after):
+        assert there == pytest.approx((x, y + 2, z), abs=1e-6)

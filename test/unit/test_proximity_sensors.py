@@ -1,0 +1,109 @@
+"""Proximity sensors of a scene: what is nearest in their volumes."""
+
+import math
+
+import pytest
+
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.modules import make_sim
+
+DOWN = "kind: proximity_sensor, rpy: [3.141592653589793, 0, 0]"
+SCENE = f"""
+objects:
+  - {{name: Ray, {DOWN}, type: ray, range: 5, position: [5, 0, 3], offset: 0.5}}
+  - {{name: Cone, {DOWN}, type: cone, range: 2.5, angle: 1.0, position: [10, 0, 3]}}
+  - {{name: Pyramid, {DOWN}, type: pyramid, range: 2.5, angle: 1.0, position: [15, 0, 3]}}
+  - {{name: Cylinder, {DOWN}, type: cylinder, range: 2.5, radius: 0.5, position: [20, 0, 3]}}
+  - {{name: Disc, {DOWN}, type: disc, range: 2.5, angle: 1.0, position: [25, 0, 3]}}
+  - {{name: Thin, {DOWN}, type: cone, range: 2.5, angle: 1.0, position: [30, 0, 3]}}
+  - {{name: Under, {DOWN}, type: ray, range: 5, parent: Quadricopter_base}}
+  - {{name: RayBox, shape: box, size: [1, 1, 1], position: [5, 0, 0.5]}}
+  - {{name: ConeBall, shape: sphere, size: [0.2], position: [10.5, 0.3, 1.5]}}
+  - {{name: PyramidBall, shape: sphere, size: [0.2], position: [15.4, 0.4, 1.5]}}
+  - {{name: CylinderBall, shape: sphere, size: [0.2], position: [20.3, 0.3, 1.5]}}
+  - {{name: DiscBall, shape: sphere, size: [0.2], position: [25.3, 0.1, 1.5]}}
+  - {{name: Needle, shape: sphere, size: [0.003], position: [30.17, 0.13, 1.2]}}
+  - {{name: Ghost, shape: box, size: [1, 1, 1], position: [5, 0, 2], respondable: false}}
+"""
+
+
+@pytest.fixture(name="simulation", scope="module")
+def _simulation(tmp_path_factory):
+    file = tmp_path_factory.mktemp("scenes") / "scene.yaml"
+    file.write_text(SCENE, encoding="utf-8")
+    simulation = Simulation(parameters.load({"scene_file": str(file)}))
+    simulation.step()
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture(name="sim")
+def _sim(simulation):
+    return make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05))
+
+
+def test_a_ray_is_exact(simulation, sim):
+    handle = simulation.drone.objects.handle
+    state, distance, point, met, normal = sim.readProximitySensor(handle("Ray"))
+    assert (state, met) == (1, handle("RayBox"))
+    assert distance == pytest.approx(2, abs=1e-3) and point == pytest.approx([0, 0, 2], abs=1e-3)
+    assert normal == pytest.approx([0, 0, -1], abs=1e-3)
+
+
+def nearest(x, y, z):
+    """Return how near a ball of 0.2 m radius is to a sensor, and which of its points."""
+    length = math.hypot(x, y, z)
+    return length - 0.2, [one * (length - 0.2) / length for one in (x, y, z)]
+
+
+@pytest.mark.parametrize(
+    "name, centre, tolerance",
+    [
+        ("Cone", (0.5, -0.3, 1.5), 1e-3),
+        ("Pyramid", (0.4, -0.4, 1.5), 1e-3),
+        ("Cylinder", (0.3, -0.3, 1.5), 1e-3),
+    ],
+)
+def test_the_nearest_point_in_a_volume(simulation, sim, name, centre, tolerance):
+    handle = simulation.drone.objects.handle
+    state, distance, point, met, _ = sim.readProximitySensor(handle(name))
+    expected, there = nearest(*centre)
+    assert (state, met) == (1, handle(f"{name}Ball"))
+    assert distance == pytest.approx(expected, abs=tolerance) and point == pytest.approx(there, abs=0.01)
+
+
+def test_a_fan_has_no_thickness(simulation, sim):
+    state, distance, point, *_ = sim.readProximitySensor(simulation.drone.objects.handle("Disc"))
+    radius = math.sqrt(0.2**2 - 0.1**2)  # of the ball where the fan cuts it
+    assert state == 1 and point[1] == pytest.approx(0, abs=1e-6)
+    assert distance == pytest.approx(math.hypot(0.3, 1.5) - radius, abs=1e-3)
+
+
+def test_what_is_thinner_than_the_gaps_between_rays(simulation, sim):
+    handle = simulation.drone.objects.handle
+    state, distance, _, met, _ = sim.readProximitySensor(handle("Thin"))
+    assert (state, met) == (1, handle("Needle"))
+    assert distance == pytest.approx(math.hypot(0.17, 0.13, 1.8) - 0.003, abs=1e-3)
+
+
+def test_one_object_alone_and_beyond_a_threshold(simulation, sim):
+    handle = simulation.drone.objects.handle
+    ray, box = handle("Ray"), handle("RayBox")
+    assert sim.checkProximitySensor(ray, handle("Floor"))[:2] == (1, pytest.approx(3, abs=1e-3))
+    assert sim.checkProximitySensor(ray, handle("Needle"))[0] == 0
+    assert sim.checkProximitySensor(ray, -2)[3] == box
+    assert sim.checkProximitySensorEx(ray, box, 0, 1.0, 0)[0] == 0
+    assert sim.handleProximitySensor(-3)[0] == 1
+    assert sim.handleProximitySensor(ray) == sim.readProximitySensor(ray)
+    sim.resetProximitySensor(ray)
+    with pytest.raises(TypeError, match="'Floor' is no sensor of the kind range, and no proximity sensor"):
+        sim.readProximitySensor(handle("Floor"))
+
+
+def test_it_does_not_see_what_carries_it(simulation, sim):
+    handle = simulation.drone.objects.handle
+    state, distance, _, met, _ = sim.readProximitySensor(handle("Under"))
+    assert (state, met) == (1, handle("Floor"))
+    assert distance == pytest.approx(simulation.drone.state.position[2] - 0.01, abs=1e-3)

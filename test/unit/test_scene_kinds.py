@@ -1,0 +1,286 @@
+"""Objects of a scene that are no shapes, and how they hang together: found, moved, saved, refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.object_tree import PARENT, WORLD
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.modules import make_sim
+
+SCENE = """
+objects:
+  - {name: Hand, kind: dummy, parent: Elbow, position: [1, 0, 0]}
+  - {name: Elbow, kind: joint, type: revolute, parent: Slide, position: [0, 0, 1], value: 0.5}
+  - {name: Slide, kind: joint, type: prismatic, position: [5, 0, 0], rpy: [1.5707963267948966, 0, 0], limits: [0, 2]}
+  - {name: Finger, shape: box, size: [0.1, 0.1, 0.1], parent: Hand, position: [0, 0, 0.5], color: [1, 0, 0]}
+  - {name: Flag, alias: cloth, shape: box, size: [0.02, 0.02, 0.2], parent: Quadricopter_base, position: [0, 0, 0.3]}
+  - {name: Ball, kind: joint, type: spherical, position: [0, 5, 1]}
+  - {name: Under, alias: cloth, kind: dummy, parent: Ball, position: [0, 0, 1]}
+  - {name: Ghost, shape: box, size: [1, 1, 1], position: [0, -6, 0.5], respondable: false, color: [0, 1, 0]}
+  - {name: Unseen, shape: box, size: [1, 1, 1], position: [0, -9, 0.5], visible: false}
+  - name: Table
+    shape: compound
+    mass: 4
+    position: [0, 9, 0.85]
+    parts:
+      - {shape: box, size: [1, 1, 0.1]}
+      - {shape: cylinder, size: [0.05, 0.8], position: [0, 0, -0.45], color: [0, 0, 1]}
+      - {shape: box, size: [0.6, 0.6, 0.02], position: [0, 0, -0.84]}
+  - {name: Way, kind: path, parent: Table, position: [0, 0, 1], points: [[0, 0, 0], [3, 0, 0], [3, 4, 0]],
+     closed: false}
+  - {name: Eye, kind: vision_sensor, parent: Hand, position: [0, 0, 2], rpy: [3.141592653589793, 0, 0],
+     width: 32, height: 24}
+"""
+
+
+@pytest.fixture(name="simulate")
+def _simulate(tmp_path):
+    made = []
+
+    def simulate(text):
+        file = tmp_path / "scene.yaml"
+        file.write_text(text, encoding="utf-8")
+        made.append(Simulation(parameters.load({"scene_file": str(file)})))
+        return made[-1]
+
+    yield simulate
+    for one in made:
+        one.close()
+
+
+def found(simulation, name):
+    objects = simulation.drone.objects
+    return objects[objects.handle(name)]
+
+
+def sim_of(simulation):
+    return make_sim(simulation.drone, Surroundings(lambda: simulation.time, 0.05))
+
+
+def place(simulation, name):
+    return frames.position(found(simulation, name).matrix())
+
+
+def test_the_motion_of_joints_composes(simulate):
+    simulation = simulate(SCENE)
+    sim, objects = sim_of(simulation), simulation.drone.objects
+    slide, elbow, hand = (objects.handle(name) for name in ("Slide", "Elbow", "Hand"))
+    assert place(simulation, "Hand") == pytest.approx((5 + math.cos(0.5), -1, math.sin(0.5)))
+    sim.setJointPosition(slide, 1.5)
+    sim.setJointPosition(elbow, math.pi / 2)
+    assert place(simulation, "Hand") == pytest.approx((5, -2.5, 1))
+    assert sim.getObjectPosition(elbow, PARENT) == pytest.approx([0, 0, 1])
+    assert sim.getObjectPosition(elbow, slide) == pytest.approx([0, 0, 1]), "relative to what the joint moves"
+    sim.setJointPosition(slide, 9)
+    assert sim.getJointPosition(slide) == 2, "as far as its limits let it"
+    sim.setObjectPosition(hand, WORLD, [5, 0, 0])
+    assert sim.getObjectPosition(hand, WORLD) == pytest.approx([5, 0, 0])
+    sim.setJointPosition(elbow, 100)
+    assert sim.getJointPosition(elbow) == pytest.approx(100 - 32 * math.pi), "one without end, within half a turn"
+
+
+def test_a_body_without_mass_goes_where_its_parent_goes(simulate):
+    simulation = simulate(SCENE)
+    flag = found(simulation, "Flag")
+    simulation.drone.receive(Twist(Vector3(0.5, 0, 0.3)))
+    for _ in range(20):
+        simulation.step()
+    above = frames.transform(simulation.drone.matrix, (0, 0, 0.29))
+    assert simulation.drone.state.position[0] > 0.05
+    assert simulation.world.state(flag.number).position == pytest.approx(above)
+    finger, sim = found(simulation, "Finger"), sim_of(simulation)
+    sim.setJointPosition(simulation.drone.objects.handle("Slide"), 2)
+    simulation.step()
+    assert simulation.world.state(finger.number).position == pytest.approx(frames.position(finger.matrix()))
+    tree = simulation.drone.objects
+    tree.set_parent(tree.handle("Flag"), WORLD, keep_in_place=True)
+    there = flag.matrix()
+    for _ in range(5):
+        simulation.step()
+    assert flag.matrix() == there, "let go, it stays"
+
+
+def test_a_spherical_joint_turns_any_way(simulate):
+    simulation = simulate(SCENE)
+    sim, joint = sim_of(simulation), simulation.drone.objects.handle("Ball")
+    sim.setSphericalJointMatrix(joint, list(frames.from_rpy((0, 0, 0), (math.pi / 2, 0, 0))))
+    assert place(simulation, "Under") == pytest.approx((0, 4, 1))
+    assert sim.getJointMatrix(joint)[3::4] == [0, 0, 0]
+    assert sim.getJointType(joint) == 12
+    for call in (lambda: sim.setSphericalJointMatrix(joint, [2.0] * 12), lambda: sim.setJointPosition(joint, 1)):
+        with pytest.raises(TypeError):
+            call()
+
+
+def test_kinds_aliases_and_paths_from_the_root(simulate):
+    simulation = simulate(SCENE)
+    objects, sim = simulation.drone.objects, sim_of(simulation)
+    kinds = {name: found(simulation, name).kind for name in ("Hand", "Elbow", "Finger", "Table", "Way", "Eye", "Floor")}
+    assert list(kinds.values()) == ["dummy", "joint", "shape", "shape", "path", "vision_sensor", "shape"]
+    assert found(simulation, "Drone").kind == "shape" and found(simulation, "FrontVision").kind == "vision_sensor"
+    assert found(simulation, "Quadricopter_propeller_joint1").kind == "joint"
+    assert sim.getObject("/Quadcopter/cloth") == objects.handle("Flag")
+    assert sim.getObject("/Ball/cloth") == objects.handle("Under")
+    assert objects.path(objects.handle("Finger")) == "/Slide/Elbow/Hand/Finger"
+
+
+def test_what_nothing_meets_and_what_nobody_sees(simulate):
+    simulation = simulate(SCENE)
+    world, visuals = simulation.world, simulation.scene.visuals()[0]
+    assert world.ray((0, -6, 3), (0, -6, 0.1)) is None
+    assert world.ray((0, -9, 3), (0, -9, 0.1)).distance == pytest.approx(2, abs=1e-3)
+    shown = {visual.key[0] for visual in visuals}
+    assert found(simulation, "Ghost").number in shown and found(simulation, "Unseen").number not in shown
+    simulation.drone.move(Pose((0, -6, 0.5)))
+    for _ in range(5):
+        simulation.step()
+    assert simulation.drone.state.position == pytest.approx((0, -6, 0.5), abs=0.06), "it flies inside"
+
+
+def test_a_compound_is_one_rigid_body(simulate):
+    simulation = simulate(SCENE)
+    looks = [one for one in simulation.scene.visuals()[0] if one.rgba[:3] == (0, 0, 1)]
+    assert len(looks) == 1, "a part of its own color"
+    for _ in range(40):
+        simulation.step()
+    assert place(simulation, "Table") == pytest.approx((0, 9, 0.85), abs=0.005), "it stands on its foot"
+    body = found(simulation, "Table").body
+    centre = frames.position(simulation.world.inertial_frame(body.number))
+    volumes, heights = np.array([0.1, math.pi * 0.05**2 * 0.8, 0.0072]), np.array([0, -0.45, -0.84])
+    assert centre == pytest.approx((0, 0, volumes @ heights / volumes.sum()), abs=1e-3)
+
+
+def test_paths(simulate):
+    simulation = simulate(SCENE)
+    sim, way = sim_of(simulation), simulation.drone.objects.handle("Way")
+    assert sim.getPathLength(way) == 7
+    assert sim.getPositionOnPath(way, 5 / 7) == pytest.approx([3, 11, 1.85], abs=1e-3)
+    assert sim.getOrientationOnPath(way, 1)[2] == pytest.approx(math.pi / 2)
+    sim.setPathPosition(way, sim.getPathPosition(way) + 2)
+    assert sim.getPathPosition(way) == 2
+    flat = [0, 0, 0, 0, 0, 0, 1, 2, 0, 0, 0, 0, 1, 0]
+    lengths, total = sim.getPathLengths(flat, 7)
+    assert (lengths, total) == ([0, 2], 2)
+    half = math.sqrt(0.5)
+    assert sim.getPathInterpolatedConfig(flat, lengths, 1) == pytest.approx([1, 0, 0, 0, 0, half, half])
+    for call in (lambda: sim.getPathLength(0), lambda: sim.getPathLengths(flat, 4), lambda: sim.getPathLengths([], 3)):
+        with pytest.raises(TypeError):
+            call()
+
+
+def test_a_vision_sensor_of_the_scene_sees(simulate):
+    simulation = simulate(SCENE)
+    sim, eye = sim_of(simulation), simulation.drone.objects.handle("Eye")
+    image, width, height = sim.getVisionSensorCharImage(eye)
+    assert (width, height, len(image)) == (32, 24, 32 * 24 * 3)
+    middle = np.frombuffer(image, np.uint8).reshape(24, 32, 3)[12, 16].astype(int)
+    assert middle[0] > middle[1] + 50, "the red finger, 1.5 m below it"
+    assert found(simulation, "Eye").picture("depth")[12, 16] == pytest.approx(1.45, abs=0.01)
+
+
+def test_it_begins_anew_is_saved_and_comes_back_with_a_snapshot(simulate, tmp_path):
+    simulation = simulate(SCENE)
+    sim, objects = sim_of(simulation), simulation.drone.objects
+    sim.setJointPosition(objects.handle("Slide"), 1)
+    sim.setObjectParent(objects.handle("Finger"), objects.handle("Quadricopter_base"), True)
+    simulation.step()
+    simulation.save_scene(tmp_path / "saved.yaml")
+    again = Simulation(parameters.load({"scene_file": str(tmp_path / "saved.yaml")}))
+    for handle in objects:
+        name = objects[handle].name
+        assert found(again, name).matrix() == pytest.approx(objects[handle].matrix(), abs=1e-6), name
+    again.close()
+    snapshot, before = simulation.snapshot(), place(simulation, "Finger")
+    sim.setJointPosition(objects.handle("Slide"), 0)
+    sim.setObjectPosition(objects.handle("Finger"), WORLD, [0, 0, 9])
+    simulation.restore(snapshot)
+    assert place(simulation, "Finger") == before and found(simulation, "Slide").value == 1
+    finger = found(simulation, "Finger")
+    assert simulation.world.state(finger.number).position == pytest.approx(before)
+    simulation.start()
+    assert found(simulation, "Slide").value == 0
+    assert found(simulation, "Finger").parent.name == "Hand"
+
+
+ONE = "kind: dummy, position: [0, 0, 0]"
+
+
+@pytest.mark.parametrize(
+    "entry, words",
+    [
+        ("{kind: dummy}", "scene.yaml: line 2: parameter objects/0/name: missing"),
+        ("{kind: cone}", "line 2: parameter objects/0/kind = 'cone': must be one of 'dummy', 'joint',"),
+        ("{name: A, kind: dummy, mass: 1}", "line 2: parameter objects/0/mass: unknown key"),
+        (f"{{name: A, {ONE}}}\n  - {{name: A, {ONE}}}", "line 3: parameter objects/1/name = 'A': comes twice"),
+        (f"{{name: A, parent: A, {ONE}}}", "line 2: parameter objects/0/parent = 'A': 'A' would be its own ancestor"),
+        (
+            f"{{name: A, parent: B, {ONE}}}\n  - {{name: B, parent: A, {ONE}}}",
+            "line 2: parameter objects/0/parent = 'B': 'A' would be its own ancestor",
+        ),
+        (
+            f"{{name: A, parent: Quadricopter_bas, {ONE}}}",
+            "line 2: no object is named 'Quadricopter_bas', the parent of 'A'; near names are Quadricopter_base",
+        ),
+        (
+            "{shape: sphere, size: [1], position: [0, 0, 9], parent: B}",
+            "line 2: parameter objects/0/parent = 'B': what",
+        ),
+        ("{name: A, kind: joint, type: revolute, limits: [1, 0]}", "must be [lowest, highest] with lowest < highest"),
+        (
+            "{name: A, kind: joint, type: revolute, limits: [0, 1], value: 2}",
+            "line 2: parameter objects/0/value = 2: must be within the limits, 0 to 1",
+        ),
+        ("{name: A, kind: joint, type: spherical, value: 2}", "a spherical joint has none"),
+        ("{name: A, kind: joint, type: screw}", "line 2: parameter objects/0/type = 'screw'"),
+        ("{name: A, kind: proximity_sensor, type: cone, range: 1}", "parameter objects/0/angle = 0: a cone needs one"),
+        ("{name: A, kind: proximity_sensor, type: pyramid, range: 1, angle: 3.2}", "that of a pyramid is at most 3.1"),
+        (
+            "{name: A, kind: proximity_sensor, type: ray, range: .inf}",
+            "objects/0/range = inf: input should be a finite",
+        ),
+        ("{name: A, kind: vision_sensor, near: 2, far: 1}", "parameter objects/0/near = 2: must be less than far = 1"),
+        ("{name: A, kind: vision_sensor, width: 5000}", "objects/0/width = 5000: input should be less than or equal"),
+        ("{name: A, kind: path, points: [[0, 0, 0]]}", "parameter objects/0/points = [[0, 0, 0]]: list should have at"),
+        (
+            "{name: A, shape: compound, position: [0, 0, 0], parts: []}",
+            "objects/0/parts = []: list should have at least 1",
+        ),
+        (
+            "{name: A, shape: compound, position: [0, 0, 0], parts: [{shape: urdf}]}",
+            "parameter objects/0/parts/0/shape = 'urdf': must be one of 'box', 'cylinder', 'sphere', 'mesh', 'capsule'",
+        ),
+        (
+            "{name: A, shape: sphere, size: [1], position: [0, 0, 9], inertia: {moments: [1, 0, 1]}}",
+            "objects/0/inertia/moments/1 = 0",
+        ),
+    ],
+)
+def test_a_wrong_entry_gets_one_line(simulate, entry, words):
+    with pytest.raises(ParameterError) as refused:
+        simulate(f"objects:\n  - {entry}\n")
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_joint_that_the_dynamics_cannot_move_is_told_of_once(simulate, caplog):
+    simulate(
+        """
+objects:
+  - {name: Empty, kind: joint, type: revolute, mode: velocity, position: [4, 0, 1]}
+  - {name: Bare, kind: joint, type: revolute, mode: velocity, position: [4, 1, 1]}
+  - {name: Round, kind: joint, type: spherical, mode: passive, position: [4, 2, 1]}
+  - {name: Bob, shape: sphere, size: [0.1], mass: 1, parent: Round, position: [0, 0, -0.5]}
+"""
+    )
+    lines = [one.getMessage() for one in caplog.records if "moved by scripts alone" in one.getMessage()]
+    assert lines == [
+        "moved by scripts alone, as no shape with a mass hangs right on it: Empty, Bare",
+        "moved by scripts alone, as spherical ones are: Round",
+    ]
