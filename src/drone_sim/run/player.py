@@ -31,6 +31,7 @@ class Player:
         self._step = step
         self.paused = False
         self.begun = False  # since this was last set to False
+        self.failure: ScriptError | Diverged | None = None  # what ended the last run, if it did not end well
         self._simulated_time = simulated_time
         self._tell = tell
         self._told = ""
@@ -49,7 +50,7 @@ class Player:
 
     def start(self, scene_file: str | None = None) -> str:
         """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
-        self.paused = False
+        self.paused, self.failure = False, None
         self.attempt(lambda: self.simulation.start(scene_file))
         self.simulation.look()  # meshes and textures are read now, which the first step would be late for
         self.begun = True
@@ -118,6 +119,7 @@ class Player:
         try:
             action()
         except (ScriptError, Diverged) as error:
+            self.failure = error
             _LOG.error(f"script error: {error}" if isinstance(error, ScriptError) else str(error))
             try:
                 self.simulation.stop()

@@ -83,4 +83,4 @@ class ObjectKinds:
             kind = "proximitysensor" if hasattr(self._sensors[name], "detected") else "dummy"
         else:
             kind = getattr(found, "kind", "") or _KINDS.get(found.alias.lower(), "shape")
-        return CONSTANTS[f"object_{kind.replace("_", "")}_type"]
+        return CONSTANTS[f"object_{kind.replace('_', '')}_type"]
