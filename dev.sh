@@ -219,13 +219,13 @@ case "$command" in
   run) stay_on_this_machine; setup; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   lint) install_packages git; setup; lint ;;
-  bench) setup; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
+  bench) setup; make_venv requirements-dev.txt; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
   pythons) # shellcheck disable=SC2046 # one word each
     install_packages $(packages)
     test_pythons "$@" ;;
-  deb) install_packages python3-matplotlib python3-opencv python3-pil python3-tqdm
+  deb) install_packages python3-matplotlib python3-opencv python3-pil python3-tqdm python3-zmq
     setup; packaging/deb.sh "$wheels" ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
 esac

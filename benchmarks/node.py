@@ -63,17 +63,17 @@ def _running(*command: str) -> Iterator[list[str]]:
         text=True,
     )
     lines: list[str] = []
-    flying = threading.Event()
+    ready = threading.Event()
 
     def read() -> None:
         for line in process.stdout or ():
             lines.append(line)
-            if "flying" in line:
-                flying.set()
+            if "commands on" in line:
+                ready.set()
 
     reader = threading.Thread(target=read, daemon=True)
     reader.start()
-    if not flying.wait(30):
+    if not ready.wait(30):
         process.kill()
         raise RuntimeError("the node does not fly:\n" + "".join(lines))
     try:
@@ -202,9 +202,9 @@ def latencies(seconds: float = 20.0) -> list[Row]:
         delays = [float(line) for line in path.read_text().split()]
     jitter = np.abs(np.diff(came) - 0.05)
     return [
-        _spread("cmd_vel published -> seen by the loop", delays),
-        _spread("image stamped -> in the subscriber's callback", ages),
-        {**_spread("jitter of the 20 Hz images", jitter), "late_steps": int(flew(lines).group(3))},
+        spread("cmd_vel published -> seen by the loop", delays),
+        spread("image stamped -> in the subscriber's callback", ages),
+        {**spread("jitter of the 20 Hz images", jitter), "late_steps": int(flew(lines).group(3))},
     ]
 
 
@@ -261,7 +261,8 @@ def screen() -> Iterator[None]:
             os.environ["DISPLAY"] = before
 
 
-def _spread(name: str, seconds: Any) -> Row:
+def spread(name: str, seconds: Any) -> Row:
+    """Return median and 95th percentile, in ms."""
     median, high = np.percentile(1e3 * np.asarray(seconds), [50, 95])
     return {"name": name, "median_ms": float(median), "p95_ms": float(high), "samples": len(seconds)}
 

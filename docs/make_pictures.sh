@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots rviz)
+sections=(diagrams cameras plots remote rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -24,6 +24,9 @@ plots() {
   "$python" scripts/fly --script docs/tutorial/5_roll.py --commands docs/tutorial/stability.yaml \
     --set "drone.position=[0, 0, 5]" --plot "$pictures/tutorial_stability.png"
 }
+
+# The flight of docs/remote_api.md; needs the client that ./dev.sh test installs.
+remote() { "$python" docs/remote/without_ros.py --plot "$pictures/remote_circle.png"; }
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.
 rviz() { docs/take_rviz_pictures.sh "$pictures"; }

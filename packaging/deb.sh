@@ -20,7 +20,7 @@ DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), 
  python3-matplotlib, python3-nav-msgs, python3-numpy, python3-opencv, python3-pil, python3-roslaunch, python3-rospy,
  python3-rosmsg, python3-rosnode, python3-rosservice, python3-rostopic, python3-sensor-msgs, python3-std-msgs,
  python3-std-srvs, python3-tf2-ros, python3-tqdm, python3-visualization-msgs, python3-yaml, ros-environment,
- python3-tf2-msgs, rosbash"
+ python3-tf2-msgs, python3-zmq, rosbash"
 
 mkdir -p "$stage" build/deb
 cmake -S . -B "$out/build" -DCMAKE_INSTALL_PREFIX=/usr -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF \

@@ -3,6 +3,7 @@
 Run as a program, it reads a request in each line of its input and answers with a line: of JSON, both.
 """
 
+import importlib
 import json
 import logging
 import os
@@ -14,6 +15,7 @@ import time
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
+EVERYTHING = ("drone_sim.run.simulation", "drone_sim.scripting.lua.script")
 HANGS = 100  # s, on a busy machine; most take less than one
 
 
@@ -87,7 +89,8 @@ def _attack(path, limit, where, answer):
 
 
 def _serve():
-
+    for module in EVERYTHING:
+        importlib.import_module(module)
     for line in sys.stdin:
         read, write = os.pipe()
         child = os.fork()

@@ -19,7 +19,9 @@ local function tell(phase)
     local order = sim.getStringSignal('order') or ''
     sim.setStringSignal('order', order .. sim.getObjectName(sim.getObject('.')) .. ':' .. phase .. ' ')
 end
-for _, phase in ipairs{'init', 'actuation', 'sensing', 'cleanup'} do _G['sysCall_' .. phase] = function() tell(phase) end end
+for _, phase in ipairs{'init', 'actuation', 'sensing', 'cleanup'} do
+    _G['sysCall_' .. phase] = function() tell(phase) end
+end
 """
 TELL_PYTHON = """
 def tell(phase):
@@ -91,7 +93,9 @@ def test_each_has_parameters_names_and_a_state_of_its_own(build):
     end
     """.replace("count + sim", "sim.getScriptExecutionCount() * 2 + 0 * sim")
     simulation = build(
-        {"DronePosition#0": text}, values={"DronePosition#0": {"step": 2.0}}, vehicles={"a": {}, "b": {"position": [0, 2, 1]}}
+        {"DronePosition#0": text},
+        values={"DronePosition#0": {"step": 2.0}},
+        vehicles={"a": {}, "b": {"position": [0, 2, 1]}},
     )
     for _ in range(3):
         simulation.step()
@@ -130,7 +134,12 @@ def test_an_object_has_one_script(tmp_path):
 
 def test_they_take_part_in_restarts_snapshots_and_saving(build, tmp_path):
     own = "n = 0 function sysCall_actuation() n = n + 1 sim.setFloatSignal('n', n) end"
-    simulation = build({"Floor": own, "DronePosition": "x = 0\ndef sysCall_sensing():\n    global x\n    x += 1\n    sim.setFloatSignal('x', x)"})
+    simulation = build(
+        {
+            "Floor": own,
+            "DronePosition": "x = 0\ndef sysCall_sensing():\n    global x\n    x += 1\n    sim.setFloatSignal('x', x)",
+        }
+    )
 
     def signals():
         return [simulation.drone.signals.getFloatSignal(name) for name in "nx"]
@@ -237,7 +246,7 @@ def test_scripts_call_each_other_by_value(build, asking, answering):
     ],
 )
 def test_a_call_that_fails_gets_one_line(build, call, words):
-    own = f"function sysCall_init() end function ask() end function sysCall_actuation() sim.callScriptFunction({call}) end"
+    own = f"function ask() end function sysCall_actuation() sim.callScriptFunction({call}) end"
     simulation = build({"Floor": "function sysCall_init() end", "DronePosition": CALLED}, own, script_time_limit=0.2)
     with pytest.raises(ScriptError, match=words) as caught:
         simulation.step()
@@ -273,4 +282,6 @@ def test_a_propellers_script_takes_the_laws_place(build):
 
 
 def test_without_scripts_nothing_is_otherwise(build):
-    assert struct.pack("600d", *sum(flown(build({})), ())) == struct.pack("600d", *sum(flown(build({"Floor": TELL_LUA})), ()))
+    assert struct.pack("600d", *sum(flown(build({})), ())) == struct.pack(
+        "600d", *sum(flown(build({"Floor": TELL_LUA})), ())
+    )

@@ -76,6 +76,16 @@ def test_a_request_that_has_begun_is_said_to_be_under_way():
     assert "it is still being carried out" in str(said[0])
 
 
+def test_where_others_are_heard_meanwhile_a_job_wakes_their_sleep():
+    inbox, slept, woken = Inbox(), [], []
+    inbox.sleep_by(slept.append, lambda: woken.append(True))
+    inbox.wait(3.0)
+    assert slept == [3.0]
+    inbox.put(lambda: slept.append(0.0))
+    inbox.empty()
+    assert woken == [True] and slept == [3.0, 0.0]
+
+
 class Clock:
     def __init__(self):
         self.now = 5.0

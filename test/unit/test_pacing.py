@@ -54,6 +54,15 @@ def test_an_overrun_is_counted_and_not_caught_up():
     assert round(pacer.worst, 9) == 0.07
 
 
+def test_a_step_that_others_held_up_is_not_late():
+    pacer, clock = make()
+    passes(pacer, clock, [0.12])
+    pacer.excuse()
+    assert pacer.wait() == 0.0 and pacer.overruns == 0
+    assert passes(pacer, clock, [0.0, 0.12, 0.0]) == [0.22, 0.27, 0.39]
+    assert pacer.overruns == 1
+
+
 def test_as_fast_as_it_can():
     pacer, clock = make(period=0.0)
     assert passes(pacer, clock, [0.01] * 4) == [0.0, 0.01, 0.02, 0.03]

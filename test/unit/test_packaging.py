@@ -15,6 +15,7 @@ SOURCE = ROOT / "src"
 KEYS = {
     "PIL": "python3-pil",
     "annotated_types": "python3-pydantic-pip",
+    "cbor2": "python3-cbor2-pip",
     "cv2": "python3-opencv",
     "moderngl": "python3-moderngl-pip",
     "pybullet": "python3-pybullet-pip",
@@ -47,7 +48,8 @@ def test_every_module_has_its_key_in_package_xml():
 
 
 def test_rosdep_and_pip_take_the_same_versions():
-    required = re.findall(r"^([a-z]+)([^;\n]*)", (ROOT / "requirements.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    listed = (ROOT / "requirements.txt").read_text(encoding="utf-8")
+    required = re.findall(r"^([a-z0-9]+)([^;\n]*)", listed, re.MULTILINE)
     versions = {name: f"{name}{version.strip()}" for name, version in required}
     rosdep = yaml.safe_load((ROOT / "rosdep.yaml").read_text(encoding="utf-8"))
     for key, systems in rosdep.items():

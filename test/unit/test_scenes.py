@@ -109,7 +109,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: [", "scene.yaml: while parsing"),
         (
             "boxes: []",
-            "scene.yaml: line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, scripts, vehicles",
+            "line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, scripts, vehicles",
         ),
         ("1: 2", "key '1' must be a text (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),

@@ -124,7 +124,7 @@ def test_scripts_are_the_own_drones(drones):
     assert sim.getObjectName(sim.getObjectAssociatedWithScript(sim.handle_self)) == "Drone#0"
     other = sim.getScriptHandle("Quadricopter_propeller_respondable1#")
     assert sim.getObjectName(sim.getObjectAssociatedWithScript(other)) == "Quadricopter_propeller_respondable1"
-    with pytest.raises(ValueError, match="no script is attached to 'Floor'; there are: Drone"):
+    with pytest.raises(ValueError, match="no script is attached to 'Floor'; known are Drone"):
         sim.getScriptHandle("Floor")
 
 

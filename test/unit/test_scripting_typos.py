@@ -82,7 +82,10 @@ def test_an_old_version_beside_the_phase_is_left_alone_but_told(load, caplog, en
     ]
 
 
-IDLE = "has none of sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup, sysCall_thread: nothing flies the drone"
+IDLE = (
+    "has none of sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup, sysCall_thread: "
+    "nothing flies the drone"
+)
 
 
 @ENDINGS

@@ -39,6 +39,7 @@ class RigidBody:
     """The URDF's links as one body, in the frame of the root link (metres, kilograms)."""
 
     mass: float
+    masses: dict[str, float]  # of each link
     centre_of_mass: np.ndarray  # (3,)
     inertia: np.ndarray  # (3, 3), about the centre of mass, root link's axes
     links: dict[str, Matrix]  # root from link, joints at zero
@@ -77,6 +78,7 @@ def _merge(robot: Xml.Element) -> RigidBody:
     visuals = [(name, visual) for name, link in links.items() for visual in link.findall("visual")]
     return RigidBody(
         mass=mass,
+        masses=masses,
         centre_of_mass=centre,
         inertia=inertia,
         links=poses,

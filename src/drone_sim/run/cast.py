@@ -9,7 +9,6 @@ from drone_sim.config.types import ParameterError
 from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.object_tree import SceneObject
 from drone_sim.run.parameters import Parameters
-from drone_sim.scripting.api.constants import ABOUT_TO_STOP, LAST_BEFORE_STOP, RUNNING
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
 from drone_sim.vehicles.attached_script import AttachedScript
@@ -73,7 +72,9 @@ class Cast:
 
     def of(self, vehicle: str) -> list[AttachedScript]:
         """Return the scripts on a vehicle's own objects, apart from its own one."""
-        return [one for one in self.in_order(self.attached) if isinstance(one, AttachedScript) and one.goes_with == vehicle]
+        return [
+            one for one in self.in_order(self.attached) if isinstance(one, AttachedScript) and one.goes_with == vehicle
+        ]
 
     # ---- in the order of the tree
 
@@ -100,17 +101,18 @@ class Cast:
     def clean_up(self, actors: Sequence[Actor]) -> list[ScriptError]:
         """Let threads end, and call every cleanup, whatever the others do; return what went wrong."""
         errors: list[ScriptError] = []
+        control = self._shared.control
         try:
-            self._shared.state = ABOUT_TO_STOP
+            control.is_stopping = True
             for _ in range(_LAST_TURNS):
                 for one in actors:
                     if one.script.threaded:
                         _attempt(one.script.take_turn, errors)
-            self._shared.state = LAST_BEFORE_STOP
+            control.is_ending = True
             for one in actors:
                 _attempt(lambda script=one.script: script.call("cleanup"), errors)  # type: ignore[misc]
         finally:
-            self._shared.state = RUNNING
+            control.is_stopping = control.is_ending = False
         return errors
 
 

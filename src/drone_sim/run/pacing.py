@@ -24,7 +24,8 @@ class Pacer:
         self._period = period
         self._clock = clock
         self._sleep = sleep
-        self.restart()
+        self._due = clock() + period
+        self._excused = False
 
     def wait(self, interrupted: Callable[[], bool] = lambda: False) -> float:
         """Sleep until the next period begins, or until interrupted; return the lateness in seconds.
@@ -33,18 +34,41 @@ class Pacer:
         a step took longer than its period, the following ones are put off by as much.
         """
         late = max(0.0, self._clock() - self._due) if self._period else 0.0
+        self._due += late
+        if self._excused:
+            late, self._excused = 0.0, False
         if late:
             self.overruns += 1
             self.worst = max(self.worst, late)
-            self._due += late
         while self._due > self._clock() and not interrupted():
             self._sleep(min(_SLICE, max(0.0, self._due - self._clock())))
         self._due += self._period
         return late
 
+    def excuse(self) -> None:
+        """Let the next step not count as late: others have held it up."""
+        self._excused = True
+
     def restart(self) -> None:
         """Begin to count anew, as after a pause: the next step is due one period from now."""
         self._due = self._clock() + self._period
+
+
+class Stopwatch:
+    """Says how long ago something was."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        """Take a monotonic clock, and start."""
+        self._clock = clock
+        self.restart()
+
+    def seconds(self) -> float:
+        """Return the real seconds since the start."""
+        return self._clock() - self._began
+
+    def restart(self) -> None:
+        """Start anew."""
+        self._began = self._clock()
 
 
 class Throttle:

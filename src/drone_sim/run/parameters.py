@@ -13,6 +13,8 @@ from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model
 
 from drone_sim.config.errors import Problem, line_of, problems, told
 from drone_sim.config.types import (
+    ADDRESS,
+    Checked,
     FileName,
     Finite,
     Location,
@@ -35,13 +37,21 @@ from drone_sim.sensors.together import check_rates
 from drone_sim.vehicles.parameters import DroneParameters, EquipmentParameters, VehicleParameters, laid_over
 from drone_sim.vrep_files.errors import VrepFileError
 from drone_sim.vrep_files.reading import SUFFIXES
-from drone_sim.wording import shown
+from drone_sim.wording import MAX_NAME, shown
 
 __all__ = ["CameraParameters", "ParameterError", "Parameters", "load", "read_yaml"]
 
 MAX_SUB_STEPS = 1000
 MAX_VEHICLES = 256
 _SPACING = 1.0  # m, between two vehicles in a row
+
+
+class RemoteApiParameters(Checked):
+    """Who may drive the simulation from outside."""
+
+    serve: Switch
+    address: Annotated[str, Field(pattern=ADDRESS, max_length=MAX_NAME)]
+    port: Annotated[int, Within(0, 65535)]
 
 
 class Parameters(EquipmentParameters):
@@ -51,6 +61,7 @@ class Parameters(EquipmentParameters):
     gui: Switch
     script_time_limit: Annotated[Finite, Within(0.01, 1e4, or_zero=True)]
     real_time_factor: Annotated[Finite, Within(1e-3, 1e3, or_zero=True)]
+    remote_api: RemoteApiParameters
     time_step: Annotated[Finite, Within(1e-4, 1)]
     sub_step: Annotated[Finite, Within(1e-5, 1)]
     gravity: Annotated[Finite, Within(-100, 100)]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.whereabouts import Diverged
+from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.errors import ScriptError
 
 _LOG = logging.getLogger(__name__)
@@ -30,6 +31,7 @@ class Player:
         self._step = step
         self.paused = False
         self.begun = False  # since this was last set to False
+        self.failure: ScriptError | Diverged | None = None  # what ended the last run, if it did not end well
         self._simulated_time = simulated_time
         self._tell = tell
         self._told = ""
@@ -48,7 +50,7 @@ class Player:
 
     def start(self, scene_file: str | None = None) -> str:
         """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
-        self.paused = False
+        self.paused, self.failure = False, None
         self.attempt(lambda: self.simulation.start(scene_file))
         self.simulation.look()  # meshes and textures are read now, which the first step would be late for
         self.begun = True
@@ -101,13 +103,23 @@ class Player:
             self.attempt(self._step)
         except (ScriptError, Diverged):
             return False
-        return True
+        return not self.simulation.asked or self._obey(self.simulation.take_asked())
+
+    def _obey(self, asked: str) -> bool:
+        """Stop or pause, as a script asked for; return whether the simulation still runs."""
+        _LOG.info(f"a script asks to {asked}")
+        try:
+            self.stop() if asked == STOP else self.pause(True)
+        except ScriptError as error:
+            _LOG.error(f"script error: {error}")
+        return self.simulation.running
 
     def attempt(self, action: Callable[[], None]) -> None:
         """Start or step. When script or dynamics fails, log its one line, run cleanup, and raise it again."""
         try:
             action()
         except (ScriptError, Diverged) as error:
+            self.failure = error
             _LOG.error(f"script error: {error}" if isinstance(error, ScriptError) else str(error))
             try:
                 self.simulation.stop()

@@ -14,6 +14,8 @@ from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.run.cast import Cast, tell
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
+from drone_sim.scripting.api.control import Control
+from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.vehicles.parameters import VehicleParameters
@@ -102,6 +104,7 @@ class Setting:
 
     def _empty_tree(self) -> None:
         self.shared.objects, self.shared.signals, self.shared.scripts = ObjectTree(), Signals(), Scripts()
+        self.shared.control, self.shared.data = Control(), CustomData()
         self.shared.objects.add("Floor", also=("ResizableFloor_5_25",), kind="shape")
 
     def _name_objects(self) -> None:

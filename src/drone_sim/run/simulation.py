@@ -250,6 +250,15 @@ class Simulation:
     # ---- stepping
 
     @property
+    def asked(self) -> str:
+        """What a script asked for since it was last taken: 'stop', 'pause' or nothing. Whoever plays this obeys."""
+        return self._setting.shared.control.asked
+
+    def take_asked(self) -> str:
+        """Return what a script asked for, and forget it."""
+        return self._setting.shared.control.take()
+
+    @property
     def run(self) -> int:
         """Number of the run: another one after every start and every stop."""
         return self._runs
@@ -305,7 +314,8 @@ class Simulation:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
         attached = self._setting.cast.attached
-        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying, *attached, self.scene]
+        held = (shared.objects, shared.signals, shared.data, self._drawings, self.scene)
+        parts: list[Any] = [*held, *self._flying, *attached]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

@@ -18,7 +18,7 @@ class AttachedScriptParameters(Checked):
 
     object: Label
     script: FileName
-    parameters: Annotated[dict[Label, ScriptValue], Field(max_length=MAX_PARAMETERS)] = {}
+    parameters: Annotated[dict[Label, ScriptValue], Field(default_factory=dict, max_length=MAX_PARAMETERS)]
 
 
 AttachedScripts = Annotated[list[AttachedScriptParameters], Field(max_length=MAX_SCRIPTS)]
@@ -28,7 +28,10 @@ def check(scripts: Sequence[AttachedScriptParameters]) -> None:
     """Raise ParameterError where an object has two scripts, or a script no file."""
     names: set[str] = set()
     for index, one in enumerate(scripts):
-        for key, mistake in (("object", one.object in names and "comes twice"), ("script", not one.script and "no file")):
+        for key, mistake in (
+            ("object", one.object in names and "comes twice"),
+            ("script", not one.script and "no file"),
+        ):
             if mistake:
                 location = ("scene", "scripts", index, key)
                 value: Any = getattr(one, key)

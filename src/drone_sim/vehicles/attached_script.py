@@ -1,4 +1,4 @@
-"""A child script on any object but a vehicle's own: on its target, its propellers, its sensors, on what stands around."""
+"""A child script on any object but a vehicle's own: its target, propellers, sensors, and what stands around."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import copy
 import logging
 from collections import ChainMap
 from collections.abc import Callable, Mapping
-from functools import partial
 
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree
@@ -17,7 +16,7 @@ from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.sensors.sensor import Instrument
-from drone_sim.vehicles.child_script import Pictures, call_init, check_callbacks, load_child_script
+from drone_sim.vehicles.child_script import call_init, check_callbacks, load_child_script
 from drone_sim.vehicles.script_parameters import bring_back, propeller_script_parameters
 from drone_sim.vehicles.shared import Shared
 from drone_sim.vehicles.vehicle import Vehicle
@@ -88,9 +87,6 @@ class AttachedScript:
     def _seen(self) -> list[Vehicle]:
         return [self.vehicle] if self.vehicle else list(self._vehicles.values())
 
-    def _pictures(self) -> Pictures:
-        return ChainMap(*(dict(one.pictures) for one in self._seen()))
-
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m, world).
 
@@ -113,7 +109,7 @@ class AttachedScript:
     def load_script(self, path: str) -> None:
         """Load its script and call its init. Raises ScriptError."""
         self.close()
-        self.script = load_child_script(path, self, self.bus, self._pictures(), self._shared)
+        self.script = load_child_script(path, self, self.bus, self._seen(), self._shared)
         if self.script.idle:
             _LOG.warning("%s, on %s: %s", path, self.own_script, self.script.idle)
         call_init(self.script, self.bus)

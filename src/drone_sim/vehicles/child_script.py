@@ -3,39 +3,64 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from drone_sim.scripting import load
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
 from drone_sim.scripting.api.turns import Turns
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.vehicles.shared import Shared
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
+_Value = TypeVar("_Value")
 Pictures = Mapping[str, Callable[[], np.ndarray]]  # what a vision sensor sees now, by the name of its object
 
 
-def load_child_script(path: str, host: Host, bus: MessageBus, pictures: Pictures, shared: Shared) -> load.Script:
+class Seen(Protocol):
+    """A vehicle, of which a script sees cameras and masses."""
+
+    @property
+    def pictures(self) -> Pictures:
+        """What its cameras see now, by the name of their object."""
+
+    @property
+    def planes(self) -> Mapping[str, tuple[float, float]]:
+        """The near and far plane (m) of its cameras, by the name of their object."""
+
+    def masses(self) -> Mapping[str, float]:
+        """Return the mass (kg) of each of its shapes, by object name."""
+
+
+def load_child_script(path: str, host: Host, bus: MessageBus, seen: Sequence[Seen], shared: Shared) -> load.Script:
     """Load a script ('' for the tutorial's) on the object that `host` names. Raises ScriptError."""
     limit, turns = TimeLimit(shared.script_time_limit), Turns()
     surroundings = Surroundings(
-        shared.time,
-        shared.time_step,
-        pictures,
-        limit.outside,
-        limit.inside,
-        turns,
-        lambda: shared.state,
+        clock=shared.time,
+        time_step=shared.time_step,
+        pictures=_together(one.pictures for one in seen),
+        planes=_together(one.planes for one in seen),
+        outside=limit.outside,
+        inside=limit.inside,
+        turns=turns,
+        gravity=shared.gravity,
+        masses=lambda: _together(one.masses() for one in seen),
+        control=shared.control,
+        data=shared.data,
     )
-    modules = {"sim": make_sim(host, surroundings), "simROS": make_sim_ros(bus)}
+    modules = {"sim": make_sim(host, surroundings), "simROS": make_sim_ros(bus, shared.time), **make_plugins(host)}
     script = load.load(path, modules, limit, turns)
     host.scripts.attached_to(host.own_script).loaded(script, shared.time())
     return script
+
+
+def _together(mappings: Iterable[Mapping[str, _Value]]) -> dict[str, _Value]:
+    return {name: value for one in mappings for name, value in one.items()}
 
 
 def refuse_if_idle(script: load.Script, path: str, bus: MessageBus) -> None:

@@ -11,6 +11,7 @@
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
       DronePosition                              /target                 the green sphere
 
+CoppeliaSim 4.0 to 4.2 say Quadcopter_base, Quadcopter_target, ...: every name with Quadricopter_ has this form, too.
 The names of the second vehicle end in #0, those of the third in #1, and so on, as those of V-REP's copies do.
 Cameras and vision sensors look along their z axis, with y up and x to the left, as V-REP's do.
 """
@@ -45,6 +46,11 @@ def respondable(number: int) -> str:
 def joint(number: int) -> str:
     """Return the name of the joint that turns the blades of propeller 1 to 4."""
     return f"Quadricopter_propeller_joint{number}"
+
+
+def _of_each_generation(name: str) -> list[str]:
+    """Return a name as V-REP 3.x has it, and as CoppeliaSim 4.0 to 4.2 have it where that is another."""
+    return list(dict.fromkeys((name, name.replace("Quadricopter_", "Quadcopter_"))))
 
 
 _PROPELLERS = [name(n) for n in (1, 2, 3, 4) for name in ("Quadricopter_propeller{}".format, respondable, joint)]
@@ -95,10 +101,9 @@ class QuadricopterObjects:
             self._add(respondable(number), name, alias="respondable", kind="shape")
             self._add(joint(number), name, alias="joint", kind="joint")
         down = frames.from_rpy((0.0, 0.0, -0.01), (0.0, math.pi / 2, 0.0))
-        seen, eye = frames.multiply(down, _ALONG_X), "vision_sensor"
-        self._add(FLOOR_CAMERA, DRONE, seen, alias="floorCamera", kind=eye)
+        self._add(FLOOR_CAMERA, DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera", kind="camera")
         front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self._add(FRONT_CAMERA, DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera", kind=eye)
+        self._add(FRONT_CAMERA, DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera", kind="camera")
         self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"), kind="shape")
         for camera in cameras.values():
             self._add_camera(links, camera)
@@ -121,13 +126,14 @@ class QuadricopterObjects:
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
         if place.parent is not None:
             above = place.parent or None
-        names = [f"{one}{self._suffix}" for one in (name, *also)]
+        names = [f"{one}{self._suffix}" for called in (name, *also) for one in _of_each_generation(called)]
         if place.name and place.name not in names:
             names.append(place.name)
         alias = place.alias or alias or name
         try:
-            local = place.local(local)
-            handle = self._objects.add(names[0], above, local, body, alias=alias, also=names[1:], kind=kind)
+            handle = self._objects.add(
+                names[0], above, place.local(local), body, alias=alias, also=names[1:], kind=kind
+            )
         except ValueError as error:  # one of the scene has that name
             raise ParameterError(str(error)) from None
         self._handles.append(handle)

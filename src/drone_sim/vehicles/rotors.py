@@ -24,6 +24,7 @@ class Rotors:
             if f"propeller_{place}" not in rigid.links:
                 raise urdf.UrdfError(f"{urdf_name}: no link propeller_{place}")
         self.links: list[Matrix] = [rigid.links[f"propeller_{place}"] for place, _ in PROPELLERS]  # root from link
+        self.masses = [rigid.masses[f"propeller_{place}"] for place, _ in PROPELLERS]  # kg, without their blades
         self._blades = rigid.blades
 
     def propellers(

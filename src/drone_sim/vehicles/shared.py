@@ -9,7 +9,8 @@ from drone_sim.config.place import DatumParameters
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.backend import Backend
-from drone_sim.scripting.api.constants import RUNNING
+from drone_sim.scripting.api.control import Control
+from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
@@ -40,6 +41,7 @@ class Shared:
     objects: ObjectTree = field(default_factory=ObjectTree)
     signals: Signals = field(default_factory=Signals)
     scripts: Scripts = field(default_factory=Scripts)
-    state: int = RUNNING  # of the simulation, as scripts see it
+    control: Control = field(default_factory=Control)
+    data: CustomData = field(default_factory=CustomData)
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are

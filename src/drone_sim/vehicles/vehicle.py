@@ -213,6 +213,11 @@ class Vehicle:
         sensor = self.objects.matrix(self.objects.handle(camera.object + self.suffix))
         return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
 
+    def masses(self) -> dict[str, float]:
+        """Return the mass (kg) of each of its shapes, by object name; they are one body."""
+        of_propellers = {respondable(number) + self.suffix: one for number, one in zip(NUMBERS, self._rotors.masses)}
+        return {self.own_script: self.body.mass - sum(of_propellers.values()), **of_propellers}
+
     # ---- commands
 
     def receive(self, twist: Twist) -> None:
@@ -252,7 +257,7 @@ class Vehicle:
     def load_script(self, path: str) -> None:
         """Load a child script ('' for the tutorial's) and call its init. Raises ScriptError."""
         self.close()
-        self.script = load_child_script(path, self, self.bus, self.pictures, self._shared)
+        self.script = load_child_script(path, self, self.bus, [self], self._shared)
         refuse_if_idle(self.script, path, self.bus)
         call_init(self.script, self.bus)
 
@@ -261,6 +266,11 @@ class Vehicle:
         """What its cameras see now, by the name of their object."""
         cameras = self.parameters.cameras
         return {cameras[name].object + self.suffix: partial(self.look, one) for name, one in self.cameras.items()}
+
+    @property
+    def planes(self) -> dict[str, tuple[float, float]]:
+        """The near and far plane (m) of its cameras, by the name of their object."""
+        return {one.object + self.suffix: (one.near, one.far) for one in self.parameters.cameras.values()}
 
     def leave(self) -> None:
         """Go out of the world, without a word to the script."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from queue import SimpleQueue
+from typing import Any
 
 _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
 
@@ -17,11 +18,22 @@ class Inbox:
         self._patience = patience
         self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._came = threading.Event()
+        self._sleep: Callable[[float], Any] = self._came.wait
+        self._wake: Callable[[], Any] = self._came.set
+
+    def sleep_by(self, sleep: Callable[[float], None], wake: Callable[[], None]) -> None:
+        """Let `wait` sleep by another function, which `wake` ends: where others are to be heard meanwhile."""
+
+        def come() -> None:
+            self._came.set()
+            wake()
+
+        self._sleep, self._wake = sleep, come
 
     def put(self, job: Callable[[], None]) -> None:
         """Leave a job and go on."""
         self._jobs.put(job)
-        self._came.set()
+        self._wake()
 
     def ask(self, job: Callable[[], str]) -> str:
         """Leave a job, wait until it is done, and return its answer; raises what it raised.
@@ -52,7 +64,7 @@ class Inbox:
 
     def wait(self, seconds: float) -> None:
         """Sleep until a job comes, or for so long."""
-        self._came.wait(seconds)
+        self._sleep(seconds)
 
     def empty(self) -> None:
         """Carry out all that has come by now. The simulation's thread calls it."""

@@ -18,6 +18,7 @@ import rospy
 from std_msgs.msg import String
 
 from drone_sim.mechanics.frames import position, to_euler
+from drone_sim.remote import outside
 from drone_sim.ros.node.ending import Ending
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.launch_arguments import check_launch_arguments
@@ -49,11 +50,12 @@ class Node:
         self._parameters = parameters
         logging.getLogger("drone_sim").handlers = [_ToRosout()]
         drawings = Drawings()
+        backend = RosBackend(self._is_of_a_camera, lambda: self._time.stamp())
         self.simulation = Simulation(
             parameters,
             script=parameters.script,
             gui=parameters.gui,
-            backend=RosBackend(self._is_of_a_camera, lambda: self._time.stamp()),
+            backend=backend,
             drawings=drawings,
             started=False,
         )
@@ -61,8 +63,11 @@ class Node:
         self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
         self.player = Player(self.simulation, self._step_and_show, self._state.publish, self._time.simulated)
         self._inbox = Inbox()
+        self._outside = outside.let_in(parameters.remote_api, self.player, backend)
         factor = parameters.real_time_factor
-        self._pacer = Pacer(parameters.time_step / factor if factor else 0.0)
+        self._pacer = Pacer(parameters.time_step / factor if factor else 0.0, sleep=self._outside.wait)
+        if self._outside.address:
+            self._inbox.sleep_by(self._outside.wait, self._outside.wake)
         self._topics = FleetTopics(self.simulation, self._inbox)
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._handles = Handles(self.simulation, self._inbox)
@@ -80,8 +85,11 @@ class Node:
 
         if over():
             return
-        with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
-            self.player.start()
+        if self._outside.address:
+            rospy.loginfo(f"drone_sim: the remote API listens on {self._outside.address}")
+        else:
+            with contextlib.suppress(ScriptError):  # said already; the node waits for `start`
+                self.player.start()
         gc.collect()
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
         commands = ", ".join(rospy.resolve_name(f"{name}/cmd_vel") for name in self.simulation.vehicles)
@@ -90,13 +98,13 @@ class Node:
         self._pacer.restart()
         while not over():
             began = time.monotonic()
-            if self.player.playing:
+            if self._goes():
                 self._wait(over)
                 steps += self.step()
                 seconds += time.monotonic() - began
             else:
                 self._stand()
-                self._pacer.restart()
+                self._count_anew()
         flown = steps * self._parameters.time_step
         factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
         late = f"{self._pacer.overruns} late steps, by {self._pacer.worst * 1e3:.0f} ms at most"
@@ -110,10 +118,21 @@ class Node:
         if late:
             rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
 
+    def _goes(self) -> bool:
+        return self.player.playing and not self._outside.holds
+
+    def _count_anew(self) -> None:
+        """Let no step be late that came late because the simulation stood."""
+        if self.player.playing and not self.player.begun:
+            self._pacer.excuse()
+        else:
+            self._pacer.restart()
+
     def step(self) -> bool:
         """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
         self._inbox.empty()
-        return self.player.playing and self.player.step()
+        self._outside.serve()
+        return self._goes() and self.player.step()
 
     def _step_and_show(self) -> None:
         self._time.begin()
@@ -123,11 +142,11 @@ class Node:
         self._time.end(at_once=self.player.paused)  # who asks for single steps is told of each
 
     def _stand(self) -> None:
-        """Paused or stopped: wait for something to do, and show what it changed."""
+        """Paused, stopped or held from outside: wait for something to do, and show what it changed."""
         self._inbox.wait(self._left())
         self._time.begin()
         self._inbox.empty()
-        if self.player.playing or self._left():
+        if self._goes() or self._left():
             return
         if self._time.simulated:
             self._show_at_the_same_time()
@@ -182,6 +201,7 @@ class Node:
 
     def close(self) -> None:
         """Run the script's cleanup, remove what rviz read, and free the world. Raises ScriptError."""
+        self._outside.close()
         self._view.close()
         self.simulation.close()
 

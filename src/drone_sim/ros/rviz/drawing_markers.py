@@ -40,7 +40,8 @@ class DrawingMarkers:
 
     def update(self) -> None:
         """Publish what has changed, if anybody listens."""
-        if self._shown == self._drawings.changes or not self._publisher.get_num_connections():
+        has_changed = self._shown != self._drawings.changes or self._drawings.carried
+        if not has_changed or not self._publisher.get_num_connections():
             return
         if self._throttle.passes():
             self._shown = self._drawings.changes
@@ -58,7 +59,7 @@ def _marker(handle: int, drawn: DrawingObject) -> Marker:
     else:
         scale = drawn.size * (_PIXEL if drawn.kind in ("points", "lines", "linestrip") else 1.0)
     marker.scale = Vector3(scale, scale, scale)
-    marker.points = [Point(*point) for item in drawn.items for point in _points(drawn, item)]
+    marker.points = [Point(*point) for item in drawn.in_world() for point in _points(drawn, item)]
     return marker
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import genpy
 import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Image as ImageMessage
 
+from drone_sim.ros.vehicle import services
 from drone_sim.ros.vehicle.filling import fill, message_class
 from drone_sim.scripting.api.backend import Image
 
@@ -20,6 +24,36 @@ class RosBackend:
         """Take what tells the topics on which the node's own cameras publish already, and what to stamp with."""
         self._is_of_a_camera = is_of_a_camera
         self._stamp = stamp
+        self._broadcaster: tf2_ros.TransformBroadcaster | None = None
+
+    def time(self) -> float:
+        """Return what messages are stamped with, in s."""
+        return float(self._stamp().to_sec())
+
+    def send_transforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
+        """Broadcast frames; what has no stamp gets that of the step."""
+        self._broadcaster = self._broadcaster or tf2_ros.TransformBroadcaster()
+        made = [fill(TransformStamped(), one, "geometry_msgs/TransformStamped") for one in transforms]
+        for one in made:
+            one.header.stamp = one.header.stamp or self._stamp()
+        self._broadcaster.sendTransform(made)
+
+    def parameter(self, name: str) -> Any:
+        """Return a parameter, None where it is not set."""
+        return rospy.get_param(name, None)
+
+    def set_parameter(self, name: str, value: Any) -> None:
+        """Set a parameter."""
+        rospy.set_param(name, value)
+
+    def delete_parameter(self, name: str) -> None:
+        """Forget a parameter, if it is set."""
+        with contextlib.suppress(KeyError):
+            rospy.delete_param(name)
+
+    def call_service(self, name: str, kind: str, request: Any) -> Any:
+        """Call a service. Raises ValueError where it does not answer within a second."""
+        return services.call(name, kind, request)
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
         """Call `take` with every message, in rospy's thread; return what ends that."""

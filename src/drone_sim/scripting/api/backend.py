@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 
@@ -49,6 +49,24 @@ class Backend(Protocol):
 
     def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> Sender:
         """Advertise a topic of any installed type."""
+
+    def time(self) -> float:
+        """Return what messages are stamped with, in s."""
+
+    def send_transforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
+        """Broadcast frames, each with the fields of geometry_msgs/TransformStamped."""
+
+    def parameter(self, name: str) -> Any:
+        """Return a parameter by its full name, None where it is not set."""
+
+    def set_parameter(self, name: str, value: Any) -> None:
+        """Set a parameter."""
+
+    def delete_parameter(self, name: str) -> None:
+        """Forget a parameter, if it is set."""
+
+    def call_service(self, name: str, kind: str, request: Any) -> Any:
+        """Call a service; raises ValueError, in one line, where it does not answer or fails."""
 
     def advertise_image(self, topic: str, queue: int) -> Sender:
         """Advertise a sensor_msgs/Image; its Sender takes Image tuples."""

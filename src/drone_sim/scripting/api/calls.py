@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
+from drone_sim.scripting.api.unknown import not_there
 from drone_sim.scripting.errors import UnknownName
-from drone_sim.wording import near_names
 
 Function = Callable[..., Any]
 _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError)
@@ -41,7 +41,7 @@ class Api:
     def __getattr__(self, name: str) -> Any:
         """Raise UnknownName, with the near names; called for what is not there."""
         own, functions, constants, _ = self.__dict__["_api"]
-        raise UnknownName(f"{own} has no '{name}'; {near_names(name, [*functions, *constants])}")
+        raise UnknownName(not_there(f"{own}.", name, [*functions, *constants]))
 
 
 def contents(api: Api) -> tuple[str, dict[str, Function], dict[str, Any]]:

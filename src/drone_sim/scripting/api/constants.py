@@ -1,4 +1,4 @@
-"""CoppeliaSim's constants, with its values (simConst.h), as far as the stock scripts and ours use them.
+"""CoppeliaSim's constants, with its values (simConst.h), as far as scripts of drones use them.
 
 `sim.particle_cyclic` in 4.x, `sim_particle_cyclic` in 3.x.
 """
@@ -6,20 +6,10 @@
 from __future__ import annotations
 
 from drone_sim.mechanics.object_tree import PARENT, WORLD
+from drone_sim.scripting.api import object_constants, script_constants
 
 PHASES = ("init", "actuation", "sensing", "cleanup")
 
-_HANDLES = {
-    "handle_world": WORLD,
-    "handle_all": -2,
-    "handle_all_except_explicit": -3,
-    "handle_self": -4,
-    "handle_tree": -6,
-    "handle_chain": -7,
-    "handle_single": -8,
-    "handle_parent": PARENT,
-    "handle_scene": -12,
-}
 _DRAWING = {
     "drawing_points": 0,
     "drawing_lines": 1,
@@ -30,6 +20,11 @@ _DRAWING = {
     "drawing_cubepoints": 6,
     "drawing_spherepoints": 7,
     "drawing_linestrip": 8,
+    "drawing_spherepts": 7,  # names of 4.3 on, of which four have numbers of their own
+    "drawing_trianglepts": 9,
+    "drawing_quadpts": 10,
+    "drawing_discpts": 11,
+    "drawing_cubepts": 12,
     "drawing_itemcolors": 0x20,
     "drawing_vertexcolors": 0x40,
     "drawing_itemsizes": 0x80,
@@ -45,6 +40,10 @@ _DRAWING = {
     "drawing_facingcamera": 0x20000,
     "drawing_overlay": 0x40000,
     "drawing_itemtransparency": 0x80000,
+    "drawing_persistent": 0x100000,
+    "drawing_auxchannelcolor1": 0x200000,
+    "drawing_auxchannelcolor2": 0x400000,
+    "drawing_local": 0x800000,
 }
 _PARTICLES = {
     "particle_points1": 0,
@@ -65,71 +64,20 @@ _PARTICLES = {
     "particle_water": 0x8000,
     "particle_painttag": 0x10000,
 }
-_CALLBACKS = {
-    "syscb_threadmain": -1,
-    "syscb_thread": -1,
-    "syscb_cleanup": 1,
-    "syscb_init": 2,
-    "syscb_nonsimulation": 3,
-    "syscb_beforesimulation": 4,
-    "syscb_aftersimulation": 5,
-    "syscb_actuation": 6,
-    "syscb_sensing": 7,
-    "syscb_suspended": 8,
-    "syscb_suspend": 9,
-    "syscb_resume": 10,
+_CALLS = {  # names of 3.x, and of 4.x
+    "initialization": "init",
+    **{phase: phase for phase in PHASES[1:]},
+    "threaded": "threadmain",
 }
-_CALL_TYPES = {  # V-REP 3.5 has made the older names mean the same
-    "childscriptcall_initialization": _CALLBACKS["syscb_init"],
-    "childscriptcall_actuation": _CALLBACKS["syscb_actuation"],
-    "childscriptcall_sensing": _CALLBACKS["syscb_sensing"],
-    "childscriptcall_cleanup": _CALLBACKS["syscb_cleanup"],
-    "childscriptcall_threaded": _CALLBACKS["syscb_threadmain"],
-}
-_SCRIPTS = {
-    "scripttype_mainscript": 0,
-    "scripttype_childscript": 1,
-    "scripttype_addonscript": 2,
-    "scripttype_customizationscript": 6,
-    "scripttype_main": 0,
-    "scripttype_simulation": 1,
-    "scripttype_customization": 6,
-}
-_STATES = {
-    "simulation_stopped": 0,
-    "simulation_paused": 8,
-    "simulation_advancing": 16,
-    "simulation_advancing_firstafterstop": 16,
-    "simulation_advancing_running": 17,
-    "simulation_advancing_lastbeforepause": 18,
-    "simulation_advancing_firstafterpause": 19,
-    "simulation_advancing_abouttostop": 20,
-    "simulation_advancing_lastbeforestop": 21,
-}
-RUNNING = _STATES["simulation_advancing_running"]
-ABOUT_TO_STOP = _STATES["simulation_advancing_abouttostop"]
-LAST_BEFORE_STOP = _STATES["simulation_advancing_lastbeforestop"]
-_OTHERS = {
-    "intparam_program_version": 9,
-    "dlgstyle_message": 0,
-    "dlgstyle_input": 1,
-    "dlgstyle_ok": 2,
-    "verbosity_errors": 200,
-    "verbosity_warnings": 300,
-    "verbosity_infos": 400,
-    "verbosity_scripterrors": 420,
-    "verbosity_scriptwarnings": 430,
-    "verbosity_scriptinfos": 440,
-}
+_CALL_TYPES = {f"childscriptcall_{old}": script_constants.CALLS[f"syscb_{new}"] for old, new in _CALLS.items()}
 
 CONSTANTS: dict[str, int] = {
-    **_HANDLES,
+    **object_constants.ALL,
+    **script_constants.ALL,
     **_DRAWING,
     **_PARTICLES,
-    **_CALLBACKS,
     **_CALL_TYPES,
-    **_SCRIPTS,
-    **_STATES,
-    **_OTHERS,
+    "handle_world": WORLD,
+    "handle_parent": PARENT,
 }
-CALL_TYPES = {phase: _CALLBACKS[f"syscb_{phase}"] for phase in (*PHASES, "thread")}  # of sim_call_type, by phase
+CALL_TYPES: dict[str, int] = dict(zip((*PHASES, "thread"), _CALL_TYPES.values()))  # of sim_call_type, by phase

@@ -10,7 +10,8 @@ import numpy as np
 
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree
-from drone_sim.scripting.api.constants import RUNNING
+from drone_sim.scripting.api.control import Control
+from drone_sim.scripting.api.custom_values import CustomData
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
@@ -75,4 +76,8 @@ class Surroundings:
     outside: Callable[[Callable[[], Any]], Any] = _call  # calls a function where OpenGL is, on nobody's time limit
     inside: Callable[[Callable[[], Any]], Any] = _call  # the same, on this script's time limit
     turns: Turns = field(default_factory=Turns)  # of the script's thread
-    state: Callable[[], int] = lambda: RUNNING  # of the simulation: one of sim.simulation_*
+    planes: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # m: the near and far plane of each
+    gravity: float = -9.81  # m/s² along z
+    masses: Callable[[], Mapping[str, float]] = dict  # kg, of the shapes that the dynamics move, by object name
+    control: Control = field(default_factory=Control)
+    data: CustomData = field(default_factory=CustomData)

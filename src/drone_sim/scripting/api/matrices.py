@@ -1,36 +1,144 @@
-"""`sim`: products of matrices, 12 numbers each."""
+"""`sim`: matrices, 12 numbers each, and rotations.
+
+Interpolation goes round one axis at one speed: K. Shoemake, Animating Rotation with Quaternion Curves, 1985.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 from drone_sim.mechanics import frames
-from drone_sim.scripting.api.calls import numbers
-from drone_sim.scripting.api.types import ThreeNumbers, TwelveNumbers
+from drone_sim.mechanics.frames import IDENTITY, Matrix, Quaternion, Vector
+from drone_sim.scripting.api.calls import WrongValue, numbers
+from drone_sim.scripting.api.types import FourNumbers, Number, Numbers, ThreeNumbers, TwelveNumbers
+
+_MOST_POINTS = 100_000
 
 
 class Matrices:
     """The functions on matrices."""
 
-    def multiplyVector(self, matrix: TwelveNumbers, vector: ThreeNumbers) -> list[float]:
-        """Return matrix · vector."""
-        m, v = numbers(matrix, 12), numbers(vector, 3)
-        return list(frames.transform(m, v))
+    def multiplyVector(self, matrix: TwelveNumbers, vector: Numbers) -> list[float]:
+        """Return matrix · vector, of one vector or of several, one after the other."""
+        m = numbers(matrix, 12)
+        if len(vector) == 3:
+            return list(frames.transform(m, numbers(vector, 3)))
+        values = numbers(vector, len(vector))
+        if not values or len(values) % 3 or len(values) > 3 * _MOST_POINTS:
+            raise WrongValue("3 numbers are expected, or 3 for each of several points")
+        return [one for index in range(0, len(values), 3) for one in frames.transform(m, values[index : index + 3])]
 
     def multiplyMatrices(self, first: TwelveNumbers, second: TwelveNumbers) -> list[float]:
         """Return first · second."""
         return list(frames.multiply(numbers(first, 12), numbers(second, 12)))
 
-    def buildMatrix(self, position: ThreeNumbers, angles: ThreeNumbers) -> list[float]:
-        """Return the transform of a position and Euler angles."""
-        return list(frames.from_euler(numbers(position, 3), numbers(angles, 3)))
+    def buildIdentityMatrix(self) -> list[float]:
+        """Return the transform that changes nothing."""
+        return list(IDENTITY)
+
+    def copyMatrix(self, matrix: TwelveNumbers) -> list[float]:
+        """Return a copy of a transform."""
+        return list(numbers(matrix, 12))
+
+    def buildMatrix(self, position: ThreeNumbers, angles: Numbers) -> list[float]:
+        """Return the transform of a position and Euler angles, or a quaternion (x, y, z, w)."""
+        return list(built(position, angles))
+
+    def buildMatrixQ(self, position: ThreeNumbers, quaternion: FourNumbers) -> list[float]:
+        """Return the transform of a position and a quaternion (x, y, z, w)."""
+        return list(frames.from_quaternion(numbers(position, 3), unit(numbers(quaternion, 4))))
 
     def getEulerAnglesFromMatrix(self, matrix: TwelveNumbers) -> list[float]:
         """Return the Euler angles of a transform."""
         return list(frames.to_euler(numbers(matrix, 12)))
 
+    def getQuaternionFromMatrix(self, matrix: TwelveNumbers) -> list[float]:
+        """Return the quaternion (x, y, z, w) of a transform."""
+        return list(frames.to_quaternion(numbers(matrix, 12)))
+
     def getMatrixInverse(self, matrix: TwelveNumbers) -> list[float]:
         """Return the inverse of a transform."""
         return list(frames.invert(numbers(matrix, 12)))
 
-    def getInvertedMatrix(self, matrix: TwelveNumbers) -> list[float]:
-        """Return the inverse of a transform (3.x)."""
-        return list(frames.invert(numbers(matrix, 12)))
+    getInvertedMatrix = getMatrixInverse
+
+    def invertMatrix(self, matrix: TwelveNumbers) -> list[float]:
+        """Invert a transform where it stands, in the table that is given, and return it."""
+        inverse = list(frames.invert(numbers(matrix, 12)))
+        if isinstance(matrix, list):
+            matrix[:] = inverse
+        return inverse
+
+    def interpolateMatrices(self, first: TwelveNumbers, second: TwelveNumbers, part: Number) -> list[float]:
+        """Return the transform so far (0 to 1) between two, the rotation on the shortest way."""
+        return list(between(numbers(first, 12), numbers(second, 12), numbers((part,), 1)[0]))
+
+    def getRotationAxis(self, start: TwelveNumbers, goal: TwelveNumbers) -> tuple[list[float], float]:
+        """Return axis (world) and angle (rad) of the turn from one transform's axes to another's."""
+        turn = frames.multiply(numbers(goal, 12), frames.invert(numbers(start, 12)))
+        axis, angle = axis_and_angle(frames.to_quaternion(turn))
+        return list(axis), angle
+
+    def rotateAroundAxis(
+        self, matrix: TwelveNumbers, axis: ThreeNumbers, position: ThreeNumbers, angle: Number
+    ) -> list[float]:
+        """Return a transform turned by an angle (rad) about an axis through a position, both in the world."""
+        there = numbers(position, 3)
+        turn = frames.from_quaternion((0.0, 0.0, 0.0), about(numbers(axis, 3), numbers((angle,), 1)[0]))
+        x, y, z = frames.rotate(turn, there)
+        r0, r1, r2, _, r4, r5, r6, _, r8, r9, r10, _ = turn
+        placed = (r0, r1, r2, there[0] - x, r4, r5, r6, there[1] - y, r8, r9, r10, there[2] - z)
+        return list(frames.multiply(placed, numbers(matrix, 12)))
+
+    def alphaBetaGammaToYawPitchRoll(self, alpha: Number, beta: Number, gamma: Number) -> tuple[float, float, float]:
+        """Return yaw, pitch and roll (R = Rz Ry Rx) of V-REP's Euler angles, in rad."""
+        roll, pitch, yaw = frames.to_rpy(frames.from_euler((0.0, 0.0, 0.0), numbers((alpha, beta, gamma), 3)))
+        return yaw, pitch, roll
+
+    def yawPitchRollToAlphaBetaGamma(self, yaw: Number, pitch: Number, roll: Number) -> tuple[float, float, float]:
+        """Return V-REP's Euler angles of yaw, pitch and roll (R = Rz Ry Rx), in rad."""
+        return frames.to_euler(frames.from_rpy((0.0, 0.0, 0.0), numbers((roll, pitch, yaw), 3)))
+
+
+def built(position: Sequence[float], turn: Sequence[float]) -> Matrix:
+    """Return the transform of a position and Euler angles (3 numbers) or a quaternion (4)."""
+    if len(turn) == 4:
+        return frames.from_quaternion(numbers(position, 3), unit(numbers(turn, 4)))
+    return frames.from_euler(numbers(position, 3), numbers(turn, 3))
+
+
+def unit(quaternion: Sequence[float]) -> Quaternion:
+    """Return a quaternion of length 1; raises WrongValue for zero."""
+    length = math.sqrt(sum(value * value for value in quaternion))
+    if length == 0:
+        raise WrongValue("a quaternion that is not zero is expected")
+    x, y, z, w = (value / length for value in quaternion)
+    return x, y, z, w
+
+
+def axis_and_angle(quaternion: Quaternion) -> tuple[Vector, float]:
+    """Return the axis of a unit quaternion, and the angle in rad; z for none."""
+    x, y, z, w = quaternion
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0:
+        return (0.0, 0.0, 1.0), 0.0
+    return (x / length, y / length, z / length), 2 * math.atan2(length, w)
+
+
+def about(axis: Sequence[float], angle: float) -> Quaternion:
+    """Return the quaternion of a turn about an axis; raises WrongValue for an axis that is zero."""
+    length = math.sqrt(sum(value * value for value in axis))
+    if length == 0:
+        raise WrongValue("an axis that is not zero is expected")
+    s = math.sin(angle / 2) / length
+    return axis[0] * s, axis[1] * s, axis[2] * s, math.cos(angle / 2)
+
+
+def between(first: Matrix, second: Matrix, part: float) -> Matrix:
+    """Return the transform so far between two."""
+    turn = frames.multiply(frames.invert(first), second)
+    axis, angle = axis_and_angle(frames.to_quaternion(turn))
+    orientation = frames.multiply_quaternions(frames.to_quaternion(first), about(axis, part * angle))
+    place = [a + part * (b - a) for a, b in zip(frames.position(first), frames.position(second))]
+    return frames.from_quaternion(place, orientation)

@@ -33,11 +33,11 @@ class MessageBus:
     """
 
     def __init__(self, namespace: str, own_topics: Mapping[str, str] | None = None):
-        """Take the drone's namespace, such as 'drone' ('' is none), and topics that the drone posts itself, with their types."""
+        """Take the namespace ('drone', '' is none), and topics that the drone posts itself, with their types."""
         self.backend: Backend | None = None
         self._prefix = f"/{namespace}" if namespace else ""
         own = _OWN_TOPICS if own_topics is None else own_topics
-        self._own_topics = {self._resolve(topic): kind for topic, kind in own.items()}
+        self._own_topics = {self.resolve(topic): kind for topic, kind in own.items()}
         self._subscriptions = Subscriptions()
         # Asked for in every step: without another call in between.
         self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
@@ -53,6 +53,8 @@ class MessageBus:
             "publish",
             "shutdownPublisher",
             "getNumSubscribers",
+            "publisherTreatUInt8ArrayAsString",
+            "subscriberTreatUInt8ArrayAsString",
             "imageTransportAdvertise",
             "imageTransportPublish",
             "imageTransportShutdownPublisher",
@@ -66,7 +68,7 @@ class MessageBus:
 
         Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1.
         """
-        resolved, kept = self._resolve(topic), _length(queue)
+        resolved, kept = self.resolve(topic), _length(queue)
 
         def begin(take: Callable[[Any], None]) -> Callable[[], None]:
             if self.backend is None or resolved in self._own_topics:
@@ -84,7 +86,7 @@ class MessageBus:
 
     def advertise(self, topic: Name, kind: Name, queue: int = 1, latch: bool = False, *_ignored: Any) -> int:
         """Advertise a topic; return a handle to publish on."""
-        resolved, kept = self._resolve(topic), _length(queue)
+        resolved, kept = self.resolve(topic), _length(queue)
 
         def begin() -> Sender | None:
             return self.backend.advertise(resolved, kind, kept, bool(latch)) if self.backend else None
@@ -107,9 +109,17 @@ class MessageBus:
         """Return how many listen to what is published; V-REP has no such function."""
         return self._publishers.subscribers(handle)
 
+    def publisherTreatUInt8ArrayAsString(self, handle: Handle) -> None:
+        """Do nothing: uint8[] may be a string or a table anyhow."""
+        self._publishers.subscribers(handle)
+
+    def subscriberTreatUInt8ArrayAsString(self, handle: Handle) -> None:
+        """Do nothing: uint8[] arrives as a string anyhow."""
+        self._subscriptions.check(handle)
+
     def imageTransportAdvertise(self, topic: Name, queue: int = 1) -> int:
         """Advertise an image topic; return a handle to publish on."""
-        resolved, kept = self._resolve(topic), _length(queue)
+        resolved, kept = self.resolve(topic), _length(queue)
 
         def begin() -> Sender | None:
             return self.backend.advertise_image(resolved, kept) if self.backend else None
@@ -133,7 +143,7 @@ class MessageBus:
 
     def post(self, topic: str, message: Any) -> None:
         """Leave a message for the next step; any thread may call it."""
-        self._subscriptions.post(self._resolve(topic), message)
+        self._subscriptions.post(self.resolve(topic), message)
 
     def close(self) -> None:
         """End every subscription and stop advertising: the script that made them is gone."""
@@ -170,7 +180,8 @@ class MessageBus:
         self._last_handle += 1
         return self._last_handle
 
-    def _resolve(self, topic: str) -> str:
+    def resolve(self, topic: str) -> str:
+        """Return the full name of a topic or parameter: a relative one stands in the drone's namespace."""
         return topic if topic.startswith("/") else f"{self._prefix}/{topic}"
 
 

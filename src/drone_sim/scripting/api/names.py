@@ -8,8 +8,12 @@ from typing import Any
 from drone_sim.mechanics.object_names import NO_SUFFIX, split
 from drone_sim.scripting.api import object_paths
 from drone_sim.scripting.api.calls import Function, numbers
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.handles import bare
 from drone_sim.scripting.api.host import Host
 from drone_sim.scripting.api.types import Handle, Name
+
+_SELF = CONSTANTS["handle_self"]
 
 
 class Names:
@@ -28,11 +32,23 @@ class Names:
         return {one.__name__: one for one in (*find, *others)}
 
     def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
-        """Return the handle of an object by path or name; -1 for none with the option noError."""
+        """Return the handle of an object by path or name; -1 for none with the option noError, or name@silentError.
+
+        The option `index` takes the i-th of several of a path; sim.handle_self is what the script is on.
+        """
+        if path == _SELF:
+            return self._objects.handle(self._own)
+        name, options = path, options or {}
+        if isinstance(path, str):
+            name, _, flag = path.partition("@")  # @alt is for names of 4.x, which are found anyhow
+            if options.get("index"):
+                name += f"[{int(options['index'])}]"
+            if flag == "silentError":
+                options = {"noError": True}
         try:
-            return object_paths.find(self._objects, path, self._own, self._suffix)
+            return object_paths.find(self._objects, name, self._own, self._suffix)
         except ValueError:
-            if options and options.get("noError"):
+            if options.get("noError"):
                 return -1
             raise
 
@@ -41,12 +57,23 @@ class Names:
         return self.getObject(path, options)
 
     def getObjectName(self, handle: Handle) -> str:
-        """Return the 3.x name of an object, with its suffix."""
-        return self._objects[handle].name
+        """Return the 3.x name of an object, with its suffix; the path where sim.handleflag_altname is added (4.2)."""
+        return self._objects.path(bare(handle)) if handle != bare(handle) else self._objects[handle].name
 
     def getObjectAlias(self, handle: Handle, options: int = -1) -> str:
-        """Return the 4.x alias of an object; its path from the root where options is 1 or more."""
-        return self._objects.path(handle) if options > 0 else self._objects[handle].alias
+        """Return the 4.x alias of an object.
+
+        `options`: -1 the alias, 0 with its index ('propeller[1]'), 1, 2 and 5 the path from the root, 3 and 4 with
+        its handle ('propeller__42__'; 3: where the alias is not unique).
+        """
+        alias = self._objects[handle].alias
+        if options in (1, 2, 5):
+            return self._objects.path(handle)
+        if options == 0:
+            last = self._objects.path(handle).rpartition("/")[2]
+            return last if last.endswith("]") else f"{last}[0]"
+        is_shared = sum(self._objects[one].alias == alias for one in self._objects) > 1
+        return f"{alias}__{int(handle)}__" if options == 4 or (options == 3 and is_shared) else alias
 
     def getNameSuffix(self, name: Name | None = None) -> int | tuple[int, str]:
         """Return the suffix in a name such as 'Drone#0', -1 for none, and the name without it.

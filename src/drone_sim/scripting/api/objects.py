@@ -8,8 +8,10 @@ from typing import Any
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import WrongValue, numbers
+from drone_sim.scripting.api.handles import AXIS, bare
 from drone_sim.scripting.api.host import Host
-from drone_sim.scripting.api.types import FourNumbers, Handle, SevenNumbers, ThreeNumbers, TwelveNumbers
+from drone_sim.scripting.api.matrices import unit
+from drone_sim.scripting.api.types import FourNumbers, Handle, Number, SevenNumbers, ThreeNumbers, TwelveNumbers
 
 
 class Objects:
@@ -32,6 +34,10 @@ class Objects:
         """Return how much an object was scaled: 1, nothing here is."""
         self._objects[handle]
         return 1.0
+
+    def getObjectSizeValues(self, handle: Handle) -> list[float]:
+        """Return how much an object was scaled along x, y and z: 1, nothing here is."""
+        return [self.getObjectSizeFactor(handle)] * 3
 
     # ---- where they are
 
@@ -65,7 +71,7 @@ class Objects:
         """Turn an object to a quaternion (x, y, z, w); the arguments in either order."""
         frame, turn = _frame_and_values(relativeTo, quaternion, 4)
         m = self._objects.matrix(handle, frame)
-        self._objects.set_matrix(handle, frame, frames.from_quaternion((m[3], m[7], m[11]), _unit(turn)))
+        self._objects.set_matrix(handle, frame, frames.from_quaternion((m[3], m[7], m[11]), unit(turn)))
 
     def getObjectPose(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return position and quaternion of an object, 7 numbers."""
@@ -75,7 +81,7 @@ class Objects:
     def setObjectPose(self, handle: Handle, relativeTo: Handle, pose: SevenNumbers = ()) -> None:
         """Move and turn an object to a position and a quaternion; the arguments in either order."""
         frame, place = _frame_and_values(relativeTo, pose, 7)
-        self._objects.set_matrix(handle, frame, frames.from_quaternion(place[:3], _unit(place[3:])))
+        self._objects.set_matrix(handle, frame, frames.from_quaternion(place[:3], unit(place[3:])))
 
     def getObjectMatrix(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the 12 numbers of an object's transform."""
@@ -89,13 +95,20 @@ class Objects:
     # ---- how they move
 
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return the linear and the angular velocity of an object, in the world frame."""
+        """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame.
+
+        sim.handleflag_axis may be added to the handle, as V-REP's manual recommends. Without it V-REP gives the Euler
+        angles of the turn in one step, divided by the step: here it is the angular velocity, too.
+        """
+        if handle >= AXIS:
+            handle = bare(handle)
         linear, angular = self._objects[handle].velocity()
         return list(linear), list(angular)
 
     def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return the linear and the angular velocity of an object, in the world frame."""
-        return self.getObjectVelocity(handle)
+        """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame."""
+        linear, angular = self._objects[handle].velocity()
+        return list(linear), list(angular)
 
     def addForceAndTorque(
         self, handle: Handle, force: ThreeNumbers = (0, 0, 0), torque: ThreeNumbers = (0, 0, 0)
@@ -128,10 +141,3 @@ def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[f
 def _vector(values: Sequence[float]) -> frames.Vector:
     x, y, z = numbers(values, 3)
     return x, y, z
-
-
-def _unit(quaternion: Sequence[float]) -> tuple[float, ...]:
-    length = sum(value * value for value in quaternion) ** 0.5
-    if length == 0:
-        raise WrongValue("a quaternion that is not zero is expected")
-    return tuple(value / length for value in quaternion)

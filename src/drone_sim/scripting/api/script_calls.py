@@ -31,7 +31,6 @@ class ScriptCalls:
         self._own = host.scripts.attached_to(host.own_script)
         self._inside = surroundings.inside
         self._clock, self._time_step = surroundings.clock, surroundings.time_step
-        self._state = surroundings.state
 
     def getScript(self, scriptType: int, object: Handle | Name = _SELF, _name: Name = "") -> int:
         """Return the handle of the script that is attached to an object, by its handle or path; -1 for none (4.x)."""
@@ -55,22 +54,6 @@ class ScriptCalls:
         """Return in how many steps this script has been called before: 0 in the first one (3.0)."""
         return round((self._clock() - self._own.began) / self._time_step)
 
-    def handleChildScripts(self, _callType: int = 0, *_more: Any) -> int:
-        """Do nothing, and return 0: the simulation calls every script by itself."""
-        return 0
-
-    def handleChildScript(self, _script: Handle = 0, *_more: Any) -> int:
-        """Do nothing, and return 0: the simulation calls every script by itself (3.0)."""
-        return 0
-
-    def getSimulationState(self) -> int:
-        """Return sim.simulation_advancing_running.
-
-        While the simulation ends: sim.simulation_advancing_abouttostop in threads, sim.simulation_advancing_lastbeforestop
-        in clean-up.
-        """
-        return self._state()
-
     def callScriptFunction(self, function: Name, script: Handle, *arguments: Any) -> Any:
         """Call 'function@object', or 'function' of the script with a handle; return what it returns.
 
@@ -83,7 +66,9 @@ class ScriptCalls:
         values = list(arguments)
         refuse_if_too_large(values)
         try:
-            return self._inside(lambda: self._scripts.call(self._own, callee, lambda one: one.call_function(name, values)))
+            return self._inside(
+                lambda: self._scripts.call(self._own, callee, lambda one: one.call_function(name, values))
+            )
         except ScriptError as error:
             raise ValueError(str(error)) from None
 

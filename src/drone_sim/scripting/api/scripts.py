@@ -1,4 +1,4 @@
-"""`sim`: time, the simulation parameters of scripts, and the log."""
+"""`sim`: the simulation parameters of scripts, and the log."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Host, Surroundings
+from drone_sim.scripting.api.host import Host
 from drone_sim.scripting.api.names import Names
 from drone_sim.scripting.api.registry import Attachment, ScriptParameters
 from drone_sim.scripting.api.script_values import refuse_if_too_large
@@ -20,7 +20,6 @@ from drone_sim.wording import near_names
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
 
-_VERSION = 40600  # the CoppeliaSim whose API this is nearest to
 _MOST = 1000  # parameters of one script
 _NEAR = 0.8  # of difflib's ratio
 _LONGEST = 80  # characters of a name that is looked at
@@ -28,37 +27,15 @@ _SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
 
 
 class Scripts:
-    """The functions on scripts and time."""
+    """The functions on scripts."""
 
-    def __init__(self, host: Host, surroundings: Surroundings, names: Names):
-        """Take the drone whose scripts they are, the clock, and how a name is understood."""
+    def __init__(self, host: Host, names: Names):
+        """Take the drone whose scripts they are, and how a name is understood."""
         self._objects = host.objects
         self._find = names.getObject
         self._scripts = host.scripts
         self._parameters = host.scripts.parameters
         self._own = host.scripts.attached_to(host.own_script)
-        self._clock = surroundings.clock
-        self._time_step = surroundings.time_step
-
-    # ---- time
-
-    def getSimulationTime(self) -> float:
-        """Return the simulated time in seconds."""
-        return self._clock()
-
-    def getSimulationTimeStep(self) -> float:
-        """Return the simulation step in seconds."""
-        return self._time_step
-
-    def getInt32Parameter(self, parameter: int) -> int:
-        """Return sim.intparam_program_version; there is no other."""
-        if parameter != CONSTANTS["intparam_program_version"]:
-            raise ValueError(f"no integer parameter {parameter}; known is sim.intparam_program_version")
-        return _VERSION
-
-    def getInt32Param(self, parameter: int) -> int:
-        """Return sim.intparam_program_version; there is no other."""
-        return self.getInt32Parameter(parameter)
 
     # ---- scripts
 

@@ -43,6 +43,11 @@ class Subscriptions:
             self._by_handle[handle] = subscription
         self._new_callbacks.append(callback)
 
+    def check(self, handle: int) -> None:
+        """Raise ValueError where no subscription has that handle."""
+        if handle not in self._by_handle:
+            raise ValueError(f"no subscription has the handle {handle}")
+
     def end(self, handle: int) -> None:
         """End a subscription; raises ValueError where there is none of that handle."""
         with self._lock:

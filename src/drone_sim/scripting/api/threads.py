@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 from drone_sim.scripting.api.calls import Function, WrongValue, numbers, public_functions
-from drone_sim.scripting.api.constants import RUNNING
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.api.turns import SOON, Turns
@@ -27,7 +26,7 @@ class Threads:
         self._clock = surroundings.clock
         self._turns: Turns = surroundings.turns
         self._signals = signals
-        self._state = surroundings.state
+        self._control = surroundings.control
 
     def functions(self) -> dict[str, Function]:
         """Return what a script may call, by name."""
@@ -71,9 +70,9 @@ class Threads:
         self._turns.set_timing(numbers((milliseconds,), 1)[0])
 
     def setThreadAutomaticSwitch(self, allowed: bool | int) -> int:
-        """Forbid (false) or allow again (true) that the thread is switched by itself; return how often it was forbidden.
+        """Forbid (false) or allow again (true) that the thread is switched by itself.
 
-        A number sets how often it is forbidden.
+        A number sets how often it is forbidden; return how often it was.
         """
         return self._turns.set_automatic(allowed)
 
@@ -109,15 +108,11 @@ class Threads:
 
     def getThreadExitRequest(self) -> bool:
         """Tell whether the simulation ends, and the thread should."""
-        return self._state() != RUNNING
+        return self._control.is_stopping or self._control.is_ending
 
     def getThreadExistRequest(self) -> bool:
         """Tell whether the simulation ends, and the thread should (so spelt in older versions)."""
         return self.getThreadExitRequest()
-
-    def setThreadIsFree(self, _free: bool) -> int:
-        """Do nothing: the simulation waits for what a thread does."""
-        return 1
 
     def setThreadResumeLocation(self, _location: int, _order: int = 0) -> int:
         """Do nothing: threads go on before the actuation of all scripts, in the order of the tree."""
@@ -126,11 +121,3 @@ class Threads:
     def delegateChildScriptExecution(self) -> int:
         """Do nothing: the simulation calls the scripts below by itself (3.0)."""
         return 1
-
-    def resumeThreads(self, _location: int = 0) -> int:
-        """Do nothing: the simulation resumes threads by itself."""
-        return 0
-
-    def launchThreadedChildScripts(self) -> int:
-        """Do nothing: the simulation starts threads by itself."""
-        return 0

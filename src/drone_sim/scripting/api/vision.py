@@ -2,26 +2,33 @@
 
 An image is a string of width · height · 3 bytes, red, green, blue, **the bottom row first**, as V-REP
 gives it (OpenGL's order); simROS.imageTransportPublish turns it over. It shows the scene as of the last
-step, or as of now where nobody has looked since.
+step, or as of now where nobody has looked since. Depth is in m along the sensor's z, and infinite beyond the far plane.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from drone_sim.mechanics.object_tree import ObjectTree
-from drone_sim.scripting.api.calls import WrongValue
+from drone_sim.scripting.api.calls import WrongValue, numbers
+from drone_sim.scripting.api.handles import CODED, GREYSCALE, METRES, bare, has
 from drone_sim.scripting.api.host import Host, Surroundings
-from drone_sim.scripting.api.types import Handle
+from drone_sim.scripting.api.types import Handle, Number
+
+_GREY, _DEPTH_IN_METRES = 1, 1  # options of 4.x
+_LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601
 
 
 @runtime_checkable
 class Eye(Protocol):
-    """A vision sensor of the scene."""
+    """A vision sensor of the scene; its planes in m."""
+
+    near: float
+    far: float
 
     def picture(self, kind: str) -> np.ndarray:
         """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane."""
@@ -34,45 +41,134 @@ class VisionSensors:
         """Take the drone and its cameras."""
         self._objects = host.objects
         self._pictures = surroundings.pictures
+        self._planes = surroundings.planes
         self._outside = surroundings.outside
 
-    def getVisionSensorCharImage(self, handle: Handle, *_options: Any) -> tuple[bytes, int, int]:
-        """Return image, width and height."""
-        picture = self._picture(handle)
-        height, width = picture.shape[:2]
-        return b"".join(picture[::-1]), width, height  # row by row: `tobytes` takes forty times as long
+    def getVisionSensorCharImage(
+        self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0, *_options: Any
+    ) -> tuple[bytes, int, int]:
+        """Return image, width and height of a part of a picture, all of it where width and height are 0.
 
-    def getVisionSensorImg(self, handle: Handle, *_options: Any) -> tuple[bytes, list[int]]:
-        """Return image and [width, height]."""
-        image, width, height = self.getVisionSensorCharImage(handle)
+        With sim.handleflag_greyscale added to the handle the image is grey, one byte for each pixel.
+        """
+        picture = self._colors(handle, (x, y), (width, height))
+        if has(handle, GREYSCALE):
+            picture = (picture @ _LUMINANCE).astype(np.uint8)
+        rows, columns = picture.shape[:2]
+        return b"".join(picture[::-1]), columns, rows  # row by row: `tobytes` takes forty times as long
+
+    def getVisionSensorImg(
+        self, handle: Handle, options: int = 0, _cutoff: Number = 0.0, pos: Any = (0, 0), size: Any = (0, 0)
+    ) -> tuple[bytes, list[int]]:
+        """Return image and [width, height] of a part of a picture; `options` 1: grey."""
+        flag = GREYSCALE if int(options) & _GREY else 0
+        image, width, height = self.getVisionSensorCharImage(bare(handle) + flag, *_two(pos), *_two(size))
         return image, [width, height]
+
+    def getVisionSensorImage(
+        self,
+        handle: Handle,
+        x: Number = 0,
+        y: Number = 0,
+        width: Number = 0,
+        height: Number = 0,
+        as_string: int = 0,
+    ) -> Any:
+        """Return an image as numbers from 0 to 1, or as a string where `as_string` is 1 (3.x)."""
+        image = self.getVisionSensorCharImage(handle, x, y, width, height)[0]
+        return image if as_string else (np.frombuffer(image, np.uint8) / np.float32(255)).tolist()
+
+    def getVisionSensorDepth(
+        self, handle: Handle, options: int = 0, pos: Any = (0, 0), size: Any = (0, 0)
+    ) -> tuple[bytes, list[int]]:
+        """Return depths as a string of floats, the bottom row first, and [width, height].
+
+        `options` 1: in m; else from 0, at the near plane, to 1, at the far one.
+        """
+        flag = CODED + (METRES if int(options) & _DEPTH_IN_METRES else 0)
+        depths = self._depths(bare(handle) + flag, _two(pos), _two(size))
+        return depths.tobytes(), [depths.shape[1], depths.shape[0]]
+
+    def getVisionSensorDepthBuffer(
+        self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0
+    ) -> Any:
+        """Return depths as numbers, the bottom row first, from 0 at the near plane to 1 at the far one.
+
+        Flags added to the handle: sim.handleflag_depthbuffermeters (m), _codedstring (a string of floats).
+        """
+        depths = self._depths(handle, (x, y), (width, height))
+        return depths.tobytes() if has(handle, CODED) else depths.ravel().tolist()
 
     def getVisionSensorResolution(self, handle: Handle) -> list[int]:
         """Return [width, height]."""
         height, width = self._picture(handle).shape[:2]
         return [width, height]
 
-    def getVisionSensorRes(self, handle: Handle) -> list[int]:
-        """Return [width, height]."""
-        return self.getVisionSensorResolution(handle)
+    getVisionSensorRes = getVisionSensorResolution
 
     def handleVisionSensor(self, handle: Handle) -> int:
         """Take the picture; return the number of detections: 0, there are no filters."""
         self._picture(handle)
         return 0
 
-    def _picture(self, handle: int) -> np.ndarray:
-        found = self._objects[handle]
+    def readVisionSensor(self, handle: Handle) -> tuple[int, list[float]]:
+        """Return 0, as there are no filters that detect anything, and 15 numbers.
+
+        They are intensity, red, green, blue (0 to 1) and depth: the least, the largest, and the mean of each. The depth
+        of a sensor of colours is 0.
+        """
+        picture = self._picture(handle)
+        if picture.ndim == 3:
+            colors = picture.reshape(-1, 3) / np.float32(255)
+            channels = np.column_stack([colors @ _LUMINANCE, colors, np.zeros(len(colors))])
+        else:
+            depths = np.nan_to_num(picture.ravel(), nan=0.0, posinf=0.0)
+            channels = np.column_stack([np.zeros((len(depths), 4)), depths])
+        return 0, [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()]
+
+    def _colors(self, handle: int, pos: Sequence[float], size: Sequence[float]) -> np.ndarray:
+        picture = self._picture(handle)
+        if picture.ndim != 3 or picture.dtype != np.uint8:
+            raise WrongValue(f"'{self._objects[bare(handle)].name}' sees no colours")
+        return _part(picture, pos, size)
+
+    def _depths(self, handle: int, pos: Sequence[float], size: Sequence[float]) -> np.ndarray:
+        """Return depths (height, width), the bottom row first; raises WrongValue for a sensor of colours."""
+        found = self._objects[bare(handle)]
+        picture, name = self._picture(handle, "depth"), found.name
+        if picture.ndim != 2:
+            raise WrongValue(f"'{name}' sees colours, and no depth: a camera of the kind depth does")
+        depths = np.nan_to_num(_part(picture, pos, size)[::-1].astype("<f4"), nan=np.inf)
+        if has(handle, METRES):
+            return depths
+        near, far = (found.near, found.far) if isinstance(found, Eye) else self._planes[name]
+        return np.clip((depths - near) / max(far - near, 1e-9), 0.0, 1.0).astype("<f4")
+
+    def _picture(self, handle: int, kind: str = "color") -> np.ndarray:
+        found = self._objects[bare(handle)]
         name = found.name
         if isinstance(found, Eye):  # of the scene
-            return self._outside(partial(found.picture, "color"))
+            return self._outside(partial(found.picture, kind))
         if name not in self._pictures:
             known = ", ".join([*self._pictures, *_eyes(self._objects)]) or "none"
             raise WrongValue(f"'{name}' is not a vision sensor; there are: {known}")
-        picture = self._outside(self._pictures[name])  # not the script's time; the first picture compiles shaders
-        if picture.ndim != 3 or picture.dtype != np.uint8:
-            raise WrongValue(f"'{name}' sees no colours")
+        return self._outside(self._pictures[name])  # not the script's time; the first picture compiles shaders
+
+
+def _two(values: Any) -> tuple[float, ...]:
+    return numbers(values, 2) if len(values) else (0.0, 0.0)
+
+
+def _part(picture: np.ndarray, pos: Sequence[float], size: Sequence[float]) -> np.ndarray:
+    """Return a part of a picture from its lower left corner; raises WrongValue for one beyond it."""
+    (x, y), (width, height) = (map(int, numbers(two, 2)) for two in (pos, size))
+    if not (x or y or width or height):
         return picture
+    rows, columns = picture.shape[:2]
+    width, height = width or columns - x, height or rows - y
+    if x < 0 or y < 0 or width <= 0 or height <= 0 or x + width > columns or y + height > rows:
+        raise WrongValue(f"a part of a picture of {columns} x {rows} is expected")
+    return picture[rows - y - height : rows - y, x : x + width]
 
 
 def _eyes(objects: ObjectTree) -> Iterator[str]:

@@ -9,11 +9,13 @@ local sources, protected = sandbox.sources, sandbox.protected
 
 local env = {} -- the script's globals
 local modules, loaded = {}, {} -- the API's and Lua's own; what the script required, by name
+local texts = {} -- of the script and what it requires
 local LOADING = {}
-sandbox.globals, sandbox.modules, sandbox.loaded = env, modules, loaded
+sandbox.globals, sandbox.modules, sandbox.loaded, sandbox.texts = env, modules, loaded, texts
 
 local function compile(text, name)
   if byte(text) == 27 then return nil, 'precompiled code' end
+  texts[#texts + 1] = text
   if newer then return load(text, name, 't', env) end
   local f, message = loadstring(text, name)
   if f then setfenv(f, env) end

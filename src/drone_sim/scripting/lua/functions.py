@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Set
 from typing import Any
 
 from drone_sim.scripting.api.calls import Api, Function, contents, explain
+from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.lua.thread import Door
 from drone_sim.scripting.lua.values import AS_STREAM, FAILED, MEMORY, TOO_MUCH, Values
 
@@ -30,11 +31,24 @@ def define(runtime: Any, sandbox: Any, modules: Mapping[str, Api], values: Value
             add(table, name, f"{module}.{name}", function)
             flat = _flat(module, name)
             add(script_globals, flat, flat, function)
+            known.add(flat)
         for name, constant in constants.items():
             table[name.encode()] = script_globals[f"{module}_{name}".encode()] = constant
             known.update((name, f"{module}_{name}"))
+        sandbox[b"guard"](table, _why_not(f"{module}.", {*functions, *constants}))
         script_globals[module.encode()] = sandbox[b"modules"][module.encode()] = table
+    sandbox[b"guard"](script_globals, _why_not("", {name for name in known if name.startswith("sim")}))
     return known
+
+
+def _why_not(prefix: str, known: Set[str]) -> Callable[[bytes], bytes | None]:
+    """Return what says why a name is not there; nothing for a plugin that a script may ask for."""
+
+    def why(name: bytes) -> bytes | None:
+        text = name.decode("utf-8", "replace")
+        return None if not prefix and text in PLUGINS else not_there(prefix, text, known).encode("utf-8", "replace")
+
+    return why
 
 
 def lua_function(name: str, function: Function, values: Values, door: Door) -> Function:

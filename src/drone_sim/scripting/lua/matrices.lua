@@ -36,6 +36,16 @@ local function inverted(m, more)
   }
 end
 
+-- 3.x inverts a matrix where it stands, in the script's own table, which Python does not see.
+local function in_place(invert)
+  return function(m, ...)
+    local inverse = invert(m, ...)
+    for index = 1, 12 do m[index] = inverse[index] end
+    return m
+  end
+end
+sandbox.wrappers = {['sim.invertMatrix'] = in_place, simInvertMatrix = in_place}
+
 -- What returns a function's result, or nil where Python has to look at the values.
 sandbox.shortcuts = {
   ['sim.multiplyVector'] = transformed, simMultiplyVector = transformed,

@@ -2,8 +2,8 @@
 
 V-REP 3.x scripts run in Lua 5.1, with flat names (simGetObjectPosition, simExtRosInterface_subscribe,
 sim_handle_self); the file's text is run once for each phase with `sim_call_type` set, where it asks for
-that, or as a whole in another form (source.py). CoppeliaSim 4.x scripts run in the newest Lua that lupa has, with `sim` and `simROS` and functions
-sysCall_init, ... Both forms of the API are there in either.
+that, or as a whole in another form (source.py). CoppeliaSim 4.x scripts run in the newest Lua that lupa
+has, with `sim` and `simROS` and functions sysCall_init, ... Both forms of the API are there in either.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api, remember
 from drone_sim.scripting.api.constants import CONSTANTS, PHASES
 from drone_sim.scripting.api.types import Callback
+from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.helpers import LuaHelpers
@@ -214,6 +215,8 @@ class LuaScript:
         if match is None:
             return ""
         name = match.group(1)
+        if name in PLUGINS:
+            return f"; {not_there('', name, ())}"
         near = near_names(name, [known for known in self._known if known.startswith("sim") == name.startswith("sim")])
         return f"; {near}" if near.startswith("near") else ""
 

@@ -17,7 +17,13 @@ _REQUIRE_OWN = re.compile(rb"\brequire[ \t]{0,9}\(?[ \t]{0,9}['\"](?:sim|simROS|
 _PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|thread|threadmain)\b")
 _THREAD_TYPE = re.compile(rb"\b(?:syscb_thread(?:main)?|childscriptcall_threaded)\b")
 _THREAD_CALLS = (
-    *("SetThreadSwitchTiming", "SetThreadAutomaticSwitch", "SwitchThread", "SetThreadIsFree", "SetThreadResumeLocation"),
+    *(
+        "SetThreadSwitchTiming",
+        "SetThreadAutomaticSwitch",
+        "SwitchThread",
+        "SetThreadIsFree",
+        "SetThreadResumeLocation",
+    ),
     *("DelegateChildScriptExecution", "GetThreadId", "Wait", "WaitForSignal", "GetThreadExi(?:s?)tRequest"),
 )
 _IN_THREAD = re.compile(
@@ -25,7 +31,9 @@ _IN_THREAD = re.compile(
     rb"|\bsim[._]simulation_advancing_abouttostop\b|\bthreadFunction\b"
 )
 _THREADS = re.compile(rb"\bcoroutine\b|\bsysCall_thread")
-_STEPS = re.compile(rb"\bsim(?:GetScriptExecutionCount|\.getScriptExecutionCount|HandleChildScripts?|\.handleChildScripts?)\b")
+_STEPS = re.compile(
+    rb"\bsim(?:GetScriptExecutionCount|\.getScriptExecutionCount|HandleChildScripts?|\.handleChildScripts?)\b"
+)
 _CALL_TYPE = re.compile(rb"\bsim[._](childscriptcall_\w{0,60})")
 _FLAT_CALL = re.compile(rb"(?<![.:\w])sim[A-Z]\w{0,200}[ \t\r\n]{0,200}\(")
 

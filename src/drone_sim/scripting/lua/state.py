@@ -25,7 +25,18 @@ from drone_sim.scripting.time_limit import TimeLimit
 
 OLDEST = "lua51"  # V-REP 3.x's
 _NEWEST_FIRST = ("lua55", "lua54", "lua53", "lua52", OLDEST)
-_FILES = ("limits", "matrices", "threads", "others", "values", "code", "snapshots", "calls", "globals")  # each uses those before it
+_FILES = (
+    "limits",
+    "matrices",
+    "threads",
+    "others",
+    "values",
+    "code",
+    "unknown",
+    "snapshots",
+    "calls",
+    "globals",
+)  # each uses those before it
 _CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
 
 TIME, OVER_MEMORY = 1, 2  # why Lua stops a script (limits.lua)
@@ -51,9 +62,7 @@ def new_runtime(dialect: str) -> Any:
     )
 
 
-def make_sandbox(
-    runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaHelpers, threads: bool
-) -> Any:
+def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, helpers: LuaHelpers, threads: bool) -> Any:
     """Run the .lua files in a new state; return their `sandbox`. `threads`: the script may have some.
 
     What Lua gets of Python must not lead back to the script's object, or neither is ever freed.

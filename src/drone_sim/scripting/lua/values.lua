@@ -8,7 +8,8 @@ local bridge, sandbox = ...
 local error, type, select, next, rawget, rawset = error, type, select, next, rawget, rawset
 local rawlen = rawlen or function(t) return #t end -- which knows no __len in 5.1
 local unpack = table.unpack or unpack
-local place_in_script, stop, shortcuts = sandbox.place_in_script, sandbox.stop, sandbox.shortcuts
+local place_in_script, stop = sandbox.place_in_script, sandbox.stop
+local shortcuts, wrappers = sandbox.shortcuts, sandbox.wrappers
 local api, own, counted = sandbox.api, sandbox.own, sandbox.counted
 local fresh, put = bridge.fresh, bridge.put
 local OPEN_LIST, OPEN_FIELDS, CLOSE = bridge.open_list, bridge.open_fields, bridge.close
@@ -143,11 +144,13 @@ function sandbox.hand_back(name, ...)
   flush()
   return true
 end
+local function as_it_is(f) return f end
 
 -- Put a function of the API into a table; `name` is what messages call it.
 function sandbox.define(place, key, name, f)
   local shortcut = shortcuts[name]
-  api[name] = function(a, b, c, ...)
+  local wrapper = wrappers[name] or as_it_is
+  api[name] = wrapper(function(a, b, c, ...)
     if shortcut and c == nil then
       local result = shortcut(a, b)
       if result then return result end
@@ -167,6 +170,6 @@ function sandbox.define(place, key, name, f)
     if b ~= nil then return results(f(how, a, b)) end
     if a ~= nil then return results(f(how, a)) end
     return results(f(0))
-  end
+  end)
   rawset(place, key, own[name] or counted(api[name]))
 end

@@ -1,0 +1,175 @@
+"""A program outside: what it may call, and what it has left here."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Generator, Iterable
+from typing import Any
+
+from drone_sim.remote.arrangement import Arrangement
+from drone_sim.remote.control import STATES, Control
+from drone_sim.remote.conversation import Call, ClientFunction, Refused, Task
+from drone_sim.remote.host import ClientHost, surroundings
+from drone_sim.remote.messages import Request
+from drone_sim.remote.stepping import Stepping
+from drone_sim.run.pacing import Stopwatch
+from drone_sim.run.player import Player
+from drone_sim.run.whereabouts import Diverged
+from drone_sim.scripting import script_log
+from drone_sim.scripting.api.backend import Backend
+from drone_sim.scripting.api.calls import Api, Function, contents, explain
+from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.modules import make_sim, make_sim_ros
+from drone_sim.scripting.api.types import Name
+from drone_sim.scripting.errors import ScriptError, UnknownName
+from drone_sim.wording import near_names
+
+_IS_FUNCTION = "@func"  # what the name of a client's own function ends in, among the arguments
+_BUFFERS = ("getStringSignal", "getVisionSensorImg", "getVisionSensorDepth", "packTable", "readCustomDataBlock")
+_OWN_LINES = (ScriptError, Diverged, OSError, RuntimeError)  # their messages are one line for the user
+
+
+class Client:
+    """Answers requests. `sim` is that of the first vehicle's script; what it draws and hears is the client's own."""
+
+    def __init__(
+        self,
+        player: Player,
+        arrangement: Arrangement,
+        backend: Backend | None,
+        everybody: Callable[[], Iterable[Stepping]],
+        clock: Callable[[], float],
+    ):
+        """Take what plays the simulation, what carries messages, and a monotonic clock of real seconds."""
+        self.stepping = Stepping()
+        self.connections: set[int] = set()
+        self.silence = Stopwatch(clock)
+        self.patience = 0.0  # s
+        self.tasks: dict[tuple[bytes, ...], list[Task]] = {}  # what is not answered yet, by the way back
+        self._simulation = player.simulation
+        self._control = Control(player, arrangement, self.stepping, everybody, clock)
+        self._bus = MessageBus(self._simulation.drone.name, {})
+        self._bus.backend = backend
+        self._run = self._era = -1
+        self._drawn: set[int] = set()
+        self._modules: dict[str, Api] = {}
+        self._functions: dict[str, Function] = {}
+
+    def answer(self, request: Request) -> Task:
+        """Carry out a request; raises Refused."""
+        self._keep_up()
+        for callback, message in self._messages():
+            yield Call(callback.name if isinstance(callback, ClientFunction) else str(callback), [message])
+        function = self._function(request.function)
+        arguments = [_argument(one) for one in request.arguments]
+        while arguments and arguments[-1] is None:
+            arguments.pop()
+        try:
+            values = function(*arguments)
+            if isinstance(values, Generator):
+                values = yield from values
+        except Refused:
+            raise
+        except _OWN_LINES as error:
+            raise Refused(str(error)) from None
+        except Exception as error:
+            raise Refused(explain(request.function, function, arguments, error)) from None
+        finally:
+            script_log.end_call()
+        return _values(request.function, values)
+
+    def leave(self) -> None:
+        """Remove what it has left: drawings, subscriptions, what it advertises, and its say in the steps."""
+        self.stepping.let_go()
+        self.tasks.clear()
+        self._bus.close()
+        drawings = self._simulation.drone.drawings
+        if self._run == self._simulation.run:
+            for handle in self._drawn & set(drawings.objects):
+                drawings.remove(handle)
+        self._drawn.clear()
+
+    # ---- what it may call
+
+    def _keep_up(self) -> None:
+        """Let the modules be those of the simulation as it is now; what was left in an earlier run is gone."""
+        simulation = self._simulation
+        if self._run != simulation.run:
+            self._run = simulation.run
+            self._drawn.clear()
+            self._bus.close()
+        if self._era != simulation.era:
+            self._era = simulation.era
+            self._modules = {"sim": self._sim(), "simROS": make_sim_ros(self._bus)}
+            self._functions = {
+                f"{name}.{function}": one
+                for name, api in self._modules.items()
+                for function, one in contents(api)[1].items()
+            }
+
+    def _sim(self) -> Api:
+        host = ClientHost(self._simulation)
+        name, functions, constants = contents(make_sim(host, surroundings(self._simulation, host)))
+        drawing = {one: self._recorded(functions[one]) for one in ("addDrawingObject",)}
+        return Api(name, {**functions, **drawing, **self._control.functions()}, {**constants, **STATES})
+
+    def _recorded(self, make: Function) -> Function:
+        @functools.wraps(make)
+        def call(*arguments: Any) -> Any:
+            handle = make(*arguments)
+            self._drawn.add(handle)
+            return handle
+
+        return call
+
+    def _function(self, name: str) -> Function:
+        """Return a function by name; raises Refused."""
+        function = self._functions.get(name)
+        if function is not None:
+            return function
+        own = {f"zmqRemoteApi.{one.__name__}": one for one in (self.info, self.require)}
+        if name in own:
+            return own[name]
+        module, dot, function_name = name.partition(".")
+        if dot and module in self._modules:
+            raise Refused(str(_unknown(self._modules[module], function_name)))
+        raise Refused(f"no function '{name:.80}'; {near_names(name[:80], [*self._functions, *own])}")
+
+    def require(self, module: Name) -> None:
+        """Raise ValueError for a module that there is not."""
+        if module not in self._modules:
+            raise ValueError(f"no module '{module}'; {near_names(str(module), self._modules)}")
+
+    def info(self, module: Name) -> dict[str, Any]:
+        """Return the functions and constants of a module. Raises ValueError."""
+        self.require(module)
+        _, functions, constants = contents(self._modules[module])
+        called: dict[str, Any] = {name: {"func": {}} for name in functions}
+        return {**called, **{name: {"const": value} for name, value in constants.items()}}
+
+    def _messages(self) -> list[tuple[Any, Any]]:
+        waiting: list[tuple[Any, Any]] = []
+        self._bus.new_callbacks()
+        self._bus.deliver(lambda callback, message: waiting.append((callback, message)))
+        return waiting
+
+
+def _unknown(api: Api, name: str) -> UnknownName:
+    try:
+        getattr(api, name)
+    except UnknownName as error:
+        return error
+    return UnknownName(f"{contents(api)[0]}.{name} is no function")
+
+
+def _argument(value: Any) -> Any:
+    is_function = isinstance(value, str) and value.endswith(_IS_FUNCTION)
+    return ClientFunction(value.removesuffix(_IS_FUNCTION)) if is_function else value
+
+
+def _values(function: str, values: Any) -> list[Any]:
+    """Return what a function returned as the list that is sent, where buffers are bytes and texts are texts."""
+    listed = list(values) if isinstance(values, tuple) else [] if values is None else [values]
+    if listed and isinstance(listed[0], str) and function.partition(".")[2] in _BUFFERS:
+        listed[0] = listed[0].encode("utf-8", "surrogateescape")
+    return listed

@@ -1,0 +1,132 @@
+"""`sim`: values in a string, as signals and custom data carry them: little endian, one after the other."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from drone_sim.scripting.api.calls import Function, WrongValue
+from drone_sim.scripting.api.script_values import refuse_if_too_large
+from drone_sim.scripting.api.types import Numbers, Text
+
+# What one value is called in 4.x and in 3.x, and its format (struct).
+_KINDS = {
+    "FloatTable": ("Floats", "f"),
+    "DoubleTable": ("Doubles", "d"),
+    "Int32Table": ("Ints", "i"),
+    "UInt32Table": ("UInts", "I"),
+    "UInt16Table": ("Words", "H"),
+    "UInt8Table": ("Bytes", "B"),
+}
+_FORMATS = {0: "B", 1: "b", 2: "H", 3: "h", 4: "I", 5: "i", 6: "f", 7: "d"}  # by sim.buffer_...
+
+
+class Packing:
+    """The functions that pack and unpack."""
+
+    def functions(self) -> dict[str, Function]:
+        """Return every function, by name."""
+        found: dict[str, Function] = {}
+        for new, (old, kind) in _KINDS.items():
+            found[f"pack{new}"] = found[f"pack{old}"] = _packer(kind, new)
+            found[f"unpack{new}"] = found[f"unpack{old}"] = _unpacker(kind, new)
+        others = (self.packTable, self.unpackTable, self.transformBuffer)
+        return {**found, **{one.__name__: one for one in others}}
+
+    def packTable(self, table: Any, _scheme: int = 0) -> bytes:
+        """Return a table as a string that unpackTable reads: numbers, strings, booleans, tables of those."""
+        refuse_if_too_large(table)
+        return json.dumps(_plain(table)).encode()
+
+    def unpackTable(self, data: Text) -> Any:
+        """Return the table in a string of packTable's."""
+        try:
+            return _table(json.loads(_bytes(data)))
+        except (ValueError, TypeError, LookupError, RecursionError):
+            raise ValueError("this string was not made by sim.packTable") from None
+
+    def transformBuffer(self, data: Text, from_kind: int, factor: float, offset: float, to_kind: int) -> bytes:
+        """Return values of one sim.buffer_... as values of another, each times `factor` plus `offset`."""
+        if from_kind not in _FORMATS or to_kind not in _FORMATS:
+            raise ValueError("known are sim.buffer_uint8, _int8, _uint16, _int16, _uint32, _int32, _float and _double")
+        values = [factor * one + offset for one in _unpacked(_FORMATS[from_kind], _bytes(data))]
+        return _packed(_FORMATS[to_kind], values)
+
+
+def _packer(kind: str, name: str) -> Function:
+    def pack(values: Numbers, start: int = 0, count: int = 0) -> bytes:
+        return _packed(kind, _part(values, start, count))
+
+    pack.__doc__ = f"Return numbers as a string of {struct.calcsize(kind)} bytes each, `count` (0: all) from `start`."
+    pack.__name__ = f"pack{name}"
+    return pack
+
+
+def _unpacker(kind: str, name: str) -> Function:
+    def unpack(data: Text, start: int = 0, count: int = 0, offset: int = 0) -> list[float]:
+        if not offset >= 0:
+            raise WrongValue("an offset of 0 bytes or more is expected")
+        return _part(_unpacked(kind, _bytes(data)[int(offset) :]), start, count)
+
+    pack_size = struct.calcsize(kind)
+    unpack.__doc__ = f"Return the numbers in a string of {pack_size} bytes each, `count` (0: all) from `start`."
+    unpack.__name__ = f"unpack{name}"
+    return unpack
+
+
+def _part(values: Sequence[Any], start: int, count: int) -> list[Any]:
+    if not (start >= 0 and count >= 0):
+        raise WrongValue("a start and a count of 0 or more are expected")
+    first = int(start)
+    return list(values[first : first + int(count)] if count else values[first:])
+
+
+def _packed(kind: str, values: Sequence[Any]) -> bytes:
+    """Return values as bytes; raises WrongValue for what is no number, ValueError for one that does not fit."""
+    try:
+        numbers = [float(one) if kind in "fd" else int(one) for one in values]
+    except (TypeError, ValueError, OverflowError):
+        raise WrongValue("a table of numbers is expected") from None
+    try:
+        return struct.pack(f"<{len(numbers)}{kind}", *numbers)
+    except (struct.error, OverflowError) as error:
+        raise ValueError(f"a number does not fit: {error}") from None
+
+
+def _unpacked(kind: str, data: bytes) -> list[Any]:
+    count = len(data) // struct.calcsize(kind)
+    return list(struct.unpack_from(f"<{count}{kind}", data))
+
+
+def _bytes(data: Text | bytes) -> bytes:
+    """Return a string as it was packed; raises WrongValue for anything else."""
+    if isinstance(data, str):
+        return data.encode("utf-8", "surrogateescape")
+    if not isinstance(data, (bytes, bytearray)):
+        raise WrongValue("a string is expected")
+    return bytes(data)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it; raises WrongValue for what cannot be packed."""
+    if isinstance(value, Mapping):
+        return {"table": [[_plain(key), _plain(one)] for key, one in value.items()]}
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    if isinstance(value, (bytes, bytearray)):
+        return {"bytes": value.decode("latin-1")}
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise WrongValue(f"a {type(value).__name__} cannot be packed")
+
+
+def _table(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_table(one) for one in value]
+    if isinstance(value, dict):
+        if "bytes" in value:
+            return value["bytes"].encode("latin-1")
+        return {_table(key): _table(one) for key, one in value["table"]}
+    return value

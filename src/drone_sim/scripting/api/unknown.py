@@ -1,0 +1,88 @@
+"""What CoppeliaSim has and this simulator has not, and what is said to a script that asks for it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from drone_sim.wording import near_names
+
+_LONGEST = 80  # characters of a name that is looked at
+
+# Plugins that a script may ask for by name: nil where Lua reads them, as in a CoppeliaSim without them.
+PLUGINS = {
+    "simROS2": "this is ROS 1: simROS has the same functions",
+    "simB0": "the ZeroMQ remote API does what B0 did",
+    "simIK": "there is no inverse kinematics: a drone has no arm to bend",
+    "simOMPL": "there is no path planner: plan outside, and send the way points",
+    "simVision": "there are no image filters: read the picture, or publish it to a node that uses OpenCV",
+    "simGeom": "there is no geometry plugin",
+    "simOctomap": "there are no octrees",
+    "simIM": "there are no image filters: publish the picture to a node that uses OpenCV",
+    "simZMQ": "sockets are not for child scripts: use topics",
+    "simWS": "sockets are not for child scripts: use topics",
+    "simMTB": "there is no such plugin here",
+    "simIGL": "there is no geometry plugin",
+    "simURDF": "vehicles come from the parameters' `urdf`",
+    "simSDF": "there is no importer for scripts",
+    "simAssimp": "meshes come from the scene file",
+    "simQHull": "there is no geometry plugin",
+    "simRRS1": "there are no industrial robots",
+    "simSkeleton": "there is no such plugin here",
+}
+
+# Functions of CoppeliaSim, by the beginning of their names, and why they are not here. Flat names are looked up as if
+# they stood in their module: simCreateIkGroup is sim.createIkGroup.
+ABSENT: dict[str, str] = {
+    r"simExtROS_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
+    r"simros_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
+    r"simExtOMPL_\w+": PLUGINS["simOMPL"],
+    r"simExtVision_\w+": PLUGINS["simVision"],
+    r"simExtOctomap_\w+": PLUGINS["simOctomap"],
+    r"simExt(?!RosInterface_)\w+": "a plugin of V-REP's that is not here",
+    r"sim_ext_\w+": "a constant of a plugin that is not here",
+    r"sim\.\w*(?:Ik|IK)(?:Group|Element|Path|\b)\w*|sim\.(?:getConfigForTipPose|computeJacobian)": PLUGINS["simIK"],
+    r"sim\.(?:load|save|close|export|import)\w*": "scenes and models are files: see `scene_file` and `vehicles`",
+    r"sim\.(?:create|copyPaste|remove|group|ungroup|convert|scale)(?!DrawingObject|Particle|Dialog)\w*": (
+        "objects come from the scene file: a script makes and removes none"
+    ),
+    r"sim\.setObject(?:Name|Alias)": "names are those of the scene file",
+    r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "masses are those of the URDF and the scene file",
+    r"sim\.\w*(?:Collision|Distance|Mill|Mechanism|Collection)\w*": (
+        "there are no collections and no collision or distance objects; a sensor of the kind contacts or range tells"
+    ),
+    r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
+    r"sim\.\w*(?:LinkDummy|DummyLink)\w*": "dummies are not linked to each other",
+    r"sim\.\w*(?:WorkThread|Module|Plugin)\w*": "plugins are not loaded from scripts",
+    r"simROS\.(?:advertiseService|shutdownServiceServer|serviceServerTreat\w+)": (
+        "a child script offers no services: subscribe to a topic"
+    ),
+    r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
+    r"sim\.launchExecutable": "a child script starts no programs: use a launch file",
+}
+_FLAT = re.compile(r"sim([A-Z]\w*)")
+
+
+def not_there(prefix: str, name: str, known: Iterable[str]) -> str:
+    """Return one line on a name that the API does not have: why not, or the near names.
+
+    `prefix` is 'sim.' for what was looked for in that module, '' for a global.
+    """
+    name = name[:_LONGEST]
+    if not prefix and name in PLUGINS:
+        return f"there is no plugin {name} here: {PLUGINS[name]}"
+    reason = why_absent(f"{prefix}{name}")
+    if reason:
+        return f"there is no {prefix}{name} here: {reason}"
+    module = prefix.removesuffix(".")
+    return f"{f'{module} has' if module else 'there is'} no '{name}'; {near_names(name, known)}"
+
+
+def why_absent(name: str) -> str:
+    """Return why a function of CoppeliaSim's is not here, '' for a name that is none of those."""
+    flat = _FLAT.fullmatch(name)
+    in_module = f"sim.{flat.group(1)[0].lower()}{flat.group(1)[1:]}" if flat else name
+    for pattern, reason in ABSENT.items():
+        if re.fullmatch(pattern, name) or re.fullmatch(pattern, in_module):
+            return reason
+    return ""

@@ -1,0 +1,94 @@
+#!/usr/bin/env python3
+"""The node, driven by CoppeliaSim's own client of the ZeroMQ remote API, with services and topics beside it."""
+
+import sys
+import threading
+import unittest
+
+import rospy
+import rostest
+from coppeliasim_zmqremoteapi_client import RemoteAPIClient
+from listening import Listener, connected
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from drone_sim.ros.node.node import Node
+from drone_sim.run import parameters
+
+
+class RemoteApi(unittest.TestCase):
+    """A node that runs in a thread of this process."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.ready = threading.Event()
+        cls.thread = threading.Thread(target=cls.run_node)
+        cls.thread.start()
+        assert cls.ready.wait(20)
+        cls.state = Listener(rospy.resolve_name("~state"), String)
+        cls.services = {name: rospy.ServiceProxy(f"~{name}", Trigger) for name in ("start", "stop")}
+
+    @classmethod
+    def tearDownClass(cls):
+        rospy.signal_shutdown("done")
+        cls.thread.join()
+
+    @classmethod
+    def run_node(cls):
+        """Make and run it in one thread, which the simulation belongs to."""
+        given = {"script": "target", "cameras": {}, "remote_api": {"serve": True, "port": 0}, "real_time_factor": 0}
+        node = Node(parameters.load(given))
+        cls.port = node._outside.port
+        cls.ready.set()
+        node.run()
+        node.close()
+
+    def test_a_client_flies_step_by_step(self):
+        client = RemoteAPIClient(port=self.port)
+        sim = client.require("sim")
+        self.assertEqual(sim.getSimulationState(), sim.simulation_stopped)
+        sim.setStepping(True)
+        sim.startSimulation()
+        target = sim.getObject("/target")
+        sim.setObjectPosition(target, [0.3, 0.0, 1.0])
+        for _ in range(60):
+            sim.step()
+        self.assertAlmostEqual(sim.getSimulationTime(), 3.0)
+        self.assertAlmostEqual(sim.getObjectPosition(sim.getObject("/Quadcopter/base"))[2], 1.0, delta=0.1)
+        self.services["stop"]()  # answered although the client holds the simulation
+        self.assertEqual(sim.getSimulationState(), sim.simulation_stopped)
+
+    def test_b_topics_reach_functions_of_the_client(self):
+        client = RemoteAPIClient(port=self.port)
+        sim, ros = client.require("sim"), client.require("simROS")
+        self.services["start"]()
+        heard, echo = [], Listener("/echo", String)
+        ros.subscribe("/said", "std_msgs/String", lambda message: heard.append(message["data"]))
+        publisher = ros.advertise("/echo", "std_msgs/String")
+        connected(rospy.Publisher("/said", String, queue_size=1, latch=True)).publish("hello")
+        while not heard:
+            self.assertEqual(sim.getSimulationState(), sim.simulation_advancing_running)
+        while not ros.getNumSubscribers(publisher):
+            pass
+        ros.publish(publisher, {"data": heard[0]})
+        echo.wait_for(lambda message: message.data == "hello", after=0)
+        sim.stopSimulation()
+
+    def test_c_a_client_that_goes_lets_the_flight_go_on(self):
+        client = RemoteAPIClient(port=self.port)
+        sim = client.require("sim")
+        sim.setStepping(True)
+        sim.startSimulation()
+        self.assertEqual(sim.getSimulationTime(), 0.0)
+        client.socket.close()
+        client.context.term()
+        watcher = RemoteAPIClient(port=self.port).require("sim")
+        while watcher.getSimulationTime() < 1.0:
+            pass
+        watcher.stopSimulation()
+        self.state.wait_for(lambda message: message.data == "stopped", after=0)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_remote_api", disable_rostime=True)
+    sys.exit(rostest.rosrun("drone_sim", "remote_api", RemoteApi))

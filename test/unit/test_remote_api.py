@@ -1,0 +1,459 @@
+"""CoppeliaSim's ZeroMQ remote API: what a client sends, and what comes back."""
+
+import math
+import struct
+import threading
+from types import SimpleNamespace
+
+import cbor2
+import numpy as np
+import pytest
+import zmq
+from remote_client import Client, Refusal
+
+from drone_sim.remote.outside import Nobody, let_in
+from drone_sim.remote.server import Server
+from drone_sim.remote.standalone import play
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.player import Player
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.drawings import Drawings
+
+SCRIPT = """
+def sysCall_actuation():
+    if sim.getInt32Signal('fail'):
+        raise RuntimeError('as it was told')
+"""
+
+
+class Radio:
+    """A backend that hands over whatever the test sends."""
+
+    def __init__(self):
+        self.heard = {}
+
+    def subscribe(self, topic, kind, take):
+        self.heard[topic] = take
+        return lambda: self.heard.pop(topic)
+
+
+class Stage:
+    """A stopped simulation, its server, and clients."""
+
+    def __init__(self, script):
+        self.radio = Radio()
+        self.drawings = Drawings()
+        values = {"script": str(script), "vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}}}
+        self.simulation = Simulation(parameters.load(values), drawings=self.drawings, backend=self.radio, started=False)
+        self.player = Player(self.simulation, self.simulation.step, lambda _state: None, simulated_time=False)
+        self.now = 0.0  # s
+        self.server = Server(self.player, "127.0.0.1", 0, self.radio, lambda: self.now)
+        self.clients = []
+
+    def client(self, *arguments, **fields):
+        self.clients.append(Client(self.server, *arguments, **fields))
+        return self.clients[-1]
+
+    def go(self, steps=1):
+        """Take so many steps, as far as clients let it."""
+        for _ in range(steps):
+            if self.player.playing and not self.server.holds:
+                self.player.step()
+
+    def settled(self, condition):
+        """Serve until it is so."""
+        for _ in range(500):
+            if condition():
+                return True
+            self.server.wait(0.001)
+        return False
+
+
+@pytest.fixture(name="theatre", scope="module")
+def _theatre(tmp_path_factory):
+    script = tmp_path_factory.mktemp("remote") / "script.py"
+    script.write_text(SCRIPT)
+    stage = Stage(script)
+    yield stage
+    stage.server.close()
+    stage.simulation.close()
+
+
+@pytest.fixture(name="stage")
+def _stage(theatre):
+    yield theatre
+    for client in theatre.clients:
+        client.vanish()
+    theatre.clients.clear()
+    assert theatre.settled(lambda: not theatre.server._clients)
+    theatre.player.stop()
+
+
+# ---- calls
+
+
+def test_a_client_learns_functions_and_constants(stage):
+    client = stage.client()
+    assert client.call("zmqRemoteApi.require", "sim") is None
+    known = client.call("zmqRemoteApi.info", "sim")
+    assert known["getObjectPosition"] == known["step"] == {"func": {}}
+    assert known["handle_world"] == {"const": -1} and known["simulation_stopped"] == {"const": 0}
+    assert "publish" in client.call("zmqRemoteApi.info", "simROS")
+
+
+def test_functions_return_nothing_one_or_several_values(stage):
+    client = stage.client()
+    drone = client.sim("getObject", "/Quadcopter")
+    assert client.sim("getObjectPosition", drone, -1) == [0, 0, 0.8]
+    assert client.sim("getObjectVelocity", drone) == ([0, 0, 0], [0, 0, 0])
+    assert client.sim("setObjectPosition", drone, -1, [0, 0, 1]) is None
+    assert client.sim("getObjectPosition", drone, None) == [0, 0, 1]
+
+
+def test_the_objects_of_every_vehicle_are_there(stage):
+    client = stage.client()
+    other = client.sim("getObject", "Quadricopter#0")
+    assert client.sim("getObjectPosition", other) == pytest.approx([1, 1, 0.8])
+    client.sim("setJointPosition", client.sim("getObject", "Quadricopter_propeller_joint1#0"), 1.5)
+    assert 1.5 in stage.simulation.vehicles["other"].blade_angles.values()
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "said"),
+    [
+        ("sim.getObject", ["/Quadcoptr"], "sim.getObject: no object '/Quadcoptr'; near names are"),
+        ("sim.getObjectPosition", [], "sim.getObjectPosition: wrong number of values"),
+        ("sim.setObjectPosition", [1, -1, [math.nan, 0, 0]], "finite numbers are expected"),
+        ("sim.getObjct", ["/Floor"], "sim has no 'getObjct'; near names are getObject"),
+        ("sim.handle_world", [], "handle_world is no function"),
+        ("os.system", ["ls"], "no function 'os.system'"),
+        ("__import__", ["os"], "no function '__import__'"),
+        ("zmqRemoteApi.require", ["simIK"], "no module 'simIK'; near names are sim"),
+        ("zmqRemoteApi.info", [[1]], "expected (module: Name)"),
+        ("sim.getObjectPosition", [10**400], "no object has the handle"),
+        ("sim.wait", ["long"], "sim.wait: a number is expected"),
+        ("sim.testCB", [1, 2, 3], "a function of the client's is expected"),
+        ("_*executed*_", [1], "nothing that was to be executed"),
+    ],
+)
+def test_a_mistake_is_one_line(stage, function, arguments, said):
+    reply = stage.client().ask(function, *arguments)
+    assert said in reply["err"] and "\n" not in reply["err"]
+    assert reply["success"] is False and reply["error"] == reply["err"]
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"",
+        b"GET / HTTP/1.1",
+        b'{"func": "sim.getSimulationTime", "args": []}',
+        b"\x81" * 100_000,
+        b"\x9b\x0f" + b"\xff" * 7,
+        cbor2.dumps([1, 2]),
+        cbor2.dumps({"args": []}),
+        cbor2.dumps({"func": 3}),
+        cbor2.dumps({"func": "x" * 1000}),
+        cbor2.dumps({"func": "sim.getObject", "args": "/Floor"}),
+        cbor2.dumps({"func": "sim.getObject", "args": 7}),
+        cbor2.dumps({"func": "sim.getObject", "args": [], "uuid": ["x"]}),
+        cbor2.dumps({"func": "sim.getObject", "args": [cbor2.CBORTag(4, [10**9, 1])]}),
+        cbor2.dumps({"func": "sim.getObject", "args": [cbor2.CBORTag(86, b"123")]}),
+        cbor2.dumps({"func": "sim.getObject", "args": [cbor2.CBORTag(28, [cbor2.CBORTag(29, 0)])]}),
+        cbor2.dumps({"func": "sim.getObject", "args": [{(1, 2): 3}]}),
+    ],
+)
+def test_what_is_no_request_gets_an_answer_and_changes_nothing(stage, payload):
+    client = stage.client()
+    client.send_bytes(payload)
+    assert "\n" not in client.reply()["err"]
+    assert client.sim("getSimulationState") == 0
+
+
+def test_a_message_without_a_way_back_and_a_huge_one_do_no_harm(stage):
+    stage.client(zmq.DEALER).send_bytes(b"\x00" * (9 * 1024 * 1024))
+    stage.client(zmq.PUSH).send_bytes(b"?")
+    assert stage.client().sim("getSimulationTime") == 0.0
+
+
+def test_what_version_1_sends_and_reads(stage):
+    client = stage.client()
+    client.fields = {}
+    assert client.ask("sim.getSimulationTime") == {"success": True, "ret": [0.0]}
+    assert client.ask("sim.nothing")["error"].startswith("sim has no 'nothing'")
+
+
+def test_numbers_and_buffers_keep_their_kinds(stage):
+    client = stage.client()
+    floats = struct.pack("<2f", 1.0, 2.5)
+    client.sim("setStringSignal", "buffer", floats)
+    assert client.sim("getStringSignal", "buffer") == floats
+    client.sim("setStringSignal", "buffer", "text")
+    assert client.sim("getStringSignal", "buffer") == b"text"
+    place = cbor2.CBORTag(86, np.array([1.0, 2.0, 3.0]).tobytes())  # RFC 8746
+    drone = client.sim("getObject", "/Quadcopter")
+    client.sim("setObjectPosition", drone, -1, place)
+    assert client.sim("getObjectPosition", drone) == [1, 2, 3]
+
+
+def test_a_picture_is_bytes_with_its_size(stage):
+    client = stage.client()
+    image, size = client.sim("getVisionSensorImg", client.sim("getObject", "FloorVision#0"))
+    assert size == [256, 256] and isinstance(image, bytes) and len(image) == 256 * 256 * 3
+
+
+# ---- start, stop, and what was moved before
+
+
+def test_start_pause_and_stop(stage):
+    client = stage.client()
+    states = [client.sim("getSimulationState")]
+    for function in ("startSimulation", "pauseSimulation", "startSimulation", "startSimulation", "stopSimulation"):
+        client.sim(function)
+        states.append(client.sim("getSimulationState"))
+    assert states == [0, 17, 8, 17, 17, 0]
+
+
+def test_what_was_moved_while_it_was_stopped_begins_there(stage):
+    client = stage.client()
+    drone, target = client.sim("getObject", "/Quadcopter"), client.sim("getObject", "/target")
+    client.sim("setObjectPosition", drone, -1, [0.5, 0, 2])
+    client.sim("setObjectPosition", target, -1, [1, 2, 3])
+    client.sim("startSimulation")
+    assert client.sim("getObjectPosition", drone) == pytest.approx([0.5, 0, 2])
+    assert client.sim("getObjectPosition", target) == pytest.approx([1, 2, 3])
+    other = client.sim("getObject", "Quadricopter#0")
+    assert client.sim("getObjectPosition", other) == pytest.approx([1, 1, 0.8])
+    client.sim("stopSimulation")
+    assert client.sim("getObjectPosition", drone) == pytest.approx([0, 0, 0.8])
+
+
+def test_a_script_that_fails_is_an_exception_where_the_client_steps(stage):
+    client = stage.client()
+    client.sim("setStepping", True)
+    client.sim("startSimulation")
+    client.sim("setInt32Signal", "fail", 1)
+    client.send("sim.step")
+    assert not client.answered(looks=3)
+    stage.go()
+    reply = client.reply()
+    assert reply["err"].startswith("[actuation]") and reply["err"].endswith("as it was told")
+    assert client.sim("getSimulationState") == 0
+    assert client.sim("step") is None  # stopped: there is nothing to wait for
+
+
+def test_a_scene_that_cannot_be_started_is_an_exception(stage, monkeypatch):
+    def fail(_scene=None):
+        raise ParameterError("scene/objects: it is not there")
+
+    monkeypatch.setattr(stage.simulation, "start", fail)
+    with pytest.raises(Refusal, match="it is not there"):
+        stage.client().sim("startSimulation")
+
+
+# ---- steps
+
+
+def test_a_stepping_client_is_asked_before_every_step(stage):
+    client = stage.client()
+    assert client.sim("setStepping", True) == 0
+    client.sim("startSimulation")
+    stage.go(3)
+    assert client.sim("getSimulationTime") == 0
+    for count in (1, 2, 3):
+        client.send("sim.step", True)
+        assert not client.answered(looks=3)
+        stage.go(5)
+        assert client.reply()["ret"] == []
+        assert client.sim("getSimulationTime") == pytest.approx(0.05 * count)
+
+
+def test_the_simulation_steps_when_every_stepping_client_has_asked(stage):
+    first, second, reader = stage.client(), stage.client(), stage.client()
+    first.sim("setStepping", True)
+    second.sim("setStepping", True)
+    first.sim("startSimulation")
+    first.send("sim.step")
+    assert not first.answered(looks=3)
+    stage.go()
+    assert reader.sim("getSimulationTime") == 0
+    second.send("sim.step")
+    assert not second.answered(looks=3)
+    stage.go()
+    assert first.reply()["ret"] == second.reply()["ret"] == []
+    assert reader.sim("getSimulationTime") == pytest.approx(0.05)
+    second.sim("setStepping", False)
+    first.send("sim.step")
+    assert not first.answered(looks=3)
+    stage.go()
+    assert first.answered()
+
+
+def test_stepping_counts_its_levels_and_stopping_ends_it_for_all(stage):
+    client, other = stage.client(), stage.client()
+    client.sim("setStepping", True)
+    assert client.sim("setStepping", True) == 1
+    assert client.sim("setStepping", False) == 2
+    other.sim("acquireLock")
+    client.sim("startSimulation")
+    assert stage.server.holds
+    other.sim("stopSimulation")
+    assert not stage.server.holds and client.sim("setStepping", False) == 0
+
+
+def test_a_lock_holds_the_simulation(stage):
+    client = stage.client()
+    client.sim("startSimulation")
+    client.sim("acquireLock")
+    stage.go()
+    assert client.sim("getSimulationTime") == 0
+    client.sim("releaseLock")
+    stage.go()
+    assert client.sim("getSimulationTime") == pytest.approx(0.05)
+
+
+def test_waiting_for_simulated_time_steps(stage):
+    client = stage.client()
+    client.sim("setStepping", True)
+    client.sim("startSimulation")
+    client.send("sim.wait", 0.1)
+    for _ in range(4):
+        client.answered(looks=2)
+        stage.go()
+    assert client.reply()["ret"] == [0.1]
+    assert client.sim("getSimulationTime") == pytest.approx(0.1)
+    client.send("sim.wait", 5, False)  # of real time
+    assert not client.answered(looks=3)
+    stage.now += 5.0
+    assert client.reply()["ret"] == [5]
+
+
+@pytest.mark.parametrize("how", ["vanish", "goodbye", "silence"])
+def test_who_has_gone_holds_nothing(stage, how):
+    client = stage.client(timeout=60.0)
+    client.sim("setStepping", True)
+    client.sim("startSimulation")
+    assert stage.server.holds
+    if how == "vanish":
+        client.vanish()
+        stage.clients.remove(client)
+    elif how == "goodbye":
+        assert client.ask("_*end*_") == {"success": True, "ret": []}
+    else:
+        stage.now += 61.0
+    assert stage.settled(lambda: not stage.server.holds)
+    stage.go(2)
+    assert stage.simulation.steps == 2
+
+
+# ---- functions of the client's
+
+
+def test_a_function_of_the_client_is_called_and_may_call(stage):
+    client = stage.client()
+    asked = client.ask("sim.testCB", "a", "mine@func", "b", 1)
+    assert asked == {"func": "mine", "args": ["a", "b"]}
+    assert client.sim("getSimulationTime") == 0.0  # within it
+    assert client.ask("_*executed*_", 1) == asked
+    assert client.ask("_*executed*_", 1, 2)["ret"] == [1, 2]
+
+
+def test_a_function_of_the_client_that_fails_leaves_it_as_it_was(stage):
+    client = stage.client()
+    for _ in range(40):
+        assert "func" in client.ask("sim.testCB", "a", "mine@func", "b")
+    assert client.sim("getSimulationTime") == 0.0
+
+
+def test_messages_are_handed_over_before_an_answer(stage):
+    client = stage.client()
+    client.sim("startSimulation")
+    handle = client.call("simROS.subscribe", "/gate", "std_msgs/Float64", "on_gate@func", 2)
+    for value in (1.0, 2.0, 3.0):
+        stage.radio.heard["/gate"](SimpleNamespace(__slots__=["data"], data=value))
+    assert client.ask("sim.getSimulationTime") == {"func": "on_gate", "args": [{"data": 2.0}]}
+    assert client.ask("_*executed*_") == {"func": "on_gate", "args": [{"data": 3.0}]}
+    assert client.ask("_*executed*_")["ret"] == [0.0]
+    client.call("simROS.shutdownSubscriber", handle)
+    assert "/gate" not in stage.radio.heard
+
+
+@pytest.mark.parametrize("how", ["stop", "vanish"])
+def test_what_a_client_leaves_behind_is_removed(stage, how):
+    client, other = stage.client(), stage.client()
+    other.sim("startSimulation")
+    client.call("simROS.subscribe", "/gate", "std_msgs/Float64", "on_gate@func")
+    client.sim("addDrawingObject", 0, 5, 0, -1, 10)
+    kept = other.sim("addDrawingObject", 0, 5, 0, -1, 10)
+    if how == "vanish":
+        client.vanish()
+        stage.clients.remove(client)
+        assert stage.settled(lambda: list(stage.drawings.objects) == [kept])
+    else:
+        other.sim("stopSimulation")
+        assert not stage.drawings.objects
+        client.sim("getSimulationState")
+    assert not stage.radio.heard
+
+
+# ---- parameters, and the official client
+
+
+def test_nobody_is_let_in_unless_told():
+    assert isinstance(let_in(parameters.load().remote_api, None), Nobody)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("serve", "yes", "remote_api/serve"),
+        ("port", 70000, "remote_api/port = 70000"),
+        ("address", "a b", "must be like 127.0.0.1"),
+        ("addres", "127.0.0.1", "address"),
+    ],
+)
+def test_a_wrong_parameter_is_one_line(key, value, said):
+    with pytest.raises(ParameterError, match=said) as caught:
+        parameters.load({"remote_api": {key: value}})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_port_that_is_taken_and_an_address_that_is_none(stage):
+    for address, port in (("127.0.0.1", stage.server.port), ("nowhere.invalid", 0)):
+        with pytest.raises(OSError, match=f"remote_api: cannot listen on {address}:{port}: "):
+            Server(stage.player, address, port)
+
+
+def test_the_official_client_flies_by_its_own_calls():
+    official = pytest.importorskip("coppeliasim_zmqremoteapi_client")
+    over, listening, found = threading.Event(), threading.Event(), []
+
+    def serve():
+        values = {"script": "target", "real_time_factor": 0, "remote_api": {"serve": True, "port": 0}}
+        play(parameters.load(values), over.is_set, lambda server: (found.append(server.port), listening.set()))
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        assert listening.wait(60)
+        client = official.RemoteAPIClient(port=found[0])
+        sim = client.require("sim")
+        assert sim.getSimulationState() == sim.simulation_stopped
+        sim.setStepping(True)
+        sim.startSimulation()
+        base, target = sim.getObject("/Quadcopter/base"), sim.getObject("/target")
+        for count in range(1, 81):
+            sim.setObjectPosition(target, [0.0, 0.0, 0.79 + min(0.01 * count, 0.5)])
+            sim.step()
+        assert sim.getSimulationTime() == pytest.approx(4.0)
+        assert sim.getObjectPosition(base)[2] == pytest.approx(1.29, abs=0.05)
+        assert sim.testCB("Paul", lambda a, b: (b, a), "Jeanine") == ["Jeanine", "Paul"]
+        assert sim.unpackFloatTable(sim.packFloatTable([1.0, 2.5])) == [1.0, 2.5]
+        with pytest.raises(Exception, match="near names are /Quadcopter"):
+            sim.getObject("/Quadcoptr")
+        sim.stopSimulation()
+        assert sim.getSimulationState() == sim.simulation_stopped
+    finally:
+        over.set()
+        thread.join()
