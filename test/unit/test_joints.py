@@ -5,6 +5,9 @@ import math
 
 import pytest
 
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.object_tree import WORLD
+from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.host import Surroundings
@@ -35,6 +38,10 @@ objects:
   - {name: LeftWheel, shape: cylinder, size: [0.2, 0.05], mass: 1, parent: Left, position: [0, 0, 0]}
   - {name: RightWheel, shape: cylinder, size: [0.2, 0.05], mass: 1, parent: Right, position: [0, 0, 0]}
   - {name: Lamp, kind: dummy, parent: LeftWheel, position: [0.2, 0, 0]}
+  # a shelf on a force sensor, and what holds it
+  - {name: Wall, shape: box, size: [0.1, 0.1, 0.1], position: [20, 0, 2]}
+  - {name: Gauge, kind: force_sensor, parent: Wall, position: [0.1, 0, 0]}
+  - {name: Shelf, shape: box, size: [0.6, 0.2, 0.02], mass: 2, parent: Gauge, position: [0.3, 0, 0]}
   - {name: Loose, shape: box, size: [0.1, 0.1, 0.1], mass: 1, parent: Bob, position: [2, 0, 0]}
 """
 
@@ -87,6 +94,10 @@ def test_joints_move_as_mechanics_says(simulation):
     assert found(simulation, "Loose").matrix()[11] < 0.1, "the tree does not weld"
     wheel, lamp = (found(simulation, name).matrix()[3::4] for name in ("LeftWheel", "Lamp"))
     assert math.dist(wheel, lamp) == pytest.approx(0.2), "what hangs on it turns with it"
+    force, torque = found(simulation, "Gauge").read()
+    assert force == pytest.approx((0, 0, -2 * 9.81), abs=1e-6), "a weight"
+    assert torque == pytest.approx((0, 0.3 * 2 * 9.81, 0), abs=1e-6), "at its arm"
+    assert found(simulation, "Shelf").matrix()[3::4] == pytest.approx((20.4, 0, 2)), "it holds"
     _, turning = found(simulation, "LeftWheel").velocity()
     assert turning[1] == pytest.approx(2, abs=0.2)
 
@@ -113,7 +124,7 @@ def test_scripts_command_joints(simulation):
     assert sim.getJointTargetPosition(lift) == 1.5 and sim.getJointMaxForce(lift) == 20
     assert sim.getJointPosition(lift) == pytest.approx(0.2, abs=0.01), "too weak, it lies on its new lower end"
     assert abs(sim.getJointPosition(pivot) - 0.7) > 0.01, "free again"
-    with pytest.raises(ValueError, match=r"'Cabin' is held by the joint 'Lift'"):
+    with pytest.raises(ValueError, match=r"'Cabin' is held by 'Lift'"):
         sim.setObjectPosition(handle("Cabin"), -1, [0, 0, 0])
     with pytest.raises(TypeError, match="'Cabin' is not a joint of the scene; there are: Pivot, Lift"):
         sim.getJointType(handle("Cabin"))
@@ -149,3 +160,26 @@ def test_moving_the_root_takes_all_along(simulation):
     after = [found(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
     for (x, y, z), there in zip(before, after):
         assert there == pytest.approx((x, y + 2, z), abs=1e-6)
+
+
+def test_a_load_is_taken_up_and_let_go(simulation):
+    """Static, it is carried by its new parent; dynamic again, it falls, with the mass that it had."""
+    loose, tree, drone = found(simulation, "Loose"), simulation.drone.objects, simulation.drone
+    loose.put(frames.from_rpy((-5, 0, 0.9), (0, 0, 0)))
+    loose.set_static(True)
+    tree.set_parent(tree.handle("Loose"), tree.handle("Drone"), keep_in_place=True)
+    drone.receive(Twist(Vector3(0.5, 0, 0.5)))
+    run(simulation, 1)
+    snapshot, there = simulation.snapshot(), loose.matrix()
+    assert frames.relative(drone.matrix, there)[3::4] == pytest.approx((0, 0, -0.1), abs=0.01)
+    assert simulation.world.state(loose.number).position == pytest.approx(there[3::4])
+    loose.set_static(False)
+    tree.set_parent(tree.handle("Loose"), WORLD, keep_in_place=True)
+    run(simulation, 0.2)
+    assert loose.velocity()[0][2] == pytest.approx(-9.81 * 0.2, rel=1e-3)
+    simulation.restore(snapshot)
+    assert loose.is_static and loose.parent.name == "Drone" and loose.matrix() == there
+    simulation.start()
+    assert not found(simulation, "Loose").is_static
+    with pytest.raises(ValueError, match="'Beam' has no mass in the scene file: it stays static"):
+        found(simulation, "Beam").set_static(False)

@@ -216,7 +216,7 @@ ONE = "kind: dummy, position: [0, 0, 0]"
     "entry, words",
     [
         ("{kind: dummy}", "scene.yaml: line 2: parameter objects/0/name: missing"),
-        ("{kind: cone}", "line 2: parameter objects/0/kind = 'cone': must be one of 'dummy', 'joint',"),
+        ("{kind: cone}", "line 2: parameter objects/0/kind = 'cone': must be one of 'dummy', 'joint', 'pro"),
         ("{name: A, kind: dummy, mass: 1}", "line 2: parameter objects/0/mass: unknown key"),
         (f"{{name: A, {ONE}}}\n  - {{name: A, {ONE}}}", "line 3: parameter objects/1/name = 'A': comes twice"),
         (f"{{name: A, parent: A, {ONE}}}", "line 2: parameter objects/0/parent = 'A': 'A' would be its own ancestor"),

@@ -188,7 +188,7 @@ objects:
 """
     )
     shapes = "'box', 'cylinder', 'sphere', 'mesh', 'urdf', 'capsule', 'compound'"
-    kinds = "; or `kind`: one of 'dummy', 'joint', 'proximity_sensor', 'vision_sensor', 'path'"
+    kinds = "; or `kind`: one of 'dummy', 'joint', 'proximity_sensor', 'vision_sensor', 'path', 'force_sensor'"
     with pytest.raises(ParameterError) as refused:
         parameters.load({"scene_file": file, "gravity": "down"})
     first, *others = str(refused.value).split("; line ")

@@ -72,9 +72,10 @@ class ObjectTree:
         for handle in handles:
             for name in self._objects.pop(handle).names:
                 del self._handles[name]
-        self._look_for_loose_ones()
+        self.look_for_loose_ones()
 
-    def _look_for_loose_ones(self) -> None:
+    def look_for_loose_ones(self) -> None:
+        """Look anew which bodies go along only where a script moves what they hang on."""
         self._loose = [one for one in self._objects.values() if one.is_loose]
 
     def is_copied(self, name: str) -> bool:
@@ -139,7 +140,7 @@ class ObjectTree:
             for one, parent, put_back in kept:
                 if one in there and parent in there:
                     put_back()
-            self._look_for_loose_ones()
+            self.look_for_loose_ones()
 
         return recall
 
@@ -190,6 +191,6 @@ class ObjectTree:
         matrix = moved.matrix()
         moved.parent = new
         if moved.body is not None:
-            self._look_for_loose_ones()
+            self.look_for_loose_ones()
         elif keep_in_place:
             moved.put(matrix)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import IDENTITY, Matrix, cross
+from drone_sim.mechanics.frames import Matrix, cross
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose, State
+from drone_sim.scene.entry import Place
 from drone_sim.world import World
 
 
@@ -35,7 +36,7 @@ class SceneBody:
 
 
 class LinkBody:
-    """A shape that a joint holds."""
+    """A shape that a joint or a force sensor holds."""
 
     def __init__(self, world: World, number: int, link: int, local: Matrix):
         """Take the world, the number of the body in it, of its link, and that link's frame from the shape's."""
@@ -66,14 +67,14 @@ class LinkBody:
 
 
 class HeldShape(SceneObject):
-    """A shape that a joint holds: nobody puts it anywhere else."""
+    """A shape that a joint or a force sensor holds: nobody puts it anywhere else."""
 
     is_loose = False
 
     def put(self, matrix: Matrix) -> None:
         """Refuse. Raises ValueError."""
-        joint = self.parent.name if self.parent is not None else ""
-        raise ValueError(f"'{self.name}' is held by the joint '{joint}': set that, or move what it hangs on")
+        above = self.parent.name if self.parent is not None else ""
+        raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move what it hangs on")
 
 
 class Carried:
@@ -100,53 +101,94 @@ class Carried:
             self.follow()
 
 
-class StaticShape(SceneObject):
-    """A shape without mass: it stands still in its parent's frame, and its body in the world with it."""
+class Shape(SceneObject):
+    """A shape that no joint holds: free where it has a mass, else it stands still in its parent's frame."""
 
     def __init__(
         self,
-        names: tuple[str, ...],
-        alias: str,
-        parent: SceneObject | None,
-        local: Matrix = IDENTITY,
+        place: Place,
         *,
         world: World,
         number: int,
-        hangs: Callable[[StaticShape], None],
+        mass: float,
+        changed: Callable[[Shape], None],
         follow: Callable[[], None],
     ):
-        """Take the number of its body; `hangs` is told whenever it has another parent, `follow` when it is put."""
+        """Take where it is, the number of its body, and its mass (kg).
+
+        `changed` is told whenever it hangs on something else, or has become static or dynamic; `follow` when it is put.
+        """
         self.number = number
         self._world = world
+        self._mass = mass
         self._parent: SceneObject | None = None
-        self._hangs, self._follow = hangs, follow
+        self._changed, self._follow = changed, follow
         self._passing: set[int] = set()
         self.carried = Carried(world, number, self.matrix)
-        super().__init__(names, alias, parent, local, kind="shape")
+        self.body = None
+        super().__init__(*place, SceneBody(world, number) if mass else None, kind="shape")
+        self._renew()
 
     @property
     def parent(self) -> SceneObject | None:  # type: ignore[override]
-        """What carries it."""
+        """What carries it, where it has no mass."""
         return self._parent
 
     @parent.setter
     def parent(self, parent: SceneObject | None) -> None:
-        if parent is self._parent:
+        if parent is not self._parent:
+            self._parent = parent
+            self._renew()
+
+    @property
+    def is_static(self) -> bool:
+        """Whether the dynamics leaves it alone."""
+        return self.body is None
+
+    def set_static(self, static: bool) -> None:
+        """Let the dynamics leave it alone, or move it again. Raises ValueError for what has never had a mass."""
+        if static == self.is_static:
             return
-        self._parent = parent
-        above = bodies_above(self)
+        if not self._mass:
+            raise ValueError(f"'{self.name}' has no mass in the scene file: it stays static")
+        matrix = self.matrix()
+        self.body = None if static else SceneBody(self._world, self.number)
+        self._world.freeze(self.number, static)
+        self._renew()
+        self.put(matrix)
+
+    def put(self, matrix: Matrix) -> None:
+        """Put it there, and its body."""
+        super().put(matrix)
+        if self.is_static:
+            self.carried.follow()
+            self._follow()
+
+    def release(self) -> None:
+        """Be in the world as at the beginning, before another object takes its place."""
+        if self._mass:
+            self.set_static(False)
+        self.parent = None
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that puts it back where it is now, as static as it is."""
+        put_back, static = super().remember(), self.is_static
+
+        def recall() -> None:
+            self.set_static(static)
+            put_back()
+
+        return recall
+
+    def _renew(self) -> None:
+        """Do not collide with what carries it, and tell that something has changed."""
+        above = bodies_above(self) if self.is_static else set()
         for number in self._passing - above:
             self._world.let_pass(self.number, number, passes=False)
         for number in above - self._passing:
             self._world.let_pass(self.number, number)
         self._passing = above
-        self._hangs(self)
-
-    def put(self, matrix: Matrix) -> None:
-        """Put it there, and its body."""
-        super().put(matrix)
-        self.carried.follow()
-        self._follow()
+        self._changed(self)
 
 
 def bodies_above(one: SceneObject) -> set[int]:
@@ -154,7 +196,7 @@ def bodies_above(one: SceneObject) -> set[int]:
     found = set()
     above = one.parent
     while above is not None:
-        carrier = above if isinstance(above, StaticShape) else above.body
+        carrier = above if isinstance(above, Shape) else above.body
         number = getattr(carrier, "number", None)
         if number is not None:
             found.add(number)

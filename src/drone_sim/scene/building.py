@@ -10,6 +10,7 @@ from drone_sim.mechanics.frames import IDENTITY, Matrix, multiply
 from drone_sim.mechanics.state import Pose
 from drone_sim.scene.chains import Chain, Hung
 from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.kinds.force_sensor import ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.object_parameters import ObjectParameters
 from drone_sim.shapes.compound import Compound, parts_of
@@ -88,6 +89,8 @@ def _frame(entries: Sequence[EntryParameters], chain: Chain, matrices: Mapping[i
 
 def _hinge(entries: Sequence[EntryParameters], hung: Hung) -> Hinge:
     joint = entries[hung.joint]
+    if isinstance(joint, ForceSensorParameters):
+        return Hinge(hung.above, hung.local, "fixed", None, 0.0)
     assert isinstance(joint, JointParameters), "a chain hangs on joints"
     return Hinge(hung.above, hung.local, joint.type, joint.limits, joint.value)
 

@@ -1,8 +1,9 @@
-"""Which joints of a scene the dynamics moves, and what hangs together by them.
+"""Which joints of a scene the dynamics moves, and what hangs together by them and by force sensors.
 
 A joint that is not kinematic, is revolute or prismatic, and has just one shape with a mass right below it, holds that
 shape to what is above: to the next such shape or joint upwards, else to its parent, which stands still or carries it.
-Shapes with a mass between which there is no such joint are free of each other: the tree does not weld.
+A force sensor with such a shape holds it rigidly. Shapes with a mass between which there is neither are free of each
+other: the tree does not weld.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ from typing import NamedTuple
 
 from drone_sim.mechanics.frames import IDENTITY, Matrix, multiply
 from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.kinds.force_sensor import ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.object_parameters import ObjectParameters
 
+_Holding = JointParameters | ForceSensorParameters
+
 
 class Hung(NamedTuple):
-    """A shape on a joint, both as indices among the entries.
+    """A shape on a joint, or on a force sensor, both as indices among the entries.
 
     above: index in the chain of what it is held to; local: that one's frame from the joint's, where the frame of a
     root is the shape's (or the joint's parent's) and that of what is held is its joint's, as it has moved.
@@ -48,6 +52,11 @@ def found(entries: Sequence[EntryParameters]) -> Chains:
     return _Search(entries).run()
 
 
+def _holds(one: _Holding) -> bool:
+    """Tell whether something may hold a shape in the dynamics."""
+    return isinstance(one, ForceSensorParameters) or one.mode != "kinematic"
+
+
 class _Search:
     def __init__(self, entries: Sequence[EntryParameters]):
         self._entries = entries
@@ -57,20 +66,20 @@ class _Search:
 
     def run(self) -> Chains:
         reasons = {}
-        joints = {index: one for index, one in enumerate(self._entries) if isinstance(one, JointParameters)}
+        joints = {index: one for index, one in enumerate(self._entries) if isinstance(one, _Holding)}
         below = self._shapes_below(joints)
         for index, one in joints.items():
             reason = self._reason(one, below[index])
             if reason:
                 reasons[index] = reason
-            elif one.mode != "kinematic":
+            elif _holds(one) and below[index]:
                 self._held[index] = below[index][0]
         chains: list[Chain] = []
         for joint in self._held:
             self._put(joint, chains)
         return Chains(chains, reasons)
 
-    def _shapes_below(self, joints: Mapping[int, JointParameters]) -> dict[int, list[int]]:
+    def _shapes_below(self, joints: Mapping[int, _Holding]) -> dict[int, list[int]]:
         """Return the shapes with a mass right below each joint."""
         below: dict[int, list[int]] = {index: [] for index in joints}
         for index, one in enumerate(self._entries):
@@ -80,11 +89,11 @@ class _Search:
                     below[above].append(index)
         return below
 
-    def _reason(self, joint: JointParameters, below: Sequence[int]) -> str:
+    def _reason(self, joint: _Holding, below: Sequence[int]) -> str:
         """Return why the dynamics does not move a joint that should be; '' where it does, or should not."""
-        if joint.mode == "kinematic":
+        if not _holds(joint) or (isinstance(joint, ForceSensorParameters) and not below):
             return ""
-        if joint.type == "spherical":
+        if isinstance(joint, JointParameters) and joint.type == "spherical":
             return "spherical ones are"
         if not below:
             return "no shape with a mass hangs right on it"

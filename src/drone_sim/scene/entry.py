@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point
 from drone_sim.mechanics.frames import Matrix, from_rpy, to_quaternion
+from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
+
+
+class Place(NamedTuple):
+    """Where an object belongs in the tree."""
+
+    names: tuple[str, ...]
+    alias: str
+    parent: SceneObject | None
+    local: Matrix
 
 
 class EntryParameters(Checked):

@@ -8,15 +8,16 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from drone_sim.config.types import ParameterError
-from drone_sim.mechanics.frames import IDENTITY, multiply, position, to_quaternion
+from drone_sim.mechanics.frames import IDENTITY, multiply
 from drone_sim.mechanics.joint import Joint
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.mechanics.state import Pose
 from drone_sim.scene import building, chains, order, scene_files
-from drone_sim.scene.bodies import Carried, HeldShape, LinkBody, SceneBody, StaticShape, bodies_above
+from drone_sim.scene.bodies import Carried, HeldShape, LinkBody, SceneBody, Shape, bodies_above
 from drone_sim.scene.drive import JointDrive
-from drone_sim.scene.kinds.kind import Around, KindParameters, Look, Place
+from drone_sim.scene.entry import Place
+from drone_sim.scene.kinds.force_sensor import ForceSensor
+from drone_sim.scene.kinds.kind import Around, KindParameters, Look
 from drone_sim.scene.object_parameters import ObjectParameters
 from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.shapes.visual import Visual
@@ -53,6 +54,7 @@ class Scene:
         self.bodies = [self._body(index) for index in sorted(self._places)]  # of the shapes, as the file has them
         self._add_names()
         self._is_placed = False
+        self._tree = ObjectTree()
         self._forget_objects()
 
     def _body(self, index: int) -> SceneBody | LinkBody:
@@ -82,6 +84,7 @@ class Scene:
         Raises ParameterError, with its place, for a name that is taken, or a parent that is not there.
         """
         self._forget_objects()
+        self._tree = objects
         for index in order.parents_first(self._entries):
             if self._entries[index].name:
                 self._objects[index] = self._add(objects, index)
@@ -93,8 +96,8 @@ class Scene:
 
     def _forget_objects(self) -> None:
         for one in getattr(self, "_objects", {}).values():
-            if isinstance(one, StaticShape):
-                one.parent = None  # collides again with what carried it
+            if isinstance(one, Shape):
+                one.release()
         self._objects: dict[int, SceneObject] = {}  # by entry
         self._hanging: dict[int, Carried] = {}  # static shapes that have a parent, by body
         self._carried_bases: list[Carried] = []  # those of chains whose first joint has one
@@ -131,37 +134,43 @@ class Scene:
         number, link = self._places[index]
         if link != -1:
             return HeldShape(*place[:3], IDENTITY, self._body(index))
-        if isinstance(one, ObjectParameters) and not one.mass:
-            return StaticShape(*place, world=self._world, number=number, hangs=self._hang, follow=self.follow)
-        return SceneObject(*place[:3], IDENTITY, self._body(index))
+        mass = one.mass if isinstance(one, ObjectParameters) else 0.0
+        return Shape(place, world=self._world, number=number, mass=mass, changed=self._changed, follow=self.follow)
 
-    def _hang(self, shape: StaticShape) -> None:
-        if shape.parent is None:
+    def _changed(self, shape: Shape) -> None:
+        """Follow what carries a shape from now on, or follow it no longer."""
+        if shape.name in self._tree:
+            self._tree.look_for_loose_ones()
+        if shape.parent is None or not shape.is_static:
             self._hanging.pop(shape.number, None)
         else:
             self._hanging[shape.number] = shape.carried
 
     def _hold_chains(self) -> None:
-        """Let the dynamics move the joints of chains."""
+        """Let the dynamics move the joints of chains, and force sensors measure."""
         for chain, body in zip(self._chains, self._bases):
             for hung in chain.hung:
-                joint = self._objects[hung.joint]
-                assert isinstance(joint, Joint), "a chain hangs on joints"
-                joint.drive = JointDrive(self._world, *self._places[hung.shape])
-                joint.drive.limit(joint.limits)
-                joint.drive.command(joint.control)
+                self._hold(self._objects[hung.joint], *self._places[hung.shape])
             first = self._objects[chain.hung[0].joint]
             if chain.root is None and first.parent is not None:
                 self._carried_bases.append(Carried(self._world, body, first.parent.below))
                 for above in bodies_above(first):
                     self._world.let_pass(body, above)
 
+    def _hold(self, one: SceneObject, body: int, link: int) -> None:
+        if isinstance(one, ForceSensor):
+            one.hold(self._world, body, link)
+        elif isinstance(one, Joint):
+            one.drive = JointDrive(self._world, body, link)
+            one.drive.limit(one.limits)
+            one.drive.command(one.control)
+
     def _place_loose_ones(self) -> None:
         """Put what hangs on vehicles where they are, now that they are there."""
         for index, one in self._objects.items():
-            if isinstance(one.body, SceneBody) and one.parent is not None:
+            if one.is_loose and one.parent is not None:
                 matrix = multiply(one.parent.below(), self._entries[index].local)
-                self._world.set_pose(one.body.number, Pose(position(matrix), to_quaternion(matrix)))
+                one.put(matrix)
 
     # ---- what is carried
 
@@ -181,7 +190,7 @@ class Scene:
         """Return a function that puts bodies without mass back where the tree has them."""
 
         def recall() -> None:
-            statics = [one.carried for one in self._objects.values() if isinstance(one, StaticShape)]
+            statics = [one.carried for one in self._objects.values() if isinstance(one, Shape)]
             for one in (*self._carried_bases, *statics):
                 one.renew()
 

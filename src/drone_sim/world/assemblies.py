@@ -19,7 +19,6 @@ from drone_sim.shapes.compound import Part
 from drone_sim.shapes.mass import Inertia
 from drone_sim.world.own_files import OwnFiles
 
-_TYPES = {"revolute": "revolute", "prismatic": "prismatic"}
 _NO_LIMIT = 1e9
 _FASTEST = 1e4  # rad/s or m/s of a joint; PyBullet's own limit is 100
 _NO_INERTIA = Inertia((0.0, 0.0, 0.0))
@@ -28,8 +27,8 @@ _NO_INERTIA = Inertia((0.0, 0.0, 0.0))
 class Hinge(NamedTuple):
     """How a link hangs on another: by a joint about or along z.
 
-    parent: index of the other link; local: that link's frame from the joint's; motion: "revolute" or "prismatic";
-    limits: rad or m, None for none; value: rad or m, at the beginning.
+    parent: index of the other link; local: that link's frame from the joint's; motion: "revolute", "prismatic", or
+    "fixed" for none; limits: rad or m, None for none; value: rad or m, at the beginning.
     """
 
     parent: int
@@ -71,18 +70,22 @@ def create(client: int, files: OwnFiles, links: Sequence[Link], pose: Pose) -> t
         raise ValueError(f"a body of {len(links)} links: PyBullet cannot make it ({error})") from None
     names = [pybullet.getJointInfo(body, number, client)[12] for number in range(len(links) - 1)]
     numbers = [-1, *(names.index(f"l{index}".encode()) for index in range(1, len(links)))]
-    for link, number in zip(links[1:], numbers[1:]):
-        _settle(client, body, number, link)
+    for link, number in zip(links, numbers):
+        if link.hinge is not None:
+            _settle(client, body, number, link.hinge)
+        if link.mass:
+            moments = list(link.inertia.moments)
+            pybullet.changeDynamics(body, number, localInertiaDiagonal=moments, physicsClientId=client)
     return body, numbers
 
 
-def _settle(client: int, body: int, number: int, link: Link) -> None:
+def _settle(client: int, body: int, number: int, hinge: Hinge) -> None:
     """Let a link be of V-REP's material, and its joint turn freely."""
     pybullet.changeDynamics(body, number, lateralFriction=1, restitution=0, physicsClientId=client)
     pybullet.changeDynamics(body, number, jointDamping=0, maxJointVelocity=_FASTEST, physicsClientId=client)
-    pybullet.setJointMotorControl2(body, number, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
-    if link.hinge is not None:
-        pybullet.resetJointState(body, number, link.hinge.value, 0, client)
+    if hinge.motion != "fixed":
+        pybullet.setJointMotorControl2(body, number, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
+        pybullet.resetJointState(body, number, hinge.value, 0, client)
 
 
 # ---- as a URDF
@@ -104,7 +107,8 @@ def _add_link(files: OwnFiles, robot: Xml.Element, index: int, link: Link) -> No
     inertial = Xml.SubElement(element, "inertial")
     _add_origin(inertial, frames.multiply(link.local, link.inertia.frame))
     Xml.SubElement(inertial, "mass", value=repr(link.mass))
-    a, b, c = map(repr, link.inertia.moments)
+    # PyBullet refuses moments that no solid has, such as V-REP lets one have: they are set afterwards, as they are.
+    a = b = c = repr(max(link.inertia.moments))
     Xml.SubElement(inertial, "inertia", ixx=a, iyy=b, izz=c, ixy="0", ixz="0", iyz="0")
     for number, part in enumerate(link.parts):
         told = part.shape.for_bullet(files, moves=link.mass != 0)
@@ -119,15 +123,18 @@ def _add_link(files: OwnFiles, robot: Xml.Element, index: int, link: Link) -> No
 
 
 def _add_joint(robot: Xml.Element, index: int, hinge: Hinge) -> None:
-    ends = hinge.limits is not None or hinge.motion == "prismatic"
-    joint = Xml.SubElement(robot, "joint", name=f"j{index}", type=_TYPES[hinge.motion] if ends else "continuous")
+    joint = Xml.SubElement(robot, "joint", name=f"j{index}", type=_type(hinge))
     Xml.SubElement(joint, "parent", link=f"l{hinge.parent}")
     Xml.SubElement(joint, "child", link=f"l{index}")
     _add_origin(joint, hinge.local)
     Xml.SubElement(joint, "axis", xyz="0 0 1")
-    if ends:
+    if hinge.limits is not None or hinge.motion == "prismatic":
         low, high = map(repr, hinge.limits or (-_NO_LIMIT, _NO_LIMIT))
         Xml.SubElement(joint, "limit", lower=low, upper=high, effort=repr(_NO_LIMIT), velocity=repr(_NO_LIMIT))
+
+
+def _type(hinge: Hinge) -> str:
+    return "continuous" if hinge.motion == "revolute" and hinge.limits is None else hinge.motion
 
 
 def _add_shape(element: Xml.Element, kind: str, place: Matrix, told: Geometry) -> Xml.Element:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pybullet
 
-from drone_sim.mechanics.frames import cross, turned
+from drone_sim.mechanics.frames import Vector, cross, turned
 from drone_sim.mechanics.state import Pose, State, compose, inverse
 
 NO_LIMIT = 1e9  # rad or m
@@ -45,6 +45,19 @@ class Joints:
         """Return position and velocity of the joint above a link, and what its motor gave in the last sub-step."""
         value, velocity, _, force = pybullet.getJointState(body, link, self._client)
         return value, velocity, force
+
+    def measure(self, body: int, link: int) -> None:
+        """Let a joint tell its `load` from now on."""
+        pybullet.enableJointForceTorqueSensor(body, link, True, self._client)
+
+    def load(self, body: int, link: int) -> tuple[Vector, Vector]:
+        """Return force and torque by which a link acted on its joint in the last sub-step, in the link's frame."""
+        reaction = pybullet.getJointState(body, link, self._client)[2]  # on the link, in its inertial frame
+        centre, turn = pybullet.getLinkState(body, link, 0, 0, self._client)[2:4]
+        fx, fy, fz = turned(turn, reaction[:3])
+        tx, ty, tz = turned(turn, reaction[3:])
+        ax, ay, az = cross(centre, (fx, fy, fz))
+        return (-fx, -fy, -fz), (-tx - ax, -ty - ay, -tz - az)
 
     def put(self, body: int, link: int, value: float) -> None:
         """Put a joint somewhere, at rest."""

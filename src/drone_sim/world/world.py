@@ -65,6 +65,7 @@ class World:
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: dict[int, tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
         self._beginning = Beginning(self._client)
+        self._frozen: dict[int, tuple[float, Vector]] = {}  # mass and moments of what has lost them for a while
         self._permeable: set[tuple[int, int]] = set()  # bodies and links that nothing meets
         self._probe: int | None = None  # a collision shape as good as a point
         self._poses: tuple[int, np.ndarray] | None = None  # of all visuals, and the changes that they are of
@@ -177,9 +178,23 @@ class World:
         self._beginning.forget(body)
         self.joints.forget(body)
         self._permeable = {one for one in self._permeable if one[0] != body}
+        self._frozen.pop(body, None)
         self._textures.forget(body)
         self._centres.pop(body, None)
         self._pictures.remove(body)
+
+    def freeze(self, body: int, still: bool) -> None:
+        """Take a body's mass away and stop it, or give the mass back."""
+        if still:
+            mass, _, moments = pybullet.getDynamicsInfo(body, -1, self._client)[:3]
+            self._frozen[body] = mass, moments
+            pybullet.changeDynamics(body, -1, mass=0, physicsClientId=self._client)
+            pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
+        elif body in self._frozen:
+            mass, moments = self._frozen.pop(body)
+            pybullet.changeDynamics(body, -1, mass=mass, physicsClientId=self._client)
+            pybullet.changeDynamics(body, -1, localInertiaDiagonal=moments, physicsClientId=self._client)
+        self._pictures.moved(body)
 
     def set_color(self, body: int, rgba: Sequence[float]) -> None:
         """Paint all of a body (0..1 each)."""

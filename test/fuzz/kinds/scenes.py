@@ -35,6 +35,36 @@ def _object(draw):
     return one
 
 
+_NAMES = st.sampled_from(["A", "B", "C", "Quadricopter_base", "FrontVision", ""])
+_POINTS = st.lists(vectors(), min_size=0, max_size=4)
+_OF_KINDS = {
+    "type": st.sampled_from(["revolute", "prismatic", "spherical", "ray", "cone", "disc", "cylinder", "pyramid"]),
+    "mode": st.sampled_from(["kinematic", "passive", "position", "velocity", "force"]),
+    "limits": mostly(st.just([-1, 1]), vectors(2)),
+    "points": _POINTS,
+    **dict.fromkeys(("value", "target", "max_force", "range", "angle", "radius", "fov", "near", "width"), numbers),
+}
+_PARTS = st.lists(
+    st.fixed_dictionaries({"shape": st.sampled_from([*_SIZES, "compound"])}, optional={"size": vectors()}), max_size=3
+)
+
+
+@st.composite
+def _of_a_kind(draw):
+    """Return a joint, a sensor, a path, or a shape that hangs on one, by names that may meet."""
+    one = {"name": draw(_NAMES), "position": draw(vectors()), "parent": draw(mostly(_NAMES, junk))}
+    kind = draw(
+        st.sampled_from(["dummy", "joint", "joint", "proximity_sensor", "vision_sensor", "path", "", "compound"])
+    )
+    if kind == "compound":
+        return {**one, "shape": kind, "parts": draw(mostly(_PARTS, junk)), "mass": draw(st.sampled_from([0, 1]))}
+    if not kind:
+        moments = {"moments": draw(vectors())}
+        one.update(shape="sphere", size=[0.1], mass=draw(st.sampled_from([0, 1])), respondable=draw(st.booleans()))
+        return {**one, "inertia": moments} if draw(st.integers(0, 3)) == 0 else one
+    return {**one, "kind": kind, **{key: draw(values) for key, values in _OF_KINDS.items() if draw(st.booleans())}}
+
+
 @st.composite
 def _scene(draw):
     scene = {}
@@ -47,7 +77,8 @@ def _scene(draw):
             "yaw": draw(mostly(small, st.one_of(numbers, junk))),
         }
         scene["drone"] = draw(mostly(st.just(drone), junk))
-    objects = [draw(_object()) for _ in range(draw(st.integers(0, 3)))] * draw(_COUNT)
+    entries = st.one_of(_object(), _of_a_kind())
+    objects = [draw(entries) for _ in range(draw(st.integers(0, 5)))] * draw(_COUNT)
     scene["objects"] = draw(mostly(st.just(objects), junk))
     if draw(st.integers(0, 19)) == 0:
         scene[draw(texts)] = draw(junk)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from drone_sim.scene.kinds.dummy import DummyParameters
+from drone_sim.scene.kinds.force_sensor import ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.kinds.path import PathParameters
 from drone_sim.scene.kinds.proximity_sensor import ProximitySensorParameters
@@ -14,4 +15,5 @@ KINDS = (
     ProximitySensorParameters,
     VisionSensorParameters,
     PathParameters,
+    ForceSensorParameters,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -14,19 +14,12 @@ from drone_sim.config.types import Label, Point
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.render.intrinsics import Intrinsics
-from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.entry import EntryParameters, Place
 from drone_sim.world import World
 
+__all__ = ["Around", "KindParameters", "Look", "Place"]
+
 Look = Callable[[str, Intrinsics, Matrix], np.ndarray]
-
-
-class Place(NamedTuple):
-    """Where an object belongs in the tree."""
-
-    names: tuple[str, ...]
-    alias: str
-    parent: SceneObject | None
-    local: Matrix
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,19 @@ scripts send what they make up. So there is one name more here, readSensor, for 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
+from drone_sim.mechanics.frames import Vector
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.host import Host, Readable
 from drone_sim.scripting.api.types import Handle
+
+
+@runtime_checkable
+class _ForceSensor(Protocol):
+    def hold(self, world: Any, body: int, link: int) -> None: ...
+
+    def read(self) -> tuple[Vector, Vector]: ...
 
 
 class Sensors:
@@ -20,6 +28,14 @@ class Sensors:
         """Take the drone whose sensors they are."""
         self._objects = host.objects
         self._sensors = host.sensors
+
+    def readForceSensor(self, handle: Handle) -> tuple[int, list[float], list[float]]:
+        """Return 1, and force (N) and torque (N m) by which what hangs on a force sensor acts on it, in its frame."""
+        found = self._objects[handle]
+        if not isinstance(found, _ForceSensor):
+            raise WrongValue(f"'{found.name}' is not a force sensor of the scene")
+        force, torque = found.read()
+        return 1, list(force), list(torque)
 
     def readSensor(self, handle: Handle) -> dict[str, Any] | None:
         """Return the last reading of a sensor of any kind, by the names of its message's fields; nothing before it.
