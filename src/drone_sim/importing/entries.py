@@ -56,11 +56,9 @@ class Entries:
     def _shape(self, one: Placed) -> dict[str, Any] | None:
         shape = one.object.shape
         assert shape is not None  # for mypy: the table says so
-        moves = one.is_dynamic and not _hangs_on_a_body(one)
+        moves = one.is_dynamic and not _is_only_carried(one)
         if one.is_dynamic and not moves:
-            self._report.add(
-                one.name, "hangs on another body by a joint or a force sensor: carried by it, with no mass"
-            )
+            self._report.add(one.name, "hangs on a joint that only scripts move: carried by it, with no mass")
         try:
             keys = form(one.name, shape, self._writer, is_solid=moves)
         except TooLarge as error:
@@ -145,20 +143,16 @@ class Entries:
         kind = getattr(one.object.of, "kind", "object")
         if kind not in ("force sensor", "light", "script"):
             self._report.add(one.name, f"a {kind}: only its place is brought")
-        return {"kind": "dummy"}
+        return {"kind": "force_sensor" if kind == "force sensor" else "dummy"}
 
 
-def _hangs_on_a_body(one: Placed) -> bool:
-    """Tell whether joints or force sensors tie a shape to another that the dynamics moves, or that stands still.
+def _is_only_carried(one: Placed) -> bool:
+    """Tell whether a shape that the dynamics would move hangs on a joint that it does not.
 
-    The tree alone does not: a dynamic shape right below another is free.
+    Joints that it does, and force sensors, hold the one shape right below them. What hangs on nothing is free.
     """
-    here = one.above
-    tied = False
-    while here is not None and here.object.shape is None:
-        tied = tied or here.is_force_sensor or isinstance(here.object.of, Joint)
-        here = here.above
-    return tied
+    joint = one.above.object.of if one.above is not None else None
+    return isinstance(joint, Joint) and (joint.mode == "kinematic" or joint.kind in ("spherical", "screw"))
 
 
 def _inertia(mass: float, inertia: Inertia | None) -> dict[str, Any]:
