@@ -111,6 +111,10 @@ def test_the_floor_the_step_and_gravity(imported):
     assert content == {"time_step": 0.01, "gravity": -1.62, "floor": {"size": 2.0}, "objects": []}
     loaded = parameters.load({"scene_file": str(imported.scene)})
     assert (loaded.time_step, loaded.sub_steps, loaded.gravity) == (0.01, 2, -1.62)
+    with pytest.raises(
+        parameters.ParameterError, match=r"time_step = 0\.01: a simulation that runs with 0\.05 s goes on"
+    ):
+        parameters.load().in_scene(str(imported.scene))
 
 
 def test_what_cannot_be_brought_is_said_object_by_object(imported):
@@ -141,6 +145,7 @@ def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported):
     content = imported(*quadricopter(code=HOVER), compressed=True)
     vehicle = content["vehicles"]["drone"]
     assert vehicle["propellers"]["particle_size"] == 0.005 and "scripts" not in content and content["objects"] == []
+    assert "Quadricopter: its propellers' scripts are V-REP's own" in imported.said
     assert vehicle["script_parameters"] == {"gain": 2.5, "shown": True}
     rigid = urdf.read(str(imported.scene.parent / vehicle["urdf"]))
     assert rigid.mass == pytest.approx(0.52) and np.diag(rigid.inertia) == pytest.approx(

@@ -44,6 +44,8 @@ def _say(imported: Imported) -> None:
     counts = {"object": imported.objects, "vehicle": imported.vehicles, "script": imported.scripts}
     said = ", ".join(f"{count} {word}" if count == 1 else f"{count} {word}s" for word, count in counts.items())
     print(f"{imported.scene}: {said}")
+    for note in imported.report.notes:
+        print(note)
     if imported.report:
         print(f"Not as it was in the file (all of it in {LIST}):")
         for line in imported.report.short():

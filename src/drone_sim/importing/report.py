@@ -12,6 +12,7 @@ class Report:
 
     def __init__(self) -> None:
         """Begin with nothing to say."""
+        self.notes: list[str] = []  # what is the same by other means
         self._said: dict[str, list[str]] = {}
 
     def add(self, name: str, what: str) -> None:

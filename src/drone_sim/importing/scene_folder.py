@@ -240,5 +240,6 @@ class _Import:
         if lines:
             self._folder.write(LIST, "\n".join([said, "", *lines, ""]))
         head = f"# {said}{f' What is not as it was there: {LIST}.' if lines else ''}\n"
+        head += "".join(f"# {note}.\n" for note in self._report.notes)
         text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
         self._folder.write(SCENE, head + text)

@@ -123,6 +123,9 @@ class ImportedVehicle:
         entry.update(self._script(files, report))
         if self.law is not None:
             entry["propellers"] = self.law
+            report.notes.append(
+                f"{self.root.name}: its propellers' scripts are V-REP's own; the built-in law is the same"
+            )
         entry["objects"] = {ours: self._object(ours, one) for ours, one in self.objects.items()}
         cameras = {self._camera_key(one): self._camera(one) for one in self.cameras}
         return {**entry, "cameras": cameras} if cameras else entry
