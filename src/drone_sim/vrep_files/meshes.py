@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -53,7 +53,9 @@ def read_mesh(outside: Level, inside: Level, pools: Pools) -> Mesh:
     return Mesh(vertices @ turn[:, :3].T + turn[:, 3], faces, _color(inside), _primitive(inside, pose))
 
 
-def _picked(inside: Level, tags: tuple[str, str], pool: list[np.ndarray], read) -> np.ndarray:  # type: ignore[no-untyped-def]
+def _picked(
+    inside: Level, tags: tuple[str, str], pool: list[np.ndarray], read: Callable[[bytes], np.ndarray]
+) -> np.ndarray:
     """Return an array from a pool, by the index under the first tag, or what is in place under the second."""
     index = inside.integer(tags[0], default=-1)
     if inside.find(tags[0]) is None:
