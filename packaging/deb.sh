@@ -38,7 +38,7 @@ rm -rf "$site"/pybullet_{data,envs,examples,utils,robots} "$site"/eglRenderer* "
 find "$site" -name '*.so' -exec strip --strip-unneeded {} +
 find "$stage$own/bin" -type f -delete
 find "$stage" -name __pycache__ -prune -exec rm -rf {} +
-sed -i "1s:.*:#!$own/bin/python:" "$stage"/usr/lib/drone_sim/{simulator,key_teleop,view,fly}
+sed -i "1s:.*:#!$own/bin/python:" "$stage"/usr/lib/drone_sim/{simulator,key_teleop,view,fly,import_scene}
 
 mkdir "$stage/DEBIAN"
 cat >"$stage/DEBIAN/control" <<CONTROL

@@ -205,7 +205,7 @@ class Toolbar(unittest.TestCase):
         self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
         self.scene.write_text("object: []\n")
         said = self.call("load_scene", expected=False)
-        self.assertIn("unknown key object; known are datum, drone, floor, magnetic_field, objects, vehicles", said)
+        self.assertIn("unknown key object; known are datum, drone, floor, gravity, magnetic_field, objects, ", said)
 
     def test_rviz_sees_the_objects_and_where_they_go(self):
         trimesh.creation.box().export(str(self.scene.parent / "one.stl"))

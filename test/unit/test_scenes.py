@@ -13,6 +13,8 @@ from drone_sim.shapes.box import Box
 from drone_sim.shapes.sphere import Sphere
 from drone_sim.world import World
 
+KEYS = "datum, drone, floor, gravity, magnetic_field, objects, scripts, sub_step, time_step, vehicles"
+
 URDF = """<robot name="barrel"><link name="barrel">
   <inertial><mass value="2"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
   <visual><geometry><mesh filename="block.stl"/></geometry></visual>
@@ -109,7 +111,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: [", "scene.yaml: while parsing"),
         (
             "boxes: []",
-            "line 1: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, scripts, vehicles",
+            f"line 1: unknown key boxes; known are {KEYS}",
         ),
         ("1: 2", "key '1' must be a text (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
@@ -194,7 +196,7 @@ objects:
     first, *others = str(refused.value).split("; line ")
     assert first == f"{file}: line 1: parameter floor/size = 'a': input should be a valid number"
     assert others == [
-        "2: unknown key boxes; known are datum, drone, floor, magnetic_field, objects, scripts, vehicles",
+        f"2: unknown key boxes; known are {KEYS}",
         "4: parameter drone/position = [1, 2]: must be 3 numbers, [x, y, z] in m",
         "5: parameter drone/yam: unknown key; known are yaw",
         "9: parameter objects/0/color = [1, 0]: must be 3 or 4 numbers from 0 to 1, "

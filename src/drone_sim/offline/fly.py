@@ -30,6 +30,7 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
+from drone_sim.vrep_files.reading import SUFFIXES
 from drone_sim.wording import near_names, shown
 
 _AFTER = 5.0  # s flown on after the last command
@@ -39,7 +40,7 @@ _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
 _FAILED, _SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
 _YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot")
 _FILES = ("script", "scene", "config", "commands", *_OUTPUTS)
-_ENDINGS = {"scene": _YAML, "config": _YAML, "commands": _YAML, "csv": (".csv", ".txt", "")}
+_ENDINGS = {"scene": (*_YAML, *SUFFIXES), "config": _YAML, "commands": _YAML, "csv": (".csv", ".txt", "")}
 _EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
 
@@ -224,7 +225,9 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
     parser.add_argument("--script", metavar="FILE", help="child script (default: the tutorial's)")
-    parser.add_argument("--scene", metavar="FILE.yaml", help="floor, objects and the drone's place, as scene:=")
+    parser.add_argument(
+        "--scene", metavar="FILE", help="floor, objects and the drone's place, .yaml or .ttt, as scene:="
+    )
     parser.add_argument("--config", metavar="FILE.yaml", help="the parameters that change, as config:=")
     parser.add_argument("--commands", metavar="FILE.yaml", help="timeline of twists, poses and pushes")
     parser.add_argument(

@@ -29,11 +29,14 @@ from drone_sim.config.types import (
 )
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import package_path, resolve
+from drone_sim.importing.cache import imported_scene
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.together import check_rates
 from drone_sim.vehicles.parameters import DroneParameters, EquipmentParameters, VehicleParameters, laid_over
+from drone_sim.vrep_files.errors import VrepFileError
+from drone_sim.vrep_files.reading import SUFFIXES
 from drone_sim.wording import MAX_NAME, shown
 
 __all__ = ["CameraParameters", "ParameterError", "Parameters", "load", "read_yaml"]
@@ -92,7 +95,7 @@ class Parameters(EquipmentParameters):
 
     @property
     def in_scene_file(self) -> Mapping[str, Any]:
-        """What the scene file says of `drone` and `vehicles`."""
+        """What the scene file says beside the scene: `drone`, `vehicles`, `time_step`, ..."""
         return self._in_scene_file
 
     @property
@@ -105,7 +108,11 @@ class Parameters(EquipmentParameters):
 
         '' is the scene that was given without a file.
         """
-        return _in_scene(self._given, file)
+        found = _in_scene(self._given, file)
+        if found.time_step != self.time_step:
+            said = f"a simulation that runs with {self.time_step:g} s goes on with that"
+            raise ParameterError(f"{file or 'the scene'}: time_step = {found.time_step:g}: {said}", ("time_step",))
+        return found
 
     def with_vehicles(self, entries: Any) -> Parameters:
         """Return the parameters with other `vehicles` given beside the scene file's. Raises ParameterError."""
@@ -200,7 +207,17 @@ def _config(name: str) -> dict[str, Any]:
 def _in_scene(given: dict[str, Any], file: Any) -> Parameters:
     if not (isinstance(file, str) and file):
         return _checked(given, file, {})
+    if Path(file).suffix.lower() in SUFFIXES:
+        file = _imported(file)
     return _checked(given, file, scene_parameters.read(file), file)
+
+
+def _imported(file: str) -> str:
+    """Return the scene file that one of V-REP's is made into. Raises ParameterError."""
+    try:
+        return str(imported_scene(resolve(file)))
+    except (OSError, VrepFileError) as error:
+        raise ParameterError(f"parameter scene_file = {shown(file)}: {error}") from None
 
 
 def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str = "") -> Parameters:
@@ -214,7 +231,7 @@ def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str
         found = [one for one in problems(error, Parameters) if _is_given(one, given, scene)]
         raise ParameterError(_told(found, named, bool(scene))) from None
     parameters._given = given
-    parameters._in_scene_file = {key: scene[key] for key in ("drone", "vehicles") if key in scene}
+    parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
     return parameters
 
 

@@ -12,7 +12,7 @@ from drone_sim.config.types import Checked, FoundFile, ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics import frames
 from drone_sim.run.parameters import Parameters
-from drone_sim.scene import state_now
+from drone_sim.scene import scene_parameters, state_now
 from drone_sim.scene.scene import Scene
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -26,7 +26,9 @@ def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Ve
     floor, and OSError; what was in the file is then still there.
     """
     own = scene.parameters
-    content: dict[str, Any] = {"datum": own.datum.model_dump(), "magnetic_field": list(own.magnetic_field)}
+    said = parameters.in_scene_file
+    content: dict[str, Any] = {key: said[key] for key in scene_parameters.WORLD if key in said}
+    content.update(datum=own.datum.model_dump(), magnetic_field=list(own.magnetic_field))
     content["floor"] = _plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))
     content["objects"] = _objects(scene, path.parent)
@@ -53,7 +55,9 @@ def _flying(parameters: Parameters, vehicles: Iterable[Vehicle], folder: Path) -
 
 
 def _place(vehicle: Vehicle) -> dict[str, Any]:
-    return {"position": list(frames.position(vehicle.matrix)), "yaw": frames.to_rpy(vehicle.matrix)[2]}
+    roll, pitch, yaw = frames.to_rpy(vehicle.matrix)
+    place: dict[str, Any] = {"position": list(frames.position(vehicle.matrix)), "yaw": yaw}
+    return {**place, "tilt": [roll, pitch]} if any(vehicle.parameters.tilt) else place
 
 
 def _named(said: Any, folder: Path) -> dict[str, Any]:

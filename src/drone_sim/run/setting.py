@@ -8,6 +8,7 @@ import numpy as np
 
 from drone_sim.config.types import ParameterError
 from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.object_names import suffixed
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.run.cast import Cast, tell
@@ -83,15 +84,23 @@ class Setting:
         self.vehicles.pop(name).leave()
 
     def _put(self, parameters: VehicleParameters) -> Vehicle:
-        vehicle = Vehicle(parameters, self._free_suffix(), self.shared)
+        vehicle = Vehicle(parameters, self._suffix(parameters), self.shared)
         self.vehicles[vehicle.name] = vehicle
         if vehicle.instruments:
             self.world.solve_contacts_for_instruments()
         return vehicle
 
-    def _free_suffix(self) -> str:
-        """Return what the names of V-REP's copies end in: nothing for the first, then #0, #1, ..."""
+    def _suffix(self, parameters: VehicleParameters) -> str:
+        """Return what the names of V-REP's copies end in: nothing for the first, then #0, #1, ..., or as it is given.
+
+        Raises ParameterError for one that another vehicle has.
+        """
         taken = {vehicle.suffix for vehicle in self.vehicles.values()}
+        if parameters.suffix is not None:
+            wanted = suffixed("", parameters.suffix)
+            if wanted in taken:
+                raise ParameterError(f"vehicle {parameters.name}: suffix = {parameters.suffix}: another vehicle has it")
+            return wanted
         return next(one for one in itertools.chain([""], map("#{}".format, itertools.count())) if one not in taken)
 
     def _empty_tree(self) -> None:

@@ -31,7 +31,8 @@ from drone_sim.scene.object_parameters import SHAPES
 from drone_sim.wording import shown
 
 MAX_OBJECTS = 1000
-_BESIDE = ("drone", "vehicles")  # what a scene file holds besides the scene
+WORLD = ("time_step", "sub_step", "gravity")  # what a scene file may say of these comes before the parameters
+BESIDE = ("drone", "vehicles", *WORLD)  # what a scene file holds besides the scene
 
 
 class FloorParameters(Checked):
@@ -98,10 +99,8 @@ def read(file: str) -> dict[str, Any]:
 
 def from_content(content: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return what `read` does, of a scene file's content."""
-    scene = {
-        key: value for key, value in content.items() if key not in _BESIDE
-    }  # the unknown are refused with the rest
-    found = {"scene": scene, **{key: content[key] for key in _BESIDE if key in content}}
+    scene = {key: value for key, value in content.items() if key not in BESIDE}  # the unknown are refused with the rest
+    found = {"scene": scene, **{key: content[key] for key in BESIDE if key in content}}
     find_files_beside(folder, found)
     return found
 
@@ -119,13 +118,13 @@ def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
 
 def problem_in_file(problem: Problem) -> Problem | None:
     """Return a problem as the scene file has it, where they stand beside the drone; None for any other."""
-    if problem.location[:1] in (("drone",), ("vehicles",)):
+    if problem.location[:1] in [(key,) for key in BESIDE]:
         return problem
     if problem.location[:1] != ("scene",):
         return None
     location, text = problem.location[1:], problem.text.replace("parameter scene/", "parameter ", 1)
     if len(location) == 1 and "unknown key" in text:
-        known = ", ".join(sorted([*SceneParameters.model_fields, *_BESIDE]))
+        known = ", ".join(sorted([*SceneParameters.model_fields, *BESIDE]))
         text = f"unknown key {readable_key(location)}; known are {known}"
     return problem._replace(location=location, text=text)
 

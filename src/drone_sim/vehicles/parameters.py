@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr
+from pydantic import AfterValidator, Field, PrivateAttr
 
 from drone_sim.config.types import (
     Angle,
@@ -26,9 +26,13 @@ from drone_sim.config.types import (
 )
 from drone_sim.forces import ForceParameters
 from drone_sim.forces.propellers import PropellerParameters
+from drone_sim.mechanics.object_names import NO_SUFFIX
 from drone_sim.sensors import AnySensor
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters
 from drone_sim.sensors.together import check_together
+from drone_sim.vehicles.object_places import ObjectPlace
+from drone_sim.vehicles.quadricopter_objects import OWN_NAMES
+from drone_sim.wording import near_names
 
 MAX_FORCES = 16
 MAX_SENSORS = 64
@@ -68,14 +72,27 @@ class ControlParameters(Checked):
     Precovery: Gain
 
 
+def _own(places: Mapping[str, ObjectPlace]) -> Mapping[str, ObjectPlace]:
+    for name in places:
+        if name not in OWN_NAMES:
+            raise ValueError(f"'{name}' is no object of a vehicle; {near_names(name, OWN_NAMES)}")
+    return places
+
+
 class PlaceParameters(Checked):
-    """Body and starting place of a vehicle."""
+    """Body and starting place of a vehicle; `tilt` is roll and pitch (rad).
+
+    `suffix` is that of its objects' names: -1 is none, 0 is #0, ...; left out, it is the next that is free.
+    """
 
     urdf: File
     position: Annotated[
         tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]], Field(description="3 numbers, [x, y, z] in m")
     ]
     yaw: Angle
+    tilt: Annotated[tuple[Angle, Angle], Field(description="2 numbers, [roll, pitch] in rad")] = (0.0, 0.0)
+    suffix: Annotated[int, Within(NO_SUFFIX, 1_000_000)] | None = None
+    objects: Annotated[dict[Label, ObjectPlace], AfterValidator(_own)] = Field(default_factory=dict)
 
 
 class DroneParameters(PlaceParameters):

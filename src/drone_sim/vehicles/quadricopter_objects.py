@@ -27,11 +27,12 @@ from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_tree import Body, ObjectTree
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.parameters import SensorParameters
+from drone_sim.vehicles.object_places import NOWHERE_ELSE, ObjectPlace
 
-_V_REPS, _COPPELIASIMS = "Quadricopter", "Quadcopter"  # what names begin with in 3.x, and in 4.0 to 4.2
 DRONE = "Drone"
 TARGET = "DronePosition"  # the green sphere
 TRACK_BASE = "Track_base"
+FLOOR_CAMERA, FRONT_CAMERA = "Quadricopter_floorCamera", "Quadricopter_frontCamera"
 BASE = frames.from_rpy((0.0, 0.0, -0.01), (0.0, 0.0, 0.0))  # Quadricopter_base in the root's frame
 _ALONG_X = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)  # z forward, y up, x left
 OPTICAL_FROM_SENSOR = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # optical frames: y down, x right
@@ -47,14 +48,37 @@ def joint(number: int) -> str:
     return f"Quadricopter_propeller_joint{number}"
 
 
+def _of_each_generation(name: str) -> list[str]:
+    """Return a name as V-REP 3.x has it, and as CoppeliaSim 4.0 to 4.2 have it where that is another."""
+    return list(dict.fromkeys((name, name.replace("Quadricopter_", "Quadcopter_"))))
+
+
+_PROPELLERS = [name(n) for n in (1, 2, 3, 4) for name in ("Quadricopter_propeller{}".format, respondable, joint)]
+OWN_NAMES = (
+    DRONE,
+    "Quadricopter_base",
+    TRACK_BASE,
+    TARGET,
+    FLOOR_CAMERA,
+    FRONT_CAMERA,
+    *_PROPELLERS,
+)  # of every vehicle
+
+
 class QuadricopterObjects:
     """Puts the objects of one vehicle into the tree, all under names with its suffix."""
 
-    def __init__(self, objects: ObjectTree, suffix: str, handles: list[int]):
-        """Take the tree, '' or '#0' and so on, and the list to which every object's handle is added."""
+    def __init__(
+        self, objects: ObjectTree, suffix: str, handles: list[int], places: Mapping[str, ObjectPlace] | None = None
+    ):
+        """Take the tree, '' or '#0' and so on, and the list to which every object's handle is added.
+
+        `places` says of some objects, by their names here, how else they are called and where they are.
+        """
         self._objects = objects
         self._suffix = suffix
         self._handles = handles
+        self._places = {} if places is None else places
 
     def add(
         self,
@@ -77,21 +101,9 @@ class QuadricopterObjects:
             self._add(respondable(number), name, alias="respondable", kind="shape")
             self._add(joint(number), name, alias="joint", kind="joint")
         down = frames.from_rpy((0.0, 0.0, -0.01), (0.0, math.pi / 2, 0.0))
-        self._add(
-            "Quadricopter_floorCamera",
-            DRONE,
-            frames.multiply(down, _ALONG_X),
-            alias="floorCamera",
-            kind="vision_sensor",
-        )
+        self._add(FLOOR_CAMERA, DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera", kind="camera")
         front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self._add(
-            "Quadricopter_frontCamera",
-            DRONE,
-            frames.multiply(front, _ALONG_X),
-            alias="frontCamera",
-            kind="vision_sensor",
-        )
+        self._add(FRONT_CAMERA, DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera", kind="camera")
         self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"), kind="shape")
         for camera in cameras.values():
             self._add_camera(links, camera)
@@ -109,12 +121,19 @@ class QuadricopterObjects:
         also: Sequence[str] = (),
         kind: str = "",
     ) -> None:
-        also = (*also, *(one.replace(_V_REPS, _COPPELIASIMS) for one in (name, *also) if one.startswith(f"{_V_REPS}_")))
+        place = self._places.get(name, NOWHERE_ELSE)
         own = None if parent is None else f"{parent}{self._suffix}"
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
-        names = [f"{one}{self._suffix}" for one in (name, *also)]
+        if place.parent is not None:
+            above = place.parent or None
+        names = [f"{one}{self._suffix}" for called in (name, *also) for one in _of_each_generation(called)]
+        if place.name and place.name not in names:
+            names.append(place.name)
+        alias = place.alias or alias or name
         try:
-            handle = self._objects.add(names[0], above, local, body, alias=alias or name, also=names[1:], kind=kind)
+            handle = self._objects.add(
+                names[0], above, place.local(local), body, alias=alias, also=names[1:], kind=kind
+            )
         except ValueError as error:  # one of the scene has that name
             raise ParameterError(str(error)) from None
         self._handles.append(handle)

@@ -59,7 +59,8 @@ class Vehicle:
         self._timeout, self._time_step = parameters.cmd_vel_timeout, shared.time_step  # asked for in every step
         rigid = urdf.read(parameters.urdf)
         self._rotors = Rotors(rigid, parameters.urdf)
-        start = Pose(parameters.position, frames.to_quaternion(frames.from_rpy((0, 0, 0), (0, 0, parameters.yaw))))
+        turned = frames.from_rpy((0, 0, 0), (*parameters.tilt, parameters.yaw))
+        start = Pose(parameters.position, frames.to_quaternion(turned))
         self.body = Body(rigid, start, shared.world)
         shapes = [(respondable(number), link) for number, link in zip(NUMBERS, self._rotors.links)]
         self._shapes = {
@@ -100,7 +101,7 @@ class Vehicle:
         self._leave_tree()
         self._tree = self.objects
         self._handles = []
-        objects = QuadricopterObjects(self._tree, self.suffix, self._handles)
+        objects = QuadricopterObjects(self._tree, self.suffix, self._handles, self.parameters.objects)
         own, links = self.parameters, self.body.rigid.links
         objects.add(self.body, links, self._rotors.links, own.cameras, own.sensors)
         self._track = self.objects[self.objects.handle(TRACK_BASE + self.suffix)]

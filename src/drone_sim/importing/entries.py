@@ -1,0 +1,171 @@
+"""What the objects of a file are in a scene: one entry of `objects:` each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from drone_sim.importing.forms import form
+from drone_sim.importing.meshes import MeshWriter, TooLarge
+from drone_sim.importing.numbers import number, numbers, pose_keys
+from drone_sim.importing.placing import Placed
+from drone_sim.importing.report import Report
+from drone_sim.mechanics import frames
+from drone_sim.vrep_files.model import Camera, Dummy, Inertia, Joint, ProximitySensor, Shape
+
+_LARGEST_PICTURE = 4096  # px, of a side
+_NEAREST, _FARTHEST = 1e-4, 1e5  # m
+_LARGEST_FORCE = 1e9  # N m or N
+_LEAST_MASS, _LEAST_MOMENT = 1e-6, 1e-12
+
+
+class Entries:
+    """Makes an entry of every object, and says what is not as it was."""
+
+    def __init__(self, writer: MeshWriter, report: Report):
+        """Take what writes mesh files, and what is told of the rest."""
+        self._writer = writer
+        self._report = report
+        self._readers: dict[type, Callable[[Placed], dict[str, Any] | None]] = {
+            Shape: self._shape,
+            Dummy: self._dummy,
+            Joint: self._joint,
+            Camera: self._camera,
+            ProximitySensor: self._proximity_sensor,
+        }
+
+    def make(self, one: Placed, parent: str, local: frames.Matrix) -> dict[str, Any]:
+        """Return the entry of an object that hangs on `parent` ('' the world) at `local` in its frame."""
+        own = self._readers.get(type(one.object.of), self._other)(one)
+        keys: dict[str, Any] = {"name": one.name}
+        if one.alias:
+            keys["alias"] = one.alias
+        if parent:
+            keys["parent"] = parent
+        place = pose_keys(local)
+        return {**keys, **(own or {"kind": "dummy"}), "position": [0.0, 0.0, 0.0], **place}
+
+    def frame(self, one: Placed, parent: str) -> dict[str, Any]:
+        """Return an entry that is only a place on `parent`, for what is seen as a part of that."""
+        alias = {"alias": one.alias} if one.alias else {}
+        return {"name": one.name, **alias, "parent": parent, "kind": "dummy"}
+
+    # ---- shapes
+
+    def _shape(self, one: Placed) -> dict[str, Any] | None:
+        shape = one.object.shape
+        assert shape is not None  # for mypy: the table says so
+        moves = one.is_dynamic and not _is_only_carried(one)
+        if one.is_dynamic and not moves:
+            self._report.add(one.name, "hangs on a joint that only scripts move: carried by it, with no mass")
+        try:
+            keys = form(one.name, shape, self._writer, is_solid=moves)
+        except TooLarge as error:
+            self._report.add(one.name, f"only its place is brought: {error}")
+            return None
+        if keys is None:
+            self._report.add(one.name, "only its place is brought: it has no surface")
+            return None
+        if moves:
+            keys["mass"] = number(max(shape.mass, _LEAST_MASS))
+            keys.update(_inertia(shape.mass, shape.inertia))
+        if not one.is_respondable:
+            keys["respondable"] = False
+        if not one.is_visible:
+            keys["visible"] = False
+        return keys
+
+    # ---- others
+
+    def _dummy(self, one: Placed) -> dict[str, Any]:
+        of = one.object.of
+        if isinstance(of, Dummy) and of.linked >= 0:
+            self._report.add(one.name, "its link to another dummy is not brought")
+        return (
+            {"kind": "dummy", "size": number(of.size)} if isinstance(of, Dummy) and of.size > 0 else {"kind": "dummy"}
+        )
+
+    def _joint(self, one: Placed) -> dict[str, Any]:
+        joint = one.object.of
+        assert isinstance(joint, Joint)
+        if joint.kind == "screw":
+            self._report.add(one.name, "a screw: it turns without sliding")
+        kind = "revolute" if joint.kind == "screw" else joint.kind
+        keys: dict[str, Any] = {"kind": "joint", "type": kind}
+        if joint.kind == "spherical":
+            if abs(joint.turn.orientation[3]) < 1 - 1e-9:
+                self._report.add(one.name, "a spherical joint: it begins unturned")
+            return keys
+        if joint.limits is not None and joint.limits[0] < joint.limits[1]:
+            keys["limits"] = numbers(joint.limits)
+        keys["value"] = number(_between(joint.position, joint.limits))
+        if joint.mode == "kinematic":
+            return keys
+        keys["mode"] = joint.mode
+        if joint.mode != "passive":
+            keys.update(target=number(joint.target), max_force=number(min(joint.max_force, _LARGEST_FORCE)))
+        return keys
+
+    def _camera(self, one: Placed) -> dict[str, Any]:
+        camera = one.object.of
+        assert isinstance(camera, Camera)
+        if camera.resolution is None:
+            return {"kind": "dummy"}
+        width, height = (min(max(side, 1), _LARGEST_PICTURE) for side in camera.resolution)
+        keys: dict[str, Any] = {"kind": "vision_sensor", "width": width, "height": height}
+        if camera.is_perspective:
+            keys["fov"] = number(min(max(camera.angle, 0.01), 3.1))
+        else:
+            keys["size"] = number(max(camera.size, _NEAREST))
+        near = min(max(camera.near, _NEAREST), _FARTHEST / 2)
+        return {**keys, "near": number(near), "far": number(min(max(camera.far, 2 * near), _FARTHEST))}
+
+    def _proximity_sensor(self, one: Placed) -> dict[str, Any]:
+        sensor = one.object.of
+        assert isinstance(sensor, ProximitySensor)
+        keys: dict[str, Any] = {
+            "kind": "proximity_sensor",
+            "type": sensor.kind,
+            "range": number(max(sensor.range, _NEAREST)),
+            "offset": number(max(sensor.offset, 0.0)),
+        }
+        if sensor.kind == "cylinder":
+            keys["radius"] = number(max(sensor.radius, _NEAREST))
+        if sensor.kind in ("cone", "disc"):
+            keys["angle"] = number(min(max(sensor.angle, 1e-3), math.tau))
+        if sensor.kind == "pyramid":
+            keys["angle"] = number(_opening(sensor))
+            self._report.add(one.name, f"a pyramid: its sides open by {keys['angle']:.3g} rad all around")
+        return keys
+
+    def _other(self, one: Placed) -> dict[str, Any]:
+        kind = getattr(one.object.of, "kind", "object")
+        if kind not in ("force sensor", "light", "script"):
+            self._report.add(one.name, f"a {kind}: only its place is brought")
+        return {"kind": "force_sensor" if kind == "force sensor" else "dummy"}
+
+
+def _is_only_carried(one: Placed) -> bool:
+    """Tell whether a shape that the dynamics would move hangs on a joint that it does not.
+
+    Joints that it does, and force sensors, hold the one shape right below them. What hangs on nothing is free.
+    """
+    joint = one.above.object.of if one.above is not None else None
+    return isinstance(joint, Joint) and (joint.mode == "kinematic" or joint.kind in ("spherical", "screw"))
+
+
+def _inertia(mass: float, inertia: Inertia | None) -> dict[str, Any]:
+    if inertia is None or min(inertia.moments) * mass < _LEAST_MOMENT:
+        return {}
+    moments = [number(moment * mass, 15) for moment in inertia.moments]
+    return {"inertia": {"moments": moments, **pose_keys(inertia.pose.matrix)}}
+
+
+def _between(value: float, limits: tuple[float, float] | None) -> float:
+    return value if limits is None else min(max(value, limits[0]), limits[1])
+
+
+def _opening(sensor: ProximitySensor) -> float:
+    """Return the angle (rad) at which a pyramid would end as wide as this one, which begins with some width."""
+    return min(max(2 * math.atan2(max(sensor.size) / 2, max(sensor.offset + sensor.range, _NEAREST)), 1e-3), 3.1)

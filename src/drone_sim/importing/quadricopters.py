@@ -1,0 +1,135 @@
+"""Quadricopters among the objects of a file, by how they are built, whatever they are called.
+
+V-REP's is a dynamic shape with four others on force sensors, which are the propellers: as heavy as each other, and
+they say by their names or their scripts what they are, or a script of the model applies forces.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from drone_sim.importing.placing import Placed
+from drone_sim.mechanics import frames
+from drone_sim.vrep_files.model import Dummy, Joint, Script
+
+COUNT = 4  # propellers
+_EQUAL = 0.1  # masses that differ by less than this part are the same
+_PROPELLER = re.compile(r"prop|rotor", re.IGNORECASE)
+_TARGET = re.compile(r"target", re.IGNORECASE)
+_NUMBER = re.compile(r"(\d+)$")
+# Quarters around the body, by the signs of x and y: V-REP's propellers 1 to 4.
+_QUARTERS = {(True, True): 1, (False, True): 2, (False, False): 3, (True, False): 4}
+
+
+@dataclass(frozen=True)
+class Propeller:
+    """One of four: the force sensor that it sits on, its body, and the joint of its blades, if it has one."""
+
+    link: Placed
+    body: Placed
+    joint: Placed | None
+
+
+@dataclass(frozen=True)
+class Quadricopter:
+    """A body with propellers 1 to 4, the frame that its scripts read, and the target that it follows."""
+
+    root: Placed
+    propellers: tuple[Propeller, ...]
+    base: Placed | None
+    target: Placed | None
+    others: frozenset[Placed]  # bodies of other quadricopters, which may hang on this one
+
+    def inside(self) -> Iterator[Placed]:
+        """Yield it and all that hangs on it, other quadricopters aside, in the order of the tree."""
+        return self.root.subtree(without=self.others)
+
+
+def find(objects: Sequence[Placed], scripts: Mapping[int, Sequence[Script]]) -> list[Quadricopter]:
+    """Return the quadricopters, in the order of the file; `scripts` are by the handle of their object."""
+    built = {one: _propellers(one, scripts) for one in objects if one.is_dynamic}
+    roots = frozenset(one for one, propellers in built.items() if propellers is not None)
+    return [
+        Quadricopter(one, propellers, _base(one), _target(one, roots - {one}), roots - {one})
+        for one, propellers in built.items()
+        if propellers is not None
+    ]
+
+
+def _propellers(root: Placed, scripts: Mapping[int, Sequence[Script]]) -> tuple[Propeller, ...] | None:
+    tied = [(link, body) for link in root.children if link.is_force_sensor for body in _bodies(link)]
+    named = [pair for pair in tied if any(_says_propeller(one, scripts) for one in pair)]
+    chosen = tied if not named and _is_pushed(root, scripts) else named
+    if len(chosen) != COUNT or not _are_equal([body for _, body in chosen]):
+        return None
+    by_number = _by_number(root, chosen)
+    return None if by_number is None else tuple(_propeller(*by_number[number]) for number in range(1, COUNT + 1))
+
+
+def _bodies(link: Placed) -> list[Placed]:
+    return [child for child in link.children if child.is_dynamic]
+
+
+def _says_propeller(one: Placed, scripts: Mapping[int, Sequence[Script]]) -> bool:
+    own = [
+        *one.object.parameters,
+        *(pair for script in scripts.get(one.object.handle, ()) for pair in script.parameters),
+    ]
+    return bool(_PROPELLER.search(one.object.name)) or any(name == "particleVelocity" for name, _ in own)
+
+
+def _is_pushed(root: Placed, scripts: Mapping[int, Sequence[Script]]) -> bool:
+    """Tell whether a script of the model applies forces."""
+    own = (script for one in root.subtree() for script in scripts.get(one.object.handle, ()))
+    return any("ddForce" in script.text for script in own)
+
+
+def _are_equal(bodies: Sequence[Placed]) -> bool:
+    masses = [body.object.shape.mass for body in bodies if body.object.shape is not None]
+    return max(masses) - min(masses) <= _EQUAL * max(masses)
+
+
+def _by_number(root: Placed, chosen: Sequence[tuple[Placed, Placed]]) -> dict[int, tuple[Placed, Placed]] | None:
+    """Return them as propellers 1 to 4: by the numbers in their names, or by where they are; None for neither."""
+    for which in (1, 0):
+        numbers = [_NUMBER.search(plain_name(pair[which])) for pair in chosen]
+        by_name = {int(match.group(1)): pair for match, pair in zip(numbers, chosen) if match}
+        if sorted(by_name) == [1, 2, 3, 4]:
+            return by_name
+    quarters = {}
+    for link, body in chosen:
+        x, y, _ = frames.position(frames.relative(root.matrix, body.matrix))
+        quarters[_QUARTERS[x > 0, y > 0]] = (link, body)
+    return quarters if len(quarters) == COUNT else None
+
+
+def plain_name(one: Placed) -> str:
+    """Return an object's name without the suffix of a copy."""
+    return one.object.name.partition("#")[0]
+
+
+def _propeller(link: Placed, body: Placed) -> Propeller:
+    joints = [one for one in body.subtree() if isinstance(one.object.of, Joint)]
+    return Propeller(link, body, joints[0] if joints else None)
+
+
+def _base(root: Placed) -> Placed | None:
+    """Return the frame that scripts read: the dummy called base."""
+    dummies = [one for one in root.children if isinstance(one.object.of, Dummy)]
+    return next((one for one in dummies if plain_name(one).lower().endswith("base")), None)
+
+
+def _target(root: Placed, others: frozenset[Placed]) -> Placed | None:
+    """Return the target that hangs on it."""
+    below = [
+        one for one in root.subtree(others) if one is not root and _TARGET.search(one.object.alias or one.object.name)
+    ]
+    return next((one for one in below if not one.is_dynamic), None)
+
+
+def turned_over(one: Placed) -> float:
+    """Return how far an object leans, rad: the angle between its z axis and the vertical."""
+    return math.acos(min(1.0, max(-1.0, one.matrix[10])))

@@ -1,0 +1,245 @@
+"""A file of V-REP's as a folder of ours: the scene file, its meshes, URDFs and scripts, and what stayed behind."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from drone_sim.importing.entries import Entries
+from drone_sim.importing.floors import floor_parts, floor_size
+from drone_sim.importing.folder import Folder
+from drone_sim.importing.meshes import MeshWriter
+from drone_sim.importing.naming import Names
+from drone_sim.importing.numbers import number, pose_keys
+from drone_sim.importing.placing import Placed, placed
+from drone_sim.importing.quadricopters import find
+from drone_sim.importing.report import Report
+from drone_sim.importing.reserved import reserved_names
+from drone_sim.importing.script_files import ScriptFiles, values
+from drone_sim.importing.vehicles import ImportedVehicle, suffixes, vehicle_names
+from drone_sim.mechanics import frames
+from drone_sim.scene.scene_parameters import MAX_OBJECTS
+from drone_sim.vrep_files.model import Camera, Dummy, Other, Script, VrepFile
+from drone_sim.vrep_files.reading import read_file
+
+SCENE, LIST = "scene.yaml", "IMPORT.txt"
+_STEP, _SUB_STEP, _GRAVITY = 0.05, 0.005, -9.81  # which a scene file need not say
+_FARTHEST = 1e5  # m
+_ONLY_LOOKED_THROUGH = ("light", "graph")
+
+
+class Imported(NamedTuple):
+    """What an import made."""
+
+    scene: Path
+    objects: int
+    vehicles: int
+    scripts: int
+    report: Report
+
+
+def import_file(path: Path, out: Path) -> Imported:
+    """Write what is in a file into the folder `out`. Raises VrepFileError and OSError."""
+    return _Import(read_file(path), path.name, Folder(out)).run()
+
+
+class _Import:
+    def __init__(self, file: VrepFile, name: str, folder: Folder):
+        self._file = file
+        self._name = name
+        self._folder = folder
+        self._report = Report()
+        self._writer = MeshWriter(folder)
+        self._script_files = ScriptFiles(folder)
+        self._objects = placed(file)
+        self._by_handle = {one.object.handle: one for one in self._objects}
+        self._floor = floor_parts(self._objects)
+        self._scripts = self._child_scripts()
+        found = find(self._objects, self._scripts)
+        self._vehicles = [ImportedVehicle(*pair) for pair in zip(found, [self._scripts] * len(found), suffixes(found))]
+        self._vehicle_names = vehicle_names(found)
+        self._words = set(re.findall(r"\w+", "\n".join(script.text for script in file.scripts)))
+        own = [one for vehicle in self._vehicles for one in vehicle.objects.values()]
+        self._of_vehicles = {id(one) for one in own}
+        Names().give(own, self._report)
+        taken = reserved_names([vehicle.suffix for vehicle in self._vehicles]) | {one.name for one in own}
+        ours = self._of_vehicles | {id(one) for one in self._floor}
+        Names(taken).give((one for one in self._objects if id(one) not in ours), self._report)
+
+    def run(self) -> Imported:
+        content: dict[str, Any] = {**self._world()}
+        vehicles = {name: self._vehicle(one) for name, one in zip(self._vehicle_names, self._vehicles)}
+        if vehicles:
+            content["vehicles"] = vehicles
+        else:
+            self._report.add("", "no quadricopter is in the file: our own flies")
+        entries = list(self._entries())
+        content["objects"] = entries
+        scripts = list(self._attached())
+        if scripts:
+            content["scripts"] = scripts
+        self._write(content)
+        return Imported(self._folder.path / SCENE, len(entries), len(vehicles), len(scripts), self._report)
+
+    # ---- the world
+
+    def _world(self) -> dict[str, Any]:
+        settings = self._file.settings
+        world: dict[str, Any] = {}
+        step = settings.time_step or _STEP
+        step = number(min(max(step, 1e-3), 1.0))
+        if step != _STEP:
+            world["time_step"] = step
+        wanted = settings.dynamics_step or _SUB_STEP
+        sub_step = step / max(1, round(step / min(max(wanted, 1e-4), step)))
+        if abs(sub_step - _SUB_STEP) > 1e-9:
+            world["sub_step"] = number(sub_step, 12)
+        if settings.gravity is not None and abs(settings.gravity[2] - _GRAVITY) > 1e-6:
+            world["gravity"] = number(settings.gravity[2])
+        if settings.gravity is not None and any(settings.gravity[:2]):
+            self._report.add("", "gravity is not vertical in the file: only what is vertical of it is brought")
+        if self._floor:
+            world["floor"] = {"size": max(number(floor_size(self._floor), 3), 0.01)}
+        elif settings.time_step is not None:
+            self._report.add("", "the file has no floor at z = 0: ours is there")
+        return world
+
+    def _vehicle(self, one: ImportedVehicle) -> dict[str, Any]:
+        return one.entry(self._folder, self._writer, self._script_files, self._report)
+
+    # ---- scripts
+
+    def _child_scripts(self) -> Mapping[int, list[Script]]:
+        """Return the child scripts that run, by the handle of their object."""
+        found: dict[int, list[Script]] = defaultdict(list)
+        for script in self._file.scripts:
+            on = self._by_handle.get(script.object)
+            if on in self._floor:
+                continue
+            name = on.object.name if on is not None else ""
+            if script.kind == "main":
+                if not script.is_stock_main:
+                    self._report.add("", "the file's own main script is not brought: the phases are V-REP's")
+            elif script.kind != "child" or on is None:
+                self._report.add(name, f"its {script.kind} script is not brought")
+            elif not script.is_enabled or not on.runs_scripts:
+                self._report.add(name, "its child script does not run in the file: not brought")
+            else:
+                found[script.object].append(script)
+        return found
+
+    def _attached(self) -> Iterator[dict[str, Any]]:
+        """Yield the entries of `scripts:`: what is on a vehicle's body, or what its built-in law does, aside."""
+        built_in = {
+            id(propeller.body)
+            for vehicle in self._vehicles
+            for propeller in vehicle.quadricopter.propellers
+            if vehicle.law is not None
+        }
+        roots = {id(vehicle.root) for vehicle in self._vehicles}
+        kept = self._kept | self._of_vehicles
+        for one in self._objects:
+            own = self._scripts.get(one.object.handle, [])
+            if id(one) in built_in:
+                continue
+            if own and id(one) not in kept:
+                self._report.add(one.name, "its child script is not brought: neither is the object")
+                continue
+            for index, script in enumerate(own):
+                on = one if index == 0 else self._by_handle.get(script.own_object)
+                if on is None:
+                    self._report.add(one.name, "has a second child script: not brought")
+                elif index > 0 or id(one) not in roots:
+                    yield self._entry_of(script, on)
+
+    def _entry_of(self, script: Script, on: Placed) -> dict[str, Any]:
+        entry = {"object": on.name, "script": self._script_files.write(on.name, script)}
+        parameters = values(script.parameters or on.object.parameters)
+        return {**entry, "parameters": parameters} if parameters else entry
+
+    # ---- objects
+
+    def _entries(self) -> Iterator[dict[str, Any]]:
+        entries = Entries(self._writer, self._report)
+        by_vehicle = {id(one): vehicle for vehicle in self._vehicles for one in vehicle.quadricopter.inside()}
+        self._kept = self._chosen()
+        for one in self._objects:
+            if id(one) not in self._kept:
+                continue
+            parent, local = self._hangs_on(one)
+            vehicle = by_vehicle.get(id(one))
+            if vehicle is not None and vehicle.carries(one) and one.object.shape is not None:
+                yield {**entries.frame(one, parent), "position": [0.0, 0.0, 0.0], **pose_keys(local)}
+            else:
+                yield entries.make(one, parent, local)
+
+    def _chosen(self) -> set[int]:
+        """Return which objects get an entry: what is a vehicle's or the floor's, or only looked through, has none."""
+        without = {id(one) for one in self._floor} | self._of_vehicles
+        without |= {id(one) for vehicle in self._vehicles for one in vehicle.cameras}
+        seen = {id(one) for vehicle in self._vehicles for one in (*vehicle.parts, *vehicle.looks)}
+        seconds = {self._by_handle.get(two.own_object) for several in self._scripts.values() for two in several[1:]}
+        kept: set[int] = set()
+        for one in reversed(self._objects):  # children first
+            if id(one) in without:
+                continue
+            if not all(abs(value) < _FARTHEST for value in frames.position(one.matrix)):
+                self._report.add(one.name, f"is left out: it is more than {_FARTHEST / 1e3:g} km away")
+                continue
+            has_kept = any(id(child) in kept for child in one.children)
+            is_asked_for = self._is_mentioned(one) or bool(self._scripts.get(one.object.handle)) or one in seconds
+            if has_kept or is_asked_for or not (id(one) in seen or self._is_idle(one)):
+                kept.add(id(one))
+        return self._as_many_as_may_be(kept)
+
+    def _as_many_as_may_be(self, kept: set[int]) -> set[int]:
+        chosen: set[int] = set()
+        for one in self._objects:
+            if id(one) in kept and len(chosen) < MAX_OBJECTS:
+                chosen.add(id(one))
+            elif id(one) in kept:
+                self._report.add(one.name, f"is left out: a scene has {MAX_OBJECTS} objects at most")
+        return chosen
+
+    def _is_idle(self, one: Placed) -> bool:
+        """Tell whether a scene is the same without an object that nothing asks for and nothing hangs on."""
+        of = one.object.of
+        if isinstance(of, Dummy):
+            return bool(one.children)  # it held nothing but what is left out
+        return (isinstance(of, Camera) and of.resolution is None) or (
+            isinstance(of, Other) and of.kind in (*_ONLY_LOOKED_THROUGH, "script", "force sensor")
+        )
+
+    def _is_mentioned(self, one: Placed) -> bool:
+        names = (one.object.name.partition("#")[0], one.object.alias)
+        return any(name in self._words for name in names if name)
+
+    def _hangs_on(self, one: Placed) -> tuple[str, frames.Matrix]:
+        """Return the nearest object above that is there, '' for the world, and the pose in its frame."""
+        if one.is_dynamic and one.above is not None and one.above.object.shape is not None:
+            return "", one.matrix  # the tree alone does not hold it
+        here = one.above
+        while here is not None and id(here) not in self._kept and id(here) not in self._of_vehicles:
+            here = here.above
+        if here is None:
+            return "", one.matrix
+        if here is one.above:
+            return here.name, one.local
+        return here.name, frames.relative(here.below, one.matrix)
+
+    # ---- files
+
+    def _write(self, content: dict[str, Any]) -> None:
+        lines = list(self._report.whole())
+        said = f"From {self._name}, {self._file.program} (format {self._file.version})."
+        if lines:
+            self._folder.write(LIST, "\n".join([said, "", *lines, ""]))
+        head = f"# {said}{f' What is not as it was there: {LIST}.' if lines else ''}\n"
+        head += "".join(f"# {note}.\n" for note in self._report.notes)
+        text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+        self._folder.write(SCENE, head + text)

@@ -1,0 +1,170 @@
+"""What stands in a V-REP file, as plain immutable values: metres, kilograms, radians, quaternions xyzw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drone_sim.mechanics.state import Pose
+
+Rgba = tuple[float, float, float, float]
+ORIGIN = Pose((0.0, 0.0, 0.0))
+# What a model says of itself and all below it.
+NOT_DYNAMIC, NOT_RESPONDABLE, INVISIBLE, WITHOUT_SCRIPTS = 0x20, 0x40, 0x100, 0x200
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """A simple form: its word, full extents along x, y and z (m), and its place in the shape's frame."""
+
+    word: str  # plane, disc, cuboid, spheroid, cylinder, cone, heightfield or capsule
+    size: tuple[float, float, float]
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """One surface of a shape: vertices (n, 3), m, in the shape's frame; faces (m, 3); colour 0..1."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    color: Rgba
+    primitive: Primitive | None = None
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Principal moments divided by the mass (m²), about a frame in the shape's."""
+
+    pose: Pose
+    moments: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What has a surface, and may have a mass (kg)."""
+
+    meshes: tuple[Mesh, ...]
+    mass: float
+    inertia: Inertia | None
+    is_dynamic: bool
+    is_respondable: bool
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint along its z axis; its position (rad, m, or a pose), limits None where it is cyclic."""
+
+    kind: str  # revolute, prismatic, spherical or screw
+    position: float
+    limits: tuple[float, float] | None
+    turn: Pose  # of a spherical one
+    lead: float  # m per turn, of a screw
+    mode: str  # kinematic, passive, velocity or position
+    target: float  # rad/s or m/s, rad or m, as the mode needs it
+    max_force: float  # N m or N
+
+
+@dataclass(frozen=True)
+class Dummy:
+    """A frame; the handle of the dummy that it is linked to, -1 for none."""
+
+    size: float
+    linked: int = -1
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What looks along +z, +y up; the angle (rad) spans the larger side, the size (m) of an orthographic one too."""
+
+    is_perspective: bool
+    angle: float
+    size: float
+    near: float
+    far: float
+    resolution: tuple[int, int] | None = None  # px, of a vision sensor
+
+
+@dataclass(frozen=True)
+class ProximitySensor:
+    """What measures the distance along +z: kind pyramid, cylinder, disc, cone or ray; m and rad."""
+
+    kind: str
+    offset: float
+    range: float
+    size: tuple[float, float]
+    radius: float
+    angle: float
+
+
+@dataclass(frozen=True)
+class Other:
+    """An object of which only its place is known: force sensor, light, path, graph, ..."""
+
+    kind: str
+
+
+Kind = Shape | Joint | Dummy | Camera | ProximitySensor | Other
+
+
+@dataclass(frozen=True)
+class Script:
+    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own."""
+
+    object: int
+    kind: str  # main, child or customization, or another's number
+    text: str
+    is_threaded: bool = False
+    is_enabled: bool = True
+    language: str = "lua"
+    parameters: tuple[tuple[str, str], ...] = ()
+    is_stock_main: bool = False
+    own_object: int = -1  # handle of the script as an object, -1 where it is none
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """An object: its handle in the file, its parent's (-1 for none), and its pose in the parent's frame."""
+
+    handle: int
+    parent: int
+    name: str  # unique in the file
+    alias: str  # '' where the file has none
+    pose: Pose
+    of: Kind
+    is_model: bool = False
+    model_flags: int = 0
+    layers: int = 1
+    is_detectable: bool = True
+    size_factor: float = 1.0
+    parameters: tuple[tuple[str, str], ...] = ()  # of its script, since 4.0
+    children: list[SceneObject] = field(default_factory=list, compare=False, repr=False)  # filled by the reader
+
+    @property
+    def shape(self) -> Shape | None:
+        """What it is, where it is a shape."""
+        return self.of if isinstance(self.of, Shape) else None
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a file says of the world: steps (s), gravity (m/s²); None where it says nothing, as models do."""
+
+    time_step: float | None = None
+    dynamics_step: float | None = None
+    gravity: tuple[float, float, float] | None = None
+    engine: str = ""
+    visible_layers: int = 0x00FF
+
+
+@dataclass(frozen=True)
+class VrepFile:
+    """A scene or a model."""
+
+    version: int  # of its format
+    program: str  # such as 3.6.1
+    objects: tuple[SceneObject, ...]  # a parent before its children
+    scripts: tuple[Script, ...]
+    settings: Settings
+    ignored: dict[str, int] = field(default_factory=dict)  # how many chunks of each tag that is passed over

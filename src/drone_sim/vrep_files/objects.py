@@ -1,0 +1,146 @@
+"""Objects: what all have in common, and what joints, dummies, cameras and sensors have of their own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from drone_sim.vrep_files.chunks import Level, finite, level, levels
+from drone_sim.vrep_files.errors import VrepFileError, within
+from drone_sim.vrep_files.meshes import Pools
+from drone_sim.vrep_files.model import (
+    ORIGIN,
+    Camera,
+    Dummy,
+    Joint,
+    Kind,
+    Other,
+    ProximitySensor,
+    SceneObject,
+)
+from drone_sim.vrep_files.poses import quaternion_first
+from drone_sim.vrep_files.scripts import read_parameters
+from drone_sim.vrep_files.shapes import read_shape
+
+_JOINTS = {10: "revolute", 11: "prismatic", 12: "spherical"}
+_SENSORS = {30: "pyramid", 31: "cylinder", 32: "disc", 33: "cone", 34: "ray"}
+_OTHERS = {
+    "FSE": "force sensor", "LGT": "light", "SCT": "script", "GRH": "graph", "PAT": "path", "MIL": "mill",
+    "MIR": "mirror", "OCT": "octree", "PTC": "point cloud", "MKR": "marker", "CSO": "custom object",
+}  # fmt: skip
+_USED = {"pyramid": (0, 1, 2, 3), "cylinder": (0, 1, 6), "disc": (0, 1, 6, 8), "cone": (0, 1, 6, 8), "ray": (0, 1)}
+_DYNAMIC_MODE = 5
+_CYCLIC, _MOTOR, _POSITION_CONTROL = 0x01, 0x10, 0x20  # bits of a joint's `Va9`
+_DETECTABLE = 0x1F0
+SCRIPT = "SCT"
+
+
+def read_object(tag: str, data: bytes, pools: Pools) -> SceneObject:
+    """Return an object. Raises VrepFileError, which names it."""
+    base, *more = levels(data, 3)
+    handle, parent = base.integers("Ids", count=2) or (-1, -1)
+    name = base.text("Nme")
+    with within(f"object {name or handle}"):
+        if handle < 0:
+            raise VrepFileError("has no handle")
+        sizes = base.numbers("_fa", "Sfa", 1)
+        own = more[0] if more else Level()
+        return SceneObject(
+            handle=handle,
+            parent=parent,
+            name=name,
+            alias=base.text("Ali"),
+            pose=quaternion_first(base.numbers("_fq", "Cfq", 7), "_fq"),
+            of=_read(tag, own, pools),
+            is_model=bool(base.bits("Va3", "Va2", "Var") & 1),
+            model_flags=base.integer("Mpo") & ~0xF000,
+            layers=base.integer("Lar", default=1, kind="H"),
+            is_detectable=bool(base.integer("Omp", default=_DETECTABLE) & _DETECTABLE),
+            size_factor=1.0 if sizes is None else sizes[0],
+            parameters=read_parameters(base.find("Lsp")),
+        )
+
+
+def is_object(tag: str) -> bool:
+    """Tell whether a chunk of the file is an object."""
+    return tag in _READERS or tag in _OTHERS
+
+
+def script_of(data: bytes) -> bytes | None:
+    """Return the script within a script object."""
+    found = levels(data, 3)
+    return found[1].find("Soo") if len(found) > 1 else None
+
+
+def _read(tag: str, own: Level, pools: Pools) -> Kind:
+    if tag == "SHP":
+        return read_shape(own, pools)
+    return _READERS[tag](own) if tag in _READERS else Other(_OTHERS[tag])
+
+
+def _joint(own: Level) -> Kind:
+    kind = _JOINTS.get(own.integer("Jtt", default=10), "revolute")
+    low, span = own.numbers("_mr", "Pmr", 2) or (0.0, 0.0)
+    position = own.numbers("_rt", "Prt", 1) or (0.0,)
+    turn = own.numbers("_st", "Jst", 4)
+    lead = own.numbers("Sld", "", 1) or [math.tau * per_radian for per_radian in own.numbers("", "Jsp", 1) or (0.0,)]
+    velocity, force = own.numbers("_mp", "Dmp", 2) or (0.0, 0.0)
+    mode, (target,) = _mode(own), own.numbers("_tp", "Dtp", 1) or (0.0,)
+    return Joint(
+        kind="screw" if kind == "revolute" and lead[0] else kind,
+        position=position[0],
+        limits=None if own.bits("Va9") & _CYCLIC or kind == "spherical" else (low, low + span),
+        turn=ORIGIN if turn is None else quaternion_first((*turn, 0.0, 0.0, 0.0), "_st"),
+        lead=lead[0],
+        mode=mode,
+        target=velocity if mode == "velocity" else target,
+        max_force=abs(force),
+    )
+
+
+def _mode(own: Level) -> str:
+    if own.integer("Jmd") != _DYNAMIC_MODE:
+        return "kinematic"
+    switches = own.bits("Va9")
+    if not switches & _MOTOR:
+        return "passive"
+    return "position" if switches & _POSITION_CONTROL else "velocity"
+
+
+def _dummy(own: Level) -> Kind:
+    size = own.numbers("_y2", "Dy2", 1) or (0.01,)
+    return Dummy(size[0], own.integer("Lli", default=-1))
+
+
+def _vision_sensor(own: Level) -> Kind:
+    size, angle, near, far = own.numbers("_cp", "Ccp", 4) or (1.0, math.pi / 3, 0.01, 10.0)
+    width, height = own.integers("Res", count=2) or (32, 32)
+    return Camera(bool(own.bits("Va3", "Var") & 1), angle, size, near, far, (width, height))
+
+
+def _camera(own: Level) -> Kind:
+    size, angle = own.numbers("_p3", "Cp3", 2) or (1.0, math.pi / 3)
+    near, far = own.numbers("_cp", "Ccp", 2) or (0.05, 500.0)
+    perspective = bool(own.bits("Ca3") & 2) if own.find("Ca3") is not None else own.integer("Cpm", default=1) != 0
+    return Camera(perspective, angle, size, near, far)
+
+
+def _proximity_sensor(own: Level) -> Kind:
+    data = own.find("Vod")
+    volume = Level() if data is None else level(data)
+    kind = _SENSORS.get(own.integer("Snt"), "ray")
+    numbers = volume.unchecked("_s3", "Ss3", 9) or (0.0,) * 9
+    # V-REP leaves what a kind does not need as it happens to be in memory.
+    used = finite(tuple(number if index in _USED[kind] else 0.0 for index, number in enumerate(numbers)), "Ss3")
+    offset, reach, x, y, _, _, radius, _, angle = used
+    return ProximitySensor(kind, offset, reach, (x, y), radius, angle)
+
+
+_READERS: dict[str, Callable[[Level], Kind]] = {
+    "SHP": lambda own: Other("shape"),  # which needs the file's pools: see _read
+    "JNT": _joint,
+    "DMY": _dummy,
+    "RSN": _vision_sensor,
+    "CMA": _camera,
+    "SNR": _proximity_sensor,
+}

@@ -1,0 +1,103 @@
+"""A whole file: its objects in a tree, its scripts, its settings."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+from drone_sim.files.resources import read_bytes
+from drone_sim.vrep_files.chunks import top
+from drone_sim.vrep_files.container import MAX_SIZE, open_container
+from drone_sim.vrep_files.errors import VrepFileError, within
+from drone_sim.vrep_files.meshes import Pools
+from drone_sim.vrep_files.model import SceneObject, Script, Settings, VrepFile
+from drone_sim.vrep_files.objects import SCRIPT, is_object, read_object, script_of
+from drone_sim.vrep_files.scripts import read_script
+from drone_sim.vrep_files.settings import with_dynamics, with_simulation
+
+SUFFIXES = (".ttt", ".ttm")
+MAX_OBJECTS = 20_000
+_DEEPEST = 200  # objects below each other
+_SETTINGS = {"SIM": with_simulation, "DYN": with_dynamics}
+
+
+def read_file(path: str | Path) -> VrepFile:
+    """Return what is in a file. Raises VrepFileError, in one line that names it."""
+    with within(str(path)):
+        try:
+            content = read_bytes(path, MAX_SIZE)
+        except OSError as error:
+            raise VrepFileError(str(error.strerror or error)) from None
+        except ValueError as error:
+            raise VrepFileError(str(error)) from None
+        return read(content)
+
+
+def read(content: bytes) -> VrepFile:
+    """Return what a file's bytes hold. Raises VrepFileError."""
+    container = open_container(content)
+    pools, settings = Pools(), Settings()
+    objects: list[SceneObject] = []
+    scripts: list[Script] = []
+    ignored: Counter[str] = Counter()
+    for tag, data in top(container.payload):
+        if is_object(tag):
+            objects.append(read_object(tag, data, pools))
+            scripts += _script_in(tag, data, objects[-1])
+        elif tag == "VIN":
+            with within("VIN"):
+                pools.add(data)
+        elif tag == "LST":
+            with within(f"script {len(scripts) + 1}"):
+                scripts.append(read_script(data))
+        elif tag in _SETTINGS:
+            with within(tag):
+                settings = _SETTINGS[tag](settings, data)
+        else:
+            ignored[tag] += 1
+        if len(objects) > MAX_OBJECTS:
+            raise VrepFileError(f"holds more than {MAX_OBJECTS} objects")
+    program = f"{container.program // 10000}.{container.program // 100 % 100}.{container.program % 100}"
+    return VrepFile(container.version, program, _tree(objects), tuple(scripts), settings, dict(ignored))
+
+
+def _script_in(tag: str, data: bytes, one: SceneObject) -> list[Script]:
+    """Return the script of a script object, which acts on the object's parent."""
+    found = script_of(data) if tag == SCRIPT else None
+    if found is None:
+        return []
+    with within(f"object {one.name}"):
+        return [replace(read_script(found, owner=one.parent), own_object=one.handle)]
+
+
+def _tree(objects: list[SceneObject]) -> tuple[SceneObject, ...]:
+    """Return the objects, a parent before its children, which it is given. Raises VrepFileError."""
+    by_handle = {one.handle: one for one in objects}
+    if len(by_handle) != len(objects):
+        twice = next(handle for handle, count in Counter(one.handle for one in objects).items() if count > 1)
+        raise VrepFileError(f"object {by_handle[twice].name}: another one has its handle {twice}")
+    roots = []
+    for one in objects:
+        if one.parent == -1:
+            roots.append(one)
+        elif one.parent in by_handle:
+            by_handle[one.parent].children.append(one)
+        else:
+            raise VrepFileError(f"object {one.name}: its parent {one.parent} is not in the file")
+    ordered: list[SceneObject] = []
+    for root in roots:
+        _add_below(root, ordered, 0)
+    if len(ordered) != len(objects):
+        there = {one.handle for one in ordered}
+        lost = next(one for one in objects if one.handle not in there)
+        raise VrepFileError(f"object {lost.name}: is its own ancestor")
+    return tuple(ordered)
+
+
+def _add_below(one: SceneObject, ordered: list[SceneObject], depth: int) -> None:
+    if depth > _DEEPEST:
+        raise VrepFileError(f"object {one.name}: hangs deeper than {_DEEPEST} objects below each other")
+    ordered.append(one)
+    for child in one.children:
+        _add_below(child, ordered, depth + 1)

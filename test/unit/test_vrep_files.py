@@ -1,0 +1,285 @@
+"""V-REP's files are read to the last byte; what is no such file, or a broken one, gets one line."""
+
+import itertools
+import math
+import struct
+
+import numpy as np
+import pytest
+from vrep_encoder import (
+    chunk,
+    container,
+    file,
+    integers,
+    mesh,
+    numbers,
+    packed,
+    scene_object,
+    script,
+    shape,
+    text,
+    weight,
+)
+
+from drone_sim.vrep_files.errors import VrepFileError
+from drone_sim.vrep_files.meshes import _packed
+from drone_sim.vrep_files.reading import read, read_file
+
+HALF_TURN_ABOUT_Z = (0.0, 0.0, 0.0, 1.0)  # w, x, y, z
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("version", [16, 22, 23, 24, 25])
+def test_both_widths_and_both_compressions(version, compressed):
+    own = (
+        integers("Jtt", 10)
+        + numbers("_rt", "Prt", 0.5, version=version)
+        + numbers("_mr", "Pmr", -1, 3, version=version)
+    )
+    joint = scene_object("JNT", 3, "Hinge", at=(1, 2, 3), own=own, version=version)
+    (found,) = read(file(joint, version=version, compressed=compressed)).objects
+    assert (found.name, found.pose.position, found.of.position, found.of.limits) == ("Hinge", (1, 2, 3), 0.5, (-1, 2))
+
+
+def test_a_double_counts_where_both_are_there():
+    level = numbers("_y2", "Dy2", 0.1, version=25) + numbers("_y2", "Dy2", 0.9, version=22)
+    assert read(file(scene_object("DMY", 0, "D", own=level))).objects[0].of.size == 0.1
+
+
+def test_unknown_tags_are_passed_over():
+    unknown = chunk("???", b"anything")
+    dummy = scene_object("DMY", 0, "D", base=unknown, own=unknown)
+    found = read(file(chunk("New", b"x"), dummy, version=25))
+    assert [one.name for one in found.objects] == ["D"] and found.ignored == {"New": 1}
+
+
+def test_a_child_may_come_before_its_parent():
+    found = read(file(scene_object("DMY", 5, "Child", parent=9), scene_object("DMY", 9, "Parent"))).objects
+    assert [one.name for one in found] == ["Parent", "Child"] and found[0].children == [found[1]]
+
+
+def test_names_and_aliases():
+    one = scene_object("DMY", 0, "Quadricopter#0", alias="target")
+    two = scene_object("DMY", 1, "Drohne-é", alias="target")
+    assert [(one.name, one.alias) for one in read(file(one, two)).objects] == [
+        ("Quadricopter#0", "target"),
+        ("Drohne-é", "target"),
+    ]
+
+
+# ---- shapes
+
+
+def test_a_mesh_has_a_place_in_its_shape():
+    found = read(file(shape(0, "S", mesh("cylinder", (2, 2, 5), (0, 0, 4), HALF_TURN_ABOUT_Z)))).objects[0].shape
+    (one,) = found.meshes
+    assert np.allclose(one.vertices, [[0, 0, 4], [-1, 0, 4], [0, -1, 4]])
+    assert (one.primitive.word, one.primitive.size, one.primitive.pose.position) == ("cylinder", (2, 2, 5), (0, 0, 4))
+
+
+@pytest.mark.parametrize("faces", ["Ind", "In2"])
+def test_meshes_may_lie_in_a_pool(faces):
+    indices = {"Ind": struct.pack("<3i", 2, 1, 0), "In2": packed([2, 1, 0])}[faces]
+    pool = chunk("VIN", chunk("Ver", struct.pack("<9f", *range(9))) + chunk(faces, indices) + b"EOO")
+    (one,) = read(file(pool, shape(0, "S", mesh(inline=False)))).objects[0].shape.meshes
+    assert one.faces.tolist() == [[2, 1, 0]] and one.vertices[2].tolist() == [6, 7, 8]
+
+
+def test_a_compound_in_a_compound_is_flat_and_the_root_has_the_mass():
+    inner = chunk("Wrp", weight(7.0) + chunk("Geo", b"EOO" + mesh(size=(1, 2, 3))) + b"EOO")
+    outer = chunk("Gsg", weight(0.5, (1, 2, 3), (0, 0, 0.1)) + inner + chunk("Geo", b"EOO" + mesh("sphere")) + b"EOO")
+    own = chunk("Ge2", outer + b"EOO") + chunk("Sss", b"\x80") + chunk("Ss3", b"\x01")
+    found = read(file(scene_object("SHP", 0, "S", own=own))).objects[0].shape
+    assert [one.primitive.word for one in found.meshes] == ["cuboid", "spheroid"]
+    assert (found.mass, found.inertia.moments, found.inertia.pose.position) == (0.5, (1, 2, 3), (0, 0, 0.1))
+    assert found.is_dynamic and found.is_respondable
+
+
+def test_packed_faces_of_every_length():
+    indices = [0, 1, 9000, 3, 2_500_000, 2, 400_000_000, 0, 31]
+    assert _packed(packed(indices)).ravel().tolist() == indices
+
+
+def test_colours():
+    new = chunk(
+        "Cl0", chunk("Cl3", struct.pack("<15f", 0.1, 0.2, 0.3, *[0] * 12)) + chunk("Trf", struct.pack("<f", 0.5))
+    )
+    old = chunk(
+        "Cl0", chunk("Cl2", struct.pack("<12f", 0.17, 0.34, 0.51, 0.34, 0.34, 0.34, *[0] * 6)) + chunk("Var", b"\x04")
+    )
+    found = [read(file(shape(0, "S", mesh(more=color)))).objects[0].shape.meshes[0].color for color in (new, old)]
+    assert np.allclose(found, [(0.1, 0.2, 0.3, 0.5), (0.4, 0.6, 0.8, 1.0)])
+
+
+# ---- the others
+
+
+def test_sensors_and_what_v_rep_leaves_unset():
+    volume = numbers("_s3", "Ss3", 0.1, 5.0, math.nan, 1e38, 0, 0, 0, 0, math.inf)
+    ray = scene_object("SNR", 0, "Ray", own=integers("Snt", 34) + chunk("Vod", volume))
+    eye = scene_object(
+        "RSN", 1, "Eye", own=numbers("_cp", "Ccp", 1, 1.5, 0.01, 10) + integers("Res", 64, 32) + chunk("Va3", b"\1")
+    )
+    proximity, camera = (one.of for one in read(file(ray, eye)).objects)
+    assert (proximity.kind, proximity.offset, proximity.range, proximity.angle) == ("ray", 0.1, 5.0, 0.0)
+    assert (camera.is_perspective, camera.angle, camera.resolution) == (True, 1.5, (64, 32))
+
+
+@pytest.mark.parametrize(
+    "switches, mode, target", [(0x00, "passive", 0.7), (0x10, "velocity", 2.0), (0x30, "position", 0.7)]
+)
+def test_what_moves_a_joint(switches, mode, target):
+    own = (
+        integers("Jmd", 5)
+        + chunk("Va9", bytes([switches | 1]))
+        + numbers("_mp", "Dmp", 2, 9)
+        + numbers("_tp", "Dtp", 0.7)
+    )
+    joint = read(file(scene_object("JNT", 0, "J", own=own))).objects[0].of
+    assert (joint.mode, joint.target, joint.max_force, joint.limits) == (mode, target, 9.0, None)
+
+
+def test_a_step_that_is_a_preset_comes_before_the_number():
+    said = chunk("St2", struct.pack("<Q", 20_000)) + chunk("Sts", struct.pack("<f", 0.5))
+    gravity = chunk("En3", struct.pack("<i3fi", 0, 0, 0, -9.81, 0))
+    steps = [
+        read(file(chunk("SIM", integers("Spi", preset) + said), chunk("DYN", gravity))).settings for preset in (4, 5)
+    ]
+    assert [one.time_step for one in steps] == [0.01, 0.02]
+    assert (steps[0].gravity, steps[0].dynamics_step, steps[0].engine) == ((0, 0, -9.81), 0.005, "Bullet")
+
+
+# ---- scripts
+
+
+@pytest.mark.parametrize("code", ["", "x", "ab", "abc", "-- été\nx = 1", "\x7f\x80 far"])
+def test_scripts_of_any_length_and_letters(code):
+    (found,) = read(file(scene_object("DMY", 4, "D"), script(4, code, parameters=[("gain", "2.5")]))).scripts
+    assert (found.text, found.object, found.kind, found.parameters) == (code, 4, "child", (("gain", "2.5"),))
+
+
+def test_a_script_in_latin_1_with_zeros_at_its_end_and_a_first_line_that_names_its_language():
+    (found,) = read(file(script(-1, b"--lua\r\nx = '\xe9'\r\n\0\0"))).scripts
+    assert found.text == "x = 'é'\n"
+
+
+def test_a_script_object_acts_on_its_parent():
+    own = script(99, "x = 1", tag="Soo", more=chunk("Lne", text("lua")))
+    held = scene_object("SCT", 8, "Script", parent=2, own=own)
+    (found,) = read(file(scene_object("DMY", 2, "D"), held, version=25)).scripts
+    assert (found.object, found.text, found.is_enabled) == (2, "x = 1", True)
+
+
+@pytest.mark.parametrize("switches, threaded, enabled", [(8, False, True), (9, True, True), (10, False, False)])
+def test_the_switches_of_a_script(switches, threaded, enabled):
+    (found,) = read(file(scene_object("DMY", 0, "D"), script(0, "x = 1", switches=switches))).scripts
+    assert (found.is_threaded, found.is_enabled) == (threaded, enabled)
+
+
+# ---- what is no such file
+
+
+def a_file(compressed=False):
+    pool = chunk(
+        "VIN", chunk("Ver", struct.pack("<9f", *range(9))) + chunk("Ind", struct.pack("<3i", 2, 1, 0)) + b"EOO"
+    )
+    one = shape(0, "S", mesh(inline=False), mesh("sphere"), dynamic=True)
+    return file(
+        pool,
+        one,
+        scene_object("JNT", 1, "J", parent=0),
+        script(1, "abcdef", parameters=[("a", "1")]),
+        compressed=compressed,
+    )
+
+
+def test_a_file_cut_at_every_byte_gets_one_line():
+    whole = a_file()
+    for length in itertools.chain(range(0, 1021, 100), range(1020, len(whole))):
+        with pytest.raises(VrepFileError) as error:
+            read(whole[:length])
+        assert str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_payload_cut_at_every_byte_is_never_more_than_one_line():
+    """A payload that says how long it is: the cut shows within its chunks."""
+    payload = a_file()[1021:]
+    for length in range(len(payload)):
+        with pytest.raises(VrepFileError):
+            read(container(payload[:length]))
+
+
+def test_a_compressed_file_that_is_cut():
+    whole = a_file(compressed=True)
+    for length in (1021, 1022, 1100, 1021 + 320, len(whole) - 2):
+        with pytest.raises(VrepFileError, match=r"is cut|ends within its Huffman tree"):
+            read(whole[:length])
+
+
+@pytest.mark.parametrize("size", [-1, -(2**31), 2**31 - 1, 10**6])
+def test_sizes_that_cannot_be_are_refused(size):
+    payload = a_file()[1021:]
+    at = payload.index(b"Ge2") + 3
+    broken = payload[:at] + struct.pack("<i", size) + payload[at + 4 :]
+    with pytest.raises(VrepFileError, match=r"Ge2: a chunk of .* does not fit"):
+        read(container(broken))
+
+
+def _nested(depth):
+    geometry = chunk("Geo", b"EOO" + mesh())
+    for _ in range(depth):
+        geometry = chunk("Wrp", geometry + b"EOO")
+    return file(scene_object("SHP", 0, "S", own=chunk("Ge2", geometry + b"EOO")))
+
+
+def _chain(length):
+    return file(*(scene_object("DMY", number, f"D{number}", parent=number - 1) for number in range(length)))
+
+
+REFUSED = {
+    "empty": (b"", "is empty"),
+    "foreign": (b"solid cube" * 200, "is no file of V-REP"),
+    "no header": (b"VREP1234", "is cut"),
+    "too new": (container(b"", version=30)[:8] + struct.pack("<i", 30) + container(b"")[12:], "has format"),
+    "too old": (container(b"", version=12), "has format 12"),
+    "compressed otherwise": (container(b"")[:12] + b"\7" + container(b"")[13:], "has compression 7"),
+    "negative length": (container(b"", length=-5), "says that it has -5 bytes"),
+    "huge": (container(b"", length=2**31 - 1), "at most"),
+    "longer than it is": (container(b"EOF", length=1000), "is cut: 3 of 1000 bytes"),
+    "no end": (container(b""), "has no EOF"),
+    "one leaf": (container(b"x" * 100, compressed=True)[:1021] + b"\xff" * 100, "Huffman tree of one leaf"),
+    "endless tree": (container(b"x" * 100, compressed=True)[:1021] + b"\0" * 5000, "Huffman tree of more than"),
+    "a loop of parents": (file(scene_object("DMY", 0, "A", 1), scene_object("DMY", 1, "B", 0)), "object A: is its own"),
+    "its own parent": (file(scene_object("DMY", 0, "A", 0)), "object A: is its own ancestor"),
+    "no such parent": (file(scene_object("DMY", 0, "A", 7)), "object A: its parent 7 is not in the file"),
+    "a handle twice": (file(scene_object("DMY", 0, "A"), scene_object("DMY", 0, "B")), "has its handle 0"),
+    "not a number": (file(scene_object("DMY", 0, "A", at=(math.nan, 0, 0))), "object A: Cfq: the number nan"),
+    "no rotation": (file(scene_object("DMY", 0, "A", turned=(0, 0, 0, 0))), "object A: _fq: its quaternion has"),
+    "no such vertex": (
+        file(shape(0, "S", mesh().replace(packed([0, 1, 2]), packed([0, 1, 9])))),
+        "object S: a face names a vertex that there is not",
+    ),
+    "no such mesh": (file(shape(0, "S", mesh(inline=False))), "object S: Vev: the file has no mesh 0"),
+    "many parameters": (
+        file(scene_object("DMY", 0, "A", base=chunk("Lsp", integers("Par", 2**30) + b"EOO"))),
+        "object A: Par: 1073741824 script parameters",
+    ),
+    "deep compounds": (_nested(100), "deeper than 16"),
+    "a deep tree": (_chain(300), "deeper than 200"),
+}
+
+
+@pytest.mark.parametrize("content, words", REFUSED.values(), ids=REFUSED)
+def test_a_broken_file_gets_one_line_that_names_it(tmp_path, content, words):
+    path = tmp_path / "scene.ttt"
+    path.write_bytes(content)
+    with pytest.raises(VrepFileError) as error:
+        read_file(path)
+    said = str(error.value)
+    assert said.startswith(f"{path}: ") and words in said and "\n" not in said
+
+
+def test_what_is_no_file_gets_one_line(tmp_path):
+    for path in (tmp_path, tmp_path / "none.ttt"):
+        with pytest.raises(VrepFileError, match=str(path)):
+            read_file(path)
