@@ -116,10 +116,36 @@ def test_each_requires_what_lies_beside_it(build, tmp_path):
     assert [simulation.drone.signals.getFloatSignal(name) for name in ("kp", "kd")] == [3, 4]
 
 
-def test_an_error_names_file_line_and_phase(build, tmp_path):
-    simulation = build({"Floor": "function sysCall_sensing()\n  sim.getObject('/Nobody')\nend"})
-    with pytest.raises(ScriptError, match=rf"\[sensing\] {tmp_path}/0.lua:2: sim.getObject: no object '/Nobody'"):
-        simulation.step()
+def test_a_script_that_fails_is_told_once_with_file_line_and_phase_and_the_others_go_on(build, tmp_path, caplog):
+    count = "n = 0 function sysCall_actuation() n = n + 1 sim.setFloatSignal('n', n) end"
+    fails = "function sysCall_sensing()\n  sim.getObject('/Nobody')\nend function f() end"
+    simulation = build({"Floor": fails, "DronePosition": count})
+    before = simulation.snapshot()
+    for _ in range(2):
+        for _ in range(3):
+            simulation.step()
+        assert simulation.drone.signals.getFloatSignal("n") == 3
+        assert simulation.failed_scripts == ["Floor"]
+        (said,) = [one.getMessage() for one in caplog.records if one.levelname == "ERROR"]
+        assert said.startswith(f"[sensing] {tmp_path}/0.lua:2: sim.getObject: no object '/Nobody'")
+        assert said.endswith("; this script is not called any more")
+        caplog.clear()
+        simulation.restore(before)
+
+
+@pytest.mark.parametrize("source", ["error('x')", "function sysCall_init() error('x') end"])
+def test_one_that_fails_while_it_is_loaded_leaves_the_flight_as_it_is(build, caplog, source):
+    simulation = build({"Floor": source})
+    simulation.step()
+    simulation.close()
+    assert [one.levelname for one in caplog.records].count("ERROR") == 1
+
+
+def test_nobody_calls_a_script_that_has_failed(build):
+    fails = "function f() end function sysCall_init() error('x') end"
+    own = "function ask() end function sysCall_actuation() sim.callScriptFunction('f@Floor', 1) end"
+    with pytest.raises(ScriptError, match="the script has failed, and is not called any more"):
+        build({"Floor": fails}, own).step()
 
 
 @pytest.mark.parametrize(

@@ -104,6 +104,7 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
             recording = Recording(file, keep=bool(options.plot), vehicle=recorded)
             flown = _status_of(lambda: _fly(simulation, timeline, steps, recording, guardian))
             took = time.perf_counter() - began
+            flown = flown or int(bool(simulation.failed_scripts))
     finally:
         # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
         closed = _status_of(simulation.close)

@@ -255,6 +255,11 @@ class Simulation:
     # ---- stepping
 
     @property
+    def failed_scripts(self) -> list[str]:
+        """Names of the objects whose attached scripts have failed and are not called any more."""
+        return [one.own_script for one in self._setting.cast.attached if one.has_failed]
+
+    @property
     def asked(self) -> str:
         """What a script asked for since it was last taken: 'stop', 'pause' or nothing. Whoever plays this obeys."""
         return self._setting.shared.control.asked

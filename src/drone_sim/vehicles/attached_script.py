@@ -15,6 +15,8 @@ from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.guarded import GuardedScript, tell_failure
 from drone_sim.sensors.sensor import Instrument
 from drone_sim.vehicles.child_script import call_init, check_callbacks, load_child_script
 from drone_sim.vehicles.script_parameters import bring_back, propeller_script_parameters
@@ -40,6 +42,7 @@ class AttachedScript:
         self.vehicle = next((one for one in vehicles.values() if here.is_part_of(one.own_object)), None)
         self.goes_with = self.vehicle.name if self.vehicle and self.vehicle.owns(handle) else ""
         self.script: load.Script = load.NoScript()
+        self.failure: ScriptError | None = None  # of its top level
         name = self.vehicle.name if self.vehicle else _EVERYWHERE
         self.bus = MessageBus(name, None if self.vehicle else {})
         self.bus.backend = shared.backend
@@ -107,12 +110,22 @@ class AttachedScript:
     # ---- phases
 
     def load_script(self, path: str) -> None:
-        """Load its script and call its init. Raises ScriptError."""
+        """Load its script and call its init. Where it fails, now or later, that is told, and the others go on."""
         self.close()
-        self.script = load_child_script(path, self, self.bus, self._seen(), self._shared)
+        try:
+            self.script = load_child_script(path, self, self.bus, self._seen(), self._shared, GuardedScript)
+        except ScriptError as error:
+            self.failure = error
+            tell_failure(error)
+            return
         if self.script.idle:
             _LOG.warning("%s, on %s: %s", path, self.own_script, self.script.idle)
         call_init(self.script, self.bus)
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether its script is not called any more."""
+        return self.failure is not None or (isinstance(self.script, GuardedScript) and self.script.failure is not None)
 
     def actuation(self) -> None:
         """Hand waiting messages to the script, then let it act."""
@@ -123,7 +136,7 @@ class AttachedScript:
     def close(self) -> None:
         """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
         self.script.close()
-        self.script = load.NoScript()
+        self.script, self.failure = load.NoScript(), None
         self.bus.close()
 
     def leave(self) -> None:

@@ -37,12 +37,19 @@ class Seen(Protocol):
         """Return the mass (kg) of each of its shapes, by object name."""
 
 
-def load_child_script(path: str, host: Host, bus: MessageBus, seen: Sequence[Seen], shared: Shared) -> load.Script:
-    """Load a script ('' for the tutorial's) on the object that `host` names. Raises ScriptError."""
+def load_child_script(
+    path: str,
+    host: Host,
+    bus: MessageBus,
+    seen: Sequence[Seen],
+    shared: Shared,
+    guarded: Callable[[load.Script], load.Script] = lambda script: script,
+) -> load.Script:
+    """Load a script ('' for the tutorial's) on the object that `host` names; `guarded` wraps it. Raises ScriptError."""
     limit, turns = TimeLimit(shared.script_time_limit), Turns()
     around = surroundings(seen, shared, limit, turns)
     modules = {"sim": make_sim(host, around), "simROS": make_sim_ros(bus, shared.time), **make_plugins(host)}
-    script = load.load(path, modules, limit, turns)
+    script = guarded(load.load(path, modules, limit, turns))
     host.scripts.attached_to(host.own_script).loaded(script, shared.time())
     return script
 

@@ -1,0 +1,76 @@
+"""A script that may fail alone: after its first error it is not called any more, and what else flies goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from drone_sim.scripting.api.types import Callback
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.load import Script
+from drone_sim.scripting.script_log import LOG
+
+
+class GuardedScript:
+    """Calls a script until that fails; the error is told once."""
+
+    def __init__(self, script: Script):
+        """Take the script, loaded."""
+        self._script = script
+        self.failure: ScriptError | None = None
+        self.idle, self.is_empty = script.idle, script.is_empty
+
+    @property
+    def threaded(self) -> bool:
+        """Whether it has a thread that has not ended."""
+        return self.failure is None and self._script.threaded
+
+    def call(self, phase: str) -> None:
+        """Run a phase: init, actuation, sensing or cleanup."""
+        self._attempt(self._script.call, phase)
+
+    def take_turn(self) -> None:
+        """Let its thread run until it is left."""
+        self._attempt(self._script.take_turn)
+
+    def call_function(self, name: str, arguments: list[Any]) -> Any:
+        """Call a global function for another script, whose error it is where it fails. Raises ScriptError."""
+        if self.failure is not None:
+            raise ScriptError(name, self.failure.path, 0, "the script has failed, and is not called any more")
+        return self._script.call_function(name, arguments)
+
+    def callback(self, callback: Callback, message: Any) -> None:
+        """Call a function of the script with a message."""
+        self._attempt(self._script.callback, callback, message)
+
+    def check(self, callback: Callback) -> None:
+        """Fail where the script has no such function to call back."""
+        self._attempt(self._script.check, callback)
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that gives the script's variables the values that they have now."""
+        failure, recall_script = self.failure, self._script.remember() if self.failure is None else None
+
+        def recall() -> None:
+            self.failure = failure
+            if recall_script is not None:
+                recall_script()
+
+        return recall
+
+    def close(self) -> None:
+        """Free what the script holds; may be called twice."""
+        self._script.close()
+
+    def _attempt(self, action: Callable[..., None], *arguments: Any) -> None:
+        if self.failure is None:
+            try:
+                action(*arguments)
+            except ScriptError as error:
+                self.failure = error
+                tell_failure(error)
+
+
+def tell_failure(error: ScriptError) -> None:
+    """Say what went wrong, and that the flight goes on."""
+    LOG.error("%s; this script is not called any more", error)
