@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from drone_sim.forces.weather import Weather
 from drone_sim.run import memory, saving
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.setting import Setting
@@ -101,6 +102,7 @@ class Simulation:
             script_time_limit=parameters.script_time_limit,
             backend=self._backend,
             drawings=self._drawings,
+            weather=Weather(parameters.weather, lambda: self.time),
         )
         return Setting(parameters, shared)
 
@@ -124,6 +126,7 @@ class Simulation:
         self.world: World = built.world
         self.scene: Scene = built.scene
         self._begin()
+        built.shared.weather.changed = self._feel_weather
 
     def _begin(self) -> None:
         """Be at time 0 of a new run, in the initial scene."""
@@ -136,6 +139,11 @@ class Simulation:
     def _changed_vehicles(self) -> None:
         self._era += 1
         self._flying = tuple(self.vehicles.values())
+        self._feel_weather()
+
+    def _feel_weather(self) -> None:
+        for vehicle in self._flying:
+            vehicle.feel_weather()
         self._any_between = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self._flying)
 
     # ---- what flies
@@ -285,7 +293,7 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying]
+        parts: list[Any] = [shared.objects, shared.signals, self._drawings, *self._flying, shared.weather]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

@@ -29,6 +29,7 @@ from drone_sim.forces.propellers import PropellerParameters
 from drone_sim.sensors import AnySensor
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters
 from drone_sim.sensors.together import check_together
+from drone_sim.vehicles.fault_parameters import FaultParameters
 
 MAX_FORCES = 16
 MAX_SENSORS = 64
@@ -98,10 +99,12 @@ class EquipmentParameters(Checked):
     cameras: Annotated[dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
     sensors: Annotated[dict[Name, AnySensor], Field(max_length=MAX_SENSORS)]
     forces: Annotated[dict[Name, ForceParameters], Field(max_length=MAX_FORCES)]
+    faults: FaultParameters
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several keys at once."""
         check_together(self.cameras, self.sensors)
+        self.faults.check([*self.sensors, *self.cameras])
 
 
 class VehicleParameters(EquipmentParameters, PlaceParameters):
