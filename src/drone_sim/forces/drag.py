@@ -25,7 +25,7 @@ _LIGHT = (0.1, 0.1, 0.1)  # kg/s
 
 
 class DragParameters(Checked):
-    """`coefficients` along the body's x, y and z; `wind` is the velocity of the air in the world, beside the weather's."""
+    """`coefficients` along the body's x, y and z; `wind` is the air's velocity in the world, beside the weather's."""
 
     kind: Literal["drag"]
     coefficients: Annotated[_Coefficients, Field(description="3 numbers, along the body's [x, y, z] in kg/s")] = _LIGHT

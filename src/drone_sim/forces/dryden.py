@@ -6,8 +6,9 @@ Airplanes, 1980, section 3.7.1.2):
     along the wind          s² 2L/pi / (1 + (LW)²)
     across it, and up       s²  L/pi (1 + 3 (LW)²) / (1 + (LW)²)²
 
-so that over a distance r gusts correlate as s² e^(-r/L), and as s² e^(-r/L) (1 - r/2L). White noise q through the filters
-1 / (1 + p) and (1 + sqrt(3) p) / (1 + p)², p = L d/ds, has these spectra. The second one, as two states and the gust g,
+so that over a distance r gusts correlate as s² e^(-r/L), and as s² e^(-r/L) (1 - r/2L). White noise q through the
+filters 1 / (1 + p) and (1 + sqrt(3) p) / (1 + p)², p = L d/ds, has these spectra. The second one, with two states and
+the gust g,
 
     dx/dh = y,  dy/dh = q - x - 2y,  g = x + sqrt(3) y        h = s/L
 

@@ -109,7 +109,7 @@ class Propellers(Force):
             )
 
     def weaken(self, effectiveness: Sequence[float]) -> None:
-        """Let each give this share of its particles' velocity, and so of thrust and torque: 1 is sound, 0 is stopped."""
+        """Let each blow at this share of the velocity, and so of thrust and torque: 1 is sound, 0 is stopped."""
         self.effectiveness = tuple(effectiveness)
         if all(share == 1 for share in effectiveness):
             self._commanded, (self._slowest, self._fastest) = self._given, self._limits

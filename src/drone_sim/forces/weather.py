@@ -1,4 +1,4 @@
-"""The weather of a scene: a steady wind, and gusts that drift with it. It is one air, in which every vehicle has a place.
+"""The weather of a scene: a steady wind, and gusts that drift with it. All vehicles are in one air.
 
 A vehicle at the position p feels, at the time t, the steady wind U and the gust at the way V t - e p: e is the wind's
 direction over ground, V its speed there. So who is further downwind meets the same gusts later, by its distance over V;

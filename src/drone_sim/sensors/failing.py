@@ -10,7 +10,7 @@ Failure = Literal["ok", "silent", "frozen"]
 
 
 class Failing:
-    """Looks in place of an instrument, which goes on measuring: when it is sound again, its noise is what it would be."""
+    """Looks in place of an instrument, which goes on measuring: once sound again, its noise is what it would be."""
 
     def __init__(self, instrument: Instrument, failure: Failure):
         """Begin to fail; what is frozen before its first reading freezes with that."""

@@ -1,4 +1,4 @@
-"""An anemometer: the velocity of the air where the vehicle is, in the world, as one that stands there would measure it."""
+"""An anemometer: the velocity of the air where the vehicle is, as one that stands there would measure it."""
 
 from __future__ import annotations
 

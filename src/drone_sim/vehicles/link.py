@@ -1,8 +1,8 @@
 """A radio link such as a drone's Wi-Fi, in simulated time: what goes over it comes later, or not at all.
 
-A message sent at t is lost with the probability `loss`; else it is there at t + latency + jitter u, u uniform in [-1, 1],
-but not before t. Whoever receives wants the newest: what a later message has overtaken is thrown away, as drones do that
-number their messages (the commands of Parrot's AR.Drone).
+A message sent at t is lost with the probability `loss`; else it is there at t + latency + jitter u, u uniform in
+[-1, 1], but not before t. Whoever receives wants the newest: what a later message has overtaken is thrown away, as
+drones do that number their messages (the commands of Parrot's AR.Drone).
 """
 
 from __future__ import annotations

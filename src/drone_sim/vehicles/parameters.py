@@ -104,6 +104,10 @@ class EquipmentParameters(Checked):
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several keys at once."""
         check_together(self.cameras, self.sensors)
+        self.check_faults()
+
+    def check_faults(self) -> None:
+        """Raise ParameterError for a fault of a sensor that it has not."""
         self.faults.check([*self.sensors, *self.cameras])
 
 
