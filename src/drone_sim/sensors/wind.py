@@ -17,7 +17,7 @@ class WindParameters(SensorParameters):
 
     kind: Literal["wind"]
     topic: Topic = "wind"
-    frame: Name = "world"
+    frame: Name = "base_link"
     noise: NoiseParameters = NoiseParameters()  # m/s
 
     def make(self, fitting: Fitting) -> Wind:
@@ -42,4 +42,4 @@ class Wind(Instrument):
         return x, y, z
 
     def _message(self, value: Vector, header: Mapping[str, Any]) -> Fields:
-        return {"header": header, "vector": xyz(value)}
+        return {"header": {**header, "frame_id": "world"}, "vector": xyz(value)}
