@@ -65,7 +65,7 @@ class VehicleInputs:
                 job = read(message)
             except (checks.Refused, ParameterError) as refused:
                 if throttle.passes():
-                    rospy.logwarn(f"{topic} refused{kept}: {refused}")
+                    rospy.logwarn(f"{topic} refused{kept}: {str(refused).removeprefix('parameter ')}")
                 return
             self._inbox.put(lambda: self._carry_out(job))
 
