@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots rviz)
+sections=(diagrams cameras plots weather rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -24,6 +24,9 @@ plots() {
   "$python" scripts/fly --script docs/tutorial/5_roll.py --commands docs/tutorial/stability.yaml \
     --set "drone.position=[0, 0, 5]" --plot "$pictures/tutorial_stability.png"
 }
+
+# The flights of docs/weather.md, beside their theory; prints the numbers that the page quotes.
+weather() { "$python" docs/draw_weather.py "$pictures"; }
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.
 rviz() { docs/take_rviz_pictures.sh "$pictures"; }
