@@ -65,7 +65,8 @@ def test_a_weak_propeller_turns_the_drone_as_its_lever_and_inertia_say(simulate,
         velocity = shares[one] * drone.particle_velocities[one]
         thrust = drone._propellers.thrusts[one]
         point = frames.position(frames.multiply(drone.body.inertial_from_root, link))
-        torque += np.cross(point, (0, 0, thrust)) + (0, 0, sense * 0.002 * velocity)
+        torque += np.cross(point, (0, 0, thrust))
+        torque[2] += sense * 0.002 * velocity
     gained = (np.array(drone.state.angular_velocity) - before) / 0.05
     expected = np.linalg.solve(drone.body.rigid.inertia, torque)
     assert gained[:2] == pytest.approx(expected[:2], rel=5e-3)
@@ -73,7 +74,7 @@ def test_a_weak_propeller_turns_the_drone_as_its_lever_and_inertia_say(simulate,
 
 
 def test_a_tenth_less_of_one_propeller_leaves_a_turn_and_a_drift(simulate):
-    """All four must blow alike again: every correction is d = -(1 - e) / (1 + 3e), the controller's are offsets of that."""
+    """All four must blow alike again, for which every correction is d = -(1 - e) / (1 + 3e)."""
     simulation = simulate(faults={"propellers": [0.9, 1, 1, 1]})
     state = fly(simulation, 300)[-1][0]
     correction = -0.1 / 3.7

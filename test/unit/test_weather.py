@@ -1,5 +1,6 @@
-"""Wind and gusts: Dryden's statistics, one air for all, what they do to a flight, and that they come again to the bit."""
+"""Wind and gusts: Dryden's statistics, one air for all, what they do to a flight, the same to the bit."""
 
+import itertools
 import math
 
 import numpy as np
@@ -67,7 +68,7 @@ def test_the_spectrum_is_drydens():
         power = np.abs(np.fft.rfft(gusts)) ** 2 / len(ways) / 16 / math.pi  # one-sided, per rad
         square = 1 + frequencies**2
         theory = 2 / math.pi / square if is_along else (1 + 3 * frequencies**2) / math.pi / square**2
-        for low, high in zip(bands, bands[1:]):
+        for low, high in itertools.pairwise(bands):
             band = (low <= frequencies) & (frequencies < high)
             assert power[band].mean() == pytest.approx(theory[band].mean(), rel=0.3), (is_along, low)
 
