@@ -50,10 +50,10 @@ class CameraOutput:
     def publish(self, stamp: Stamp) -> None:
         """Publish what the camera sees, and the model that belongs to it, stamped with when it was taken.
 
-        Over a link both come together, or neither.
+        Over a link both come together, or neither; of a silent camera nothing comes.
         """
         camera = self._camera
-        is_there = camera.over is None or camera.image is not None
+        is_there = camera.image is not None or (camera.over is None and camera.failure != "silent")
         if is_there and self._info_publisher.get_num_connections():
             self._info.header.stamp = stamp(camera.age)
             self._info_publisher.publish(self._info)
