@@ -2,6 +2,8 @@
 
 import collections
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -270,6 +272,14 @@ def test_parameter_timeline_and_call_fly_alike(simulate, tmp_path):
         one.drone.receive(FORWARD)
         flights.append(fly(one, 40))
     assert flights[0] == flights[1] == flights[2]
+
+
+def test_the_pages_example_is_allowed(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "weather.md").read_text(encoding="utf-8")
+    file = tmp_path / "storm.yaml"
+    file.write_text(re.search(r"^```yaml\n(weather:.*?)^```", page, re.S | re.M)[1])
+    loaded = parameters.load({"config": str(file)})
+    assert loaded.weather.gusts.deviation == (3, 3, 1.5) and loaded.fleet[0].faults.sensors == {"front": "frozen"}
 
 
 @pytest.mark.parametrize(

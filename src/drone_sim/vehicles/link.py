@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Annotated, Generic, NamedTuple, TypeVar
+from dataclasses import dataclass
+from typing import Annotated, Generic, TypeVar
 
 import numpy as np
 
@@ -34,7 +35,8 @@ class LinkParameters(Checked):
         return not (self.latency or self.jitter or self.loss)
 
 
-class _Sent(NamedTuple, Generic[_What]):
+@dataclass(frozen=True)
+class _Sent(Generic[_What]):  # no NamedTuple: Python 3.10 has none that are generic
     at: float  # s
     due: float  # s
     what: _What
