@@ -220,11 +220,12 @@ def _draw_a_tenth_less(figure, grid, times, states):
 def link(figure, grid):
     """Draw commands over a bad link: a bit of them, how old those in force are, and what becomes of the flight."""
     period, seconds = 6.0, 240
-    (sent, _, direct), (_, forced, flown) = (_swing(period, seconds, faults) for faults in ({}, {"commands": WIFI}))
+    sent, _, _, direct = _swing(period, seconds, {})
+    _, obeyed, ages, flown = _swing(period, seconds, {"commands": WIFI})
     times = np.arange(1, len(sent) + 1) * STEP
     axes = panel(figure, grid[0, 0], "Commands at 10 Hz over 200 ± 100 ms, one in five lost", y="forward [m/s]")
     axes.step(times, sent, where="pre", color=GREY, label="sent")
-    axes.step(times, forced, where="pre", color=ORANGE, label="in force")
+    axes.step(times, obeyed, where="pre", color=ORANGE, label="in force")
     axes.set_xlim(12, 18)
     axes.legend(loc="upper right", fontsize="small")
     axes = panel(figure, grid[1, 0], "What becomes of them", y="forward [m/s]")
@@ -232,36 +233,29 @@ def link(figure, grid):
     axes.plot(times, flown, color=BLUE, label="flown over it")
     axes.set_xlim(12, 18)
     axes.legend(loc="upper right", fontsize="small")
-    ages = np.round([_age(forced[step], step, period) for step in range(200, len(forced))], 2)
-    _draw_ages(panel(figure, grid[:, 1], "How old the command in force is", "age [s]", "share of the steps"), ages)
+    _draw_ages(
+        panel(figure, grid[:, 1], "How old the command in force is", "age [s]", "share of the steps"), ages[200:]
+    )
     turning = 2 * math.pi / period
     late = [_lag(one[200:], turning) for one in (flown, direct)]
     expected = _delay(ages_in_force(), turning) - _delay({0.0: 0.5, STEP: 0.5}, turning)
     say("lag of the flight behind that without the link", (late[0] - late[1]) % period, expected, "s")
 
 
-def _command(time, period):
-    return 0.4 * math.sin(2 * math.pi * time / period) + 1e-4 * time  # no two of them are the same
-
-
 def _swing(period, seconds, faults):
-    """Return in each step the last command sent, that in force, and the speed (m/s) along x."""
+    """Return in each step the last command sent, that in force, its age (s), and the speed (m/s), all along x."""
     simulation = Simulation(parameters.load({"faults": faults}))
-    drone, rows, sent = simulation.drone, [], 0.0
+    drone, rows, times = simulation.drone, [], {0.0: 0}
     for step in range(round(seconds / STEP)):
         if step % 2 == 0:
-            sent = _command(step * STEP, period)
+            sent = 0.4 * math.sin(2 * math.pi * step * STEP / period) + 1e-6 * step  # no two of them are the same
             drone.receive(Twist(Vector3(sent)))
+            times[sent] = step
         simulation.step()
-        rows.append((sent, drone.command.linear.x, drone.state.linear_velocity[0]))
+        obeyed = drone.command.linear.x
+        rows.append((sent, obeyed, (step - times[obeyed]) * STEP, drone.state.linear_velocity[0]))
     simulation.close()
     return np.array(rows).T
-
-
-def _age(command, step, period):
-    """Return how long ago (s) a command was sent that is in force in a step."""
-    sent = [(abs(command - _command(one * STEP, period)), one) for one in range(max(0, step - 60), step + 1)]
-    return (step - min(one for one in sent if one[1] % 2 == 0)[1]) * STEP
 
 
 def ages_in_force():
