@@ -26,7 +26,7 @@ DRAG, GRAVITY = 0.1, 9.81  # kg/s, m/s²
 PANGLE, DANGLE, KVCORR = 0.3, 0.2, 0.5  # the gains of config/drone.yaml
 GUSTY = {"wind": [4.0, 0.0, 0.0], "gusts": {"deviation": [3.0, 3.0, 1.5]}}
 WIFI = {"latency": 0.2, "jitter": 0.1, "loss": 0.2}
-SOURCE = {0.15: 0.25, 0.20: 0.5, 0.25: 0.75}  # share of what is not lost that has come after these s; all after 0.3 s
+COME = {0.15: 0.25, 0.20: 0.5, 0.25: 0.75}  # share of what is not lost that has come after these s; all after 0.3 s
 
 
 def main():
@@ -123,8 +123,7 @@ def _draw_spectra(axes):
     window = np.hanning(count)[:, None]
     power = (np.abs(np.fft.rfft(blown * window, axis=1)) ** 2).mean(axis=0) * 2 * STEP / (window**2).sum()
     frequencies = np.fft.rfftfreq(count, STEP)
-    axes.set_xlim(4e-3, 10)
-    axes.set_ylim(3e-4, 1e3)
+    axes.set(xlim=(4e-3, 10), ylim=(3e-4, 1e3))
     lengths = weather.now.gusts.length
     for number, (color, name) in enumerate(zip((BLUE, ORANGE, GREEN), ("along", "across", "up"))):
         deviation = weather.now.gusts.deviation[number]
@@ -153,8 +152,7 @@ def propeller(figure, grid):
     for number, (color, name) in enumerate(zip((BLUE, ORANGE, GREEN), "xyz")):
         axes.plot(times, rates[:, number], ".-", color=color, label=f"about {name}")
         axes.plot([1.0, 1.15], [0, expected[number] * 0.15], **THEORY)
-    axes.set_xlim(0.9, 1.5)
-    axes.set_ylim(-5, 5)
+    axes.set(xlim=(0.9, 1.5), ylim=(-5, 5))
     axes.legend(loc="upper left", ncol=3, fontsize="small")
     gained = (rates[21] - rates[20]) / STEP
     for name, flown, theory in zip("xyz", gained, expected):
@@ -261,7 +259,7 @@ def _swing(period, seconds, faults):
 def ages_in_force():
     """Return the share of the steps in which the command in force has each age (s), by theory.
 
-    It is the newest that has come. One sent so long ago has come with the probability 0.8 F(age), F of SOURCE; those
+    It is the newest that has come. One sent so long ago has come with the probability 0.8 F(age), F of COME; those
     sent after it have not. There is one for each 0.1 s; every other step is 0.05 s after the last was sent.
     """
     shares = {}
@@ -269,7 +267,7 @@ def ages_in_force():
         left = 0.5
         for steps in range(first, 60, 2):
             age = round(steps * STEP, 2)
-            come = (1 - WIFI["loss"]) * SOURCE.get(age, 1.0 if age > 0.25 else 0.0)
+            come = (1 - WIFI["loss"]) * COME.get(age, 1.0 if age > 0.25 else 0.0)
             shares[age] = left * come
             left *= 1 - come
     return shares
