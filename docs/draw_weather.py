@@ -62,11 +62,11 @@ def say(what, flown, theory, unit):
 def gusts(figure, grid):
     """Draw a minute of gusts, the drone in them, and their spectrum over eight hours."""
     times, winds, speeds, drone = _flown_in_gusts(1200)
-    upper = panel(figure, grid[0, 0], "Wind at the drone: 4 m/s and gusts of 3 m/s", y="[m/s]")
+    upper = panel(figure, grid[0, 0], "Wind at the drone", y="[m/s]")
     for winds_along, color, label in zip(winds.T, (BLUE, ORANGE, GREEN), ("along", "across", "up")):
         upper.plot(times, winds_along, color=color, label=label)
     upper.legend(**ABOVE)
-    lower = panel(figure, grid[1, 0], "How fast the drone is blown away", y="along the wind [m/s]")
+    lower = panel(figure, grid[1, 0], "How it is blown away", y="along the wind [m/s]")
     lower.plot(times, speeds, color=BLUE, label="flown")
     expected = _speed_in(winds[:, 0], drone)
     lower.plot(times, expected, **THEORY, label="theory: the loop, linear")

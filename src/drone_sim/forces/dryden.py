@@ -33,7 +33,7 @@ from numpy.random import Generator
 from drone_sim.mechanics.frames import Vector
 
 KNOTS = 128  # a length L; between them the gust goes in a straight line, which takes 0.4 % of its deviation
-MOST = 2**18  # knots: after 2048 lengths the same gusts come once more, the last ones first
+MOST = 2**19  # knots: after 4096 lengths the same gusts come once more, the last ones first
 _AT_ONCE = 256  # knots
 _NOWHERE = 1e12  # knots
 
