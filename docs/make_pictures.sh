@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots remote rviz)
+sections=(diagrams cameras plots remote weather rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -27,6 +27,9 @@ plots() {
 
 # The flight of docs/remote_api.md; needs the client that ./dev.sh test installs.
 remote() { "$python" docs/remote/without_ros.py --plot "$pictures/remote_circle.png"; }
+
+# The flights of docs/weather.md, beside their theory; prints the numbers that the page quotes.
+weather() { "$python" docs/draw_weather.py "$pictures"; }
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.
 rviz() { docs/take_rviz_pictures.sh "$pictures"; }

@@ -1,4 +1,4 @@
-"""What pushes: propellers, pushes, drag and wind. A kind that `forces:` may name has its line here."""
+"""What pushes: propellers, pushes, drag, weather. A kind that `forces:` may name has its line here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Air drag, and the steady wind that it lets one feel.
+"""Air drag, which lets one feel the weather, and a steady wind of its own.
 
     F = -c (v - w)    N: c the coefficients along the body's axes (kg/s), v and w velocities of body and air (m/s)
 
@@ -25,7 +25,7 @@ _LIGHT = (0.1, 0.1, 0.1)  # kg/s
 
 
 class DragParameters(Checked):
-    """`coefficients` along the body's x, y and z; `wind` is the velocity of the air, in the world."""
+    """`coefficients` along the body's x, y and z; `wind` is the air's velocity in the world, beside the weather's."""
 
     kind: Literal["drag"]
     coefficients: Annotated[_Coefficients, Field(description="3 numbers, along the body's [x, y, z] in kg/s")] = _LIGHT
@@ -40,6 +40,7 @@ class Drag(Force):
     """What the air does to a body that moves in it; at the centre of mass, in every sub-step."""
 
     every_sub_step: ClassVar[bool] = True
+    feels_wind: ClassVar[bool] = True
 
     def __init__(self, parameters: DragParameters):
         """Take coefficients and wind."""
@@ -47,7 +48,7 @@ class Drag(Force):
 
     def add_to(self, wrench: Wrench, body: Carried) -> None:
         """Add the drag of this moment."""
-        (vx, vy, vz), (wx, wy, wz) = body.state.linear_velocity, self._wind
-        x, y, z = rotate(invert(body.matrix), (vx - wx, vy - wy, vz - wz))
+        (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = body.state.linear_velocity, self._wind, body.wind
+        x, y, z = rotate(invert(body.matrix), (vx - wx - ax, vy - wy - ay, vz - wz - az))
         cx, cy, cz = self._coefficients
         wrench.add(rotate(body.matrix, (-cx * x, -cy * y, -cz * z)), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

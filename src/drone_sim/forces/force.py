@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar, Protocol
 
-from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.state import State
 from drone_sim.mechanics.wrench import Wrench
 
@@ -25,6 +25,10 @@ class Carried(Protocol):
     def matrix(self) -> Matrix:
         """World from its root link."""
 
+    @property
+    def wind(self) -> Vector:
+        """Velocity of the air where it is (m/s, world)."""
+
 
 class Force:
     """Acts on a body: asked once a step, as V-REP's scripts push, or before every sub-step.
@@ -34,6 +38,7 @@ class Force:
     """
 
     every_sub_step: ClassVar[bool] = False
+    feels_wind: ClassVar[bool] = False  # of a vehicle that has such a force, weather needs no other
 
     def add_to(self, wrench: Wrench, body: Carried) -> None:
         """Add what acts now. Forces in N, torques in N m, both in the world; points in the body's inertial frame."""

@@ -68,13 +68,14 @@ class Propellers(Force):
 
         `commanded` returns the particle velocities (m/s) that are asked for.
         """
-        self._commanded = commanded
+        self._commanded = self._given = commanded
+        self.effectiveness: tuple[float, ...] = (1.0,) * len(axes)
         self.air = [0.0] * len(axes)  # m of it that went through each
         self._newtons = 0.0  # per m/s, of the step
         self._emitted: Sequence[float] = [0.0] * len(axes)  # m/s, of the step
         self._law = ParticleLaw(parameters, time_step)
         self._time_step = time_step
-        self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
+        self._limits = self._slowest, self._fastest = parameters.velocity_limits or (-math.inf, math.inf)
         by_axis: dict[Vector, list[tuple[int, float, float, float, float]]] = {}
         for number, (axis, point, rotation) in enumerate(zip(axes, points, rotations)):
             by_axis.setdefault(axis, []).append((number, *point, rotation * parameters.torque_per_velocity))
@@ -107,16 +108,29 @@ class Propellers(Force):
                 along,
             )
 
+    def weaken(self, effectiveness: Sequence[float]) -> None:
+        """Let each blow at this share of the velocity, and so of thrust and torque: 1 is sound, 0 is stopped."""
+        self.effectiveness = tuple(effectiveness)
+        if all(share == 1 for share in effectiveness):
+            self._commanded, (self._slowest, self._fastest) = self._given, self._limits
+        else:
+            self._commanded, self._slowest, self._fastest = self._weakened, -math.inf, math.inf
+
+    def _weakened(self) -> list[float]:
+        slowest, fastest = self._limits
+        return [share * min(max(one, slowest), fastest) for share, one in zip(self.effectiveness, self._given())]
+
     @property
     def thrusts(self) -> list[float]:
         """Thrust of each propeller in N, as in the last step."""
         return [self._newtons * velocity for velocity in self._emitted]
 
     def remember(self) -> Callable[[], None]:
-        """Return a function that brings back the fraction of a particle and the blades' way."""
-        carry, air = self._law.carry, list(self.air)
+        """Return a function that brings back the fraction of a particle, the blades' way, and what is broken."""
+        carry, air, effectiveness = self._law.carry, list(self.air), self.effectiveness
 
         def recall() -> None:
             self._law.carry, self.air = carry, list(air)
+            self.weaken(effectiveness)
 
         return recall

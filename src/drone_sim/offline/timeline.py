@@ -4,6 +4,8 @@
     - {at: 5.0, pose: {position: [0, 0, 2], rpy: [0.3, 0, 0]}}             # m, rad; put there at rest
     - {at: 8.0, push: {force: [1, 0, 0], torque: [0, 0, 0], duration: 0.2}}  # N, N m, world frame; s
     - {at: 9.0, vehicle: drone2, twist: {linear: [0, 1, 0]}}               # of several; the first one otherwise
+    - {at: 10.0, weather: {wind: [3, 0, 0]}}                               # other values for keys of `weather`
+    - {at: 11.0, faults: {propellers: [1, 1, 0, 1]}}                       # and of `faults`; the others stay
 
 `at` is in seconds of simulated time, in any order; three numbers that are left out are zeros.
 """
@@ -22,6 +24,7 @@ from drone_sim.files import yaml_files
 from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.frames import Vector, from_rpy, to_quaternion
 from drone_sim.mechanics.state import Pose, Twist
+from drone_sim.offline.changes import CHANGES, Change, read_change
 from drone_sim.run.parameters import Parameters
 from drone_sim.vehicles import checks
 from drone_sim.vehicles.parameters import EquipmentParameters, VehicleParameters
@@ -41,7 +44,7 @@ class Entry(NamedTuple):
     """What happens to a vehicle ('' is the first) at `at` seconds of simulated time."""
 
     at: float
-    action: Twist | Pose | Push
+    action: Twist | Pose | Push | Change
     vehicle: str = ""
 
     @property
@@ -56,8 +59,10 @@ class Entry(NamedTuple):
             vehicle.receive(self.action)
         elif isinstance(self.action, Pose):
             vehicle.move(self.action)
-        else:
+        elif isinstance(self.action, Push):
             vehicle.push(*self.action)
+        else:
+            self.action.apply(vehicle)
 
 
 class Timeline:
@@ -162,6 +167,7 @@ class _Push(_Model):
 
 
 _KINDS: dict[str, type[_Twist | _Pose | _Push]] = {"twist": _Twist, "pose": _Pose, "push": _Push}
+_ALL_KINDS = (*_KINDS, *CHANGES)
 
 
 class _WrongKeys(Exception):
@@ -177,20 +183,24 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
     here: Location = ()
     if not isinstance(row, dict):
         raise _WrongKeys((here, f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
-    known = ("at", "vehicle", *_KINDS)
+    known = ("at", "vehicle", *_ALL_KINDS)
     unknown: list[tuple[Location, str]] = [
         ((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}")
         for key in row
         if key not in known
     ]
-    kinds = [kind for kind in _KINDS if kind in row]
+    kinds = [kind for kind in _ALL_KINDS if kind in row]
     if len(kinds) != 1:
         held = " and ".join(kinds) or "none"
-        raise _WrongKeys(*(unknown or [(here, f"must hold one of {', '.join(_KINDS)}; it holds {held}")]))
+        raise _WrongKeys(*(unknown or [(here, f"must hold one of {', '.join(_ALL_KINDS)}; it holds {held}")]))
     kind = kinds[0]
     times = {key: row[key] for key in row if key == "at"}
-    (at, no_time), (action, no_action) = _checked(_Time, times, ()), _checked(_KINDS[kind], row[kind], (kind,))
+    at, no_time = _checked(_Time, times, ())
     own, no_vehicle = _vehicle(row.get("vehicle", ""), parameters)
+    is_change = kind in CHANGES
+    action, no_action = (
+        read_change(kind, row[kind], parameters, own) if is_change else _checked(_KINDS[kind], row[kind], (kind,))
+    )
     wrong = [*unknown, *no_time, *no_vehicle, *no_action]
     if wrong:
         raise _WrongKeys(*wrong)

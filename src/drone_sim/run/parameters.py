@@ -29,6 +29,7 @@ from drone_sim.config.types import (
 )
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import package_path, resolve
+from drone_sim.forces.weather import WeatherParameters
 from drone_sim.importing.cache import imported_scene
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
@@ -68,6 +69,7 @@ class Parameters(EquipmentParameters):
     scene_file: FileName
     scene: SceneParameters
     drone: DroneParameters
+    weather: WeatherParameters
     vehicles: Annotated[dict[Name, VehicleParameters], Field(max_length=MAX_VEHICLES)]
     samples: Annotated[Literal[0, 2, 4, 8], BeforeValidator(numeric)]
     _given: dict[str, Any] = PrivateAttr(default_factory=dict)  # what stands without the scene file

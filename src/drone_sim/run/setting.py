@@ -54,6 +54,7 @@ class Setting:
     def begin_anew(self) -> None:
         """Put everything where it began, at rest, without scripts."""
         self.world.begin_anew()
+        self.shared.weather.reset()
         self._empty_tree()
         for vehicle in self.vehicles.values():
             vehicle.reset()

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from drone_sim.forces.weather import Weather
 from drone_sim.run import memory, saving
 from drone_sim.run.cast import Actor, tell
 from drone_sim.run.parameters import Parameters
@@ -104,6 +105,7 @@ class Simulation:
             script_time_limit=parameters.script_time_limit,
             backend=self._backend,
             drawings=self._drawings,
+            weather=Weather(parameters.weather, lambda: self.time),
         )
         return Setting(parameters, shared)
 
@@ -127,6 +129,7 @@ class Simulation:
         self.world: World = built.world
         self.scene: Scene = built.scene
         self._begin()
+        built.shared.weather.changed = self._feel_weather
 
     def _begin(self) -> None:
         """Be at time 0 of a new run, in the initial scene."""
@@ -139,6 +142,11 @@ class Simulation:
     def _changed_vehicles(self) -> None:
         self._era += 1
         self._flying = tuple(self.vehicles.values())
+        self._feel_weather()
+
+    def _feel_weather(self) -> None:
+        for vehicle in self._flying:
+            vehicle.feel_weather()
         self._any_between = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self._flying)
         self._changed_scripts()
 
@@ -333,7 +341,7 @@ class Simulation:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
         kept = (shared.objects, shared.signals, shared.data, shared.tubes, self._drawings)
-        parts: list[Any] = [*kept, *self._flying, *self._setting.cast.attached, self.scene]
+        parts: list[Any] = [*kept, *self._flying, *self._setting.cast.attached, self.scene, shared.weather]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 
     def restore(self, snapshot: Snapshot) -> None:

@@ -13,6 +13,7 @@ from drone_sim.sensors.imu import ImuParameters
 from drone_sim.sensors.magnetic_field import MagneticFieldParameters
 from drone_sim.sensors.pressure import PressureParameters
 from drone_sim.sensors.range import RangeParameters
+from drone_sim.sensors.wind import WindParameters
 
 AnySensor = one_of(
     ImuParameters,
@@ -22,4 +23,5 @@ AnySensor = one_of(
     FixParameters,
     ContactsParameters,
     BatteryParameters,
+    WindParameters,
 )

@@ -13,6 +13,7 @@ from drone_sim.render.context import RendererUnavailable
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Renderer
 from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.sensors.failing import Failure
 from drone_sim.sensors.sensor import Reading, Sensor
 from drone_sim.shapes.visual import Visual
 
@@ -112,6 +113,10 @@ class Camera(Sensor):
         self.watched: Callable[[], bool] = lambda: False
         self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
         self.pose = pose
+        self.failure: Failure = "ok"
+        # Carries pictures to those who look: takes a new one or None, returns what has come and its age (s).
+        self.over: Callable[[np.ndarray | None], tuple[float, np.ndarray | None]] | None = None
+        self.age = 0.0  # s, of `image`
         self._vision = vision
         self._last: tuple[int, Matrix, np.ndarray] | None = None  # the scene's changes, the pose, the picture
 
@@ -120,14 +125,29 @@ class Camera(Sensor):
         return self._vision.picture(self.kind, self.intrinsics, np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4)))
 
     def look(self) -> np.ndarray:
-        """Return what it sees now: the last picture where nothing has changed since, else a new one."""
+        """Return what it sees now: the last picture where nothing has changed since, else a new one.
+
+        Frozen, it sees what it saw; silent, it is dark.
+        """
         changes, pose = self._vision.changes, self.pose()
+        if self.failure == "silent":
+            return self._dark()
+        if self.failure == "frozen" and self._last is not None:
+            return self._last[2]
         if self._last is None or self._last[:2] != (changes, pose):
             self._last = changes, pose, self.take()
         return self._last[2]
 
+    def _dark(self) -> np.ndarray:
+        shape = self.intrinsics.height, self.intrinsics.width
+        return np.zeros((*shape, 3), np.uint8) if self.kind == "color" else np.zeros(shape, np.float32)
+
     def show(self, steps: int, image: np.ndarray | None) -> None:
         """Let those who look see a picture, taken after so many steps; None is none."""
+        if self.failure == "silent":
+            image = None
+        if self.over is not None:
+            self.age, image = self.over(image)
         self.image = image
         if image is not None:
             self.latest = Reading(steps, image)
@@ -135,12 +155,13 @@ class Camera(Sensor):
     def reset(self) -> None:
         """Forget the pictures that were taken."""
         self.image = self.latest = self._last = None
+        self.age = 0.0
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back the last picture that was shown."""
-        image, latest = self.image, self.latest
+        image, age, latest, last = self.image, self.age, self.latest, self._last
 
         def recall() -> None:
-            self.image, self.latest = image, latest
+            self.image, self.age, self.latest, self._last = image, age, latest, last
 
         return recall

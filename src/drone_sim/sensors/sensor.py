@@ -67,6 +67,10 @@ class Carrier(Protocol):
         """Thrust of each propeller in N."""
 
     @property
+    def wind(self) -> Vector:
+        """Velocity of the air where it is (m/s, world)."""
+
+    @property
     def datum(self) -> DatumParameters:
         """Where on the Earth the world's origin is."""
 

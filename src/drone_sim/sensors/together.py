@@ -11,6 +11,7 @@ from drone_sim.sensors.parameters import SensorParameters
 # What a vehicle publishes and hears in its namespace, beside its sensors.
 RESERVED_TOPICS = (
     *("cmd_vel", "set_pose", "initialpose", "push", "target_pose", "odom", "propellers", "joint_states"),
+    *("set_wind", "weather", "faults"),
     *("command", "scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
     *(f"view/{what}" for what in ("surroundings", "bodies", "path", "height", "command", "state")),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from drone_sim.forces.force import Force
 from drone_sim.mechanics import frames
@@ -29,6 +29,7 @@ class Body:
         self._links = {name: (self._named(above), matrix) for name, (above, matrix) in rigid.parents.items()}
         self._start = start
         self._world = world
+        self.air: Callable[[Vector], Vector] = lambda place: (0.0, 0.0, 0.0)  # its velocity (m/s, world) at a place
         self.reset()
 
     def reset(self) -> None:
@@ -47,6 +48,11 @@ class Body:
         self.jumps += 1
         self._world.set_pose(self.number, pose)
         self.refresh()
+
+    @property
+    def wind(self) -> Vector:
+        """Velocity of the air where it is (m/s, world)."""
+        return self.air(self.state.position)
 
     @property
     def links(self) -> dict[str, tuple[str, Matrix]]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from drone_sim.config.place import DatumParameters
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.state import State
+from drone_sim.sensors.failing import Failing, Failure
 from drone_sim.sensors.parameters import SensorParameters
 from drone_sim.sensors.sensor import Carrier, Contact, Fitting, Hit, Instrument
 from drone_sim.vehicles.body import Body
@@ -40,6 +41,11 @@ class Carrying:
     def jumps(self) -> int:
         """How often it has been put somewhere else, at rest."""
         return self._body.jumps
+
+    @property
+    def wind(self) -> Vector:
+        """Velocity of the air where it is (m/s, world)."""
+        return self._body.wind
 
     @property
     def thrusts(self) -> Sequence[float]:
@@ -78,6 +84,7 @@ class Instruments:
                 self.fixed_frames[one.frame] = matrix
         self._body = body
         self._all = tuple(self.by_name.values())
+        self._looking: tuple[Instrument | Failing, ...] = self._all
 
     def __bool__(self) -> bool:
         """Whether there are any."""
@@ -98,8 +105,14 @@ class Instruments:
         place, _, linear, angular = self._body.state
         if not -_NOWHERE < sum(place) + sum(linear) + sum(angular) < _NOWHERE:  # nor a NaN, with which nothing is known
             return
-        for one in self._all:
+        for one in self._looking:
             one.look(count)
+
+    def fail(self, failures: Mapping[str, Failure]) -> None:
+        """Let those fail that are named, and no others."""
+        sound: Failure = "ok"
+        named = [(one, failures.get(name, sound)) for name, one in self.by_name.items()]
+        self._looking = tuple(one if how == sound else Failing(one, how) for one, how in named)
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings them back, once the body is where it was."""

@@ -30,6 +30,7 @@ from drone_sim.mechanics.object_names import NO_SUFFIX
 from drone_sim.sensors import AnySensor
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters
 from drone_sim.sensors.together import check_together
+from drone_sim.vehicles.fault_parameters import FaultParameters
 from drone_sim.vehicles.object_places import ObjectPlace
 from drone_sim.vehicles.quadricopter_objects import OWN_NAMES
 from drone_sim.wording import near_names
@@ -115,10 +116,16 @@ class EquipmentParameters(Checked):
     cameras: Annotated[dict[Name, CameraParameters], Field(max_length=MAX_CAMERAS)]
     sensors: Annotated[dict[Name, AnySensor], Field(max_length=MAX_SENSORS)]
     forces: Annotated[dict[Name, ForceParameters], Field(max_length=MAX_FORCES)]
+    faults: FaultParameters
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several keys at once."""
         check_together(self.cameras, self.sensors)
+        self.check_faults()
+
+    def check_faults(self) -> None:
+        """Raise ParameterError for a fault of a sensor that it has not."""
+        self.faults.check([*self.sensors, *self.cameras])
 
 
 class VehicleParameters(EquipmentParameters, PlaceParameters):

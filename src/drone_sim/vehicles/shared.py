@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from drone_sim.config.place import DatumParameters
+from drone_sim.forces.weather import Weather
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.backend import Backend
@@ -21,7 +22,7 @@ from drone_sim.world import World
 
 @dataclass
 class Shared:
-    """World, objects, signals, scripts, custom data, tubes, drawings, messages, eyes and clock.
+    """World, weather, objects, signals, scripts, custom data, tubes, drawings, messages, eyes and clock.
 
     `time` returns the simulated time in s; `time_step` and `sub_step` in s; `script_time_limit` in s of real time;
     `gravity` in m/s² along z; `magnetic_field` in T. `names` has for each body in the world what a person calls it,
@@ -38,6 +39,7 @@ class Shared:
     magnetic_field: Vector
     script_time_limit: float
     drawings: Drawings
+    weather: Weather
     backend: Backend | None = None
     objects: ObjectTree = field(default_factory=ObjectTree)
     signals: Signals = field(default_factory=Signals)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from drone_sim.forces.drag import DragParameters
 from drone_sim.forces.force import Force
 from drone_sim.forces.pushes import Push, Pushes
 from drone_sim.mechanics import frames, urdf
@@ -27,6 +28,7 @@ from drone_sim.sensors.sensor import Instrument
 from drone_sim.vehicles.blades import Blades
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.child_script import Pictures, call_init, load_child_script, refuse_if_idle
+from drone_sim.vehicles.faults import Faults
 from drone_sim.vehicles.instruments import Carrying, Instruments
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.quadricopter_objects import (
@@ -62,6 +64,7 @@ class Vehicle:
         turned = frames.from_rpy((0, 0, 0), (*parameters.tilt, parameters.yaw))
         start = Pose(parameters.position, frames.to_quaternion(turned))
         self.body = Body(rigid, start, shared.world)
+        self.body.air = shared.weather.at
         shapes = [(respondable(number), link) for number, link in zip(NUMBERS, self._rotors.links)]
         self._shapes = {
             name + suffix: frames.multiply(self.body.inertial_from_root, link)
@@ -80,6 +83,7 @@ class Vehicle:
         try:
             self.instruments = Instruments(parameters, suffix, self.body, carrying, shared)
             self.sensors: Mapping[str, Instrument] = self.instruments.by_object  # as scripts find them
+            self.faults = Faults(self.name, parameters.faults, self.instruments, self.cameras, shared.time)
             self.reset()
         except BaseException:
             self.leave()
@@ -95,6 +99,8 @@ class Vehicle:
         others = [one.make() for one in self.parameters.forces.values()]
         self._forces: list[Force] = [self._propellers, *(one for one in others if not one.every_sub_step)]
         self.sub_step_forces = [one for one in others if one.every_sub_step]
+        self._has_drag = any(one.feels_wind for one in others)
+        self.feel_weather()
         self.command = Twist()
         self._command_age = 0.0
         self.blades.reset()
@@ -114,6 +120,20 @@ class Vehicle:
         for camera in self.cameras.values():
             camera.reset()
         self.instruments.reset()
+        self.faults.begin(self._propellers)
+        self._prepare()
+
+    def feel_weather(self) -> None:
+        """Have drag, once there is weather; what `forces` does not give has the coefficients of DragParameters."""
+        if self._shared.weather.is_felt and not self._has_drag:
+            self._has_drag = True
+            self.sub_step_forces = [*self.sub_step_forces, DragParameters(kind="drag").make()]
+
+    def _prepare(self) -> None:
+        """List what comes before the script in every step; a sound vehicle without sensors has nothing."""
+        self._before_script = [self.instruments.clear] if self.sensors else []
+        if self.faults.commands is not None:
+            self._before_script.append(self._take_commands)
 
     def _leave_tree(self) -> None:
         """Take its objects out of the tree that they are in, if that is still the simulation's."""
@@ -221,7 +241,21 @@ class Vehicle:
     # ---- commands
 
     def receive(self, twist: Twist) -> None:
-        """Take a command for the next step; held until the next one, or for cmd_vel_timeout."""
+        """Take a command for the next step, or for when it comes over a link that is slow (`faults`).
+
+        It is held until the next one, or for cmd_vel_timeout.
+        """
+        if self.faults.commands is None:
+            self._obey(twist)
+        else:
+            self.faults.commands.send(self._shared.time(), twist)
+
+    def _take_commands(self) -> None:
+        came = self.faults.commands and self.faults.commands.receive(self._shared.time())
+        if came:
+            self._obey(came[1])
+
+    def _obey(self, twist: Twist) -> None:
         self.command = twist
         self._command_age = 0.0
         for bus in (self.bus, *self.listening):
@@ -238,6 +272,15 @@ class Vehicle:
     def push(self, force: Vector, torque: Vector, duration: float) -> None:
         """Push with a force (N) at the centre of mass and a torque (N m), fixed in the world, for `duration` s."""
         self._pushes.add(Push(force, torque, duration))
+
+    def change_faults(self, changes: Mapping[str, Any]) -> None:
+        """Let other things be wrong with it: keys of `faults`, as in YAML. Raises ParameterError."""
+        self.faults.change(changes)
+        self._prepare()
+
+    def change_weather(self, changes: Mapping[str, Any]) -> None:
+        """Let another weather be where it and all others are: keys of `weather`, as in YAML. Raises ParameterError."""
+        self._shared.weather.change(changes)
 
     def has_shape(self, name: str) -> bool:
         """Tell whether that is the name of a dynamic shape of it."""
@@ -289,11 +332,11 @@ class Vehicle:
 
     def actuation(self) -> None:
         """Hand waiting messages to the script, then let it command the propellers."""
-        if self.sensors:
-            self.instruments.clear()
+        for prepare in self._before_script:
+            prepare()
         timeout = self._timeout
         if timeout and self._command_age > timeout - self._time_step / 2 and self.command != Twist():
-            self.receive(Twist())
+            self._obey(Twist())
         self._command_age += self._time_step
         for callback in self.bus.new_callbacks():
             self.script.check(callback)
@@ -349,7 +392,8 @@ class Vehicle:
             *self.cameras.values(),
         )
         others = [one.remember() for one in parts]
-        instruments = self.instruments.remember()
+        instruments, faults = self.instruments.remember(), self.faults.remember()
+        sub_step_forces, has_drag = self.sub_step_forces, self._has_drag
 
         def recall() -> None:
             self.command, self._command_age = command, age
@@ -358,5 +402,8 @@ class Vehicle:
                 one()
             self.body.restored()
             instruments()  # which ask the body how often it was put somewhere
+            faults()
+            self._prepare()
+            self.sub_step_forces, self._has_drag = sub_step_forces, has_drag
 
         return recall

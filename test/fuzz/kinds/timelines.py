@@ -6,7 +6,13 @@ from hypothesis import strategies as st
 
 from kinds.values import junk, mostly, mutated, numbers, texts, vectors, words
 
-_ACTIONS = {"twist": ("linear", "angular"), "pose": ("position", "rpy"), "push": ("force", "torque")}
+_ACTIONS = {
+    "twist": ("linear", "angular"),
+    "pose": ("position", "rpy"),
+    "push": ("force", "torque"),
+    "weather": ("wind", "gusts"),
+    "faults": ("propellers", "sensors"),
+}
 _GOOD = b"- {at: 0.1, twist: {linear: [1, 0, 0]}}\n- {at: 0.2, push: {force: [1, 0, 0], duration: 0.2}}\n"
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import rospy
 from cv_bridge import CvBridge
 from sensor_msgs.msg import CameraInfo, Image
 
+from drone_sim.ros.node.step_time import Stamp
 from drone_sim.ros.vehicle import messages
 from drone_sim.ros.vehicle.compression import CompressedPublisher
 from drone_sim.sensors.camera import Camera
@@ -48,13 +47,18 @@ class CameraOutput:
         compressed = self._compressed
         return self._image.get_num_connections() > 0 or bool(compressed and compressed.get_num_connections())
 
-    def publish(self, stamp: Callable[[], rospy.Time]) -> None:
-        """Publish what the camera sees, and the model that belongs to it, under what `stamp` returns."""
-        if self._info_publisher.get_num_connections():
-            self._info.header.stamp = stamp()
+    def publish(self, stamp: Stamp) -> None:
+        """Publish what the camera sees, and the model that belongs to it, stamped with when it was taken.
+
+        Over a link both come together, or neither; of a silent camera nothing comes.
+        """
+        camera = self._camera
+        is_there = camera.image is not None or (camera.over is None and camera.failure != "silent")
+        if is_there and self._info_publisher.get_num_connections():
+            self._info.header.stamp = stamp(camera.age)
             self._info_publisher.publish(self._info)
-        if self._camera.image is not None:
-            self._publish_image(stamp(), self._camera.image)
+        if camera.image is not None:
+            self._publish_image(stamp(camera.age), camera.image)
 
     def _publish_image(self, stamp: rospy.Time, image: np.ndarray) -> None:
         frame = self._frame

@@ -42,7 +42,7 @@ class FleetTopics:
                 self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox)
         self._transforms.tell_fixed(vehicles.values())
 
-    def publish_state(self, stamp: Callable[[], rospy.Time]) -> None:
+    def publish_state(self, stamp: Stamp) -> None:
         """Publish pictures and state of every vehicle, under what `stamp` returns."""
         for topics in self._topics.values():
             topics.publish_state(stamp)

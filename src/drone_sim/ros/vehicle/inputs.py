@@ -6,12 +6,16 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rospy
+from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import Pose as PoseMessage
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Vector3Stamped, WrenchStamped
 from geometry_msgs.msg import Twist as TwistMessage
 
+from drone_sim.config.changing import changed
+from drone_sim.config.types import ParameterError
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.vehicle.conditions import check_changes, read_changes
 from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
@@ -40,6 +44,9 @@ class VehicleInputs:
                 ("initialpose", PoseWithCovarianceStamped, self._pose_estimate),
                 ("target_pose", PoseStamped, self._target),
                 ("push", WrenchStamped, self._push),
+                ("set_wind", Vector3Stamped, self._wind),
+                ("weather", KeyValue, self._weather),
+                ("faults", KeyValue, self._faults),
             )
         ]
 
@@ -56,9 +63,9 @@ class VehicleInputs:
         def take(message: Any) -> None:
             try:
                 job = read(message)
-            except checks.Refused as refused:
+            except (checks.Refused, ParameterError) as refused:
                 if throttle.passes():
-                    rospy.logwarn(f"{topic} refused{kept}: {refused}")
+                    rospy.logwarn(f"{topic} refused{kept}: {str(refused).removeprefix('parameter ')}")
                 return
             self._inbox.put(lambda: self._carry_out(job))
 
@@ -93,6 +100,22 @@ class VehicleInputs:
         force, torque = _numbers(message.wrench.force), _numbers(message.wrench.torque)
         push = checks.push(force, torque, self._parameters)
         return lambda vehicle: vehicle.push(*push)
+
+    def _wind(self, message: Vector3Stamped) -> _Job:
+        """Take the steady wind, for all vehicles; the gusts stay."""
+        _check_frame(message.header.frame_id)
+        changes = {"wind": _numbers(message.vector)}
+        check_changes(changes, self._simulation.parameters.weather)
+        return lambda vehicle: vehicle.change_weather(changes)
+
+    def _weather(self, message: KeyValue) -> _Job:
+        changes = read_changes(message, self._simulation.parameters.weather)
+        return lambda vehicle: vehicle.change_weather(changes)
+
+    def _faults(self, message: KeyValue) -> _Job:
+        changes = read_changes(message, self._parameters.faults)
+        self._parameters.model_copy(update={"faults": changed(self._parameters.faults, changes)}).check_faults()
+        return lambda vehicle: vehicle.change_faults(changes)
 
 
 def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters) -> Pose:

@@ -55,7 +55,7 @@ class VehicleTopics:
         for sensor in self._sensors.values():
             sensor.close()
 
-    def publish_state(self, stamp: Callable[[], rospy.Time]) -> None:
+    def publish_state(self, stamp: Stamp) -> None:
         """Publish pictures and state."""
         for camera in self._cameras.values():
             camera.publish(stamp)

@@ -1,0 +1,45 @@
+"""An anemometer: the velocity of the air where the vehicle is, as one that stands there would measure it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from drone_sim.config.types import Name
+from drone_sim.mechanics.frames import Vector
+from drone_sim.sensors.noise import NoiseParameters
+from drone_sim.sensors.parameters import SensorParameters, Topic
+from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, xyz
+
+
+class WindParameters(SensorParameters):
+    """An anemometer."""
+
+    kind: Literal["wind"]
+    topic: Topic = "wind"
+    frame: Name = "base_link"
+    noise: NoiseParameters = NoiseParameters()  # m/s
+
+    def make(self, fitting: Fitting) -> Wind:
+        """Return the instrument; `reset` comes before its first look."""
+        return Wind(self, fitting)
+
+
+class Wind(Instrument):
+    """Measures the wind, gusts included."""
+
+    parameters: WindParameters
+
+    def __init__(self, parameters: WindParameters, fitting: Fitting):
+        """Take what it is like and where it sits."""
+        super().__init__(parameters, fitting)
+        self._noise = self.make_noise(parameters.noise, 3)
+        self.outputs = (Output("", "geometry_msgs/Vector3Stamped", self._message),)
+
+    def sample(self) -> Vector:
+        """Return the velocity of the air (m/s, world)."""
+        x, y, z = self._noise.add(self.carrier.wind)
+        return x, y, z
+
+    def _message(self, value: Vector, header: Mapping[str, Any]) -> Fields:
+        return {"header": {**header, "frame_id": "world"}, "vector": xyz(value)}

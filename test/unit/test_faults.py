@@ -1,0 +1,268 @@
+"""What is wrong with a vehicle: propellers as theory has them, a slow link, sensors; always the same."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.offline import timeline
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.rotors import PROPELLERS
+
+FORWARD = Twist(Vector3(0.5, 0.0, 0.0))
+SMALL = {name: {"width": 16, "height": 12} for name in ("front", "depth")}
+SENSORS = {
+    "imu": {"kind": "imu", "rate": 100, "noise": {"linear_acceleration": {"deviation": 0.1}}},
+    "range": {"kind": "range", "rate": 20, "min_range": 0.04, "max_range": 4.0, "noise": {"deviation": 0.01}},
+}
+WIFI = {"latency": 0.2, "jitter": 0.1, "loss": 0.2}
+
+
+@pytest.fixture(name="simulate")
+def _simulate():
+    made = []
+
+    def simulate(**overrides):
+        made.append(Simulation(parameters.load({"cameras": SMALL, "drone": {"position": [0, 0, 5]}, **overrides})))
+        return made[-1]
+
+    yield simulate
+    for simulation in made:
+        simulation.close()
+
+
+def fly(simulation, steps, each=lambda: None):
+    """Return the state after each step, and what `each` returned."""
+    flown = []
+    for _ in range(steps):
+        simulation.step()
+        flown.append((simulation.drone.state, each()))
+    return flown
+
+
+# ---- propellers
+
+
+@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("share", [0.7, 0.0])
+def test_a_weak_propeller_turns_the_drone_as_its_lever_and_inertia_say(simulate, number, share):
+    """I α = r × f + reaction, of all four; while it turns slowly, and so in the first step."""
+    simulation = simulate()
+    fly(simulation, 20)
+    drone = simulation.drone
+    before = np.array(drone.state.angular_velocity)
+    shares = [share if index == number else 1.0 for index in range(4)]
+    drone.change_faults({"propellers": shares})
+    fly(simulation, 1)
+    torque = np.zeros(3)
+    for one, (_, sense), link in zip(range(4), PROPELLERS, drone._rotors.links):
+        velocity = shares[one] * drone.particle_velocities[one]
+        thrust = drone._propellers.thrusts[one]
+        point = frames.position(frames.multiply(drone.body.inertial_from_root, link))
+        torque += np.cross(point, (0, 0, thrust))
+        torque[2] += sense * 0.002 * velocity
+    gained = (np.array(drone.state.angular_velocity) - before) / 0.05
+    expected = np.linalg.solve(drone.body.rigid.inertia, torque)
+    assert gained[:2] == pytest.approx(expected[:2], rel=5e-3)
+    assert gained[2] == pytest.approx(expected[2], rel=0.1)  # the least of them, and gyroscopic torque adds to it
+
+
+def test_a_tenth_less_of_one_propeller_leaves_a_turn_and_a_drift(simulate):
+    """All four must blow alike again, for which every correction is d = -(1 - e) / (1 + 3e)."""
+    simulation = simulate(faults={"propellers": [0.9, 1, 1, 1]})
+    state = fly(simulation, 300)[-1][0]
+    correction = -0.1 / 3.7
+    track = frames.rotate(frames.invert(simulation.drone.track), state.linear_velocity)
+    assert state.angular_velocity[2] == pytest.approx(-correction, rel=1e-3)  # Dyaw = 1
+    # Level: Pangle (Kvcorr (0 - v)) = d, forwards; the same to the side.
+    assert track[0] == pytest.approx(-correction / 0.3 / 0.5, rel=0.05)
+    assert math.hypot(*state.angular_velocity[:2]) < 1e-3
+    thrusts = simulation.drone._propellers.thrusts
+    assert thrusts == pytest.approx([thrusts[0]] * 4, rel=1e-3)
+
+
+def test_limits_are_of_what_is_commanded(simulate):
+    simulation = simulate(propellers={"velocity_limits": [4, 5]}, faults={"propellers": [0.5, 0, 1, 1]})
+    fly(simulation, 1)
+    weak, stopped, *sound = simulation.drone._propellers.thrusts
+    assert stopped == 0
+    assert sound == [2 * weak] * 2
+
+
+def test_a_propeller_comes_back_at_the_next_start_and_with_a_snapshot(simulate):
+    simulation = simulate()
+    first = fly(simulation, 30)
+    simulation.start()
+    fly(simulation, 10)
+    sound = simulation.snapshot()
+    simulation.drone.change_faults({"propellers": [1, 1, 0, 1]})
+    broken = simulation.snapshot()
+    falling = fly(simulation, 20)
+    simulation.restore(sound)
+    assert fly(simulation, 20) == first[10:]
+    simulation.restore(broken)
+    assert fly(simulation, 20) == falling != first[10:]
+    simulation.stop()
+    simulation.start()
+    assert fly(simulation, 30) == first
+
+
+# ---- a radio link
+
+
+def test_a_command_takes_effect_when_it_comes(simulate):
+    simulation = simulate(faults={"commands": {"latency": 0.2}}, cmd_vel_timeout=0.5)
+    simulation.drone.receive(FORWARD)
+    commands = [command for _, command in fly(simulation, 20, lambda: simulation.drone.command)]
+    assert commands == [Twist()] * 4 + [FORWARD] * 10 + [Twist()] * 6
+
+
+def test_a_bad_link_loses_the_same_commands_in_every_flight(simulate):
+    simulation = simulate(faults={"commands": WIFI})
+
+    def flight():
+        commands = []
+        for step in range(60):
+            simulation.drone.receive(Twist(Vector3(0.01 * step)))
+            commands += fly(simulation, 1, lambda: simulation.drone.command)
+        return commands
+
+    first = flight()
+    assert 15 < len({command for _, command in first}) < 50
+    simulation.stop()
+    simulation.start()
+    assert flight() == first
+
+
+def test_a_snapshot_brings_back_what_is_under_way(simulate):
+    simulation = simulate()
+    simulation.drone.change_faults({"commands": {"latency": 0.3, "jitter": 0.3}})
+    simulation.drone.receive(FORWARD)
+    snapshot = simulation.snapshot()
+    first = fly(simulation, 20, lambda: simulation.drone.command)
+    simulation.drone.change_faults({"commands": {"latency": 0, "jitter": 0}})
+    simulation.restore(snapshot)
+    assert fly(simulation, 20, lambda: simulation.drone.command) == first
+    assert FORWARD in [command for _, command in first]
+
+
+def test_pictures_come_late_and_know_how_old_they_are(simulate):
+    simulation = simulate(faults={"images": {"latency": 0.1}})
+    camera = simulation.drone.cameras["front"]
+    camera.watched = lambda: True
+    simulation.drone.receive(FORWARD)
+    taken, came = [], []
+    look = camera.look
+    camera.look = lambda: taken.append(look()) or taken[-1]
+    for _ in range(12):
+        simulation.step()
+        came.append(camera.image)
+        assert camera.image is None or camera.age == pytest.approx(0.1)
+    assert came[:2] == [None, None]
+    assert all(one is other for one, other in zip(came[2:], taken))
+    simulation.drone.change_faults({"images": {"loss": 1}})
+    simulation.drone.change_faults({"images": {"latency": 0}})
+    fly(simulation, 3)
+    assert camera.image is None
+
+
+# ---- sensors
+
+
+def test_sensors_fall_silent_freeze_and_come_back_as_if_nothing_had_been(simulate):
+    sound, failing = simulate(sensors=SENSORS), simulate(sensors=SENSORS)
+    instruments = failing.drone.instruments
+
+    def step():
+        sound.step()
+        failing.step()
+        return {name: list(one.readings) for name, one in instruments.by_name.items()}
+
+    last = step()
+    failing.drone.change_faults({"sensors": {"imu": "silent", "range": "frozen"}})
+    kept = instruments.by_name["imu"].read()
+    for _ in range(5):
+        now = step()
+        assert now["imu"] == [] and instruments.by_name["imu"].read() == kept
+        assert [one.value for one in now["range"]] == [last["range"][-1].value]
+        assert [one.at for one in now["range"]] == [failing.steps * 10]
+    failing.drone.change_faults({"sensors": {"imu": "ok", "range": "ok"}})
+    step()
+    for name, one in instruments.by_name.items():
+        assert one.readings == sound.drone.instruments.by_name[name].readings != []
+
+
+def test_cameras_fail_too(simulate):
+    simulation = simulate(cameras={"front": {**SMALL["front"], "mount": None}})
+    camera = simulation.drone.cameras["front"]
+    camera.watched = lambda: True
+    fly(simulation, 1)
+    first = camera.image
+    simulation.drone.change_faults({"sensors": {"front": "frozen"}})
+    simulation.drone.push((3, 0, 0), (0, 0, 0.1), 0.3)
+    fly(simulation, 8)
+    assert camera.image is first
+    simulation.drone.change_faults({"sensors": {"front": "silent"}})
+    fly(simulation, 1)
+    assert camera.image is None
+    assert not camera.look().any() and camera.look().shape == first.shape
+    simulation.drone.change_faults({"sensors": {"front": "ok"}})
+    fly(simulation, 1)
+    assert (camera.image != first).any()
+
+
+# ---- how they come
+
+
+def test_parameter_timeline_and_call_fly_alike(simulate, tmp_path):
+    faults = {"propellers": [1.0, 0.95, 1.0, 1.0], "commands": {"latency": 0.1, "jitter": 0.05}}
+    weather = {"wind": [1.0, 0.0, 0.0], "gusts": {"deviation": [1.0, 1.0, 1.0]}}
+    file = tmp_path / "faults.yaml"
+    file.write_text(f"- {{at: 0, faults: {faults}}}\n- {{at: 0, weather: {weather}}}\n")
+    by_parameter, by_timeline, by_call = simulate(faults=faults, weather=weather), simulate(), simulate()
+    timeline.read(str(file), by_timeline.parameters).apply(0, by_timeline.vehicles)
+    by_call.drone.change_faults(faults)
+    by_call.drone.change_weather(weather)
+    flights = []
+    for one in (by_parameter, by_timeline, by_call):
+        one.drone.receive(FORWARD)
+        flights.append(fly(one, 40))
+    assert flights[0] == flights[1] == flights[2]
+
+
+def test_the_pages_example_is_allowed(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "weather.md").read_text(encoding="utf-8")
+    file = tmp_path / "storm.yaml"
+    file.write_text(re.search(r"^```yaml\n(weather:.*?)^```", page, re.S | re.M)[1])
+    loaded = parameters.load({"config": str(file)})
+    assert loaded.weather.gusts.deviation == (3, 3, 1.5) and loaded.fleet[0].faults.sensors == {"front": "frozen"}
+
+
+@pytest.mark.parametrize(
+    "faults, message",
+    [
+        ({"propellers": [1, 1, 1]}, "faults/propellers = [1, 1, 1]: must be 4 numbers from 0 to 1"),
+        ({"propellers": [1, 1, 1, 2]}, "faults/propellers/3 = 2: input should be less than or equal to 1"),
+        ({"commands": {"latancy": 1}}, "faults/commands/latancy: unknown key; known are latency"),
+        ({"images": {"latency": 3}}, "faults/images/latency = 3: input should be less than or equal to 2"),
+        ({"sensors": {"front": "mad"}}, "faults/sensors/front = 'mad': input should be 'ok', 'silent' or 'frozen'"),
+        ({"sensors": {"frnt": "ok"}}, "faults/sensors/'frnt': no such sensor or camera; near names are front"),
+        (5, "faults = 5: must hold `key: value` lines with propellers, commands, images, sensors, seed"),
+    ],
+)
+def test_a_mistake_gets_one_line_whichever_way_it_comes(simulate, tmp_path, faults, message):
+    with pytest.raises(ParameterError) as refused:
+        parameters.load({"faults": faults})
+    assert f"parameter {message}" in str(refused.value)
+    file = tmp_path / "faults.yaml"
+    file.write_text(f"- {{at: 0, faults: {faults}}}\n")
+    with pytest.raises(timeline.TimelineError) as refused:
+        timeline.read(str(file), parameters.load())
+    assert str(refused.value) == f"{file}: line 1: entry 1: {str(refused.value).partition('entry 1: ')[2]}"
+    assert message in str(refused.value)

@@ -1,0 +1,229 @@
+"""Wind and gusts: Dryden's statistics, one air for all, what they do to a flight, the same to the bit."""
+
+import hashlib
+import itertools
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from drone_sim.forces.dryden import MOST, Gusts, Series
+from drone_sim.forces.weather import Weather, WeatherParameters
+from drone_sim.mechanics.frames import to_euler
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.simulation import Simulation
+
+CALM = {"deviation": (0, 0, 0), "length": (20, 20, 5), "speed": 2, "seed": 1}
+GUSTS = {**CALM, "deviation": (3, 2, 1)}
+
+
+def weather(wind=(0, 0, 0), gusts=CALM, now=0.0):
+    clock = [now]
+    return Weather(WeatherParameters(wind=wind, gusts=gusts), lambda: clock[0]), clock
+
+
+@pytest.fixture(name="simulate")
+def _simulate():
+    made = []
+
+    def simulate(**overrides):
+        made.append(Simulation(parameters.load(overrides)))
+        return made[-1]
+
+    yield simulate
+    for simulation in made:
+        simulation.close()
+
+
+def fly(simulation, steps):
+    path = []
+    for _ in range(steps):
+        simulation.step()
+        path.append([vehicle.state for vehicle in simulation.vehicles.values()])
+    return path
+
+
+# ---- Dryden
+
+
+@pytest.mark.parametrize("is_along", [True, False])
+def test_gusts_have_drydens_variance_and_correlation(is_along):
+    """4000 lengths in all; an estimate of the variance then is good to some 3 %."""
+    spacing, ways = 0.25, np.arange(0, 1000, 0.25)
+    series = np.array([list(map(Series((seed,), is_along).at, ways)) for seed in range(4)])
+    assert series.var() == pytest.approx(1.0, abs=0.08)
+    assert abs(series.mean()) < 0.05
+    for distance in (0.5, 1.0, 2.0, 3.0):
+        lag = round(distance / spacing)
+        expected = math.exp(-distance) * (1 if is_along else 1 - distance / 2)
+        assert np.mean(series[:, :-lag] * series[:, lag:]) == pytest.approx(expected, abs=0.08)
+
+
+def test_the_spectrum_is_drydens():
+    ways = np.arange(0, 1024, 1 / 16)
+    frequencies = np.fft.rfftfreq(len(ways), 1 / 16) * 2 * math.pi  # rad per length
+    bands = np.geomspace(0.05, 12, 8)
+    for is_along in (True, False):
+        gusts = np.array(list(map(Series((7,), is_along).at, ways)))
+        power = np.abs(np.fft.rfft(gusts)) ** 2 / len(ways) / 16 / math.pi  # one-sided, per rad
+        square = 1 + frequencies**2
+        theory = 2 / math.pi / square if is_along else (1 + 3 * frequencies**2) / math.pi / square**2
+        for low, high in itertools.pairwise(bands):
+            band = (low <= frequencies) & (frequencies < high)
+            assert power[band].mean() == pytest.approx(theory[band].mean(), rel=0.3), (is_along, low)
+
+
+def test_gusts_are_of_seed_and_way_alone():
+    one, other, another = Gusts(5), Gusts(5), Gusts(6)
+    ways = [float(way) for way in range(0, 500, 7)]
+    there = [one.at(way, (1, 1, 1), (20, 20, 5)) for way in ways]
+    back = [other.at(way, (1, 1, 1), (20, 20, 5)) for way in reversed(ways)]
+    assert there == back[::-1]
+    assert there != [another.at(way, (1, 1, 1), (20, 20, 5)) for way in ways]
+    assert len({round(value, 9) for gust in there for value in gust}) == 3 * len(ways)  # nor are the components alike
+
+
+def test_gusts_are_the_same_everywhere():
+    """To the last bit: with Python 3.10 to 3.13, and numpy 1.24 to 2.5."""
+    gusts = Gusts(1)
+    blown = hashlib.sha256()
+    for way in range(0, 1000, 3):
+        blown.update(struct.pack("3d", *gusts.at(way / 7, (3.0, 2.0, 1.0), (23.0, 23.0, 3.0))))
+    assert blown.hexdigest() == "1f68caa73bdb785f868425473634a7aba8b7f557e91655bcd6887ecba4c98baa"
+
+
+def test_however_far_somebody_is_there_is_a_gust(monkeypatch):
+    monkeypatch.setattr("drone_sim.forces.dryden.MOST", 1000)
+    series = Series((3,), True)
+    assert MOST > 1000 >= len(series._knots)
+    ends = [series.at(place / 128) for place in (990, 1010)]  # it turns back, without a jump
+    assert ends[0] == ends[1]
+    assert abs(series.at(1e6)) < 6
+    assert [series.at(way) for way in (1e300, math.inf, math.nan)] == [0, 0, 0]
+    assert len(series._knots) < 1500
+
+
+# ---- one air
+
+
+def test_who_is_further_downwind_meets_the_same_gusts_later():
+    air, clock = weather((3.0, 4.0, 0.0), GUSTS)
+    clock[0] = 10.0
+    here = air.at((1.0, 2.0, 0.5))
+    clock[0] = 12.0
+    assert air.at((1.0 + 6.0, 2.0 + 8.0, 3.0)) == pytest.approx(here, abs=1e-12)
+    assert air.at((1.0, 2.0, 0.5)) != pytest.approx(here, abs=0.1)
+
+
+def test_components_are_along_the_wind_across_it_and_up():
+    series = {}
+    for axis in range(3):
+        deviation = [0, 0, 0]
+        deviation[axis] = 1
+        air, _ = weather((0.0, 5.0, 0.0), {**CALM, "deviation": deviation})
+        series[axis] = np.array(air.at((0.3, 0.4, 0.5))) - (0, 5, 0)
+    along, across, up = (series[axis] for axis in range(3))
+    assert along[0] == along[2] == 0 != along[1]
+    assert across[1] == pytest.approx(0, abs=1e-15) and across[2] == 0 != across[0]
+    assert up[0] == up[1] == 0 != up[2]
+
+
+def test_a_change_of_the_wind_lets_the_gusts_go_on():
+    air, clock = weather((5.0, 0.0, 0.0), GUSTS)
+    clock[0] = 8.0
+    before = air.at((0, 0, 0))
+    air.change({"wind": [2.5, 0, 0]})
+    after = air.at((0, 0, 0))
+    assert after[0] - before[0] == pytest.approx(-2.5)
+    assert after[1:] == before[1:]
+    clock[0] = 10.0  # and now they pass at half the speed
+    slow = air.at((0, 0, 0))[1:]
+    other, time = weather((5.0, 0.0, 0.0), GUSTS)
+    time[0] = 9.0
+    assert other.at((0, 0, 0))[1:] == pytest.approx(slow)
+
+
+def test_a_wrong_change_changes_nothing():
+    air, _ = weather((1.0, 0.0, 0.0))
+    with pytest.raises(ParameterError, match=r"^parameter gusts/lenght: unknown key; known are length"):
+        air.change({"gusts": {"lenght": [1, 1, 1]}})
+    with pytest.raises(ParameterError, match=r"wind = \[1, 2\]: must be 3 numbers, \[x, y, z\] in m/s"):
+        air.change({"wind": [1, 2]})
+    assert air.at((0, 0, 0)) == (1.0, 0.0, 0.0)
+
+
+# ---- in flight
+
+
+@pytest.mark.parametrize("wind, drag", [(3.0, None), (-6.0, 0.3)])
+def test_in_a_steady_wind_it_leans_as_far_as_drag_and_weight_say(simulate, wind, drag):
+    """tan θ = c (w - v) / (m g), with the speed v at which the tutorial's controller lets it drift."""
+    forces = {"air": {"kind": "drag", "coefficients": [drag] * 3}} if drag else {}
+    simulation = simulate(weather={"wind": [0, wind, 0]}, forces=forces)
+    flown = [state for (state,) in fly(simulation, 400)[300:]]
+    lean = np.mean([to_euler(state.matrix)[0] for state in flown])
+    drift = np.mean([state.linear_velocity[1] for state in flown])
+    mass = simulation.drone.body.mass
+    assert math.tan(lean) == pytest.approx((drag or 0.1) * (wind - drift) / (mass * 9.81), rel=1e-3)
+    # The controller's own law: it leans by Kvcorr v against a speed that it is not told to have.
+    assert lean == pytest.approx(0.5 * drift, rel=1e-2)
+
+
+def test_drag_of_ones_own_is_the_only_one(simulate):
+    own = {"air": {"kind": "drag", "coefficients": [0, 0, 0]}}
+    assert fly(simulate(weather={"wind": [9, 0, 0]}, forces=own), 50)[-1][0].linear_velocity[0] == 0
+
+
+def test_without_weather_nothing_follows_the_sub_steps(simulate):
+    simulation = simulate()
+    assert simulation.drone.sub_step_forces == [] and not simulation._any_between
+    simulation.drone.change_weather({"wind": [3, 0, 0]})
+    assert len(simulation.drone.sub_step_forces) == 1 and simulation._any_between
+    assert fly(simulation, 20)[-1][0].linear_velocity[0] > 0.05
+    simulation.start()  # as the parameters say
+    assert simulation.drone.sub_step_forces == [] and not simulation._any_between
+
+
+def test_a_flight_in_gusts_comes_again_to_the_bit(simulate):
+    windy = {"wind": [2, 1, 0], "gusts": GUSTS}
+    first = fly(simulate(weather=windy), 100)
+    simulation = simulate(weather=windy)
+    assert fly(simulation, 100) == first
+    simulation.start()
+    assert fly(simulation, 100) == first
+    assert fly(simulate(weather={**windy, "gusts": {**GUSTS, "seed": 2}}), 10) != first[:10]
+
+
+def test_a_snapshot_brings_the_weather_back(simulate):
+    simulation = simulate()
+    fly(simulation, 10)
+    calm = simulation.snapshot()
+    simulation.drone.change_weather({"wind": [2, 0, 0], "gusts": GUSTS})
+    fly(simulation, 30)
+    windy = simulation.snapshot()
+    then = fly(simulation, 50)
+    simulation.drone.change_weather({"wind": [0, 0, 0], "gusts": {"seed": 9}})
+    fly(simulation, 20)
+    simulation.restore(windy)
+    assert fly(simulation, 50) == then
+    simulation.restore(calm)
+    assert simulation.drone.sub_step_forces == []
+    assert fly(simulation, 20)[-1][0].linear_velocity[0] == 0
+
+
+def test_an_anemometer_says_what_blows_at_each_vehicle(simulate):
+    sensors = {"wind": {"kind": "wind", "rate": 20}}
+    vehicles = {"front": {"position": [0, 0, 1]}, "behind": {"position": [4, 0, 1]}}
+    simulation = simulate(weather={"wind": [4, 0, 0], "gusts": GUSTS}, sensors=sensors, vehicles=vehicles)
+    said = {name: [] for name in vehicles}
+    for _ in range(60):
+        simulation.step()
+        for name, vehicle in simulation.vehicles.items():
+            fields = vehicle.instruments.by_name["wind"].read()
+            said[name].append(fields["vector"]["x"])
+    first, later = (np.array(said[name]) for name in vehicles)
+    assert first.std() > 0.3
+    # 4 m at 4 m/s: 20 steps; both drift, a bit.
+    assert np.corrcoef(first[:-20], later[20:])[0, 1] > 0.95 > np.corrcoef(first, later)[0, 1]
