@@ -33,10 +33,16 @@ class Player:
         self._simulated_time = simulated_time
         self._tell = tell
         self._told = ""
+        self.failure = ""  # why it stopped by itself, since the last start
         self._tell_state()
 
+    @property
+    def state(self) -> str:
+        """What it does: `flying`, `paused` or `stopped`."""
+        return "flying" if self.playing else "paused" if self.simulation.running else "stopped"
+
     def _tell_state(self) -> None:
-        state = "flying" if self.playing else "paused" if self.simulation.running else "stopped"
+        state = self.state
         if state != self._told:
             self._told = state
             self._tell(state)
@@ -48,7 +54,7 @@ class Player:
 
     def start(self, scene_file: str | None = None) -> str:
         """Read scene and script from disk and begin at time 0. Raises what Simulation.start does, after stopping."""
-        self.paused = False
+        self.paused, self.failure = False, ""
         self.attempt(lambda: self.simulation.start(scene_file))
         self.simulation.look()  # meshes and textures are read now, which the first step would be late for
         self.begun = True
@@ -108,7 +114,8 @@ class Player:
         try:
             action()
         except (ScriptError, Diverged) as error:
-            _LOG.error(f"script error: {error}" if isinstance(error, ScriptError) else str(error))
+            self.failure = f"script error: {error}" if isinstance(error, ScriptError) else str(error)
+            _LOG.error(self.failure)
             try:
                 self.simulation.stop()
             except ScriptError as second:

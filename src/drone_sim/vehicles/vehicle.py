@@ -167,6 +167,11 @@ class Vehicle:
         return first[key], second[key], third[key], fourth[key]
 
     @property
+    def clipped_steps(self) -> int:
+        """Steps of the run in which the script commanded more than the propellers can do."""
+        return self._propellers.clipped
+
+    @property
     def blade_angles(self) -> dict[str, float]:
         """Angle (rad) of each propeller's blades, by joint of the URDF."""
         return self.blades.angles

@@ -13,6 +13,7 @@ from geometry_msgs.msg import Twist as TwistMessage
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.vehicle.messages import WORLD_FRAME
+from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
@@ -32,6 +33,7 @@ class VehicleInputs:
         self._simulation = simulation
         self._name, self._parameters = parameters.name, parameters
         self._inbox = inbox
+        self.log = CommandLog()
         self._subscribers = [
             rospy.Subscriber(f"{self._name}/{topic}", kind, self._taking(topic, read), queue_size=1, tcp_nodelay=True)
             for topic, kind, read in (
@@ -42,6 +44,11 @@ class VehicleInputs:
                 ("push", WrenchStamped, self._push),
             )
         ]
+        self.log.senders = self._commanders
+
+    def _commanders(self) -> list[str]:
+        """Return the nodes that are connected to cmd_vel."""
+        return sorted({one.callerid_pub for one in self._subscribers[0].impl.connections})
 
     def close(self) -> None:
         """Listen no more."""
@@ -57,9 +64,11 @@ class VehicleInputs:
             try:
                 job = read(message)
             except checks.Refused as refused:
+                self.log.refuse(topic, _sender(message), str(refused))
                 if throttle.passes():
                     rospy.logwarn(f"{topic} refused{kept}: {refused}")
                 return
+            self.log.take(topic, _sender(message))
             self._inbox.put(lambda: self._carry_out(job))
 
         return take
@@ -93,6 +102,10 @@ class VehicleInputs:
         force, torque = _numbers(message.wrench.force), _numbers(message.wrench.torque)
         push = checks.push(force, torque, self._parameters)
         return lambda vehicle: vehicle.push(*push)
+
+
+def _sender(message: Any) -> str:
+    return str(message._connection_header.get("callerid", "?"))
 
 
 def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters) -> Pose:
