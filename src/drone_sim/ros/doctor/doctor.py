@@ -57,7 +57,7 @@ def main() -> int:
         print(line, flush=True)
     wrong, hints = marks.count(WRONG), marks.count(HINT)
     print(f"{wrong} wrong, {hints} hints" if wrong or hints else "all is well", flush=True)
-    list(lines("the end", _goodbye, _AT_THE_END))
+    lines("the end", _goodbye, _AT_THE_END)
     os._exit(1 if wrong else 0)  # a thread of rospy's may wait for a master that has gone
 
 

@@ -21,8 +21,11 @@ def python() -> Iterator[Line]:
     if sys.version_info < _OLDEST:
         yield Line(WRONG, "Python", f"{version}, but 3.10 is the oldest that will do")
         return
-    yield Line(OK, "Python", f"{version}, {sys.executable}")
     first, own = shutil.which("python3"), package_path() / ".venv/bin"
+    if own.is_dir() and Path(sys.executable).parent != own:
+        yield Line(WRONG, "Python", f"the doctor runs on {sys.executable}, its package's modules are in {own.parent}")
+    else:
+        yield Line(OK, "Python", f"{version}, {sys.executable}")
     if own.is_dir() and (first is None or Path(first).parent != own):
         cure = f"`source {package_path()}/devel/setup.bash` puts {own} first"
         yield Line(HINT, "Python", f"the python3 on the PATH is {first}, which lacks the package's modules: {cure}")

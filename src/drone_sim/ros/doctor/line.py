@@ -32,15 +32,16 @@ class _TooLongError(Exception):
     pass
 
 
-def lines(what: str, check: Check, seconds: float) -> Iterator[Line]:
-    """Yield what a check finds; where it fails or takes longer than `seconds` (real time), that. Main thread only."""
+def lines(what: str, check: Check, seconds: float) -> list[Line]:
+    """Return what a check finds; where it fails or takes longer than `seconds` (real time), that. Main thread only."""
     try:
         with _limited(seconds):
-            yield from list(check())
+            found = list(check())
     except _TooLongError:
-        yield Line(WRONG, what, f"no answer within {seconds:g} s")
+        found = [Line(WRONG, what, f"no answer within {seconds:g} s")]
     except Exception as error:  # whatever is broken here is what the user wants to know
-        yield Line(WRONG, what, f"cannot be checked: {type(error).__name__}: {error}")
+        found = [Line(WRONG, what, f"cannot be checked: {type(error).__name__}: {error}")]
+    return found
 
 
 @contextlib.contextmanager

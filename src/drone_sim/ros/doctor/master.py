@@ -75,7 +75,8 @@ class Master:
         except ConnectionRefusedError:
             return Line(HINT, "master", f"none at {self.uri}: {_START}")
         except FAILURES as error:
-            said = f"port {port} of {self.uri} does not answer as a master ({error or type(error).__name__})"
+            why = f"HTTP {error.errcode}" if isinstance(error, xmlrpc.client.ProtocolError) else str(error)
+            said = f"port {port} of {self.uri} does not answer as a master ({why or type(error).__name__})"
             return Line(
                 WRONG, "master", f"{said}: end what listens there, or `export ROS_MASTER_URI=` with another port"
             )

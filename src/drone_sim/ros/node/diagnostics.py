@@ -14,7 +14,7 @@ from diagnostic_updater import DiagnosticStatusWrapper, Updater
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.run.diagnosis.finding import ERROR, Finding
 
-_PERIOD = 1.0  # s of real time
+PERIOD = 1.0  # s of real time
 _PATIENCE = 2.0  # s, for the simulation's answer
 _LONGEST = 600  # characters of a value
 _BUSY = "simulation"  # the finding that says that there is no answer
@@ -27,16 +27,10 @@ class Diagnostics(threading.Thread):
     its period, and fails where that has gone.
     """
 
-    def __init__(
-        self,
-        look: Callable[[], list[Finding]],
-        stamp: Callable[[], rospy.Time],
-        inbox: Inbox,
-        period: float = _PERIOD,
-    ):
-        """Advertise. `look` and `stamp` are called in the simulation's thread; `period` in s of real time."""
+    def __init__(self, look: Callable[[], list[Finding]], stamp: Callable[[], rospy.Time], inbox: Inbox):
+        """Advertise. `look` and `stamp` are called in the simulation's thread."""
         super().__init__(name="diagnostics", daemon=True)
-        self._look, self._stamp, self._inbox, self._period = look, stamp, inbox, period
+        self._look, self._stamp, self._inbox = look, stamp, inbox
         self._ended = threading.Event()
         self._findings: dict[str, Finding] = {}
         self._answered = threading.Event()
@@ -51,7 +45,7 @@ class Diagnostics(threading.Thread):
 
     def run(self) -> None:
         """Publish until it is closed."""
-        while not self._ended.wait(self._period):
+        while not self._ended.wait(PERIOD):
             if not self._updater.publisher.get_num_connections():
                 continue
             self._ask()
@@ -85,8 +79,9 @@ class Diagnostics(threading.Thread):
         names = {one.name for one in self._updater.tasks}
         for name in names - findings.keys():
             self._updater.removeByName(name)
-        for name in findings.keys() - names:
-            self._updater.add(name, self._status)
+        for name in findings:  # in this order
+            if name not in names:
+                self._updater.add(name, self._status)
         self._updater.force_update()
 
     def _status(self, status: DiagnosticStatusWrapper) -> DiagnosticStatusWrapper:
