@@ -163,34 +163,34 @@ class Interface(unittest.TestCase):
             status = next(filter(fits, array.status))
             return {pair.key: pair.value for pair in status.values}
 
-        told("drone", DiagnosticStatus.OK, "no command has come yet")
+        told("vehicle drone", DiagnosticStatus.OK, "no command has come yet")
         self.assertEqual(told("simulation", None, "")["state"], "flying")
         commands = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1))
         command = Twist()
         command.linear.x = 0.5
         commands.publish(command)
-        values = told("drone", DiagnosticStatus.OK, f"as {own} commands")
+        values = told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands")
         self.assertEqual(values["command"], "0.50 0.00 0.00 m/s, 0.00 0.00 0.00 rad/s")
         self.assertEqual(values["connected commanders"], own)
         command.linear.x = 50.0
         commands.publish(command)
-        values = told("drone", DiagnosticStatus.WARN, f"refused what {own} sends on cmd_vel")
+        values = told("vehicle drone", DiagnosticStatus.WARN, f"refused what {own} sends on cmd_vel")
         self.assertIn("linear.x = 50.0: must lie within", values["why refused"])
         command.linear.x = 0.5
         self.call("pause", True)
         commands.publish(command)
-        told("drone", DiagnosticStatus.WARN, "but the simulation is paused")
+        told("vehicle drone", DiagnosticStatus.WARN, "but the simulation is paused")
         told("simulation", DiagnosticStatus.WARN, "/clock stands still")
         upside_down = PoseStamped()
         upside_down.pose.position.z, upside_down.pose.orientation.x = 2.0, 1.0
         poses = connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=1))
         poses.publish(upside_down)
-        told("drone", DiagnosticStatus.WARN, "leans (180 degrees)")
+        told("vehicle drone", DiagnosticStatus.WARN, "leans (180 degrees)")
         self.call("restart")
         commands.publish(command)
-        told("drone", DiagnosticStatus.OK, f"as {own} commands")
+        told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands")
         commands.unregister()
-        told("drone", DiagnosticStatus.WARN, f"flies on by the last command of {own}, which has gone")
+        told("vehicle drone", DiagnosticStatus.WARN, f"flies on by the last command of {own}, which has gone")
         camera = Listener("/drone/front", roslib.message.get_message_class("sensor_msgs/Image"))
         camera.wait_for()
         values = told("cameras", None, "")
@@ -199,7 +199,7 @@ class Interface(unittest.TestCase):
         camera.close()
         self.script.write_text(BROKEN)
         self.call("restart")
-        told("drone", DiagnosticStatus.ERROR, f"stands still: script error: [actuation] {self.script}:2")
+        told("vehicle drone", DiagnosticStatus.ERROR, f"stands still: script error: [actuation] {self.script}:2")
         listener.close()
 
     # ---- the doctor
@@ -212,8 +212,8 @@ class Interface(unittest.TestCase):
         marks = {line.what: line.mark for line in lines}
         self.assertEqual(marks["master"], OK, lines)
         self.assertEqual(marks["clock"], OK, lines)
-        self.assertEqual(marks["drone"], WRONG, lines)
-        self.assertIn("script error", next(line.said for line in lines if line.what == "drone"))
+        self.assertEqual(marks["vehicle drone"], WRONG, lines)
+        self.assertIn("script error", next(line.said for line in lines if line.what == "vehicle drone"))
         hint = next(line for line in lines if line.what == "commands")
         self.assertEqual(hint.mark, HINT)
         self.assertIn("/cmd_vel, which nobody hears: start it with cmd_vel:=/drone/cmd_vel", hint.said)

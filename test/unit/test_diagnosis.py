@@ -58,7 +58,7 @@ class Looked:
             self.player.step()
             self.now += step
 
-    def look(self, what="drone"):
+    def look(self, what="vehicle drone"):
         return next(one for one in self.diagnosis.look() if one.name == what)
 
 
@@ -158,7 +158,7 @@ def test_a_script_error_is_told_until_the_next_start(looked):
     looked.script.write_text("def sysCall_actuation():\n    1 / 0\n")
     looked.player.restart()
     looked.fly(1)
-    for what in ("drone", "simulation"):
+    for what in ("vehicle drone", "simulation"):
         found = looked.look(what)
         assert found.level == ERROR
         assert f"script error: [actuation] {looked.script}:2: ZeroDivisionError" in found.message

@@ -39,7 +39,7 @@ class VehicleDiagnosis:
             *self._cannot(),
             *self._is_on_its_own(),
         ]
-        return finding(self._vehicle.name, self._fine(), problems, self._values())
+        return finding(f"vehicle {self._vehicle.name}", self._fine(), problems, self._values())
 
     # ---- what may be wrong
 
