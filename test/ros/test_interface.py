@@ -16,6 +16,7 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, Twist
 from listening import Listener, connected
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from drone_sim.files.resources import package_path
@@ -202,11 +203,25 @@ class Interface(unittest.TestCase):
         told("vehicle drone", DiagnosticStatus.ERROR, f"stands still: script error: [actuation] {self.script}:2")
         listener.close()
 
+    def test_6_a_simulation_that_does_not_answer_is_told(self):
+        go_on = threading.Event()
+        diagnostics.PATIENCE = 0.1
+        listener = Listener("/diagnostics", DiagnosticArray)
+        self.node._inbox.put(go_on.wait)
+        try:
+            array = listener.wait_for(lambda m: any("busy for" in one.message for one in m.status))
+            self.assertEqual(max(one.level for one in array.status), DiagnosticStatus.ERROR)
+        finally:
+            go_on.set()
+        listener.wait_for(lambda m: not any("busy for" in one.message for one in m.status))
+        listener.close()
+
     # ---- the doctor
 
     def test_5_the_doctor_repeats_what_the_node_says(self):
         self.script.write_text(BROKEN)
         self.call("restart")
+        Listener("~state", String).wait_for(lambda m: m.data == "stopped", after=0)
         rospy.Publisher("/cmd_vel", Twist, queue_size=1)
         lines = list(examined(thorough=False))
         marks = {line.what: line.mark for line in lines}

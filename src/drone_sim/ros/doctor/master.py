@@ -13,7 +13,7 @@ from drone_sim.ros.doctor.line import HINT, OK, WRONG, Line
 from drone_sim.ros.doctor.network import MASTER, PATIENCE, addresses
 
 _ME = "/drone_sim_doctor"
-_MOST = 30  # nodes that are asked for a sign of life
+_ENOUGH = 5  # nodes that do not answer: each takes its time
 _START = "`roslaunch drone_sim drone.launch` starts one"
 FAILURES = (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError)
 
@@ -114,12 +114,16 @@ class Master:
 
     def dead(self) -> Iterator[Line]:
         """Are there nodes that have gone without a word?"""
-        for node in self.nodes()[:_MOST] if self.there else ():
+        gone = 0
+        for node in self.nodes() if self.there else ():
             try:
                 asked(asked(self.uri, "lookupNode", node), "getPid")
             except FAILURES:
+                gone += 1
                 cure = "`rosnode cleanup` removes it, if it is not just another machine that cannot be reached"
                 yield Line(HINT, "nodes", f"{node} is registered and does not answer: {cure}")
+            if gone == _ENOUGH:
+                return
 
     def commands(self) -> Iterator[Line]:
         """Are there commands that nobody hears?"""

@@ -15,7 +15,7 @@ from drone_sim.ros.node.inbox import Inbox
 from drone_sim.run.diagnosis.finding import ERROR, Finding
 
 PERIOD = 1.0  # s of real time
-_PATIENCE = 2.0  # s, for the simulation's answer
+PATIENCE = 2.0  # s, for the simulation's answer
 _LONGEST = 600  # characters of a value
 _BUSY = "simulation"  # the finding that says that there is no answer
 
@@ -60,7 +60,7 @@ class Diagnostics(threading.Thread):
             self._answered.clear()
             self._asked = time.monotonic()
             self._inbox.put(self._answer)
-        if self._answered.wait(_PATIENCE):
+        if self._answered.wait(PATIENCE):
             return
         seconds = time.monotonic() - self._asked
         why = "a scene or script is being read, or a script or a picture does not come to an end"
