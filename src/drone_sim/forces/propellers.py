@@ -71,6 +71,7 @@ class Propellers(Force):
         self._commanded = self._given = commanded
         self.effectiveness: tuple[float, ...] = (1.0,) * len(axes)
         self.air = [0.0] * len(axes)  # m of it that went through each
+        self.clipped = 0  # steps in which a limit was in force
         self._newtons = 0.0  # per m/s, of the step
         self._emitted: Sequence[float] = [0.0] * len(axes)  # m/s, of the step
         self._law = ParticleLaw(parameters, time_step)
@@ -85,6 +86,7 @@ class Propellers(Force):
         """Emit a step's particles at the velocities that are commanded, within limits."""
         velocities, matrix = self._commanded(), body.matrix
         if min(velocities) < self._slowest or max(velocities) > self._fastest:
+            self.clipped += 1
             velocities = [min(max(velocity, self._slowest), self._fastest) for velocity in velocities]
         self._emitted = velocities
         newtons = self._newtons = self._law.emit()

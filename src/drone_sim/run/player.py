@@ -37,8 +37,20 @@ class Player:
         self._told = ""
         self._tell_state()
 
+    @property
+    def state(self) -> str:
+        """What it does: `flying`, `paused` or `stopped`."""
+        return "flying" if self.playing else "paused" if self.simulation.running else "stopped"
+
+    @property
+    def why_stopped(self) -> str:
+        """Why it stopped by itself since the last start, in one line; '' where it did not."""
+        if self.failure is None:
+            return ""
+        return f"script error: {self.failure}" if isinstance(self.failure, ScriptError) else str(self.failure)
+
     def _tell_state(self) -> None:
-        state = "flying" if self.playing else "paused" if self.simulation.running else "stopped"
+        state = self.state
         if state != self._told:
             self._told = state
             self._tell(state)
@@ -120,7 +132,7 @@ class Player:
             action()
         except (ScriptError, Diverged) as error:
             self.failure = error
-            _LOG.error(f"script error: {error}" if isinstance(error, ScriptError) else str(error))
+            _LOG.error(self.why_stopped)
             try:
                 self.simulation.stop()
             except ScriptError as second:

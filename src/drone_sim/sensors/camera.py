@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
 from typing import Protocol
 
@@ -18,6 +19,7 @@ from drone_sim.sensors.sensor import Reading, Sensor
 from drone_sim.shapes.visual import Visual
 
 _LOG = logging.getLogger(__name__)
+TINY = "TinyRenderer"
 
 
 class Subject(Protocol):
@@ -51,6 +53,7 @@ class Vision:
         self._samples = samples
         self._renderer: Renderer | None = None
         self._fallback = False
+        self.pictures, self.seconds = 0, 0.0  # taken by now, and the real time that they took
 
     def look_at(self, subject: Subject) -> None:
         """Take the pictures of another subject from now on."""
@@ -64,6 +67,13 @@ class Vision:
         """
         if self._renderer is None and not self._fallback:
             self._open()
+        began = time.perf_counter()
+        taken = self._drawn(kind, intrinsics, pose)
+        self.pictures += 1
+        self.seconds += time.perf_counter() - began
+        return taken
+
+    def _drawn(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
         if self._renderer is None:
             return self._tiny_picture(kind, intrinsics, pose)
         self._renderer.set_visuals(self._subject.visuals())
@@ -76,6 +86,13 @@ class Vision:
             pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far
         )
         return color if kind == "color" else depth
+
+    @property
+    def renderer(self) -> str:
+        """What draws: OpenGL's name for it, "TinyRenderer", or '' before the first picture."""
+        if self._renderer is not None:
+            return self._renderer.description
+        return TINY if self._fallback else ""
 
     def _open(self) -> None:
         try:
@@ -111,6 +128,7 @@ class Camera(Sensor):
             parameters.width, parameters.height, parameters.horizontal_fov, parameters.near, parameters.far
         )
         self.watched: Callable[[], bool] = lambda: False
+        self.shown = 0  # pictures, to those who look
         self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
         self.pose = pose
         self.failure: Failure = "ok"
@@ -150,6 +168,7 @@ class Camera(Sensor):
             self.age, image = self.over(image)
         self.image = image
         if image is not None:
+            self.shown += 1
             self.latest = Reading(steps, image)
 
     def reset(self) -> None:

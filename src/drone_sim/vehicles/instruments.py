@@ -82,6 +82,7 @@ class Instruments:
                 self.moving_frames[one.frame] = pose
             elif one.frame not in body.rigid.links:
                 self.fixed_frames[one.frame] = matrix
+        self.carrier = carrying
         self._body = body
         self._all = tuple(self.by_name.values())
         self._looking: tuple[Instrument | Failing, ...] = self._all

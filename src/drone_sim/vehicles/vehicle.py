@@ -220,6 +220,11 @@ class Vehicle:
         return self._commanded[numbers[0] - 1] if numbers else None
 
     @property
+    def clipped_steps(self) -> int:
+        """Steps of the run in which the script commanded more than the propellers can do."""
+        return self._propellers.clipped
+
+    @property
     def blade_angles(self) -> dict[str, float]:
         """Angle (rad) of each propeller's blades, by joint of the URDF."""
         return self.blades.angles

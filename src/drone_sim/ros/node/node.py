@@ -2,7 +2,8 @@
 
 Parameters (private): every key of config/drone.yaml.
 Topics, in the namespace of each vehicle: see ros/vehicle; for rviz: see ros/rviz; services: services.py.
-/clock is published with use_sim_time: see step_time.py. Frames: see ros/vehicle/transforms.py.
+/clock is published with use_sim_time: see step_time.py; /diagnostics: see diagnostics.py.
+Frames: see ros/vehicle/transforms.py.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from std_msgs.msg import String
 
 from drone_sim.mechanics.frames import position, to_euler
 from drone_sim.remote import outside
+from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.ending import Ending
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.launch_arguments import check_launch_arguments
@@ -30,6 +32,7 @@ from drone_sim.ros.rviz.handles import Handles
 from drone_sim.ros.rviz.rviz_view import RvizView
 from drone_sim.ros.vehicle.fleet_topics import FleetTopics
 from drone_sim.ros.vehicle.script_topics import RosBackend
+from drone_sim.run.diagnosis.diagnosis import Diagnosis
 from drone_sim.run.guardian import Guardian
 from drone_sim.run.pacing import Beat, Pacer
 from drone_sim.run.parameters import Parameters
@@ -72,6 +75,8 @@ class Node:
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._handles = Handles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
+        diagnosis = Diagnosis(self.player, self._pacer, self._topics.command_logs, self._time.simulated)
+        self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
         self._beat = Beat(_SOON, _SELDOM)
         self._shown = -1  # the world's changes, when it was shown
         for camera in self.simulation.drone.cameras.values():
@@ -94,6 +99,7 @@ class Node:
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
         commands = ", ".join(rospy.resolve_name(f"{name}/cmd_vel") for name in self.simulation.vehicles)
         rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; commands on {commands}")
+        self._diagnostics.start()
         steps, seconds = 0, 0.0
         self._pacer.restart()
         while not over():
@@ -201,6 +207,7 @@ class Node:
 
     def close(self) -> None:
         """Run the script's cleanup, remove what rviz read, and free the world. Raises ScriptError."""
+        self._diagnostics.close()
         self._outside.close()
         self._view.close()
         self.simulation.close()

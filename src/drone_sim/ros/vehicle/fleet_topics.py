@@ -10,6 +10,7 @@ from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.step_time import Stamp
 from drone_sim.ros.vehicle.transforms import Transforms
 from drone_sim.ros.vehicle.vehicle_topics import VehicleTopics
+from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.simulation import Simulation
 
 
@@ -41,6 +42,10 @@ class FleetTopics:
             else:
                 self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox)
         self._transforms.tell_fixed(vehicles.values())
+
+    def command_logs(self) -> dict[str, CommandLog]:
+        """Return what has come in, by vehicle."""
+        return {name: topics.command_log for name, topics in self._topics.items()}
 
     def publish_state(self, stamp: Stamp) -> None:
         """Publish pictures and state of every vehicle, under what `stamp` returns."""

@@ -17,6 +17,7 @@ from drone_sim.mechanics.state import Pose
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.vehicle.conditions import check_changes, read_changes
 from drone_sim.ros.vehicle.messages import WORLD_FRAME
+from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
@@ -36,6 +37,7 @@ class VehicleInputs:
         self._simulation = simulation
         self._name, self._parameters = parameters.name, parameters
         self._inbox = inbox
+        self.log = CommandLog()
         self._subscribers = [
             rospy.Subscriber(f"{self._name}/{topic}", kind, self._taking(topic, read), queue_size=1, tcp_nodelay=True)
             for topic, kind, read in (
@@ -49,6 +51,11 @@ class VehicleInputs:
                 ("faults", KeyValue, self._faults),
             )
         ]
+        self.log.senders = self._commanders
+
+    def _commanders(self) -> list[str]:
+        """Return the nodes that are connected to cmd_vel."""
+        return sorted({one.callerid_pub for one in self._subscribers[0].impl.connections})
 
     def close(self) -> None:
         """Listen no more."""
@@ -64,9 +71,12 @@ class VehicleInputs:
             try:
                 job = read(message)
             except (checks.Refused, ParameterError) as refused:
+                said = str(refused).removeprefix("parameter ")
+                self.log.refuse(topic, _sender(message), said)
                 if throttle.passes():
-                    rospy.logwarn(f"{topic} refused{kept}: {str(refused).removeprefix('parameter ')}")
+                    rospy.logwarn(f"{topic} refused{kept}: {said}")
                 return
+            self.log.take(topic, _sender(message))
             self._inbox.put(lambda: self._carry_out(job))
 
         return take
@@ -116,6 +126,10 @@ class VehicleInputs:
         changes = read_changes(message, self._parameters.faults)
         self._parameters.model_copy(update={"faults": changed(self._parameters.faults, changes)}).check_faults()
         return lambda vehicle: vehicle.change_faults(changes)
+
+
+def _sender(message: Any) -> str:
+    return str(message._connection_header.get("callerid", "?"))
 
 
 def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters) -> Pose:

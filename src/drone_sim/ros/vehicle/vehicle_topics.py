@@ -13,6 +13,7 @@ from drone_sim.ros.vehicle.description import set_description
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.ros.vehicle.outputs import VehicleOutputs
 from drone_sim.ros.vehicle.sensors import SensorOutput
+from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -33,6 +34,11 @@ class VehicleTopics:
             name: SensorOutput(vehicle.parameters, sensor) for name, sensor in vehicle.instruments.by_name.items()
         }
         set_description(vehicle.parameters)
+
+    @property
+    def command_log(self) -> CommandLog:
+        """What has come in."""
+        return self._inputs.log
 
     def fits(self, vehicle: Vehicle) -> bool:
         """Whether these would be the topics of this vehicle, too."""

@@ -145,6 +145,10 @@ class MessageBus:
         """Leave a message for the next step; any thread may call it."""
         self._subscriptions.post(self.resolve(topic), message)
 
+    def hears(self, topic: str) -> bool:
+        """Whether the script is subscribed to a topic."""
+        return self._subscriptions.has(self._resolve(topic))
+
     def close(self) -> None:
         """End every subscription and stop advertising: the script that made them is gone."""
         self._subscriptions.close()

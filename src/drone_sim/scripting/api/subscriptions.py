@@ -69,6 +69,11 @@ class Subscriptions:
                 if subscription.topic == topic:
                     subscription.messages.append(message)
 
+    def has(self, topic: str) -> bool:
+        """Whether there is one to that topic; any thread may call it."""
+        with self._lock:
+            return any(one.topic == topic for one in self._by_handle.values())
+
     def new_callbacks(self) -> list[Callback]:
         """Return what was subscribed with since the last call."""
         if not self._new_callbacks:

@@ -1,0 +1,107 @@
+"""Whether what package.xml names can be imported, drawn with and flown."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+from drone_sim.files.resources import package_path
+from drone_sim.ros.doctor.line import HINT, OK, WRONG, Line
+from drone_sim.ros.doctor.probe import FLIGHT, RENDERER
+
+PATIENCE = 60.0  # s, for all of it; two are usual
+_MODULES = {"python3-opencv": "cv2", "python3-pil": "PIL", "python3-pycollada-pip": "collada", "python3-tk": "tkinter"}
+_NO_MODULES = {"rviz"}
+_WITHOUT = {  # what still works where a module is missing
+    "tkinter": "`view` writes files instead of opening a window",
+    "matplotlib": "`fly --plot` does not work",
+    "tqdm": "`fly` does not work",
+}
+_TOLD = {"numpy": "numpy", "cv2": "OpenCV", "pybullet": "PyBullet", "pydantic": "pydantic", "lupa": "lupa"}
+
+
+def modules() -> dict[str, str]:
+    """Return the keys of package.xml by the modules that they bring."""
+    keys = [str(one.text) for one in Xml.parse(package_path() / "package.xml").iter("exec_depend")]
+    named = {_MODULES.get(key, key.removeprefix("python3-").removesuffix("-pip")): key for key in keys}
+    return {module: key for module, key in named.items() if key not in _NO_MODULES}
+
+
+def packages() -> Iterator[Line]:
+    """Import them all, draw, and fly, in a process that may die."""
+    keys = modules()
+    tried = results([*sorted(keys), RENDERER, FLIGHT])
+    failed = {name: text for name, (state, text) in tried.items() if state != "ok" and name in keys}
+    for name, text in failed.items():
+        yield _missing(name, keys[name], text)
+    if not failed:
+        versions = ", ".join(f"{told} {_version(name, tried[name][1])}" for name, told in _TOLD.items())
+        yield Line(OK, "packages", f"all {len(keys)} that package.xml names; {versions}")
+    yield from _drawing(*tried[RENDERER])
+    yield _flying(*tried[FLIGHT])
+
+
+def _missing(module: str, key: str, why: str) -> Line:
+    here = (package_path() / "dev.sh").is_file()
+    debian = key if key.startswith("python3-") else f"python3-{key.replace('_', '-')}"
+    cure = "`./dev.sh setup` installs it" if here else f"`apt install {debian}`, or install drone_sim anew"
+    if module in _WITHOUT:
+        return Line(HINT, "packages", f"no {module} ({why}): {_WITHOUT[module]}; {cure}")
+    return Line(WRONG, "packages", f"{module} cannot be imported ({why}): {cure}")
+
+
+def _version(module: str, own: str) -> str:
+    from importlib import metadata
+
+    distribution = metadata.packages_distributions().get(module, [module])[0] if not own else module
+    try:
+        return own or metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return "of some version"
+
+
+def _drawing(state: str, text: str) -> Iterator[Line]:
+    if state == "ok":
+        yield Line(OK, "pictures", text)
+        return
+    slow = "pictures will come from PyBullet's TinyRenderer, at a few frames per second"
+    yield Line(HINT, "pictures", f"{text}; {slow}; `apt install libegl1 libgl1-mesa-dri`, or a driver that has EGL")
+
+
+def _flying(state: str, text: str) -> Line:
+    return Line(OK if state == "ok" else WRONG, "flight", text if state == "ok" else f"no test flight: {text}")
+
+
+def results(names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return what the probe says of each name: `ok` or `failed`, and a text. What kills it is named."""
+    found: dict[str, tuple[str, str]] = {}
+    while len(found) < len(names):
+        left = [name for name in names if name not in found]
+        output, ended = _probed(left)
+        begun = ""
+        for line in output.splitlines():
+            name, state, text = (*line.split("\t"), "", "")[:3]
+            if name in left and state == "begins":
+                begun = name
+            elif name in left and state in ("ok", "failed"):
+                found[name], begun = (state, text), ""
+        if len(found) < len(names):  # it died, in the one that it had begun with
+            found[begun or next(name for name in names if name not in found)] = ("failed", ended)
+    return found
+
+
+def _probed(names: Sequence[str]) -> tuple[str, str]:
+    """Return what the probe printed, and how it ended."""
+    source = str(Path(__file__).resolve().parents[3])  # whatever a devel space has in its place
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([source, os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, "-m", "drone_sim.ros.doctor.probe", *names]
+    try:
+        done = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE)
+    except subprocess.TimeoutExpired as late:
+        return (late.stdout or b"").decode(errors="replace"), f"no end within {PATIENCE:g} s"
+    last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+    return done.stdout.decode(errors="replace"), f"ended with {done.returncode}{': ' if last else ''}{''.join(last)}"

@@ -1,0 +1,57 @@
+"""Who commanded a vehicle what, and what of it was refused: for people who ask why it does not fly."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+
+class Taken(NamedTuple):
+    """The last good message of a topic."""
+
+    sender: str
+    at: float  # s, of the log's clock
+
+
+class Refusal(NamedTuple):
+    """The last message of a topic that was refused."""
+
+    topic: str
+    sender: str
+    at: float  # s, of the log's clock
+    why: str
+    times: int  # of those refused by now
+
+
+class CommandLog:
+    """What has come in for one vehicle since it is there. Any thread may write, and any may read."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        """Begin empty; take a monotonic clock (s)."""
+        self.clock = clock
+        self.senders: Callable[[], list[str]] = list  # returns who is connected, and could command
+        self.taken: dict[str, Taken] = {}  # by topic
+        self.refused: dict[str, Refusal] = {}
+        self._lock = threading.Lock()
+
+    def take(self, topic: str, sender: str) -> None:
+        """Note a good message."""
+        self.taken[topic] = Taken(sender, self.clock())
+
+    def refuse(self, topic: str, sender: str, why: str) -> None:
+        """Note one that was refused."""
+        with self._lock:
+            before = self.refused.get(topic)
+            self.refused[topic] = Refusal(topic, sender, self.clock(), why, before.times + 1 if before else 1)
+
+    def last_refusal(self) -> Refusal | None:
+        """Return the latest refusal on any topic."""
+        with self._lock:
+            return max(self.refused.values(), key=lambda one: one.at, default=None)
+
+    def is_refusing(self, topic: str) -> bool:
+        """Whether the last message of a topic was refused."""
+        refused, taken = self.refused.get(topic), self.taken.get(topic)
+        return refused is not None and (taken is None or taken.at < refused.at)

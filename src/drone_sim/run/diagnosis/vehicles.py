@@ -1,0 +1,160 @@
+"""Why a vehicle does not fly as its pilot expects."""
+
+from __future__ import annotations
+
+import math
+
+from drone_sim.mechanics.state import Twist
+from drone_sim.run.diagnosis.command_log import CommandLog
+from drone_sim.run.diagnosis.counts import Since
+from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, finding, numbers
+from drone_sim.run.player import Player
+from drone_sim.sensors.sensor import Contact
+from drone_sim.vehicles.vehicle import Vehicle
+
+COMMAND = "cmd_vel"
+_RECENT = 5.0  # s of real time
+_LEANING = math.radians(60)  # no flight of the tutorial's needs half as much
+_SHARE = 0.5  # of the steps with a propeller at its limit, after which it is a problem
+_SLOW = 0.1  # of the speed that is commanded
+_MOVES = 0.1  # m/s, of a command that means to
+
+
+class VehicleDiagnosis:
+    """Looks at one vehicle, between two steps."""
+
+    def __init__(self, vehicle: Vehicle, player: Player, log: CommandLog, since: Since | None):
+        """Take what is to be looked at; `since` is what was counted since the last look, None where nothing was."""
+        self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
+        self._now = log.clock()
+        self._tilt = tilt(vehicle)
+        self._contacts = vehicle.instruments.carrier.contacts()
+
+    def finding(self) -> Finding:
+        """Return what was found."""
+        problems = [
+            *self._stands(),
+            *self._refuses(),
+            *self._leans(),
+            *self._cannot(),
+            *self._is_on_its_own(),
+        ]
+        return finding(f"vehicle {self._vehicle.name}", self._fine(), problems, self._values())
+
+    # ---- what may be wrong
+
+    def _stands(self) -> list[Problem]:
+        player = self._player
+        if player.playing:
+            return []
+        if player.why_stopped:
+            return [Problem(ERROR, f"stands still: {player.why_stopped}; `start` runs the edited file")]
+        taken = self._log.taken.get(COMMAND)
+        cure = "`pause false` lets it go on" if player.state == "paused" else "`start` lets it fly"
+        if taken is not None and self._now - taken.at < _RECENT:
+            return [Problem(WARN, f"commands of {taken.sender} come in, but the simulation is {player.state}: {cure}")]
+        return []
+
+    def _refuses(self) -> list[Problem]:
+        refused = self._log.last_refusal()
+        if refused is None or not self._log.is_refusing(refused.topic):
+            return []
+        kept = ", and flies by the last good one" if refused.topic == COMMAND else ""
+        return [Problem(WARN, f"refused what {refused.sender} sends on {refused.topic}{kept}: {refused.why}")]
+
+    def _leans(self) -> list[Problem]:
+        if self._tilt < _LEANING:
+            return []
+        how = "lies on its back" if self._tilt > math.pi / 2 and self._contacts else "leans"
+        return [Problem(WARN, f"{how} ({math.degrees(self._tilt):.0f} degrees): `restart` puts it upright")]
+
+    def _cannot(self) -> list[Problem]:
+        problems = []
+        since, command = self._since, self._vehicle.command
+        if since and since.steps and since.clipped[self._vehicle.name] > _SHARE * since.steps:
+            problems.append(Problem(WARN, f"propellers at their limit in {self._clipped()}"))
+        wanted = math.hypot(*command.linear)
+        if since and self._contacts and wanted > _MOVES and self._speed() < _SLOW * wanted:
+            met = ", ".join(_names(self._contacts))
+            problems.append(Problem(WARN, f"held up by {met}: told {wanted:.2f} m/s, moves at {self._speed():.2f}"))
+        return problems
+
+    def _is_on_its_own(self) -> list[Problem]:
+        """Nobody hears the commands, or nobody is there any more who gave the one in force."""
+        vehicle, taken = self._vehicle, self._log.taken.get(COMMAND)
+        if taken is None or not self._player.playing:
+            return []
+        if not any(bus.hears(COMMAND) for bus in (vehicle.bus, *vehicle.listening)):
+            return [Problem(WARN, f"commands come in, but the child script does not subscribe to {COMMAND}")]
+        gone = taken.sender not in self._log.senders()
+        if gone and vehicle.command != Twist() and not vehicle.parameters.cmd_vel_timeout:
+            said = f"flies on by the last command of {taken.sender}, which has gone"
+            return [Problem(WARN, f"{said}: send a zero one, or set cmd_vel_timeout")]
+        return []
+
+    # ---- what is so
+
+    def _fine(self) -> str:
+        taken = self._log.taken.get(COMMAND)
+        state = self._player.state
+        if not self._player.playing:
+            return state
+        if taken is None:
+            return f"{state}; no command has come yet"
+        return f"{state} as {taken.sender} commands"
+
+    def _values(self) -> dict[str, str]:
+        vehicle, log = self._vehicle, self._log
+        taken, refused = log.taken.get(COMMAND), log.last_refusal()
+        limits = vehicle.parameters.propellers.velocity_limits
+        return {
+            "state": self._player.state,
+            "command": _shown(vehicle.command),
+            "command came": self._ago(taken.at) if taken else "never",
+            "command sender": taken.sender if taken else "nobody",
+            "connected commanders": ", ".join(log.senders()) or "nobody",
+            "command held for": f"{vehicle.parameters.cmd_vel_timeout:g} s" if self._forgets() else "ever",
+            "refused": f"{sum(one.times for one in log.refused.values())}",
+            "last refused": f"{refused.topic} of {refused.sender}, {self._ago(refused.at)}" if refused else "",
+            "why refused": refused.why if refused else "",
+            "propellers": f"{numbers(vehicle.particle_velocities)} m/s",
+            "propeller limits": f"{numbers(limits)} m/s" if limits else "none",
+            "propellers at a limit": self._clipped(),
+            "tilt": f"{math.degrees(self._tilt):.1f} degrees",
+            "position": f"{numbers(vehicle.state.position)} m",
+            "speed": f"{self._speed():.2f} m/s",
+            "contacts": ", ".join(_names(self._contacts)) or "none",
+            "put elsewhere": f"{vehicle.jumps} times",
+            "script": str(vehicle.parameters.script or self._player.simulation.script or "tutorial"),
+            "frame": f"{vehicle.parameters.base_link}, in world",
+        }
+
+    def _ago(self, at: float) -> str:
+        return f"{self._now - at:.1f} s ago"
+
+    def _forgets(self) -> bool:
+        return self._vehicle.parameters.cmd_vel_timeout > 0
+
+    def _speed(self) -> float:
+        return math.hypot(*self._vehicle.state.linear_velocity)
+
+    def _clipped(self) -> str:
+        since = self._since
+        return f"{since.clipped[self._vehicle.name]} of the last {since.steps} steps" if since else "not known"
+
+
+def tilt(vehicle: Vehicle) -> float:
+    """Return the angle (rad) between a vehicle's z axis and the vertical."""
+    return math.acos(max(-1.0, min(1.0, vehicle.matrix[10])))
+
+
+def _names(contacts: list[Contact]) -> list[str]:
+    """Return what is touched, and with how many newtons in all, the hardest first."""
+    newtons: dict[str, float] = {}
+    for one in contacts:
+        newtons[one.what] = newtons.get(one.what, 0.0) + math.hypot(*one.force)
+    return [f"{what or 'something'} ({newtons[what]:.2g} N)" for what in sorted(newtons, key=lambda one: -newtons[one])]
+
+
+def _shown(command: Twist) -> str:
+    return f"{numbers(command.linear)} m/s, {numbers(command.angular)} rad/s"

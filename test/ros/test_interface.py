@@ -1,0 +1,244 @@
+#!/usr/bin/env python3
+"""docs/interface.md says what the node has; /diagnostics says why a drone does not fly; the doctor repeats it."""
+
+import itertools
+import re
+import sys
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+import roslib.message
+import rospy
+import rosservice
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseStamped, Twist
+from listening import Listener, connected
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from drone_sim.files.resources import package_path
+from drone_sim.ros.doctor.doctor import examined
+from drone_sim.ros.doctor.line import HINT, OK, WRONG
+from drone_sim.ros.node import diagnostics
+from drone_sim.ros.node.node import Node
+from drone_sim.run import parameters
+
+PAGE = (package_path() / "docs/interface.md").read_text(encoding="utf-8")
+SMALL = {name: {"width": 16, "height": 12} for name in ("front", "depth", "track", "floor")}
+BROKEN = "def sysCall_actuation():\n    1 / 0\n"
+OF_ROSPY = {"/clock"}  # what this process hears since it is a node that goes by the clock
+
+
+def table(title):
+    """Return the rows of the first table with at least two columns of a section, without its head."""
+    section = re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", PAGE, re.S | re.M).group(1)
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in section.splitlines() if line[:3] == "| `"]
+    return [[row[0].strip("`"), *row[1:]] for row in rows]
+
+
+def resolved(name, namespace="/drone"):
+    return name if name.startswith("/") else f"{namespace}/{name}"
+
+
+class Interface(unittest.TestCase):
+    """A node in this process with every sensor; the tests follow one another by name."""
+
+    @classmethod
+    def setUpClass(cls):
+        diagnostics.PERIOD = 0.1
+        cls.looks, cls.ready = 0, threading.Event()
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.script = Path(cls.folder.name) / "script.py"
+        cls.script.write_text((package_path() / "src/drone_sim/child_scripts/tutorial.py").read_text())
+        cls.thread = threading.Thread(target=cls.run_node)
+        cls.thread.start()
+        cls.ready.wait(20)
+        master = rospy.get_master()
+        published, subscribed, _ = master.getSystemState()[2]
+        own = rospy.get_name()
+        cls.published = {topic for topic, nodes in published if own in nodes}
+        cls.subscribed = {topic for topic, nodes in subscribed if own in nodes} - OF_ROSPY
+        cls.types = dict(master.getTopicTypes()[2])
+        cls.services = {name: rosservice.get_service_type(name) for name in rosservice.get_service_list(node=own)}
+
+    @classmethod
+    def tearDownClass(cls):
+        rospy.signal_shutdown("done")
+        cls.thread.join()
+        cls.folder.cleanup()
+
+    @classmethod
+    def run_node(cls):
+        """Make and run it in one thread, which OpenGL belongs to."""
+        settings = {
+            "config": str(package_path() / "config/sensors.yaml"),
+            **{"cameras": SMALL, "real_time_factor": 4.0, "script": str(cls.script)},
+        }
+        cls.node = Node(parameters.load(settings))
+        look = cls.node._diagnostics._look
+
+        def counted():
+            cls.looks += 1
+            return look()
+
+        cls.node._diagnostics._look = counted
+        cls.ready.set()
+        cls.node.run()
+        cls.node.close()
+
+    def call(self, name, *arguments):
+        return rospy.ServiceProxy(f"~{name}", SetBool if arguments else Trigger)(*arguments).message
+
+    # ---- docs/interface.md
+
+    def test_1_topics_and_services_are_those_of_the_page(self):
+        said = {(resolved(row[0]).replace("/drone_sim", rospy.get_name()), row[1], row[2]) for row in table("Topics")}
+        true = {(topic, "→", self.types[topic]) for topic in self.published}
+        true |= {(topic, "←", self.types[topic]) for topic in self.subscribed}
+        self.assertEqual(said, true)
+        services = {resolved(name, rospy.get_name()): kind for name, kind, _ in table("Services")}
+        self.assertEqual(services, self.services)
+
+    def test_2_parameters_are_those_of_the_page(self):
+        said = {row[0] for row in table("Parameters") if row[0].startswith("/")}
+        self.assertEqual(said, {name for name in rospy.get_param_names() if name.startswith("/drone/")})
+        self.assertEqual(self.looks, 0, "nobody has listened to /diagnostics")
+
+    def test_3_rates_and_frames_are_those_of_the_page(self):
+        rows = [row for row in table("Topics") if row[1] == "→" and row[0] not in ("/rosout", "/clock")]
+        listeners = {
+            row[0]: Listener(resolved(row[0]), roslib.message.get_message_class(row[2]))
+            for row in rows
+            if not row[0].startswith("/")
+        }
+        frames = {
+            name: Listener(name, roslib.message.get_message_class("tf2_msgs/TFMessage"))
+            for name in ("/tf", "/tf_static")
+        }
+        try:
+            for topic, _, _, rate, frame, _ in rows:
+                if topic in listeners:
+                    with self.subTest(topic):
+                        self.check(listeners[topic], rate, frame.strip("`"))
+            for frame, parent, topic, _ in table("Frames"):
+                wanted = (frame, parent.strip("`"))
+                frames[topic.strip("`")].wait_for(lambda m, one=wanted: one in links(m), after=0)
+            true = {one for listener in frames.values() for message in listener.messages for one in links(message)}
+            self.assertEqual({(frame, parent.strip("`")) for frame, parent, *_ in table("Frames")}, true)
+        finally:
+            for listener in (*listeners.values(), *frames.values()):
+                listener.close()
+
+    def check(self, listener, rate, frame):
+        """Check what comes at a rate that counts in simulated time, and the frame of whatever comes by itself."""
+        seconds = {"step": 0.05}.get(rate) or (1 / float(rate.split()[0]) if rate.endswith("Hz") else None)
+        if seconds is None:
+            return
+        listener.wait_for(lambda _: len(listener.messages) > 2, after=0)
+        headers = [m.header for m in listener.messages if hasattr(m, "header")]
+        frames = {header.frame_id for header in headers}
+        frames |= {one.header.frame_id for m in listener.messages for one in getattr(m, "markers", ())}
+        self.assertLessEqual(frames, {frame})
+        times = [header.stamp.to_sec() for header in headers]
+        for before, after in itertools.pairwise(times):
+            # A busy machine may drop a message; it cannot bring one between two.
+            self.assertAlmostEqual((after - before) / seconds, max(1, round((after - before) / seconds)), delta=0.01)
+
+    # ---- /diagnostics
+
+    def test_4_a_look_answers_the_complaints(self):
+        listener = Listener("/diagnostics", DiagnosticArray)
+        own = rospy.get_name()
+
+        def told(what, level, words):
+            """Wait for a message; the level None is any: a busy machine is slow."""
+            name = f"{own[1:]}: {what}"
+
+            def fits(status):
+                return status.name == name and level in (None, status.level) and words in status.message
+
+            array = listener.wait_for(lambda m: any(map(fits, m.status)))
+            status = next(filter(fits, array.status))
+            return {pair.key: pair.value for pair in status.values}
+
+        told("vehicle drone", DiagnosticStatus.OK, "no command has come yet")
+        self.assertEqual(told("simulation", None, "")["state"], "flying")
+        commands = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1))
+        command = Twist()
+        command.linear.x = 0.5
+        commands.publish(command)
+        values = told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands")
+        self.assertEqual(values["command"], "0.50 0.00 0.00 m/s, 0.00 0.00 0.00 rad/s")
+        self.assertEqual(values["connected commanders"], own)
+        command.linear.x = 50.0
+        commands.publish(command)
+        values = told("vehicle drone", DiagnosticStatus.WARN, f"refused what {own} sends on cmd_vel")
+        self.assertIn("linear.x = 50.0: must lie within", values["why refused"])
+        command.linear.x = 0.5
+        self.call("pause", True)
+        commands.publish(command)
+        told("vehicle drone", DiagnosticStatus.WARN, "but the simulation is paused")
+        told("simulation", DiagnosticStatus.WARN, "/clock stands still")
+        upside_down = PoseStamped()
+        upside_down.pose.position.z, upside_down.pose.orientation.x = 2.0, 1.0
+        poses = connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=1))
+        poses.publish(upside_down)
+        told("vehicle drone", DiagnosticStatus.WARN, "leans (180 degrees)")
+        self.call("restart")
+        commands.publish(command)
+        told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands")
+        commands.unregister()
+        told("vehicle drone", DiagnosticStatus.WARN, f"flies on by the last command of {own}, which has gone")
+        camera = Listener("/drone/front", roslib.message.get_message_class("sensor_msgs/Image"))
+        camera.wait_for()
+        values = told("cameras", None, "")
+        self.assertEqual(values["looked at"], "1 of 4 cameras")
+        self.assertNotIn("none yet", values["renderer"])
+        camera.close()
+        self.script.write_text(BROKEN)
+        self.call("restart")
+        told("vehicle drone", DiagnosticStatus.ERROR, f"stands still: script error: [actuation] {self.script}:2")
+        listener.close()
+
+    def test_6_a_simulation_that_does_not_answer_is_told(self):
+        go_on = threading.Event()
+        diagnostics.PATIENCE = 0.1
+        listener = Listener("/diagnostics", DiagnosticArray)
+        self.node._inbox.put(go_on.wait)
+        try:
+            array = listener.wait_for(lambda m: any("busy for" in one.message for one in m.status))
+            self.assertEqual(max(one.level for one in array.status), DiagnosticStatus.ERROR)
+        finally:
+            go_on.set()
+        listener.wait_for(lambda m: not any("busy for" in one.message for one in m.status))
+        listener.close()
+
+    # ---- the doctor
+
+    def test_5_the_doctor_repeats_what_the_node_says(self):
+        self.script.write_text(BROKEN)
+        self.call("restart")
+        Listener("~state", String).wait_for(lambda m: m.data == "stopped", after=0)
+        rospy.Publisher("/cmd_vel", Twist, queue_size=1)
+        lines = list(examined(thorough=False))
+        marks = {line.what: line.mark for line in lines}
+        self.assertEqual(marks["master"], OK, lines)
+        self.assertEqual(marks["clock"], OK, lines)
+        self.assertEqual(marks["vehicle drone"], WRONG, lines)
+        self.assertIn("script error", next(line.said for line in lines if line.what == "vehicle drone"))
+        hint = next(line for line in lines if line.what == "commands")
+        self.assertEqual(hint.mark, HINT)
+        self.assertIn("/cmd_vel, which nobody hears: start it with cmd_vel:=/drone/cmd_vel", hint.said)
+
+
+def links(message):
+    """Return frames and parents of a message."""
+    return {(one.child_frame_id, one.header.frame_id) for one in message.transforms}
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_interface")
+    sys.exit(rostest.rosrun("drone_sim", "interface", Interface))

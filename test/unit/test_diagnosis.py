@@ -1,0 +1,231 @@
+"""One look says why a vehicle does not fly as expected; nobody needs ROS for it."""
+
+import pytest
+
+from drone_sim.files.resources import package_path
+from drone_sim.mechanics.frames import from_rpy, to_quaternion
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.diagnosis.command_log import CommandLog
+from drone_sim.run.diagnosis.diagnosis import Diagnosis
+from drone_sim.run.diagnosis.finding import ERROR, OK, WARN, Problem, finding
+from drone_sim.run.pacing import Pacer
+from drone_sim.run.player import Player
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.errors import ScriptError
+
+FORWARD = Twist(Vector3(0.5, 0, 0), Vector3(0, 0, 0))
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+WALL = {"shape": "box", "name": "Wall", "size": [0.2, 4, 4], "position": [1.0, 0, 2]}
+SCRIPT = package_path() / "src/drone_sim/child_scripts/tutorial.py"
+
+
+class Looked:
+    """A flight under diagnosis, whose real time is told."""
+
+    def __init__(self, script):
+        self.script = script
+        self.script.write_text(SCRIPT.read_text())
+        settings = {"script": str(script), "scene": {"objects": [WALL]}}
+        self.simulation = Simulation(parameters.load(settings))
+        self.now = 0.0
+        self.player = Player(self.simulation, self.simulation.step, lambda _: None, False)
+        self.pacer = Pacer(0.05, self.clock, lambda _: None)
+        self.renew()
+
+    def clock(self):
+        return self.now
+
+    def renew(self):
+        """Begin anew, at the start, with nothing said and nothing heard."""
+        self.script.write_text(SCRIPT.read_text())
+        self.player.restart()
+        self.log = CommandLog(self.clock)
+        self.log.senders = lambda: ["/pilot"]
+        self.diagnosis = Diagnosis(self.player, self.pacer, lambda: {"drone": self.log}, False, self.clock)
+
+    @property
+    def drone(self):
+        return self.simulation.drone
+
+    def command(self, twist=FORWARD, sender="/pilot"):
+        self.log.take("cmd_vel", sender)
+        self.drone.receive(twist)
+
+    def fly(self, steps, step=0.05):
+        """Fly so many steps, each in `step` s of real time."""
+        for _ in range(steps):
+            self.player.step()
+            self.now += step
+
+    def look(self, what="vehicle drone"):
+        return next(one for one in self.diagnosis.look() if one.name == what)
+
+
+@pytest.fixture(name="flight", scope="module")
+def _flight(tmp_path_factory):
+    flight = Looked(tmp_path_factory.mktemp("scripts") / "script.py")
+    yield flight
+    flight.simulation.close()
+
+
+@pytest.fixture(name="looked")
+def _looked(flight):
+    flight.renew()
+    return flight
+
+
+def test_all_is_well(looked):
+    looked.fly(2)
+    found = looked.look()
+    assert (found.level, found.message) == (OK, "flying; no command has come yet")
+    looked.command()
+    looked.fly(10)
+    found = looked.look()
+    assert (found.level, found.message) == (OK, "flying as /pilot commands")
+    assert found.values["command came"] == "0.5 s ago"
+    assert found.values["propellers at a limit"] == "0 of the last 10 steps"
+    assert looked.look("simulation").level == OK
+
+
+def test_the_pace_is_what_was_flown_in_real_time(looked):
+    looked.look()
+    looked.fly(10, step=0.1)
+    found = looked.look("simulation")
+    assert found.level == WARN
+    assert "too slow: 0.50 times real time, 1 are asked for" in found.message
+    looked.fly(10)
+    assert looked.look("simulation").message == "flying at 1.00 times real time"
+
+
+def test_what_was_counted_long_ago_says_nothing_of_now(looked):
+    looked.look()
+    looked.fly(1, step=100.0)
+    assert looked.look("simulation").values["real-time factor"] == "not known"
+
+
+def test_a_refused_command_is_told_with_its_sender_until_a_good_one_comes(looked):
+    looked.command()
+    looked.now += 1
+    looked.log.refuse("cmd_vel", "/child", "linear.x = nan: must lie within +-20 m/s")
+    looked.log.refuse("cmd_vel", "/child", "linear.x = 50: must lie within +-20 m/s")
+    found = looked.look()
+    assert found.level == WARN
+    assert found.message.startswith("refused what /child sends on cmd_vel, and flies by the last good one: linear.x")
+    assert (found.values["refused"], found.values["command sender"]) == ("2", "/pilot")
+    looked.now += 1
+    looked.command()
+    found = looked.look()
+    assert found.level == OK
+    assert found.values["last refused"] == "cmd_vel of /child, 1.0 s ago"
+
+
+def test_commands_to_what_stands_still_are_told(looked):
+    looked.fly(1)
+    looked.player.pause(True)
+    assert looked.look().message == "paused"
+    looked.command()
+    found = looked.look()
+    assert found.level == WARN
+    assert "commands of /pilot come in, but the simulation is paused: `pause false`" in found.message
+    looked.now += 60
+    assert looked.look().level == OK
+
+
+def test_who_flies_on_after_its_commander_has_gone(looked):
+    looked.command()
+    looked.log.senders = list
+    looked.fly(1)
+    found = looked.look()
+    assert found.level == WARN
+    assert "flies on by the last command of /pilot, which has gone" in found.message
+    looked.command(Twist())
+    assert looked.look().level == OK
+
+
+def test_a_script_that_does_not_listen_is_told(looked):
+    looked.script.write_text("def sysCall_init():\n    pass\n")
+    looked.player.restart()
+    looked.command()
+    found = looked.look()
+    assert (found.level, found.message) == (
+        WARN,
+        "commands come in, but the child script does not subscribe to cmd_vel",
+    )
+
+
+def test_a_script_error_is_told_until_the_next_start(looked):
+    looked.script.write_text("def sysCall_actuation():\n    1 / 0\n")
+    looked.player.restart()
+    looked.fly(1)
+    for what in ("vehicle drone", "simulation"):
+        found = looked.look(what)
+        assert found.level == ERROR
+        assert f"script error: [actuation] {looked.script}:2: ZeroDivisionError" in found.message
+    looked.script.write_text("def sysCall_init():\n    1 / 0\n")
+    with pytest.raises(ScriptError):
+        looked.player.start()
+    assert "[init]" in looked.look().message
+    looked.renew()
+    assert looked.look().level == OK
+
+
+def test_propellers_at_their_limit_are_counted(looked):
+    looked.drone.move(Pose((0, 0, 900), UPRIGHT))
+    full = "\n".join(
+        f"    sim.setScriptSimulationParameter(sim.getScriptHandle('{name}'), 'particleVelocity', 100)"
+        for name in (f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4))
+    )
+    looked.script.write_text(f"def sysCall_actuation():\n{full}\n")
+    looked.player.restart()
+    looked.look()
+    looked.fly(10)
+    assert "propellers at their limit in 10 of the last 10 steps" in looked.look().message
+
+
+def test_what_it_touches_holds_it_up(looked):
+    looked.drone.move(Pose((0.7, 0, 1), UPRIGHT))
+    looked.command()
+    looked.fly(60)
+    looked.look()
+    looked.fly(5)
+    found = looked.look()
+    assert "held up by Wall (" in found.message
+    assert found.values["contacts"].startswith("Wall (")
+
+
+def test_lying_on_its_back_is_told(looked):
+    upside_down = to_quaternion(from_rpy((0, 0, 0), (3.1, 0, 0)))
+    looked.drone.move(Pose((0, 0, 0.1), upside_down))
+    looked.fly(20)
+    found = looked.look()
+    assert found.level == WARN
+    assert "`restart` puts it upright" in found.message
+    assert found.values["put elsewhere"] == "1 times"
+
+
+def test_cameras_tell_their_rate_and_what_draws(looked):
+    camera = looked.drone.cameras["front"]
+    assert looked.look("cameras").message == "nobody looks"
+    camera.watched = lambda: True
+    try:
+        looked.fly(1)
+        looked.look()
+        looked.fly(8)
+        found = looked.look("cameras")
+        assert found.level == OK
+        assert found.values["drone/front"] == "20.0 of 20.0 Hz"
+        assert found.values["frame time"].endswith(" ms")
+        assert "none yet" not in found.values["renderer"]
+        looked.fly(8, step=0.2)
+        found = looked.look("cameras")
+        assert found.level == WARN
+        assert "drone/front comes at 5.0 of 20.0 Hz" in found.message
+    finally:
+        camera.watched = lambda: False
+
+
+def test_the_worst_comes_first():
+    found = finding("x", "well", [Problem(WARN, "odd"), Problem(ERROR, "bad")], {})
+    assert (found.level, found.message) == (ERROR, "bad; odd")
+    assert finding("x", "well", [], {}).message == "well"

@@ -1,0 +1,208 @@
+"""The doctor finds what is wrong, says what to do, hangs nowhere and shows no traceback."""
+
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+import pytest
+
+from drone_sim.files.resources import package_path
+from drone_sim.ros.doctor import environment, network, packages
+from drone_sim.ros.doctor import master as master_module
+from drone_sim.ros.doctor.line import HINT, OK, WRONG, Line, lines
+from drone_sim.ros.doctor.master import Master
+
+HANGS = 60.0  # s; nothing here takes nearly as long unless it hangs
+
+
+@pytest.fixture(name="port")
+def _port():
+    """Return a port where something listens that never answers."""
+    with socket.create_server(("localhost", 0)) as mute:
+        yield mute.getsockname()[1]
+
+
+@pytest.fixture(name="closed")
+def _closed():
+    with socket.create_server(("localhost", 0)) as server:
+        number = server.getsockname()[1]
+    return number
+
+
+def served(server):
+    threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+    return f"http://localhost:{server.server_address[1]}"
+
+
+class Graph:
+    """A master that knows what it was told."""
+
+    def __init__(self, published=(), subscribed=(), services=(), use_sim_time=None):
+        self.graph = [[[name, list(nodes)] for name, nodes in one] for one in (published, subscribed, services)]
+        self.use_sim_time = use_sim_time
+        self.node = ""  # where all nodes are
+
+    def getSystemState(self, _me):
+        return [1, "", self.graph]
+
+    def getParam(self, _me, _name):
+        return [-1, "not set", 0] if self.use_sim_time is None else [1, "", self.use_sim_time]
+
+    def lookupNode(self, _me, _name):
+        return [1, "", self.node]
+
+
+@pytest.fixture(name="known")
+def _known(monkeypatch):
+    """Return what makes a master that knows a graph the one of this shell, and asks it."""
+    servers = []
+
+    def make(**graph):
+        server = SimpleXMLRPCServer(("localhost", 0), requestHandler=SimpleXMLRPCRequestHandler, logRequests=False)
+        servers.append(server)
+        answers = Graph(**graph)
+        server.register_instance(answers)
+        monkeypatch.setenv("ROS_MASTER_URI", served(server))
+        found = Master()
+        assert [line.mark for line in found.found()] == [OK]
+        return found, answers
+
+    yield make
+    for server in servers:
+        server.shutdown()
+        server.server_close()
+
+
+@pytest.mark.ros
+def test_without_a_master_it_ends_with_a_line_for_each_check(closed):
+    own = {"ROS_MASTER_URI": f"http://localhost:{closed}", "ROS_HOSTNAME": "localhost"}
+    done = subprocess.run(
+        [sys.executable, package_path() / "scripts/doctor"],
+        env={**os.environ, **own},
+        capture_output=True,
+        text=True,
+        timeout=HANGS,
+    )
+    marks = [line.split()[:2] for line in done.stdout.splitlines()]
+    assert done.stderr == ""
+    assert done.returncode == int(any(mark == WRONG for mark, *_ in marks))
+    for what in ("packages", "pictures", "flight"):
+        assert [OK, what] in marks, done.stdout
+    assert f"hint   master          none at http://localhost:{closed}" in done.stdout
+
+
+@pytest.mark.parametrize("uri", ["garbage", "http://localhost:99999", "https://localhost:11311", ""])
+def test_a_master_s_address_that_is_none(monkeypatch, uri):
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
+    (line,) = Master().found()
+    assert line == Line(WRONG, "master", f"ROS_MASTER_URI = '{uri}' must be like http://localhost:11311")
+
+
+def test_a_port_that_does_not_answer(monkeypatch, port):
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
+    monkeypatch.setattr(master_module, "PATIENCE", 0.1)
+    (line,) = Master().found()
+    assert line.mark == WRONG
+    assert f"port {port} of http://localhost:{port} does not answer as a master (timed out)" in line.said
+
+
+class NoMaster(BaseHTTPRequestHandler):
+    """A web server of another kind."""
+
+    def do_POST(self):
+        self.send_error(404)
+
+    def log_message(self, *_):
+        pass
+
+
+def test_a_port_with_something_else_on_it(monkeypatch):
+    server = HTTPServer(("localhost", 0), NoMaster)
+    monkeypatch.setenv("ROS_MASTER_URI", served(server))
+    (line,) = Master().found()
+    assert line.mark == WRONG
+    assert "does not answer as a master (HTTP 404)" in line.said
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.mark.parametrize(
+    "graph, mark, said",
+    [
+        ({}, OK, "real time"),
+        ({"use_sim_time": False}, OK, "real time"),
+        ({"use_sim_time": True}, WRONG, "nobody publishes /clock"),
+        ({"use_sim_time": True, "published": [("/clock", ["/a"])]}, OK, "told by /a"),
+        ({"use_sim_time": True, "published": [("/clock", ["/a", "/b"])]}, WRONG, "/a, /b all publish /clock"),
+        ({"published": [("/clock", ["/a"])]}, HINT, "/use_sim_time is not true"),
+    ],
+)
+def test_clocks(known, graph, mark, said):
+    master, _ = known(**graph)
+    (line,) = master.clocks()
+    assert line.mark == mark
+    assert said in line.said
+
+
+def test_commands_that_nobody_hears(known):
+    published = [("/cmd_vel", ["/teleop"]), ("/drone/cmd_vel", ["/other"])]
+    master, _ = known(published=published, subscribed=[("/drone/cmd_vel", ["/drone_sim"])])
+    (line,) = master.commands()
+    assert line.mark == HINT
+    assert line.said == "/teleop publishes /cmd_vel, which nobody hears: start it with cmd_vel:=/drone/cmd_vel"
+
+
+def test_nodes_that_have_gone(known, closed):
+    master, answers = known(published=[("/rosout", ["/gone"])])
+    answers.node = f"http://localhost:{closed}"
+    (line,) = master.dead()
+    assert line.mark == HINT
+    assert "/gone is registered and does not answer: `rosnode cleanup`" in line.said
+
+
+def test_a_node_s_address_that_others_cannot_use(monkeypatch):
+    monkeypatch.delenv("ROS_IP", raising=False)
+    monkeypatch.setenv("ROS_HOSTNAME", "localhost")
+    assert [line.mark for line in network.names()] == [OK]
+    monkeypatch.setenv("ROS_HOSTNAME", "no.such.host.invalid")
+    (line,) = network.names()
+    assert line.mark == WRONG
+    assert "ROS_HOSTNAME = 'no.such.host.invalid' is not known here" in line.said
+
+
+def test_a_shell_without_ros(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    (line,) = environment.ros()
+    assert line.mark == WRONG
+    assert line.said.startswith("no roslaunch, rosrun, rosmaster on the PATH: `source ")
+    monkeypatch.setenv("ROS_VERSION", "2")
+    (line,) = environment.ros()
+    assert "ROS 2 is sourced" in line.said
+
+
+def test_a_module_that_is_missing_and_one_that_kills(tmp_path, monkeypatch):
+    (tmp_path / "kills.py").write_text("import os\nprint('loud')\nos.abort()\n")
+    (tmp_path / "fails.py").write_text("raise RuntimeError('compiled for\\nanother numpy')\n")
+    (tmp_path / "versioned.py").write_text("__version__ = '1.2'\nprint('ok')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    names = ["versioned", "kills", "no_such_module", "fails", "json"]
+    found = packages.results(names)
+    assert found["versioned"] == ("ok", "1.2")
+    assert found["json"][0] == "ok"
+    assert found["fails"] == ("failed", "RuntimeError: compiled for another numpy")
+    assert found["no_such_module"][1] == "ModuleNotFoundError: No module named 'no_such_module'"
+    assert found["kills"][0] == "failed"
+    assert found["kills"][1].startswith("ended with -6")
+
+
+def test_a_check_neither_hangs_nor_raises():
+    (line,) = lines("slow", lambda: time.sleep(HANGS), 0.05)
+    assert line == Line(WRONG, "slow", "no answer within 0.05 s")
+    (line,) = lines("broken", lambda: 1 / 0, 1.0)
+    assert line == Line(WRONG, "broken", "cannot be checked: ZeroDivisionError: division by zero")
+    assert "\n" not in str(Line(OK, "x", "two\nlines"))
