@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from tqdm import tqdm
 
@@ -22,6 +22,7 @@ from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics.frames import to_euler
 from drone_sim.offline import film as film_module
 from drone_sim.offline import timeline as timeline_module
+from drone_sim.offline.command_line import FAILED, Parser
 from drone_sim.offline.film import Film
 from drone_sim.offline.recording import Recording, TableError
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
@@ -37,7 +38,7 @@ _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
 _PLOTTED = 500_000  # steps
 _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
-_FAILED, _SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
+_SIGNALLED = 128  # exit status; shells add the signal's number: 130 after Ctrl-C
 _YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot", "video")
 _FILES = ("script", "scene", "config", "commands", *_OUTPUTS)
 _ENDINGS = {"scene": _YAML, "config": _YAML, "commands": _YAML, "csv": (".csv", ".txt", ""), "video": (".mp4",)}
@@ -233,20 +234,14 @@ def _status_of(action: Callable[[], int | None]) -> int:
         raise
     except _EXPECTED as error:
         print(f"fly: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
-        return _FAILED
+        return FAILED
 
 
 # ---- arguments
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        """Give one line, as for every other mistake, instead of the usage."""
-        self.exit(_FAILED, f"fly: {' '.join(message.split())} (see fly --help)\n")
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
+    parser = Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
     parser.add_argument("--script", metavar="FILE", help="child script (default: the tutorial's)")
     parser.add_argument("--scene", metavar="FILE.yaml", help="floor, objects and the drone's place, as scene:=")
     parser.add_argument("--config", metavar="FILE.yaml", help="the parameters that change, as config:=")

@@ -68,7 +68,7 @@ def save(path: str, recording: Recording, timeline: Timeline, sensors: Sequence[
         _mark(ax, timeline)
         ax.tick_params(labelbottom=ax in labelled)
     for ax in labelled:
-        ax.set_xlabel("simulated time [s]")
+        ax.set_xlabel(f"{recording.clock} [s]")
         ax.set_xlim(0, max(rows[-1, 0], 1e-3))
     _draw_path(figure.add_subplot(grid[:2, 2]), rows, timeline)
     with writing.replacing(path, binary=True) as file:

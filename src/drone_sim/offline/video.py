@@ -54,7 +54,7 @@ class Video:
         cv2.setLogLevel(0)  # of the codecs that are not there
         try:
             for word, self.codec in _CODECS.items():
-                code = cv2.VideoWriter_fourcc(*word)
+                code = cv2.VideoWriter.fourcc(*word)
                 writer = cv2.VideoWriter(self._path, cv2.CAP_FFMPEG, code, self.rate, self.size)
                 if writer.isOpened():
                     return writer
