@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`rosrun drone_sim joy_teleop`: from the topic `joy`, and from a device, which a FIFO stands in for."""
+"""`rosrun drone_sim joy_teleop` from the topic `joy`, and from a device, which a FIFO stands in for; and `record`."""
 
 import os
 import signal
@@ -8,13 +8,17 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from pathlib import Path
 
+import rosbag
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
 from listening import Listener, connected
-from sensor_msgs.msg import Joy
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Image, Joy
 from std_msgs.msg import Empty
+from std_srvs.srv import SetBool, SetBoolResponse
 
 PATIENCE = 20.0  # s; nothing here takes nearly as long unless it hangs
 LB, Y = 4, 3
@@ -33,17 +37,33 @@ def event(kind, number, value):
     return struct.pack("=IhBB", 0, value, kind, number)
 
 
-class JoyTeleop(unittest.TestCase):
-    """A joy node, and then a gamepad's driver, are this process."""
+def started(*command):
+    return subprocess.Popen(
+        ["rosrun", "drone_sim", *command],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+class Tools(unittest.TestCase):
+    """A joy node, a gamepad's driver, and a simulator to record, are this process."""
 
     def listener(self, topic, kind):
         made = Listener(topic, kind)
         self.addCleanup(made.close)
         return made
 
-    def test_it_commands_while_the_button_is_held_and_stops_when_all_falls_silent(self):
+    def folder(self):
+        made = tempfile.TemporaryDirectory()
+        self.addCleanup(made.cleanup)
+        return Path(made.name)
+
+    def test_the_topic_joy_commands_while_the_button_is_held_and_stops_when_all_falls_silent(self):
         sent = self.listener("/drone/cmd_vel", Twist)
         takeoffs = self.listener("/drone/takeoff", Empty)
+        connected(takeoffs._subscriber)
         joy = connected(rospy.Publisher("/joy", Joy, queue_size=10))
         joy.publish(stands(forward=1.0))
         joy.publish(stands(LB, forward=1.0))
@@ -68,19 +88,11 @@ class JoyTeleop(unittest.TestCase):
         self.assertEqual(len(takeoffs.messages), 1)
 
     def test_a_gamepad_that_vanishes_and_a_node_that_ends_leave_a_drone_that_stands(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        device = os.path.join(folder.name, "js0")
+        device = str(self.folder() / "js0")
         os.mkfifo(device)
         driver = os.open(device, os.O_RDWR)
         sent = self.listener("/drone2/cmd_vel", Twist)
-        node = subprocess.Popen(
-            ["rosrun", "drone_sim", "joy_teleop", "_drone:=drone2", f"_device:={device}"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-        )
+        node = started("joy_teleop", "_drone:=drone2", f"_device:={device}")
         self.addCleanup(node.wait)
         self.addCleanup(node.kill)
         os.write(driver, event(AXIS, 4, -32767) + event(BUTTON, LB, 1))
@@ -95,7 +107,27 @@ class JoyTeleop(unittest.TestCase):
         self.assertIn("stop sent on /drone2/cmd_vel", said)
         self.assertNotIn("Traceback", said)
 
+    def test_what_is_there_once_the_simulator_runs_is_recorded_but_for_pictures(self):
+        odometry = rospy.Publisher("/pretended/odom", Odometry, queue_size=10)
+        pictures = rospy.Publisher("/pretended/front", Image, queue_size=10)
+        folder = self.folder()
+        record = started("record", "--simulator", "pretended", "--folder", str(folder))
+        self.addCleanup(record.wait)
+        self.addCleanup(record.kill)
+        rospy.Service("/pretended/pause", SetBool, lambda _: SetBoolResponse())
+        connected(odometry).publish(Odometry(child_frame_id="base_link"))
+        pictures.publish(Image())
+        record.send_signal(signal.SIGINT)
+        said, _ = record.communicate(timeout=PATIENCE)
+        self.assertEqual(record.returncode, 0, said)
+        (path,) = folder.iterdir()
+        self.assertIn(f"into {path}", said)
+        with rosbag.Bag(str(path)) as bag:
+            found = [(topic, message.child_frame_id) for topic, message, _ in bag.read_messages(["/pretended/odom"])]
+            self.assertEqual(found, [("/pretended/odom", "base_link")])
+            self.assertNotIn("/pretended/front", bag.get_type_and_topic_info().topics)
+
 
 if __name__ == "__main__":
-    rospy.init_node("test_joy_teleop")
-    sys.exit(rostest.rosrun("drone_sim", "joy_teleop", JoyTeleop))
+    rospy.init_node("test_tools")
+    sys.exit(rostest.rosrun("drone_sim", "tools", Tools))
