@@ -57,7 +57,8 @@ def _record(options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:
     if not recorder:
         raise OSError("rosbag's recorder is not installed (on Debian: python3-rosbag)")
     topics = chosen(_kinds(f"/{options.simulator.strip('/')}"), options.images == "true")
-    print(f"{_NAME}: {len(topics)} topics into {bag}", flush=True)
+    # roslaunch shows this, and what goes wrong, and keeps the recorder's own lines, one for each topic, in its log.
+    print(f"{_NAME}: {len(topics)} topics into {bag}", file=sys.stderr, flush=True)
     os.execv(recorder[0], [recorder[0], "--quiet", "-O", str(bag), *topics, *remappings])
 
 
