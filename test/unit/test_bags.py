@@ -157,6 +157,15 @@ def test_a_video_waits_where_no_picture_came(tmp_path):
     assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FRAME_COUNT) == 13 + 100 + 1  # a still of 10 s at most
 
 
+def test_a_picture_that_is_none_is_told(tmp_path, capsys):
+    path, out = str(tmp_path / "wrong.bag"), tmp_path / "out.mp4"
+    with rosbag.Bag(path, "w") as bag:
+        bag.write("/camera/image/compressed", CompressedImage(format="jpeg", data=b"none"), rospy.Time(1))
+    assert bag_video.main([path, str(out)]) == 1
+    assert "/camera/image/compressed: not a picture: format 'jpeg'" in capsys.readouterr().err
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [

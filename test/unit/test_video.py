@@ -113,6 +113,18 @@ def test_a_film_that_cannot_be_written_whole_is_told(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_one_that_is_interrupted_can_be_played_as_far_as_it_goes(tmp_path):
+    path = tmp_path / "out.mp4"
+    with pytest.raises(KeyboardInterrupt), video.writing_to(str(path), 20) as film:
+        film.add(grey(), None, times=3)
+        raise KeyboardInterrupt
+    before = path.read_bytes()
+    assert len(decoded(path)[0]) == 3
+    with pytest.raises(OSError, match=r"out\.mp4: interrupted"), video.writing_to(str(path), 20):
+        raise KeyboardInterrupt
+    assert path.read_bytes() == before
+
+
 # ---- the display
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Callable
 from typing import NoReturn
 
-FAILED = 1  # exit status
+FAILED, SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
 
 
 class Parser(argparse.ArgumentParser):
@@ -19,7 +20,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def status_of(program: str, action: Callable[[], None]) -> int:
-    """Return the exit status of an action: 0, or 1 after a line on stderr for what users may have done wrong."""
+    """Return the exit status of an action: 0, 130 after Ctrl-C, 1 after a line on stderr for a user's mistake."""
     try:
         action()
         return 0
@@ -27,5 +28,7 @@ def status_of(program: str, action: Callable[[], None]) -> int:
         said = str(error) if error.filename is None else f"{error.filename}: {error.strerror}"
     except ValueError as error:
         said = str(error)
+    except KeyboardInterrupt:
+        return SIGNALLED + signal.SIGINT
     print(f"{program}: {' '.join(said.split())}", file=sys.stderr, flush=True)
     return FAILED

@@ -22,7 +22,7 @@ from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics.frames import to_euler
 from drone_sim.offline import film as film_module
 from drone_sim.offline import timeline as timeline_module
-from drone_sim.offline.command_line import FAILED, Parser
+from drone_sim.offline.command_line import FAILED, SIGNALLED, Parser
 from drone_sim.offline.film import Film
 from drone_sim.offline.recording import Recording, TableError
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
@@ -38,7 +38,6 @@ _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
 _PLOTTED = 500_000  # steps
 _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
-_SIGNALLED = 128  # exit status; shells add the signal's number: 130 after Ctrl-C
 _YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot", "video")
 _FILES = ("script", "scene", "config", "commands", *_OUTPUTS)
 _ENDINGS = {"scene": _YAML, "config": _YAML, "commands": _YAML, "csv": (".csv", ".txt", ""), "video": (".mp4",)}
@@ -197,7 +196,7 @@ def _fly(
     with tqdm(total=steps, unit=" steps", delay=_BAR_AFTER, disable=None, leave=False) as bar:
         for step in range(steps):
             if guardian is not None and guardian.asked:
-                return _SIGNALLED + guardian.asked
+                return SIGNALLED + guardian.asked
             timeline.apply(step, simulation.vehicles)
             simulation.step()
             for observer in observers:
@@ -229,7 +228,7 @@ def _status_of(action: Callable[[], int | None]) -> int:
     try:
         return action() or 0
     except KeyboardInterrupt:
-        return _SIGNALLED + signal.SIGINT
+        return SIGNALLED + signal.SIGINT
     except TableError:  # ends the writing of the table, which then says so
         raise
     except _EXPECTED as error:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 
 from drone_sim.files import writing
 from drone_sim.mechanics import frames
@@ -37,42 +39,63 @@ def check(path: str) -> None:
         raise ValueError(f"{path}: matplotlib does not write .{ending}; it writes {', '.join(sorted(known))}")
 
 
+class _Places(NamedTuple):
+    left: list[Axes]
+    middle: list[Axes]
+    propellers: Axes
+    path: Axes
+    sensors: list[Axes]
+
+    @property
+    def lowest(self) -> tuple[Axes, ...]:
+        """Those with a time axis that is written out."""
+        return self.left[-1], self.middle[-1], self.propellers, *self.sensors
+
+
 def save(path: str, recording: Recording, timeline: Timeline, sensors: Sequence[Series] = ()) -> None:
     """Draw a recording, with the timeline's poses and pushes marked; the path's ending gives the format.
 
-    What sensors measured stands below, as far as there is room. Propellers and commands that are not known are NaN.
+    What sensors measured stands below, as far as there is room. Propellers that are not known are NaN.
     Raises OSError, and ValueError for a format that matplotlib does not have.
     """
-    # No pyplot: it would look for a display, and keep every figure.
+    figure, places = _laid_out(len(sensors))
+    rows = np.array(recording.rows)
+    in_track = np.array([_in_track(recording.matrix(index), row[8:11]) for index, row in enumerate(rows)])
+    flown = np.column_stack((in_track[:, :3], rows[:, 13]))
+    _draw_velocities(places.left, rows[:, 0], rows[:, 14:18], flown)
+    _draw_drone(places.middle, rows, in_track[:, 3:])
+    _draw_propellers(places.propellers, rows)
+    for ax, series in zip(places.sensors, sensors):
+        plot_sensors.draw(ax, series)
+    for ax in (*places.left, *places.middle, places.propellers, *places.sensors):
+        _finish(ax)
+        _mark(ax, timeline)
+        ax.tick_params(labelbottom=ax in places.lowest)
+    for ax in places.lowest:
+        ax.set_xlabel(f"{recording.clock} [s]")
+        ax.set_xlim(0, max(rows[-1, 0], 1e-3))
+    _draw_path(places.path, rows, timeline)
+    with writing.replacing(path, binary=True) as file:
+        figure.savefig(file, dpi=120, format=Path(path).suffix[1:] or "png")
+
+
+def _laid_out(sensors: int) -> tuple[Figure, _Places]:
+    """Return an empty figure, with room for so many plots of sensors as far as there is."""
     below = plot_sensors.rows_of(sensors)
+    # No pyplot: it would look for a display, and keep every figure.
     figure = Figure(figsize=(16, _HEIGHT + _SENSOR_HEIGHT * below), layout="constrained")
     heights = [_HEIGHT / 4] * 4 + [_SENSOR_HEIGHT] * below
     grid = figure.add_gridspec(4 + below, 3, width_ratios=(1, 1, 1.1), height_ratios=heights)
     first = figure.add_subplot(grid[0, 0])
-    left = [first, *(figure.add_subplot(grid[row, 0], sharex=first) for row in (1, 2, 3))]
-    middle = [figure.add_subplot(grid[row, 1], sharex=first) for row in range(4)]
-    propellers = figure.add_subplot(grid[2:4, 2], sharex=first)
-    places = [grid[4 + number // 3, number % 3] for number in range(min(len(sensors), plot_sensors.PANELS))]
-    lowest = [figure.add_subplot(place, sharex=first) for place in places]
-    rows = np.array(recording.rows)
-    in_track = np.array([_in_track(recording.matrix(index), row[8:11]) for index, row in enumerate(rows)])
-    flown = np.column_stack((in_track[:, :3], rows[:, 13]))
-    _draw_velocities(left, rows[:, 0], rows[:, 14:18], flown)
-    _draw_drone(middle, rows, in_track[:, 3:])
-    _draw_propellers(propellers, rows)
-    for ax, series in zip(lowest, sensors):
-        plot_sensors.draw(ax, series)
-    labelled = (left[-1], middle[-1], propellers, *lowest)
-    for ax in (*left, *middle, propellers, *lowest):
-        _finish(ax)
-        _mark(ax, timeline)
-        ax.tick_params(labelbottom=ax in labelled)
-    for ax in labelled:
-        ax.set_xlabel(f"{recording.clock} [s]")
-        ax.set_xlim(0, max(rows[-1, 0], 1e-3))
-    _draw_path(figure.add_subplot(grid[:2, 2]), rows, timeline)
-    with writing.replacing(path, binary=True) as file:
-        figure.savefig(file, dpi=120, format=Path(path).suffix[1:] or "png")
+
+    def of_time(place: SubplotSpec) -> Axes:
+        return figure.add_subplot(place, sharex=first)
+
+    left = [first, *(of_time(grid[row, 0]) for row in (1, 2, 3))]
+    middle = [of_time(grid[row, 1]) for row in range(4)]
+    propellers = of_time(grid[2:4, 2])
+    lowest = [of_time(grid[4 + number // 3, number % 3]) for number in range(min(sensors, plot_sensors.PANELS))]
+    return figure, _Places(left, middle, propellers, figure.add_subplot(grid[:2, 2]), lowest)
 
 
 def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> tuple[float, ...]:

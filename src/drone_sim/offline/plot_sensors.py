@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +23,9 @@ class Series(NamedTuple):
     labels: tuple[str, ...] = ()  # of the k columns, if there is more than one
 
 
-def rows_of(series: Sequence[Series]) -> int:
-    """Return how many rows of plots they take."""
-    return math.ceil(min(len(series), PANELS) / COLUMNS)
+def rows_of(count: int) -> int:
+    """Return how many rows so many plots take, of which PANELS are drawn."""
+    return math.ceil(min(count, PANELS) / COLUMNS)
 
 
 def draw(ax: Axes, series: Series) -> None:

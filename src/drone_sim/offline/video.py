@@ -95,14 +95,16 @@ def check(path: str) -> None:
 def writing_to(path: str, rate: float) -> Iterator[Video]:
     """Give a video to write, `rate` pictures per second, which takes the place of `path` at the end.
 
-    Without a picture there is no file. Raises OSError, in one line that names the file.
+    Without a picture there is no file, and the last one stays. Raises OSError, in one line that names the file.
     """
     with writing.replacing(path, binary=True) as file:
         video = Video(file.name, rate)
         try:
             yield video
-        except BaseException:
+        except BaseException as error:  # Ctrl-C among them
             video.close()  # what there is of it can be played
+            if not video.pictures:
+                raise OSError(0, str(error) or "interrupted") from error
             raise
         video.finish()
 

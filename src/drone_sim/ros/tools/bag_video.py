@@ -94,7 +94,11 @@ def _timed(bag: Bag, topic: str, rate: float) -> Iterator[tuple[float, np.ndarra
         until = min(until, _stamp(this) + _LONGEST_STILL)
         times = round((until - start) * rate) - shown
         if times > 0:
-            yield _stamp(this), pictures.decode(this.message), times
+            try:
+                picture = pictures.decode(this.message)
+            except ValueError as error:
+                raise ValueError(f"{topic}: {error}") from None
+            yield _stamp(this), picture, times
             shown += times
         if following and _stamp(following) > until:  # what was cut out is not made up for
             start += _stamp(following) - until
