@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 PANELS = 12  # at most
 COLUMNS = 3  # of the figure
+_LARGEST = 1e12  # beyond it nothing was measured
 _COLORS = ("#1f5fa8", "#d9730d", "#2c8a57")  # x, y, z
 
 
@@ -30,7 +31,7 @@ def rows_of(count: int) -> int:
 
 def draw(ax: Axes, series: Series) -> None:
     """Draw one."""
-    values = np.where(np.isfinite(series.values), series.values, np.nan)
+    values = np.where(np.abs(series.values) < _LARGEST, series.values, np.nan)
     for column, color in zip(range(values.shape[1]), _COLORS):
         label = series.labels[column] if series.labels else ""
         ax.plot(series.times, values[:, column], color=color, linewidth=1, label=label)

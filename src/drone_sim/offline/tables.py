@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TextIO
 
@@ -10,6 +9,7 @@ from drone_sim.offline.recording import COLUMNS, Recording
 from drone_sim.wording import shown
 
 MAX_ROWS = 500_000  # as many as are drawn
+LARGEST = 1e9  # m, m/s, ...: nothing is there, and no axis goes so far
 _LONGEST = 10_000  # characters of a line
 _Row = tuple[float, ...]
 
@@ -60,6 +60,6 @@ def _row(line: str, number: int) -> _Row:
         row = tuple(map(float, fields))
     except ValueError as error:
         raise TableRefused(f"line {number}: {error!s:.80}") from None
-    if not all(map(math.isfinite, row)):
-        raise TableRefused(f"line {number}: must hold finite numbers")
+    if not all(abs(value) < LARGEST for value in row):
+        raise TableRefused(f"line {number}: must hold numbers below {LARGEST:g}")
     return row

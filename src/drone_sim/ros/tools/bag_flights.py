@@ -13,6 +13,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.offline.plot_sensors import Series
 from drone_sim.offline.recording import Recording
+from drone_sim.offline.tables import LARGEST
 from drone_sim.offline.timeline import Entry, Timeline
 from drone_sim.ros.tools.bags import Bag, BagRefused, Heard
 
@@ -42,11 +43,13 @@ class BagFlight:
         self.start = stamps[0]
 
     def recording(self) -> Recording:
-        """Return the flight as a table, NaN where command or propellers were not recorded. Raises BagRefused."""
+        """Return the flight as a table, NaN where the propellers were not recorded. Raises BagRefused."""
         columns = ((self._stamps - self.start)[:, None], self._rows, self._commands(), self._propellers())
         recording = Recording()
         recording.clock = "time by the stamps"
-        recording.rows = [tuple(row) for row in np.hstack(columns).tolist()]
+        table = np.hstack(columns)
+        table[~(np.abs(table) < LARGEST)] = math.nan
+        recording.rows = [tuple(row) for row in table.tolist()]
         return recording
 
     def _commands(self) -> np.ndarray:
@@ -133,7 +136,10 @@ def _state(message: Any) -> tuple[float, ...]:
     turn = message.pose.pose.orientation
     place, quaternion = _xyz(message.pose.pose.position), (turn.x, turn.y, turn.z, turn.w)
     linear, angular = _xyz(message.twist.twist.linear), _xyz(message.twist.twist.angular)
-    if not math.isfinite(sum((*place, *linear, *angular))) or not abs(math.hypot(*quaternion) - 1) < _UNIT:
+    if (
+        not all(abs(value) < LARGEST for value in (*place, *linear, *angular))
+        or not abs(math.hypot(*quaternion) - 1) < _UNIT
+    ):
         return ()
     matrix = frames.from_quaternion(place, quaternion)
     return *place, *quaternion, *frames.rotate(matrix, linear), *frames.rotate(matrix, angular)
