@@ -3,6 +3,7 @@
 PYTHONPATH=src .venv/bin/python docs/take_pictures.py [FOLDER]
 """
 
+import itertools
 import sys
 from pathlib import Path
 
@@ -10,6 +11,9 @@ import numpy as np
 from matplotlib import image
 
 from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.offline import hud
+from drone_sim.offline.hud import Flight
+from drone_sim.offline.video import to_color
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -27,6 +31,7 @@ def main():
     image.imsave(folder / "tutorial_track_body.png", leaning(on_body))
     image.imsave(folder / "tutorial_7_camera.png", published())
     image.imsave(folder / "cameras.png", cameras())
+    image.imsave(folder / "display.png", display())
 
 
 def scene():
@@ -89,6 +94,17 @@ def cameras():
     simulation.close()
     near = np.uint8(255 / (1 + np.nan_to_num(depth, nan=np.inf) / 2))
     return np.hstack([front, track, np.dstack([near] * 3)])
+
+
+def display():
+    """Return a picture of the video that `fly --video` makes: the tracking camera's, with the head-up display."""
+    simulation = Simulation(parameters.load({"scene_file": "package://drone_sim/config/scenes/gates.yaml"}))
+    simulation.drone.receive(Twist(Vector3(1, 0.6, 0.2)))
+    fly(simulation, 0.6)
+    flight = Flight.of((simulation.time, *itertools.chain(*simulation.drone.state)), "flying")
+    picture = to_color(take(simulation, "track"))
+    hud.draw(picture, flight)
+    return picture[:, :, ::-1]
 
 
 def fly(simulation, seconds):

@@ -194,6 +194,11 @@ def test_settings_are_what_is_flown(tmp_path):
         (["--config", "room"], "--config room: must end in .yaml or .yml"),
         (["--scene", "nowhere.yaml"], "parameter scene_file = 'nowhere.yaml': no such file: nowhere.yaml"),
         (["--config", "nowhere.yaml"], "parameter config = 'nowhere.yaml': no such file: nowhere.yaml"),
+        (["--video", "out.avi"], "--video out.avi: must end in .mp4"),
+        (["--video", "nowhere/out.mp4"], "nowhere/out.mp4"),
+        (["--video", "out.mp4", "--camera", "trak"], "--camera 'trak': no such camera; near names are track"),
+        (["--video", "out.mp4", "--set", "time_step=0.001", "sub_step=0.001"], "1000 pictures a second; at most 240"),
+        (["--camera", "track"], "--camera track: is of --video FILE.mp4, which is not given"),
         (["--csv", "a.txt", "--plot", "./a.txt"], "--csv a.txt: is the file of --plot as well"),
     ],
 )

@@ -28,7 +28,8 @@ def replacing(path: str | Path, binary: bool = False) -> Iterator[IO[Any]]:
             return
         target = os.path.realpath(path)  # a link stays a link
         folder, name = os.path.split(target)
-        temporary = os.path.join(folder, f".{name:.100}.{secrets.token_hex(4)}")
+        stem, ending = os.path.splitext(name)  # libraries that write by name look at the ending
+        temporary = os.path.join(folder, f".{stem:.100}.{secrets.token_hex(4)}{ending:.20}")
         try:
             with open(temporary, **options) as file:
                 try:

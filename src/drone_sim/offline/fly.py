@@ -11,16 +11,19 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from tqdm import tqdm
 
 from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics.frames import to_euler
+from drone_sim.offline import film as film_module
 from drone_sim.offline import timeline as timeline_module
+from drone_sim.offline.command_line import FAILED, SIGNALLED, Parser
+from drone_sim.offline.film import Film
 from drone_sim.offline.recording import Recording, TableError
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
 from drone_sim.run import parameters as parameters_module
@@ -37,10 +40,15 @@ _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
 _PLOTTED = 500_000  # steps
 _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
-_FAILED, _SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
-_YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot")
+_YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot", "video")
 _FILES = ("script", "scene", "config", "commands", *_OUTPUTS)
-_ENDINGS = {"scene": (*_YAML, *SUFFIXES), "config": _YAML, "commands": _YAML, "csv": (".csv", ".txt", "")}
+_ENDINGS = {
+    "scene": (*_YAML, *SUFFIXES),
+    "config": _YAML,
+    "commands": _YAML,
+    "csv": (".csv", ".txt", ""),
+    "video": (".mp4",),
+}
 _EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
 
@@ -95,14 +103,15 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     steps = first_step(_duration(options, timeline), parameters.time_step)
     if options.plot:
         _check_plot(options.plot, steps)
-    if options.csv:
-        writing.check(options.csv)
+    camera = _camera(options, parameters, recorded)
+    for output in filter(None, (options.csv, options.video)):
+        writing.check(output)
     simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
     began = time.perf_counter()
     try:
-        with _csv(options.csv) as file:
+        with _csv(options.csv) as file, _film(options.video, simulation, recorded, camera) as films:
             recording = Recording(file, keep=bool(options.plot), vehicle=recorded)
-            flown = _status_of(lambda: _fly(simulation, timeline, steps, recording, guardian))
+            flown = _status_of(lambda: _fly(simulation, timeline, steps, (recording, *films), guardian))
             took = time.perf_counter() - began
             flown = flown or int(bool(simulation.failed_scripts))
     finally:
@@ -111,6 +120,8 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     if guardian is not None:
         guardian.stand_down()  # no script runs any more, and a plot takes its time
     print(_summary(recording, took), flush=True)
+    for film in films:
+        print(f"wrote {options.video}: {film}", flush=True)
     draw = options.plot and recording.rows
     drawn = _status_of(lambda: _plot(options.plot, recording, timeline.of(recorded))) if draw else 0
     return flown or closed or drawn
@@ -148,6 +159,22 @@ def _csv(path: str | None) -> AbstractContextManager[Any]:
     return writing.replacing(path) if path else contextlib.nullcontext()
 
 
+def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -> str:
+    """Return the camera whose pictures the video shows, '' without one. Raises ValueError."""
+    if not options.video:
+        if options.camera is not None:
+            raise ValueError(f"--camera {_shown(options.camera)}: is of --video FILE.mp4, which is not given")
+        return ""
+    own = next(one for one in parameters.fleet if one.name == vehicle)
+    camera = film_module.camera_of(own, options.camera)
+    film_module.rate_of(own.cameras[camera], parameters.time_step)
+    return camera
+
+
+def _film(path: str | None, simulation: Simulation, vehicle: str, camera: str) -> AbstractContextManager[list[Film]]:
+    return film_module.filming(path, simulation, vehicle, camera) if path else contextlib.nullcontext([])
+
+
 @contextlib.contextmanager
 def _shown_on_stdout(log: logging.Logger) -> Iterator[None]:
     """Let what a script prints be seen."""
@@ -166,17 +193,23 @@ def _duration(options: argparse.Namespace, timeline: Timeline) -> float:
 
 
 def _fly(
-    simulation: Simulation, timeline: Timeline, steps: int, recording: Recording, guardian: Guardian | None
+    simulation: Simulation,
+    timeline: Timeline,
+    steps: int,
+    observers: Iterable[Recording | Film],
+    guardian: Guardian | None,
 ) -> int:
-    recording.add(simulation)
+    for observer in observers:
+        observer.add(simulation)
     # disable=None: no bar where stderr is not a terminal.
     with tqdm(total=steps, unit=" steps", delay=_BAR_AFTER, disable=None, leave=False) as bar:
         for step in range(steps):
             if guardian is not None and guardian.asked:
-                return _SIGNALLED + guardian.asked
+                return SIGNALLED + guardian.asked
             timeline.apply(step, simulation.vehicles)
             simulation.step()
-            recording.add(simulation)
+            for observer in observers:
+                observer.add(simulation)
             bar.update()
             if simulation.asked == STOP:
                 break
@@ -206,25 +239,19 @@ def _status_of(action: Callable[[], int | None]) -> int:
     try:
         return action() or 0
     except KeyboardInterrupt:
-        return _SIGNALLED + signal.SIGINT
+        return SIGNALLED + signal.SIGINT
     except TableError:  # ends the writing of the table, which then says so
         raise
     except _EXPECTED as error:
         print(f"fly: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
-        return _FAILED
+        return FAILED
 
 
 # ---- arguments
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        """Give one line, as for every other mistake, instead of the usage."""
-        self.exit(_FAILED, f"fly: {' '.join(message.split())} (see fly --help)\n")
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
+    parser = Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
     parser.add_argument("--script", metavar="FILE", help="child script (default: the tutorial's)")
     parser.add_argument(
         "--scene", metavar="FILE", help="floor, objects and the drone's place, .yaml or .ttt, as scene:="
@@ -248,6 +275,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--vehicle", metavar="NAME", help="the one of several to record (default: the first)")
     parser.add_argument("--csv", metavar="OUT.csv", help="write a row per step: state, command, propellers")
     parser.add_argument("--plot", metavar="OUT.png", help="draw path, velocities, height, attitude and propellers")
+    parser.add_argument("--video", metavar="OUT.mp4", help="film what a camera sees, with a head-up display")
+    parser.add_argument("--camera", metavar="NAME", help="the camera of --video, such as track (default: the first)")
     return parser
 
 

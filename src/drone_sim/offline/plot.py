@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 
 from drone_sim.files import writing
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist
+from drone_sim.offline import plot_sensors
+from drone_sim.offline.plot_sensors import Series
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import Push, Timeline
 
@@ -22,6 +26,7 @@ _VELOCITIES = ("forward $v_x$ [m/s]", "left $v_y$ [m/s]", "up $v_z$ [m/s]", "yaw
 _USUAL = (1, 99)  # percentiles of the propellers' velocities, between which their axis shows everything
 _SMALLEST_PROPELLER_RANGE = 1.0  # m/s
 _SMALLEST_PATH = 1.0  # m
+_HEIGHT, _SENSOR_HEIGHT = 9.5, 2.6  # inches, of all above the sensors, and of a row of them
 _SMALLEST_RANGE = 0.05  # of an axis, in its unit: less would blow a ripple up to look like a manoeuvre
 
 
@@ -34,34 +39,63 @@ def check(path: str) -> None:
         raise ValueError(f"{path}: matplotlib does not write .{ending}; it writes {', '.join(sorted(known))}")
 
 
-def save(path: str, recording: Recording, timeline: Timeline) -> None:
+class _Places(NamedTuple):
+    left: list[Axes]
+    middle: list[Axes]
+    propellers: Axes
+    path: Axes
+    sensors: list[Axes]
+
+    @property
+    def lowest(self) -> tuple[Axes, ...]:
+        """Those with a time axis that is written out."""
+        return self.left[-1], self.middle[-1], self.propellers, *self.sensors
+
+
+def save(path: str, recording: Recording, timeline: Timeline, sensors: Sequence[Series] = ()) -> None:
     """Draw a recording, with the timeline's poses and pushes marked; the path's ending gives the format.
 
+    What sensors measured stands below, as far as there is room. Propellers that are not known are NaN.
     Raises OSError, and ValueError for a format that matplotlib does not have.
     """
-    # No pyplot: it would look for a display, and keep every figure.
-    figure = Figure(figsize=(16, 9.5), layout="constrained")
-    grid = figure.add_gridspec(4, 3, width_ratios=(1, 1, 1.1))
-    first = figure.add_subplot(grid[0, 0])
-    left = [first, *(figure.add_subplot(grid[row, 0], sharex=first) for row in (1, 2, 3))]
-    middle = [figure.add_subplot(grid[row, 1], sharex=first) for row in range(4)]
-    propellers = figure.add_subplot(grid[2:, 2], sharex=first)
+    figure, places = _laid_out(len(sensors))
     rows = np.array(recording.rows)
     in_track = np.array([_in_track(recording.matrix(index), row[8:11]) for index, row in enumerate(rows)])
     flown = np.column_stack((in_track[:, :3], rows[:, 13]))
-    _draw_velocities(left, rows[:, 0], rows[:, 14:18], flown)
-    _draw_drone(middle, rows, in_track[:, 3:])
-    _draw_propellers(propellers, rows)
-    for ax in (*left, *middle, propellers):
+    _draw_velocities(places.left, rows[:, 0], rows[:, 14:18], flown)
+    _draw_drone(places.middle, rows, in_track[:, 3:])
+    _draw_propellers(places.propellers, rows)
+    for ax, series in zip(places.sensors, sensors):
+        plot_sensors.draw(ax, series)
+    for ax in (*places.left, *places.middle, places.propellers, *places.sensors):
         _finish(ax)
         _mark(ax, timeline)
-        ax.tick_params(labelbottom=ax in (left[-1], middle[-1], propellers))
-    for ax in (left[-1], middle[-1], propellers):
-        ax.set_xlabel("simulated time [s]")
+        ax.tick_params(labelbottom=ax in places.lowest)
+    for ax in places.lowest:
+        ax.set_xlabel(f"{recording.clock} [s]")
         ax.set_xlim(0, max(rows[-1, 0], 1e-3))
-    _draw_path(figure.add_subplot(grid[:2, 2]), rows, timeline)
+    _draw_path(places.path, rows, timeline)
     with writing.replacing(path, binary=True) as file:
         figure.savefig(file, dpi=120, format=Path(path).suffix[1:] or "png")
+
+
+def _laid_out(sensors: int) -> tuple[Figure, _Places]:
+    """Return an empty figure, with room for so many plots of sensors as far as there is."""
+    below = plot_sensors.rows_of(sensors)
+    # No pyplot: it would look for a display, and keep every figure.
+    figure = Figure(figsize=(16, _HEIGHT + _SENSOR_HEIGHT * below), layout="constrained")
+    heights = [_HEIGHT / 4] * 4 + [_SENSOR_HEIGHT] * below
+    grid = figure.add_gridspec(4 + below, 3, width_ratios=(1, 1, 1.1), height_ratios=heights)
+    first = figure.add_subplot(grid[0, 0])
+
+    def of_time(place: SubplotSpec) -> Axes:
+        return figure.add_subplot(place, sharex=first)
+
+    left = [first, *(of_time(grid[row, 0]) for row in (1, 2, 3))]
+    middle = [of_time(grid[row, 1]) for row in range(4)]
+    propellers = of_time(grid[2:4, 2])
+    lowest = [of_time(grid[4 + number // 3, number % 3]) for number in range(min(sensors, plot_sensors.PANELS))]
+    return figure, _Places(left, middle, propellers, figure.add_subplot(grid[:2, 2]), lowest)
 
 
 def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> tuple[float, ...]:
@@ -99,9 +133,13 @@ def _draw_drone(axes: Sequence[Axes], rows: np.ndarray, angles: np.ndarray) -> N
 
 
 def _draw_propellers(ax: Axes, rows: np.ndarray) -> None:
+    ax.set_ylabel("propellers [m/s]")
+    rows = rows[np.isfinite(rows[:, 18:22]).all(axis=1)]
+    if not len(rows):
+        ax.text(0.5, 0.5, "not recorded", transform=ax.transAxes, ha="center", color=_GREY)
+        return
     for (name, color), velocities in zip(_PROPELLERS, rows[:, 18:22].T):
         ax.step(rows[:, 0], velocities, where="pre", color=color, linewidth=1, label=name)
-    ax.set_ylabel("propellers [m/s]")
     commanded = rows[1:, 18:22] if len(rows) > 1 else rows[:, 18:22]  # nothing is, at time 0
     low, high = np.percentile(commanded, _USUAL)
     margin = max(0.5 * (high - low), _SMALLEST_PROPELLER_RANGE / 2)

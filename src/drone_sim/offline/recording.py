@@ -31,6 +31,8 @@ class Recording:
     base_link in the world frame, the command is in the track frame, propellers are particle velocities.
     """
 
+    clock = "simulated time"  # what its times are
+
     def __init__(self, file: TextIO | None = None, keep: bool = True, vehicle: str = ""):
         """Take the CSV file, if there is to be one, and write its header. Raises TableError.
 

@@ -9,10 +9,11 @@ import numpy as np
 from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 
+from drone_sim.offline.video import depth_to_grey
+
 _GREY, _WHITE = (60, 60, 60), (255, 255, 255)
 _EMPTY = (240, 320)  # px, height and width of what is not there yet
 _CAPTION = 24  # px, height
-_HALF = 3.0  # m, at which depth is shown half as bright as right in front
 _DEPTHS = ("32FC1", "16UC1")
 _MILLIMETRES = 1e-3  # ROS's unit of depth in 16UC1
 
@@ -43,9 +44,7 @@ def _decode_raw(message: Image) -> np.ndarray:
         raise ValueError(f"encoding '{message.encoding}': {' '.join(str(error).split())}") from None
     if message.encoding == "16UC1":
         depth = np.where(depth == 0, np.nan, depth * _MILLIMETRES)
-    with np.errstate(invalid="ignore"):
-        grey = 255 / (1 + np.maximum(np.nan_to_num(depth, nan=np.inf), 0) / _HALF)
-    return cv2.cvtColor(grey.astype(np.uint8), cv2.COLOR_GRAY2BGR)
+    return depth_to_grey(depth)
 
 
 def blank(text: str) -> np.ndarray:

@@ -32,6 +32,7 @@ class Teleop:
     def __init__(self) -> None:
         """Advertise and subscribe; init_node must have been called."""
         drone, self._simulator = rospy.get_param("~drone", "drone"), rospy.get_param("~simulator", "drone_sim")
+        self.drone = drone  # its namespace
         self.said = ""  # one line for the user
         self.farewell = ""  # the last one
         self._in_force = CommandInForce()
@@ -81,11 +82,21 @@ class Teleop:
         command = self._in_force.next.after(key)
         if command is None:
             return False
-        if self.connected:
-            self._in_force.send(command)
-            self._publisher.publish(_message(command))
-        else:
-            self.said = f"nobody listens on {self._publisher.resolved_name}: nothing sent"
+        self.send(command)
+        return True
+
+    @property
+    def topic(self) -> str:
+        """The topic of the commands."""
+        return str(self._publisher.resolved_name)
+
+    def send(self, command: Command) -> bool:
+        """Send a command; where nobody would hear it, return False, and `said` says so."""
+        if not self.connected:
+            self.said = f"nobody listens on {self.topic}: nothing sent"
+            return False
+        self._in_force.send(command)
+        self._publisher.publish(_message(command))
         return True
 
     def stop(self) -> None:

@@ -1,0 +1,61 @@
+"""Draw a flight from a bag, or from a table that `fly --csv` wrote: commands against flown, path, attitude, sensors."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+from drone_sim.offline.command_line import Parser, status_of
+from drone_sim.offline.plot_sensors import Series
+from drone_sim.offline.recording import Recording
+from drone_sim.offline.timeline import Timeline
+from drone_sim.wording import shown
+
+_NAME = "plot_flight"
+_TABLES, _BAG = (".csv", ".txt"), ".bag"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
+    parser = Parser(prog=_NAME, description=__doc__)
+    parser.add_argument("flight", metavar="FLIGHT", help="what was recorded: a .bag, or a .csv of fly")
+    parser.add_argument("plot", metavar="OUT.png", nargs="?", help="(default: the name of FLIGHT, here)")
+    parser.add_argument("--vehicle", metavar="NAME", help="the one of several in a bag (default: the first)")
+    options = parser.parse_args(arguments)
+    return status_of(_NAME, lambda: _draw(options))
+
+
+def _draw(options: argparse.Namespace) -> None:
+    flight = Path(options.flight)
+    ending = flight.suffix.lower()
+    if ending not in (*_TABLES, _BAG):
+        raise ValueError(f"{shown(options.flight)}: must end in {', '.join(_TABLES)} or {_BAG}")
+    if options.vehicle is not None and ending != _BAG:
+        raise ValueError(f"--vehicle {shown(options.vehicle)}: a table is of one vehicle")
+    from drone_sim.offline import plot  # matplotlib takes a while to import
+
+    out = options.plot or f"{flight.stem}.png"
+    plot.check(out)
+    read = _read_bag(options.flight, options.vehicle) if ending == _BAG else _read_table(options.flight)
+    plot.save(out, *read)
+    print(f"{_NAME}: wrote {out}", flush=True)
+
+
+_Read = tuple[Recording, Timeline, Sequence[Series]]
+
+
+def _read_table(path: str) -> _Read:
+    from drone_sim.offline import tables
+
+    return tables.read(path), Timeline((), 1.0), ()
+
+
+def _read_bag(path: str, vehicle: str | None) -> _Read:
+    from drone_sim.ros.tools.bag_flights import BagFlight  # needs ROS, which a table does not
+    from drone_sim.ros.tools.bags import Bag
+
+    with closing(Bag(path)) as bag:
+        flight = BagFlight(bag, vehicle)
+        return flight.recording(), flight.timeline(), flight.sensors()

@@ -1,0 +1,92 @@
+"""Record what is flown: `rosbag record` of all topics but pictures, of those the compressed ones where they are wanted.
+
+What is for rviz alone is not recorded, either. It waits for the simulator, asks the master which topics there are, and
+then becomes rosbag's own recorder: topics that come later, as of a vehicle that comes in flight, are not recorded.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import signal
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+import rosgraph
+import roslib.packages
+import rospkg
+
+from drone_sim.offline.command_line import Parser, status_of
+from drone_sim.ros.node.paths import from_shell
+
+_NAME = "record"
+_PERIOD = 0.1  # s, between two questions to the master
+_LARGE = r"sensor_msgs/(Image|PointCloud2?)|visualization_msgs/.*|dynamic_reconfigure/.*|theora_image_transport/.*"
+_IMAGES = r"sensor_msgs/(CompressedImage|CameraInfo)"  # a twentieth of the raw ones
+_TWICE = "/rosout_agg"
+_LAST_SERVICE = "pause"  # that the simulator advertises: its topics are there by then
+
+
+def main() -> int:
+    """Become rosbag's recorder; return 1, after a line on stderr, where that cannot be."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is recorded yet
+    parser = Parser(prog=_NAME, description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--images", choices=("true", "false"), default="false", help="record compressed pictures, too")
+    parser.add_argument("--folder", metavar="DIR", default="", help="where the bag comes (default: ~/.ros)")
+    parser.add_argument("--simulator", metavar="NODE", default="drone_sim", help="(default: %(default)s)")
+    options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
+    remappings = [one for one in sys.argv[1:] if ":=" in one]
+    return status_of(_NAME, lambda: _record(options, remappings))
+
+
+def chosen(kinds: Mapping[str, str], images: bool) -> list[str]:
+    """Return the topics to record, of all with their kinds of message."""
+    left_out = _LARGE if images else f"{_LARGE}|{_IMAGES}"
+    return sorted(name for name, kind in kinds.items() if name != _TWICE and not re.fullmatch(left_out, kind))
+
+
+def _record(options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:
+    """Raises OSError and ValueError."""
+    folder = "" if options.folder in ("", "none") else from_shell(f"{options.folder}/")
+    bag = _file(folder)
+    recorder = roslib.packages.find_node("rosbag", "record")
+    if not recorder:
+        raise OSError("rosbag's recorder is not installed (on Debian: python3-rosbag)")
+    topics = chosen(_kinds(f"/{options.simulator.strip('/')}"), options.images == "true")
+    # roslaunch shows this, and what goes wrong, and keeps the recorder's own lines, one for each topic, in its log.
+    print(f"{_NAME}: {len(topics)} topics into {bag}", file=sys.stderr, flush=True)
+    os.execv(recorder[0], [recorder[0], "--quiet", "-O", str(bag), *topics, *remappings])
+
+
+def _file(folder: str) -> Path:
+    """Return the name of the bag. Raises OSError where it cannot be written."""
+    where = Path(folder or rospkg.get_ros_home()).expanduser()
+    if folder and not where.is_dir():
+        raise OSError(f"--folder {where}: no such folder")
+    where.mkdir(parents=True, exist_ok=True)
+    if not os.access(where, os.W_OK):
+        raise OSError(f"--folder {where}: must not be written to")
+    return where / time.strftime("drone_sim_%Y-%m-%d-%H-%M-%S.bag")
+
+
+def _kinds(simulator: str) -> dict[str, str]:
+    """Wait for the simulator, and return all topics with their kinds. Raises OSError without a master."""
+    master = rosgraph.Master(f"/{_NAME}")
+    try:
+        while not _is_there(master, f"{simulator}/{_LAST_SERVICE}"):
+            time.sleep(_PERIOD)
+        return dict(master.getTopicTypes())
+    except (OSError, rosgraph.MasterException) as error:
+        raise OSError(f"the ROS master at {rosgraph.get_master_uri()} does not answer: {error}") from None
+
+
+def _is_there(master: rosgraph.Master, service: str) -> bool:
+    try:
+        master.lookupService(service)
+    except rosgraph.MasterError:  # not yet
+        return False
+    return True

@@ -1,0 +1,239 @@
+"""Flights out of bags: what was flown comes back to the last digit, and a file that is none gets one line."""
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbag", reason="needs ROS")
+
+import genpy
+import rosbag
+import rospy
+from cv_bridge import CvBridge
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from matplotlib.figure import Figure
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CompressedImage, Imu, Range
+from std_msgs.msg import String
+
+from drone_sim.forces.pushes import Push
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.offline.recording import Recording
+from drone_sim.ros.tools import bag_video, plot_flight
+from drone_sim.ros.tools.bag_flights import BagFlight
+from drone_sim.ros.tools.bags import Bag, BagRefused
+from drone_sim.ros.tools.record import chosen
+from drone_sim.ros.vehicle import messages
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+BEGAN = 1000.0  # s, of the recorder's clock
+STEPS = 40
+RED = np.full((240, 320, 3), (0, 0, 200), np.uint8)
+
+
+@pytest.fixture(name="flown", scope="module")
+def _flown(tmp_path_factory):
+    """A bag as `drone.launch record:=true` would write it, and the flight that is in it."""
+    path = tmp_path_factory.mktemp("bags") / "flight.bag"
+    simulation, recording = Simulation(parameters.load()), Recording()
+    jpeg = CompressedImage(format="jpeg", data=cv2.imencode(".jpg", RED)[1].tobytes())
+    with rosbag.Bag(str(path), "w") as bag:
+
+        def write(topic, message, late=0.002):
+            at = rospy.Time.from_sec(BEGAN + simulation.time)
+            if hasattr(message, "header"):
+                message.header.stamp = at
+            bag.write(topic, message, at + rospy.Duration.from_sec(late))
+
+        write("/drone_sim/state", String("flying"))
+        for step in range(STEPS):
+            if step == 10:
+                simulation.drone.receive(Twist(Vector3(1, 0, 0.2), Vector3(0, 0, 0.5)))
+            simulation.step()
+            drone, stamp = simulation.drone, rospy.Time()
+            recording.add(simulation)
+            write("/drone/odom", messages.odometry(stamp, drone.state, "base_link"), 0.001)
+            write("/drone/propellers", messages.propellers(drone.particle_velocities))
+            write("/drone/command", messages.command(stamp, drone.command, "Track_base"))
+            write("/drone/range", Range(range=step))
+            write("/drone/imu/data", Imu())
+            write("/drone/imu/data_raw", Imu())
+            write("/drone/front/compressed", jpeg, 0.01)
+        write("/drone/push", WrenchStamped(), 0)
+        write("/drone/set_pose", PoseStamped(), 0)
+    simulation.close()
+    return str(path), recording
+
+
+@pytest.fixture(name="bag")
+def _bag(flown):
+    bag = Bag(flown[0])
+    yield bag
+    bag.close()
+
+
+@pytest.fixture(name="drawn")
+def _drawn(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    return drawn
+
+
+def test_what_was_flown_comes_back(flown, bag):
+    rows = np.array(BagFlight(bag).recording().rows)
+    expected = np.array(flown[1].rows)
+    expected[:, 0] -= expected[0, 0]
+    assert rows.shape == expected.shape == (STEPS, 22)
+    assert np.abs(rows[:, :18] - expected[:, :18]).max() < 1e-6  # stamps are in ns
+    assert np.abs(rows[:, 18:] - expected[:, 18:]).max() < 1e-6  # propellers are 32 bit floats
+
+
+def test_pushes_jumps_and_sensors_come_back(bag):
+    flight = BagFlight(bag, "drone")
+    assert [(type(one.action), one.at) for one in flight.timeline().entries] == [
+        (Pose, pytest.approx(1.95)),
+        (Push, pytest.approx(1.95)),
+    ]
+    series = flight.sensors()
+    assert [(one.title, one.values.shape) for one in series] == [
+        ("imu/data", (STEPS, 3)),
+        ("imu/data", (STEPS, 3)),
+        ("range", (STEPS, 1)),
+    ]
+    assert series[-1].values[:, 0].tolist() == list(range(STEPS))
+
+
+def test_what_was_not_recorded_is_not_known(tmp_path, drawn):
+    path = str(tmp_path / "odom.bag")
+    with rosbag.Bag(path, "w") as bag:
+        for second in (1, 2, 2, 3, 4):
+            message = Odometry()
+            message.header.stamp = rospy.Time(second)
+            message.pose.pose.orientation.w = 1.0 if second != 3 else 0.0  # no quaternion
+            message.pose.pose.position.x = second
+            bag.write("/a/b/odom", message, rospy.Time(second))
+    flight = BagFlight(Bag(path))
+    rows = np.array(flight.recording().rows)
+    assert flight.namespace == "/a/b"
+    assert rows[:, :2].tolist() == [[0, 1], [1, 2], [3, 4]]
+    assert not rows[:, 14:18].any()
+    assert np.isnan(rows[:, 18:]).all()
+    assert plot_flight.main([path, str(tmp_path / "odom.png")]) == 0
+    assert [text.get_text() for ax in drawn[0].axes for text in ax.texts] == ["not recorded"]
+
+
+def test_a_bag_is_drawn_with_its_sensors(flown, tmp_path, monkeypatch, drawn):
+    monkeypatch.chdir(tmp_path)
+    assert plot_flight.main([flown[0]]) == 0
+    labels = {ax.get_ylabel(): ax for ax in drawn[0].axes}
+    assert labels["range [m]"].get_lines()[0].get_ydata()[-1] == STEPS - 1
+    assert labels["forward $v_x$ [m/s]"].get_lines()[0].get_ydata()[-1] == 1.0
+    assert labels["range [m]"].get_xlabel() == "time by the stamps [s]"
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.png"]
+
+
+def test_a_bag_becomes_a_video(flown, tmp_path, capsys):
+    out = tmp_path / "out.mp4"
+    assert bag_video.main([flown[0], str(out)]) == 0
+    assert f"of /drone/front/compressed: 320 x 240, {STEPS} pictures, 2.00 s" in capsys.readouterr().out
+    reader = cv2.VideoCapture(str(out))
+    (_, first), count = reader.read(), 1
+    while reader.read()[0]:
+        count += 1
+    assert count == STEPS
+    assert abs(first[60:120].astype(int) - RED[0, 0]).max() < 12
+    assert abs(first[:14].astype(int) - RED[0, 0]).mean() > 30  # the display
+
+
+def test_a_video_waits_where_no_picture_came(tmp_path):
+    path, out = str(tmp_path / "gap.bag"), tmp_path / "out.mp4"
+    with rosbag.Bag(path, "w") as bag:
+        for at in (1.0, 1.1, 1.2, 2.2, 2.3, 100.0):
+            message = CvBridge().cv2_to_imgmsg(RED, "bgr8")
+            message.header.stamp = rospy.Time.from_sec(at)
+            bag.write("/camera/image", message, message.header.stamp)
+    assert bag_video.main([path, str(out)]) == 0
+    assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FRAME_COUNT) == 13 + 100 + 1  # a still of 10 s at most
+
+
+def test_a_picture_that_is_none_is_told(tmp_path, capsys):
+    path, out = str(tmp_path / "wrong.bag"), tmp_path / "out.mp4"
+    with rosbag.Bag(path, "w") as bag:
+        bag.write("/camera/image/compressed", CompressedImage(format="jpeg", data=b"none"), rospy.Time(1))
+    assert bag_video.main([path, str(out)]) == 1
+    assert "/camera/image/compressed: not a picture: format 'jpeg'" in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "is empty"),
+        (b"#ROSBAG V2.0\n", "was cut off"),
+        (b"#ROSBAG V9.0\n", "is no bag that can be read"),
+        (b"picture", "is no bag that can be read"),
+        (4096 + 2000, "was cut off"),
+        (0.5, "was cut off"),
+        (0.999, "was cut off"),
+    ],
+)
+def test_what_is_no_whole_bag_gets_one_line(flown, tmp_path, capsys, content, said):
+    path = tmp_path / "wrong.bag"
+    if not isinstance(content, bytes):
+        with open(flown[0], "rb") as file:
+            whole = file.read()
+        content = whole[: content if isinstance(content, int) else int(content * len(whole))]
+    path.write_bytes(content)
+    for program, out in ((plot_flight, "out.png"), (bag_video, "out.mp4")):
+        assert program.main([str(path), str(tmp_path / out)]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"{path}: {said}" in line
+    assert [one.name for one in tmp_path.iterdir()] == ["wrong.bag"]
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "said"),
+    [
+        (plot_flight, ["BAG", "--vehicle", "drone2"], "no odometry /drone2/odom; near names are /drone/odom"),
+        (plot_flight, ["BAG", "out.wrong"], "matplotlib does not write .wrong"),
+        (plot_flight, ["nowhere.bag"], "nowhere.bag: No such file"),
+        (plot_flight, ["flight.mp3"], "'flight.mp3': must end in .csv, .txt or .bag"),
+        (plot_flight, ["flight.csv", "--vehicle", "drone"], "--vehicle 'drone': a table is of one vehicle"),
+        (bag_video, ["BAG", "out.avi"], "out.avi: must end in .mp4"),
+        (bag_video, ["BAG", "out.mp4", "--topic", "/drone/front"], "near names are /drone/front/compressed"),
+        (bag_video, [".", "out.mp4"], ".: is no regular file"),
+    ],
+)
+def test_a_mistake_gets_one_line(flown, tmp_path, monkeypatch, capsys, program, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    assert program.main([flown[0] if one == "BAG" else one for one in arguments]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_class_is_made_from_what_a_bag_says(tmp_path):
+    path = str(tmp_path / "other.bag")
+    other = genpy.dynamic.generate_dynamic("nav_msgs/Odometry", "string data\n")["nav_msgs/Odometry"]
+    with rosbag.Bag(path, "w") as bag:
+        bag.write("/drone/odom", other(data="x"), rospy.Time(1))
+    with pytest.raises(BagRefused, match="no message on /drone/odom that can be read"):
+        BagFlight(Bag(path))
+
+
+def test_pictures_are_recorded_by_choice_and_never_raw():
+    kinds = {
+        "/drone/odom": "nav_msgs/Odometry",
+        "/drone/cmd_vel": "geometry_msgs/Twist",
+        "/drone/front": "sensor_msgs/Image",
+        "/drone/front/compressed": "sensor_msgs/CompressedImage",
+        "/drone/camera_info": "sensor_msgs/CameraInfo",
+        "/drone/front/compressed/parameter_updates": "dynamic_reconfigure/Config",
+        "/drone/contacts": "visualization_msgs/MarkerArray",
+        "/rosout": "rosgraph_msgs/Log",
+        "/rosout_agg": "rosgraph_msgs/Log",
+    }
+    small = ["/drone/cmd_vel", "/drone/odom", "/rosout"]
+    assert chosen(kinds, images=False) == small
+    assert chosen(kinds, images=True) == sorted([*small, "/drone/camera_info", "/drone/front/compressed"])

@@ -1,0 +1,154 @@
+"""A gamepad's events, fed through a FIFO in place of a device; what they command; what joy.yaml may say."""
+
+import os
+import struct
+
+import pytest
+
+from drone_sim.config.types import ParameterError
+from drone_sim.ros.tools import gamepad, joy_parameters
+from drone_sim.ros.tools.commands import Command
+from drone_sim.ros.tools.gamepad import Gamepad, Pad
+from drone_sim.ros.tools.pilot import Pilot
+
+BUTTON, AXIS, INITIAL = 1, 2, 0x80
+LB, A, Y, BACK = 4, 0, 3, 6
+
+
+def event(kind, number, value):
+    return struct.pack("=IhBB", 0, value, kind, number)
+
+
+@pytest.fixture(name="device")
+def _device(tmp_path):
+    path = str(tmp_path / "js0")
+    os.mkfifo(path)
+    return path
+
+
+@pytest.fixture(name="pad")
+def _pad(device):
+    pad = Gamepad(device)
+    yield pad
+    pad.close()
+
+
+def test_events_tell_how_it_stands_with_the_signs_of_the_joy_node(device, pad):
+    with open(device, "wb", buffering=0) as kernel:
+        assert list(pad.read()) == []
+        kernel.write(event(BUTTON | INITIAL, 1, 0) + event(AXIS | INITIAL, 2, 0))
+        assert list(pad.read()) == [Pad((), (False, False)), Pad((0.0, 0.0, 0.0), (False, False))]
+        kernel.write(event(AXIS, 0, -32767) + event(AXIS, 2, 32767) + event(AXIS, 1, -32768))
+        assert list(pad.read())[-1].axes == (1.0, 1.0, -1.0)
+        pressed = event(BUTTON, 1, 1)
+        kernel.write(pressed[:3])
+        assert list(pad.read()) == []
+        kernel.write(pressed[3:] + event(9, 0, 7))  # of a kind that nobody knows
+        assert [one.buttons for one in pad.read()] == [(False, True)] * 2
+
+
+def test_a_gamepad_that_is_unplugged_is_told(device, pad):
+    with open(device, "wb", buffering=0) as kernel:
+        kernel.write(event(BUTTON, 0, 1))
+        assert len(list(pad.read())) == 1
+    with pytest.raises(OSError, match=r"No such device.*js0"):
+        list(pad.read())
+
+
+def test_gamepads_are_found_in_the_order_of_their_numbers(monkeypatch):
+    there = ["/dev/input/js10", "/dev/input/js2", "/dev/input/js-keys"]
+    monkeypatch.setattr(gamepad.glob, "glob", lambda _: there)
+    assert gamepad.found() == ["/dev/input/js2", "/dev/input/js10"]
+
+
+# ---- what is commanded
+
+
+@pytest.fixture(name="pilot")
+def _pilot():
+    return Pilot(joy_parameters.load({"axes": {"vy": {"scale": -2.0}}}))
+
+
+def stands(*buttons, **axes):
+    numbers = {"vx": 4, "vy": 3, "vz": 1, "wz": 0}
+    values = {numbers[name]: value for name, value in axes.items()}
+    return Pad(tuple(values.get(number, 0.0) for number in range(6)), tuple(one in buttons for one in range(8)))
+
+
+def test_sticks_command_while_the_dead_mans_button_is_held(pilot):
+    assert pilot.command is None
+    assert pilot.see(stands(vx=1.0)) == []
+    assert pilot.command is None
+    pilot.see(stands(LB, vx=1.0, vy=0.55, vz=-0.55, wz=0.05))
+    assert pilot.command == pytest.approx(Command(1.0, -1.0, -0.5, 0.0))
+    pilot.see(stands(LB))
+    assert pilot.command == Command()
+    pilot.see(stands(vx=1.0))
+    assert pilot.command is None
+
+
+def test_a_gamepad_that_comes_back_with_the_button_pressed_commands_nothing(pilot):
+    pilot.see(stands(LB, vx=1.0))
+    pilot.lose()
+    assert pilot.command is None
+    assert pilot.see(stands(LB, A, vx=1.0)) == []
+    assert pilot.command is None
+    pilot.see(stands(vx=1.0))
+    pilot.see(stands(LB, vx=1.0))
+    assert pilot.command == Command(vx=1.0)
+
+
+def test_buttons_ask_once_and_take_off_needs_the_dead_mans(pilot):
+    assert pilot.see(stands(Y)) == []  # it may have been pressed for long
+    assert pilot.see(stands()) == []
+    assert pilot.see(stands(Y)) == []
+    assert pilot.see(stands(LB)) == []
+    assert pilot.see(stands(LB, Y)) == ["takeoff"]
+    assert pilot.see(stands(LB, Y)) == []
+    assert pilot.see(stands(A, BACK)) == ["land", "reset"]
+
+
+def test_axes_and_buttons_that_it_does_not_have_are_nothing(pilot):
+    pilot.see(Pad((1.0,), (False,) * 4 + (True,)))
+    assert pilot.command == Command(wz=1.0)
+    assert pilot.see(Pad()) == []
+    assert pilot.command is None
+    less = Pilot(joy_parameters.load({"axes": {"wz": {"axis": -1}}, "buttons": {"land": -1}}))
+    less.see(stands())
+    assert less.see(stands(LB, *range(8), wz=1.0)) == ["reset", "takeoff"]
+    assert less.command == Command()
+
+
+# ---- joy.yaml
+
+
+def test_a_file_and_then_parameters_are_laid_over_joy_yaml(tmp_path):
+    (tmp_path / "my.yaml").write_text("dead_man: 5\naxes: {vx: {scale: 3.0}}\n")
+    parameters = joy_parameters.load({"config": str(tmp_path / "my.yaml"), "axes": {"vx": {"axis": 1}}})
+    assert (parameters.dead_man, parameters.axes.vx.axis, parameters.axes.vx.scale) == (5, 1, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"deadman": 5}, "parameter deadman: unknown key; known are dead_man"),
+        ({"dead_man": -1}, "parameter dead_man = -1: "),
+        ({"axes": {"vx": 4}}, "parameter axes/vx = 4: must hold `key: value` lines with axis, scale"),
+        ({"axes": {"vx": {"axis": 1.5}}}, "parameter axes/vx/axis = 1.5: "),
+        ({"axes": {"vx": {"scale": "fast"}}}, "parameter axes/vx/scale = 'fast': "),
+        ({"rate": 0}, "parameter rate = 0: "),
+        ({"config": "nowhere.yaml"}, "parameter config = 'nowhere.yaml': no such file: nowhere.yaml"),
+        ({"config": 3}, "parameter config = 3: must be the name of a file"),
+    ],
+)
+def test_a_wrong_value_is_told_in_one_line(given, said):
+    with pytest.raises(ParameterError) as error:
+        joy_parameters.load(given)
+    assert str(error.value).startswith(said)
+
+
+def test_a_wrong_value_in_a_file_is_told_with_its_line(tmp_path):
+    path = tmp_path / "my.yaml"
+    path.write_text("dead_man: 5\nbuttons: {land: 999}\n")
+    with pytest.raises(ParameterError, match=r"my\.yaml: line 2: parameter buttons/land = 999"):
+        joy_parameters.load({"config": str(path)})
