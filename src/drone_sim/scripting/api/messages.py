@@ -147,7 +147,7 @@ class MessageBus:
 
     def hears(self, topic: str) -> bool:
         """Whether the script is subscribed to a topic."""
-        return self._subscriptions.has(self._resolve(topic))
+        return self._subscriptions.has(self.resolve(topic))
 
     def close(self) -> None:
         """End every subscription and stop advertising: the script that made them is gone."""
