@@ -129,7 +129,8 @@ class VehicleInputs:
 
 
 def _sender(message: Any) -> str:
-    return str(message._connection_header.get("callerid", "?"))
+    header = getattr(message, "_connection_header", {})  # rospy's, of what came over a wire
+    return str(header.get("callerid", "?"))
 
 
 def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters) -> Pose:
