@@ -170,8 +170,8 @@ stay_on_this_machine() {
 
 run_tests() {
   make_venv requirements-dev.txt
-  # Every core tests; the tests with a master run one after another.
-  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test
+  # Every core tests; of the tests with a master, each with its own, two run at a time.
+  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS=-j2
 }
 
 # A python of that version which can make an environment. pyenv's are found where it has put them: its shims on the
