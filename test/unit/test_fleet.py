@@ -256,3 +256,15 @@ def test_a_wrong_vehicle_of_a_scene_is_named_with_its_line(tmp_path):
         parameters.ParameterError, match=r"scene\.yaml: line 3: parameter vehicles/red/position = \[1, 0\]"
     ):
         parameters.load({"scene_file": str(scene)})
+
+
+@pytest.mark.parametrize(
+    "vehicles, frames",
+    [
+        ({"drone": {"position": [1, 0, 1]}}, ["base_link"]),
+        ({"drone1": {}}, ["drone1/base_link"]),
+        ({"drone": {}, "drone1": {"position": [1, 0, 1]}}, ["drone/base_link", "drone1/base_link"]),
+    ],
+)
+def test_the_only_one_has_the_frames_of_the_drone_if_it_has_its_name(vehicles, frames):
+    assert [one.base_link for one in parameters.load({"vehicles": vehicles}).fleet] == frames

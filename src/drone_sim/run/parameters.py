@@ -92,7 +92,7 @@ class Parameters(EquipmentParameters):
 
     @property
     def fleet(self) -> tuple[VehicleParameters, ...]:
-        """What flies: the `vehicles`, or the drone alone where there are none."""
+        """What flies: the `vehicles`, or the drone alone where there are none, or one that has the drone's name."""
         return self._fleet
 
     @property
@@ -148,7 +148,8 @@ class Parameters(EquipmentParameters):
         check_rates(self.sensors, self.sub_step)
         for name, vehicle in self.vehicles.items():
             check_rates(vehicle.sensors, self.sub_step, ("vehicles", name))
-        self._fleet = tuple(self.vehicles.values()) or (VehicleParameters.only(self.drone, self),)
+        fleet = tuple(self.vehicles.values()) or (VehicleParameters.only(self.drone, self),)
+        self._fleet = (fleet[0].alone(),) if [one.name for one in fleet] == [self.drone.name] else fleet
 
 
 def _entries(given: Any, drone: Any) -> Any:

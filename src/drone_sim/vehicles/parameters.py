@@ -139,13 +139,17 @@ class VehicleParameters(EquipmentParameters, PlaceParameters):
         """Return the only vehicle of a simulation, whose frames have no prefix."""
         place = {key: getattr(drone, key) for key in DroneParameters.model_fields}
         carried = {key: getattr(equipment, key) for key in EquipmentParameters.model_fields}
-        made = cls.model_construct(**place, **carried)
+        return cls.model_construct(**place, **carried).alone()
+
+    def alone(self) -> VehicleParameters:
+        """Return the same for a vehicle that flies alone."""
+        made = self.model_copy()
         made._is_alone = True
         return made
 
     @property
     def is_alone(self) -> bool:
-        """Whether there can be no other, so that its frames need no prefix."""
+        """Whether it begins as the only one, so that its frames need no prefix."""
         return self._is_alone
 
     @property
