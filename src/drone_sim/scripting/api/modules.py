@@ -55,9 +55,6 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         ScriptCalls(host, surroundings, names),
         SimulationFunctions(surroundings, ignored),
         Dialogs(host, ignored),
-        Joints(host),
-        ProximitySensors(host),
-        Paths(host),
         VisionSensors(host, surroundings),
         Sensors(host),
     )

@@ -52,7 +52,6 @@ ABSENT: dict[str, str] = {
         "there are no collections and no collision or distance objects; a sensor of the kind contacts or range tells"
     ),
     r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
-    r"sim\.\w*(?:LinkDummy|DummyLink)\w*": "dummies are not linked to each other",
     r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
     r"simROS\.(?:advertiseService|shutdownServiceServer|serviceServerTreat\w+)": (
         "a child script offers no services: subscribe to a topic"
