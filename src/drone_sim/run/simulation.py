@@ -10,7 +10,7 @@ For example:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -285,7 +285,17 @@ class Simulation:
             self._take_turns()
         for actor in vehicles if self._alone else self._setting.cast.all():
             actor.actuation()
-        self._advance(vehicles)
+        wrenches = {}
+        for vehicle in vehicles:
+            wrenches[vehicle.body.number] = vehicle.wrench()
+        carries = self.scene.carries  # what scripts may change, but the dynamics does not
+        if carries:
+            self.scene.follow()
+        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
+        for vehicle in vehicles:
+            vehicle.body.refresh()
+        if carries:
+            self.scene.follow()
         self.steps += 1
         self._whereabouts.check(vehicles)
         for vehicle in vehicles:
@@ -298,20 +308,6 @@ class Simulation:
         for thread in self._threaded:
             if thread.script.threaded:
                 thread.script.take_turn()
-
-    def _advance(self, vehicles: Sequence[Vehicle]) -> None:
-        """Let the dynamics go on by a step, and what hangs on other things follow."""
-        wrenches = {}
-        for vehicle in vehicles:
-            wrenches[vehicle.body.number] = vehicle.wrench()
-        scene = self.scene
-        if scene.carries:
-            scene.follow()
-        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
-        for vehicle in vehicles:
-            vehicle.body.refresh()
-        if scene.carries:
-            scene.follow()
 
     def _between(self, count: int) -> None:
         """Do what is due after so many sub-steps of the step: instruments look, and forces follow."""

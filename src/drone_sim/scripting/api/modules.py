@@ -43,7 +43,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
     names, ignored = Names(host), _ignored(host)
     parts = (
         Objects(host),
-        Joints(host),
+        Joints(host, ignored),
         ProximitySensors(host),
         Paths(host),
         ObjectKinds(host),
