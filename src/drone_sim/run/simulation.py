@@ -285,16 +285,13 @@ class Simulation:
             self._take_turns()
         for actor in vehicles if self._alone else self._setting.cast.all():
             actor.actuation()
-        wrenches = {}
-        for vehicle in vehicles:
-            wrenches[vehicle.body.number] = vehicle.wrench()
-        carries = self.scene.carries  # what scripts may change, but the dynamics does not
-        if carries:
+        wrenches = {vehicle.body.number: vehicle.wrench() for vehicle in vehicles}
+        if self.scene.carries:
             self.scene.follow()
         self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
         for vehicle in vehicles:
             vehicle.body.refresh()
-        if carries:
+        if self.scene.carries:
             self.scene.follow()
         self.steps += 1
         self._whereabouts.check(vehicles)

@@ -13,8 +13,8 @@ from drone_sim.forces.force import Force
 from drone_sim.forces.pushes import Push, Pushes
 from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector
-from drone_sim.mechanics.object_tree import ObjectTree, SceneObject
 from drone_sim.mechanics.inertia import Inertia, Inertial, together
+from drone_sim.mechanics.object_tree import ObjectTree, SceneObject
 from drone_sim.mechanics.state import Pose, State, Twist
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.scripting import load

@@ -13,7 +13,7 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.object_parameters import readable, settable
-from drone_sim.scripting.api.types import Handle, Number, TwelveNumbers
+from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers
 from drone_sim.wording import near_names
 
 _NONE = Inertia((0.0,) * 9, frames.IDENTITY)
@@ -70,7 +70,7 @@ class Dynamics:
             place = frames.multiply(frames.invert(numbers(transform, 12)), place)
         return self.getShapeMass(handle), turned(inertia, place).ravel().tolist(), list(frames.position(place))
 
-    def getShapeInertia(self, handle: Handle) -> tuple[list[float], list[float]]:
+    def getShapeInertia(self, handle: Handle) -> tuple[Numbers, TwelveNumbers]:
         """Return the inertia of a shape about its centre of mass (kg m², 9 numbers), and in which frame that is (4.x).
 
         The frame is a transform in the shape's own. A propeller's shape is without its blades, as its mass is.

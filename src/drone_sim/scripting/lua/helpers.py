@@ -51,13 +51,19 @@ class LuaHelpers:
             text, chunk = self._read_file(name.decode("utf-8"))
         except (OSError, ValueError) as error:
             said = getattr(error, "strerror", None) or error
-            return False, f"cannot load '{name.decode('utf-8', 'replace')[:80]}': {said}".encode("utf-8", "replace"), b""
+            return (
+                False,
+                f"cannot load '{name.decode('utf-8', 'replace')[:80]}': {said}".encode("utf-8", "replace"),
+                b"",
+            )
         return True, text, chunk.encode("utf-8", "replace")
 
     def _read_file(self, name: str) -> tuple[bytes, str]:
         inner = name.removeprefix("./")
         if len(inner) > _LONGEST or not _FILE.fullmatch(inner):
-            raise ValueError("a .lua file beside the script, or in a folder there, is expected, such as helpers/pid.lua")
+            raise ValueError(
+                "a .lua file beside the script, or in a folder there, is expected, such as helpers/pid.lua"
+            )
         path = self._folder / inner
         if not path.exists():
             near = near_names(inner, [one.name for one in self._folder.glob("*.lua")])
