@@ -72,6 +72,12 @@ SIM: dict[str, list[Example]] = {
     ],
     "isHandle": [Example("NAME(BASE)", [True]), Example("NAME(1000)", [False])],
     "isHandleValid": [Example("NAME(BASE)", [1]), Example("NAME(1000)", [0])],
+    "createDummy": [Example("sim.getObjectType(NAME(0.01)) == sim.object_dummy_type", [True])],
+    "removeObject": [
+        Example("NAME(sim.createDummy(0.01))", [1]),
+        Example("REFUSED(NAME, BASE)", ["only those can be removed"]),
+    ],
+    "removeObjects": [Example("NAME({sim.createDummy(0.01, {1, 0, 0}), sim.createDummy(0.02)})", [1])],
     "getObjectUid": [Example("NAME(BASE) == BASE", [True])],
     # ---- where objects are
     "setObjectPosition": [Example("NAME(TARGET, -1, {1,2,3})", []), Example("NAME(TARGET, {4,5,6}, -1)", [])],
