@@ -139,6 +139,7 @@ class Simulation:
     def _changed_vehicles(self) -> None:
         self._era += 1
         self._flying = tuple(self.vehicles.values())
+        self._bodies = tuple(vehicle.body.number for vehicle in self._flying)
         self._any_between = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self._flying)
         self._changed_scripts()
 
@@ -285,7 +286,7 @@ class Simulation:
             self._take_turns()
         for actor in vehicles if self._alone else self._setting.cast.all():
             actor.actuation()
-        wrenches = {vehicle.body.number: vehicle.wrench() for vehicle in vehicles}
+        wrenches = dict(zip(self._bodies, map(Vehicle.wrench, vehicles)))
         if self.scene.carries:
             self.scene.follow()
         self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)

@@ -42,8 +42,6 @@ from drone_sim.vehicles.rotors import Rotors
 from drone_sim.vehicles.script_parameters import NUMBERS, PARTICLE_VELOCITY, bring_back, script_parameters
 from drone_sim.vehicles.shared import Shared
 
-_STILL = Twist()  # made once: compared with in every step
-
 
 class Vehicle:
     """A quadricopter in a world. What it shares with others is in `Shared`, and nothing else is."""
@@ -98,7 +96,7 @@ class Vehicle:
         others = [one.make() for one in self.parameters.forces.values()]
         self._forces: list[Force] = [self._propellers, *(one for one in others if not one.every_sub_step)]
         self.sub_step_forces = [one for one in others if one.every_sub_step]
-        self.command = _STILL
+        self.command = Twist()
         self._command_age = 0.0
         self.blades.reset()
         self._leave_tree()
@@ -306,8 +304,8 @@ class Vehicle:
         if self.sensors:
             self.instruments.clear()
         timeout = self._timeout
-        if timeout and self._command_age > timeout - self._time_step / 2 and self.command != _STILL:
-            self.receive(_STILL)
+        if timeout and self._command_age > timeout - self._time_step / 2 and self.command != Twist():
+            self.receive(Twist())
         self._command_age += self._time_step
         for callback in self.bus.new_callbacks():
             self.script.check(callback)
