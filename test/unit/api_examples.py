@@ -33,6 +33,9 @@ def near(*values: float) -> Any:
     return approx(list(values), abs=1e-9)
 
 
+ALONG_X = near(8e-6, 0, 0, 0, 9.04e-4, 0, 0, 0, 9.04e-4)  # kg m², of a drone without its propellers
+
+
 def _packed(count: int, size: int, name: str) -> list[Example]:
     """Return examples of the functions that pack numbers of so many bytes each."""
     return [
@@ -69,6 +72,12 @@ SIM: dict[str, list[Example]] = {
     ],
     "isHandle": [Example("NAME(BASE)", [True]), Example("NAME(1000)", [False])],
     "isHandleValid": [Example("NAME(BASE)", [1]), Example("NAME(1000)", [0])],
+    "createDummy": [Example("sim.getObjectType(NAME(0.01)) == sim.object_dummy_type", [True])],
+    "removeObject": [
+        Example("NAME(sim.createDummy(0.01))", [1]),
+        Example("REFUSED(NAME, BASE)", ["only those can be removed"]),
+    ],
+    "removeObjects": [Example("NAME({sim.createDummy(0.01, {1, 0, 0}), sim.createDummy(0.02)})", [1])],
     "getObjectUid": [Example("NAME(BASE) == BASE", [True])],
     # ---- where objects are
     "setObjectPosition": [Example("NAME(TARGET, -1, {1,2,3})", []), Example("NAME(TARGET, {4,5,6}, -1)", [])],
@@ -96,11 +105,11 @@ SIM: dict[str, list[Example]] = {
     "getJointMode": [Example("NAME(HINGE)", [0, 0])],
     "setJointInterval": [Example("NAME(HINGE, false, {-1, 3})", [])],
     "getJointInterval": [Example("NAME(HINGE)", [False, [-1, 3]])],
-    "setJointTargetPosition": [Example("NAME(HINGE, 0.5)", [])],
+    "setJointTargetPosition": [Example("NAME(HINGE, 0.5)", []), Example("NAME(JOINT, 1)", [])],
     "getJointTargetPosition": [Example("NAME(HINGE)", [0.5])],
-    "setJointTargetVelocity": [Example("NAME(HINGE, 0.1)", [])],
+    "setJointTargetVelocity": [Example("NAME(HINGE, 0.1)", []), Example("NAME(JOINT, 300)", [])],
     "getJointTargetVelocity": [Example("NAME(HINGE)", [0.1])],
-    "setJointTargetForce": [Example("NAME(HINGE, 2)", [])],
+    "setJointTargetForce": [Example("NAME(HINGE, 2)", []), Example("NAME(JOINT, 1)", [])],
     "getJointTargetForce": [Example("NAME(HINGE)", [2])],
     "setJointForce": [Example("NAME(HINGE, 4)", [])],
     "setJointMaxForce": [Example("NAME(HINGE, 5)", [])],
@@ -121,7 +130,9 @@ SIM: dict[str, list[Example]] = {
     "getShapeMass": [Example("NAME(DRONE)", [approx(0.12)]), Example("NAME(FLOOR)", [0])],
     "getShapeMassAndInertia": [
         Example("NAME(FLOOR, {1,0,0,5, 0,1,0,0, 0,0,1,0})", [0, [0.0] * 9, near(-5, 0, 0)]),
+        Example("NAME(DRONE, sim.getObjectMatrix(DRONE))", [approx(0.12), ALONG_X, near(0, 0, 0)]),
     ],
+    "getShapeInertia": [Example("NAME(DRONE)", [ALONG_X, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]])],
     "getObjectInt32Param": [Example("NAME(DRONE, sim.shapeintparam_static)", [0])],
     "setObjectInt32Param": [Example("NAME(DRONE, sim.shapeintparam_respondable, 1)", [1])],
     "getObjectFloatParam": [Example("NAME(DRONE, sim.shapefloatparam_mass)", [approx(0.12)])],

@@ -3,7 +3,7 @@
 from api_examples import Example
 
 ROS: dict[str, list[Example]] = {
-    "subscribe": [Example("NAME('in', 'std_msgs/String', 'heard')", [1])],
+    "subscribe": [Example("NAME('in', 'std_msgs/String', 'heard')", [1])] * 2,
     "subscriberTreatUInt8ArrayAsString": [Example("NAME(1)", [])],
     "shutdownSubscriber": [Example("NAME(1)", [])],
     "advertise": [Example("NAME('out', 'std_msgs/String')", [2])],

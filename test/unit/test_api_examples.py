@@ -103,7 +103,8 @@ def _simulation(tmp_path_factory):
 @pytest.fixture(name="modules")
 def _modules(simulation):
     drone = simulation.drone
-    around = Surroundings(lambda: 0.0, 0.05, PICTURES, planes={"TrackCam": (1.0, 5.0)}, masses=drone.masses)
+    weights = {"masses": drone.masses, "inertias": drone.inertias}
+    around = Surroundings(lambda: 0.0, 0.05, PICTURES, planes={"TrackCam": (1.0, 5.0)}, **weights)
     return {
         "sim": make_sim(drone, around),
         "simROS": make_sim_ros(MessageBus("drone"), around.clock),

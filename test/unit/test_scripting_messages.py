@@ -53,6 +53,24 @@ def test_names_stand_in_the_drones_namespace():
     assert heard == [("relative", 1), ("absolute", 1)]
 
 
+def test_the_same_subscription_once_more_is_the_one_that_is_there():
+    bus, heard = MessageBus("drone"), []
+    for _ in range(300):  # as from a script that subscribes in every step
+        assert bus.subscribe("/cmd_vel", "geometry_msgs/Twist", "on_twist") == 1
+    others = [
+        bus.subscribe("/cmd_vel", "geometry_msgs/Twist", "on_other"),
+        bus.subscribe("/cmd_vel", "std_msgs/String", "on_twist"),
+        bus.subscribe("/more", "geometry_msgs/Twist", "on_twist"),
+    ]
+    assert others == [2, 3, 4]
+    bus.shutdownSubscriber(3)
+    bus.post("/cmd_vel", 1)
+    bus.deliver(lambda callback, message: heard.append((callback, message)))
+    assert heard == [("on_twist", 1), ("on_other", 1)]
+    bus.shutdownSubscriber(1)
+    assert bus.subscribe("/cmd_vel", "geometry_msgs/Twist", "on_twist") == 5
+
+
 @pytest.mark.parametrize("queue, kept", [(0, [4]), (1, [4]), (3, [2, 3, 4]), (10, [0, 1, 2, 3, 4])])
 def test_the_last_messages_are_kept(queue, kept):
     bus, heard = MessageBus("drone"), []

@@ -19,6 +19,7 @@ import numpy as np
 
 from drone_sim.files import urdf_files
 from drone_sim.mechanics.frames import IDENTITY, Matrix, from_rpy, multiply, position, to_rpy, transform
+from drone_sim.mechanics.inertia import Inertial, together
 
 
 class UrdfError(ValueError):
@@ -39,7 +40,7 @@ class RigidBody:
     """The URDF's links as one body, in the frame of the root link (metres, kilograms)."""
 
     mass: float
-    masses: dict[str, float]  # of each link
+    inertials: dict[str, Inertial]  # of each link
     centre_of_mass: np.ndarray  # (3,)
     inertia: np.ndarray  # (3, 3), about the centre of mass, root link's axes
     links: dict[str, Matrix]  # root from link, joints at zero
@@ -65,20 +66,12 @@ def _merge(robot: Xml.Element) -> RigidBody:
     joints = {_end(joint, "child"): joint for joint in robot.findall("joint")}
     poses = {name: _pose(name, joints) for name in links}
     roots = [name for name in links if name not in joints]
-    masses = {name: _mass(link) for name, link in links.items()}
-    mass = sum(masses.values())
-    if not mass > 0:
-        raise ValueError(f"total mass {mass} kg: must be greater than 0")
-    centres = {name: np.array(transform(poses[name], _origin(links[name].find("inertial"))[3::4])) for name in links}
-    centre = sum((masses[name] * centres[name] for name in links), np.zeros(3)) / mass
-    inertia = sum(
-        (_inertia(links[name], poses[name]) + masses[name] * _steiner(centres[name] - centre) for name in links),
-        np.zeros((3, 3)),
-    )
+    inertials = {name: _inertial(link, poses[name]) for name, link in links.items()}
+    mass, centre, inertia = together(list(inertials.values()))
     visuals = [(name, visual) for name, link in links.items() for visual in link.findall("visual")]
     return RigidBody(
         mass=mass,
-        masses=masses,
+        inertials=inertials,
         centre_of_mass=centre,
         inertia=inertia,
         links=poses,
@@ -117,6 +110,11 @@ def _origin(element: Xml.Element | None) -> Matrix:
     return from_rpy(_numbers(origin.attrib["xyz"]), _numbers(origin.attrib["rpy"]))
 
 
+def _inertial(link: Xml.Element, pose: Matrix) -> Inertial:
+    centre = np.array(transform(pose, _origin(link.find("inertial"))[3::4]))
+    return Inertial(_mass(link), centre, _inertia(link, pose))
+
+
 def _mass(link: Xml.Element) -> float:
     element = link.find("inertial/mass")
     return 0.0 if element is None else float(element.attrib["value"])
@@ -129,10 +127,6 @@ def _inertia(link: Xml.Element, pose: Matrix) -> np.ndarray:
     xx, xy, xz, yy, yz, zz = (float(element.attrib[key]) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     turn = np.array(multiply(pose, _origin(link.find("inertial")))).reshape(3, 4)[:, :3]
     return turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
-
-
-def _steiner(d: np.ndarray) -> np.ndarray:
-    return d @ d * np.eye(3) - np.outer(d, d)
 
 
 def _blades(

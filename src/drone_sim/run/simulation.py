@@ -10,7 +10,7 @@ For example:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -142,6 +142,7 @@ class Simulation:
     def _changed_vehicles(self) -> None:
         self._era += 1
         self._flying = tuple(self.vehicles.values())
+        self._bodies = tuple(vehicle.body.number for vehicle in self._flying)
         self._feel_weather()
 
     def _feel_weather(self) -> None:
@@ -293,7 +294,14 @@ class Simulation:
             self._take_turns()
         for actor in vehicles if self._alone else self._setting.cast.all():
             actor.actuation()
-        self._advance(vehicles)
+        wrenches = dict(zip(self._bodies, map(Vehicle.wrench, vehicles)))
+        if self.scene.carries:
+            self.scene.follow()
+        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
+        for vehicle in vehicles:
+            vehicle.body.refresh()
+        if self.scene.carries:
+            self.scene.follow()
         self.steps += 1
         self._whereabouts.check(vehicles)
         for vehicle in vehicles:
@@ -306,20 +314,6 @@ class Simulation:
         for thread in self._threaded:
             if thread.script.threaded:
                 thread.script.take_turn()
-
-    def _advance(self, vehicles: Sequence[Vehicle]) -> None:
-        """Let the dynamics go on by a step, and what hangs on other things follow."""
-        wrenches = {}
-        for vehicle in vehicles:
-            wrenches[vehicle.body.number] = vehicle.wrench()
-        scene = self.scene
-        if scene.carries:
-            scene.follow()
-        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
-        for vehicle in vehicles:
-            vehicle.body.refresh()
-        if scene.carries:
-            scene.follow()
 
     def _between(self, count: int) -> None:
         """Do what is due after so many sub-steps of the step: instruments look, and forces follow."""

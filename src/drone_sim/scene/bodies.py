@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, cross
+from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.scene.entry import Place
@@ -61,6 +62,11 @@ class LinkBody:
         """World from its frame."""
         return frames.multiply(self._world.joints.link_state(self.number, self._link).matrix, self._local)
 
+    def inertia(self) -> Inertia:
+        """Return how its mass lies in its frame."""
+        found = self._world.inertia(self.number, self._link)
+        return found._replace(frame=frames.multiply(frames.invert(self._local), found.frame))
+
     def move(self, pose: Pose) -> None:
         """Refuse: its joint says where it is. Raises ValueError."""
         raise ValueError("a shape that a joint holds is put nowhere else")
@@ -72,6 +78,10 @@ class HeldShape(SceneObject):
     is_loose = False
     is_held = True
     mass = 0.0  # kg
+
+    def inertia(self) -> Inertia | None:
+        """Return how its mass lies in it, None where it has none."""
+        return self.body.inertia() if isinstance(self.body, LinkBody) and self.mass else None
 
     def put(self, matrix: Matrix) -> None:
         """Refuse. Raises ValueError."""
@@ -141,6 +151,10 @@ class Shape(SceneObject):
         if parent is not self._parent:
             self._parent = parent
             self._renew()
+
+    def inertia(self) -> Inertia | None:
+        """Return how its mass lies in it, None where the dynamics leaves it alone."""
+        return None if self.is_static else self._world.inertia(self.number)
 
     @property
     def is_static(self) -> bool:

@@ -101,6 +101,7 @@ class Scene:
         self._objects: dict[int, SceneObject] = {}  # by entry
         self._hanging: dict[int, Carried] = {}  # static shapes that have a parent, by body
         self._carried_bases: list[Carried] = []  # those of chains whose first joint has one
+        self.carries = False  # whether there is anything to `follow`: asked for in every step
 
     def _add(self, objects: ObjectTree, index: int) -> SceneObject:
         one = self._entries[index]
@@ -148,6 +149,7 @@ class Scene:
             self._hanging.pop(shape.number, None)
         else:
             self._hanging[shape.number] = shape.carried
+        self._look_what_is_carried()
 
     def _hold_chains(self) -> None:
         """Let the dynamics move the joints of chains, and force sensors measure."""
@@ -159,6 +161,7 @@ class Scene:
                 self._carried_bases.append(Carried(self._world, body, first.parent.below))
                 for above in bodies_above(first):
                     self._world.solidity.let_pass(body, above)
+        self._look_what_is_carried()
 
     def _hold(self, one: SceneObject, body: int, link: int) -> None:
         if isinstance(one, ForceSensor):
@@ -177,10 +180,8 @@ class Scene:
 
     # ---- what is carried
 
-    @property
-    def carries(self) -> bool:
-        """Whether there is anything to `follow`."""
-        return bool(self._hanging or self._carried_bases)
+    def _look_what_is_carried(self) -> None:
+        self.carries = bool(self._hanging or self._carried_bases)
 
     def follow(self) -> None:
         """Put every body without mass to where what carries it has gone."""

@@ -28,18 +28,17 @@ class _Lines:
             LOG.info("… %d lines left out: a call of the script may write %d", left_out, MOST)
 
 
-_lines = _Lines()
+lines = _Lines()  # of the call that is under way
 
 
 def say(text: Any) -> None:
     """Write a line to the log, or count it where there were too many in this call of the script."""
-    _lines.say(text if type(text) is str else shown(text))
+    lines.say(text if type(text) is str else shown(text))
 
 
 def end_call() -> None:
     """Begin to count anew, after a call of the script; say how many lines were left out."""
-    if _lines.count:
-        _lines.end()
+    lines.end()
 
 
 def shown(value: Any) -> str:

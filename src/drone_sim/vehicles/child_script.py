@@ -8,6 +8,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from drone_sim.mechanics.inertia import Inertia
 from drone_sim.scripting import load
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.messages import MessageBus
@@ -35,6 +36,9 @@ class Seen(Protocol):
 
     def masses(self) -> Mapping[str, float]:
         """Return the mass (kg) of each of its shapes, by object name."""
+
+    def inertias(self) -> Mapping[str, Inertia]:
+        """Return how the mass of each of its shapes lies, by object name."""
 
 
 def load_child_script(
@@ -66,6 +70,7 @@ def surroundings(seen: Sequence[Seen], shared: Shared, limit: TimeLimit, turns: 
         turns=turns,
         gravity=shared.gravity,
         masses=lambda: _together(one.masses() for one in seen),
+        inertias=lambda: _together(one.inertias() for one in seen),
         control=shared.control,
         data=shared.data,
         tubes=shared.tubes,

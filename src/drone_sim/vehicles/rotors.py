@@ -24,7 +24,9 @@ class Rotors:
             if f"propeller_{place}" not in rigid.links:
                 raise urdf.UrdfError(f"{urdf_name}: no link propeller_{place}")
         self.links: list[Matrix] = [rigid.links[f"propeller_{place}"] for place, _ in PROPELLERS]  # root from link
-        self.masses = [rigid.masses[f"propeller_{place}"] for place, _ in PROPELLERS]  # kg, without their blades
+        own = [f"propeller_{place}" for place, _ in PROPELLERS]
+        self.inertials = [rigid.inertials[name] for name in own]  # without their blades, in the root link's frame
+        self.others = [one for name, one in rigid.inertials.items() if name not in own]
         self._blades = rigid.blades
 
     def propellers(

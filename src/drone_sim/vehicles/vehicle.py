@@ -14,6 +14,7 @@ from drone_sim.forces.force import Force
 from drone_sim.forces.pushes import Push, Pushes
 from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector
+from drone_sim.mechanics.inertia import Inertia, Inertial, together
 from drone_sim.mechanics.object_tree import ObjectTree, SceneObject
 from drone_sim.mechanics.state import Pose, State, Twist
 from drone_sim.mechanics.wrench import Wrench
@@ -240,8 +241,19 @@ class Vehicle:
 
     def masses(self) -> dict[str, float]:
         """Return the mass (kg) of each of its shapes, by object name; they are one body."""
-        of_propellers = {respondable(number) + self.suffix: one for number, one in zip(NUMBERS, self._rotors.masses)}
+        of_propellers = {name: one.mass for name, one in self._of_propellers()}
         return {self.own_script: self.body.mass - sum(of_propellers.values()), **of_propellers}
+
+    def inertias(self) -> dict[str, Inertia]:
+        """Return how the mass of each of its shapes lies, in that shape's frame, by object name."""
+        frames_of = dict(zip((name for name, _ in self._of_propellers()), self._rotors.links))
+        found = {name: one.seen_from(frames_of[name]) for name, one in self._of_propellers() if one.mass}
+        if sum(one.mass for one in self._rotors.others):
+            found[self.own_script] = together(self._rotors.others).seen_from(IDENTITY)
+        return found
+
+    def _of_propellers(self) -> list[tuple[str, Inertial]]:
+        return [(respondable(number) + self.suffix, one) for number, one in zip(NUMBERS, self._rotors.inertials)]
 
     # ---- commands
 

@@ -13,6 +13,7 @@ import numpy as np
 import pybullet
 
 from drone_sim.mechanics.frames import Matrix, Quaternion, Vector, cross, multiply_quaternions, turned
+from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.state import Pose, State, compose, inverse
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
@@ -208,6 +209,11 @@ class World:
     def inertial_frame(self, body: int) -> Matrix:
         """Return the transform root link from inertial frame (centre of mass, principal axes)."""
         return self._inertial_frames[body][0].matrix
+
+    def inertia(self, body: int, link: int = -1) -> Inertia:
+        """Return how the mass of a link (-1: the root) lies in its frame: along its principal axes."""
+        _, _, (a, b, c), place, turn, *_ = pybullet.getDynamicsInfo(body, link, self._client)
+        return Inertia((a, 0.0, 0.0, 0.0, b, 0.0, 0.0, 0.0, c), Pose(place, turn).matrix)
 
     def state(self, body: int) -> State:
         """Return pose and velocity of a body's root link."""

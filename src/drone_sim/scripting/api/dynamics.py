@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from drone_sim.mechanics import frames
+from drone_sim.mechanics.inertia import Inertia, turned
 from drone_sim.mechanics.object_tree import SceneObject
 from drone_sim.scripting.api.calls import WrongValue, numbers
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.object_parameters import readable, settable
-from drone_sim.scripting.api.types import Handle, Number, TwelveNumbers
+from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers
 from drone_sim.wording import near_names
 
+_NONE = Inertia((0.0,) * 9, frames.IDENTITY)
 _EVERYTHING = (CONSTANTS["handle_all"], CONSTANTS["handle_scene"])
 _WHOLE = ("objintparam_", "shapeintparam_", "jointintparam_", "visionintparam_", "proxintparam_")
 _FLOAT = ("objfloatparam_", "shapefloatparam_", "jointfloatparam_", "visionfloatparam_")
+
+
+@runtime_checkable
+class Massive(Protocol):
+    """A shape of the scene."""
+
+    def inertia(self) -> Inertia | None:
+        """Return how its mass lies in it, None where it has none."""
 
 
 class Dynamics:
@@ -27,6 +37,7 @@ class Dynamics:
         """Take the drone whose objects they are, the masses (kg) by name, and what says that something is ignored."""
         self._objects = host.objects
         self._masses = surroundings.masses
+        self._inertias = surroundings.inertias
         self._ignored = ignored
 
     def resetDynamicObject(self, handle: Handle) -> None:
@@ -49,15 +60,30 @@ class Dynamics:
     def getShapeMassAndInertia(
         self, handle: Handle, transform: TwelveNumbers | None = None
     ) -> tuple[float, list[float], list[float]]:
-        """Return mass (kg), a table of nine zeros, and the shape's place in the frame of `transform` (m).
+        """Return mass (kg), inertia about the centre of mass (kg m², 9 numbers), and that centre (m) of a shape (3.x).
 
-        The inertia of one shape is not known: bodies of several are one here.
+        All in the frame of `transform`, the world's without one. What the dynamics do not move has 0 and nine zeros.
         """
-        place = self._objects[handle].matrix()
+        inertia = self._inertia(handle) or _NONE
+        place = frames.multiply(self._objects[handle].matrix(), inertia.frame)
         if transform is not None:
             place = frames.multiply(frames.invert(numbers(transform, 12)), place)
-        self._ignored.say("getShapeMassAndInertia", "the inertia of one shape is not known: nine zeros are returned")
-        return self.getShapeMass(handle), [0.0] * 9, list(frames.position(place))
+        return self.getShapeMass(handle), turned(inertia, place).ravel().tolist(), list(frames.position(place))
+
+    def getShapeInertia(self, handle: Handle) -> tuple[Numbers, TwelveNumbers]:
+        """Return the inertia of a shape about its centre of mass (kg m², 9 numbers), and in which frame that is (4.x).
+
+        The frame is a transform in the shape's own. A propeller's shape is without its blades, as its mass is.
+        """
+        inertia = self._inertia(handle)
+        if inertia is None:
+            raise ValueError(f"'{self._objects[handle].name}' has no mass that the dynamics move")
+        return list(inertia.tensor), list(inertia.frame)
+
+    def _inertia(self, handle: int) -> Inertia | None:
+        """Return how the mass of a shape lies in it, None where there is none."""
+        found = self._objects[handle]
+        return found.inertia() if isinstance(found, Massive) else self._inertias().get(found.name)
 
     # ---- parameters of objects
 

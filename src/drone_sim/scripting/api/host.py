@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.control import Control
 from drone_sim.scripting.api.custom_values import CustomData
@@ -80,6 +81,7 @@ class Surroundings:
     planes: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # m: the near and far plane of each
     gravity: float = -9.81  # m/s² along z
     masses: Callable[[], Mapping[str, float]] = dict  # kg, of the shapes that the dynamics move, by object name
+    inertias: Callable[[], Mapping[str, Inertia]] = dict  # how these lie in each, in its frame
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)

@@ -124,6 +124,10 @@ _RIGID = Group(
     "propellers are rigidly attached, and nothing breaks",
     {"breakForceSensor": None, "readForceSensor": 0},
 )
+_LINKS = Group(
+    "dummies are not linked to each other: what hangs on a link does not hang here",
+    {"setLinkDummy": None, "setDummyLinkType": None, "getLinkDummy": -1, "getDummyLinkType": 0},
+)
 _PICTURES = Group(
     "a picture is what the sensor sees; publish another one instead",
     _nothing("setVisionSensorCharImage", "setVisionSensorImage", "setVisionSensorImg", "resetVisionSensor"),
@@ -133,7 +137,7 @@ _SERVER = Group(
     _nothing("extRemoteApiStart"),
 )
 
-SIM = (_PARTICLES, _VIEWS, _COLORS, _GRAPHS, _BUTTONS, _SELECTION, _FLAGS, _ORDER, _RIGID, _PICTURES, _SERVER)
+SIM = (_PARTICLES, _VIEWS, _COLORS, _GRAPHS, _BUTTONS, _SELECTION, _FLAGS, _ORDER, _RIGID, _LINKS, _PICTURES, _SERVER)
 
 _UI = Group(
     "there are no windows of scripts; rqt and rviz have what one needs",

@@ -1,6 +1,7 @@
 """`sim`: joints. Revolute ones in rad, rad/s and N m, prismatic ones in m, m/s and N.
 
-A propeller's joint answers to getJointPosition and setJointPosition: how its blades look.
+A propeller's joint answers to getJointPosition and setJointPosition: how its blades look. Targets are accepted of it
+and ignored, for the law turns the blades.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from drone_sim.mechanics.frames import IDENTITY
 from drone_sim.mechanics.joint import FORCE, KINEMATIC, PRISMATIC, REVOLUTE, SPHERICAL, Joint
 from drone_sim.scripting.api.calls import WrongValue, numbers
 from drone_sim.scripting.api.host import Host
+from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers
 
 _TYPES = {REVOLUTE: 10, PRISMATIC: 11, SPHERICAL: 12}  # sim.joint_revolute_subtype and so on
@@ -25,10 +27,11 @@ _UNIT = 1e-3  # by how much a rotation may miss
 class Joints:
     """The functions on joints."""
 
-    def __init__(self, host: Host):
-        """Take the drone whose objects they are."""
+    def __init__(self, host: Host, ignored: Ignored):
+        """Take the drone whose objects they are, and what says that something is ignored."""
         self._host = host
         self._objects = host.objects
+        self._ignored = ignored
 
     # ---- where they are
 
@@ -109,7 +112,8 @@ class Joints:
     def setJointTargetPosition(self, handle: Handle, position: Number, _motion: Any = None) -> None:
         """Let a joint go to a position; one that scripts move is there at once."""
         (value,) = numbers((position,), 1)
-        self._moving(handle).change(position=value)
+        if not self._is_propellers(handle, "setJointTargetPosition"):
+            self._moving(handle).change(position=value)
 
     def getJointTargetVelocity(self, handle: Handle) -> float:
         """Return how fast a joint is to move."""
@@ -118,7 +122,8 @@ class Joints:
     def setJointTargetVelocity(self, handle: Handle, velocity: Number, _motion: Any = None) -> None:
         """Let a joint move at a velocity, in the mode for that."""
         (value,) = numbers((velocity,), 1)
-        self._moving(handle).change(velocity=value)
+        if not self._is_propellers(handle, "setJointTargetVelocity"):
+            self._moving(handle).change(velocity=value)
 
     def getJointForce(self, handle: Handle) -> float:
         """Return what a joint's motor gave in the last sub-step."""
@@ -132,7 +137,10 @@ class Joints:
 
     def setJointTargetForce(self, handle: Handle, force: Number, signedValue: bool = True) -> None:
         """Give a joint in force mode a force, signed or in the direction of before; else set the most of its motor."""
-        joint, (value,) = self._moving(handle), numbers((force,), 1)
+        (value,) = numbers((force,), 1)
+        if self._is_propellers(handle, "setJointTargetForce"):
+            return
+        joint = self._moving(handle)
         if joint.control.mode != FORCE:
             joint.change(max_force=abs(value))
         elif signedValue:
@@ -151,6 +159,14 @@ class Joints:
     def setJointForce(self, handle: Handle, force: Number) -> None:
         """Set the most that a joint's motor gives (3.x)."""
         self.setJointTargetForce(handle, force, False)
+
+    def _is_propellers(self, handle: int, function: str) -> bool:
+        """Tell whether that is the joint of a propeller; say of one that nothing comes of the call."""
+        found = self._objects[handle]
+        if found.kind != "joint" or isinstance(found, Joint):
+            return False
+        self._ignored.say(function, "a propeller's blades are turned by its law; accepted and ignored")
+        return True
 
     def _joint(self, handle: int) -> Joint:
         found = self._objects[handle]

@@ -66,9 +66,13 @@ class MessageBus:
     def subscribe(self, topic: Name, kind: Name, callback: Callback, queue: int = 1, *_ignored: Any) -> int:
         """Call the script's function `callback` with each message on `topic`; return a handle.
 
-        Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1.
+        Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1. The same
+        topic, type and callback once more give the handle that they have; V-REP calls back once more for each.
         """
         resolved, kept = self.resolve(topic), _length(queue)
+        there = self._subscriptions.same(resolved, kind, callback)
+        if there is not None:
+            return there
 
         def begin(take: Callable[[Any], None]) -> Callable[[], None]:
             if self.backend is None or resolved in self._own_topics:
@@ -77,7 +81,7 @@ class MessageBus:
 
         self._check_type(resolved, kind)
         handle = self._new_handle()
-        self._subscriptions.add(handle, resolved, callback, kept, begin)
+        self._subscriptions.add(handle, resolved, kind, callback, kept, begin)
         return handle
 
     def shutdownSubscriber(self, handle: Handle) -> None:

@@ -16,6 +16,7 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.custom_data import CustomDataFunctions
 from drone_sim.scripting.api.dialogs import Dialogs
 from drone_sim.scripting.api.drawing import Drawing
+from drone_sim.scripting.api.dummies import Dummies
 from drone_sim.scripting.api.dynamics import Dynamics
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
@@ -43,10 +44,11 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
     names, ignored = Names(host), _ignored(host)
     parts = (
         Objects(host),
-        Joints(host),
+        Joints(host, ignored),
         ProximitySensors(host),
         Paths(host),
         ObjectKinds(host),
+        Dummies(host),
         Dynamics(host, surroundings, ignored),
         Matrices(),
         Poses(),
@@ -55,9 +57,6 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         ScriptCalls(host, surroundings, names),
         SimulationFunctions(surroundings, ignored),
         Dialogs(host, ignored),
-        Joints(host),
-        ProximitySensors(host),
-        Paths(host),
         VisionSensors(host, surroundings),
         Sensors(host),
     )

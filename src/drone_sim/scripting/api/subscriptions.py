@@ -16,6 +16,7 @@ _NONE: list[Callback] = []
 
 class _Subscription(NamedTuple):
     topic: str
+    kind: str
     callback: Callback
     messages: deque[Any]
     begin: Begin
@@ -35,10 +36,17 @@ class Subscriptions:
         """Return how many there are."""
         return len(self._by_handle)
 
-    def add(self, handle: int, topic: str, callback: Callback, queue: int, begin: Begin) -> None:
-        """Subscribe to a topic; of the messages that wait the last `queue` are kept."""
+    def same(self, topic: str, kind: str, callback: Callback) -> int | None:
+        """Return the handle of the subscription of a callback to a topic of a type, None where there is none."""
+        for handle, one in self._by_handle.items():
+            if one.topic == topic and one.kind == kind and _are_same(one.callback, callback):
+                return handle
+        return None
+
+    def add(self, handle: int, topic: str, kind: str, callback: Callback, queue: int, begin: Begin) -> None:
+        """Subscribe to a topic of a type; of the messages that wait the last `queue` are kept."""
         messages: deque[Any] = deque(maxlen=queue)
-        subscription = _Subscription(topic, callback, messages, begin, begin(messages.append))
+        subscription = _Subscription(topic, kind, callback, messages, begin, begin(messages.append))
         with self._lock:
             self._by_handle[handle] = subscription
         self._new_callbacks.append(callback)
@@ -107,6 +115,11 @@ class Subscriptions:
                     kept[handle].messages.extend(_copied(messages))
 
         return recall
+
+
+def _are_same(one: Callback, other: Callback) -> bool:
+    """Tell whether two callbacks are the same function: by its name, or itself."""
+    return one == other if isinstance(one, str) and isinstance(other, str) else one is other
 
 
 def _copied(messages: deque[Any]) -> deque[Any]:

@@ -44,7 +44,7 @@ ABSENT: dict[str, str] = {
     r"sim\.\w*(?:Ik|IK)(?:Group|Element|Path|\b)\w*|sim\.(?:getConfigForTipPose|computeJacobian)": PLUGINS["simIK"],
     r"sim\.(?:load|save|close|export|import)\w*": "scenes and models are files: see `scene_file` and `vehicles`",
     r"sim\.(?:create|copyPaste|remove|group|ungroup|convert|scale)(?!DrawingObject|Particle|Dialog)\w*": (
-        "objects come from the scene file: a script makes and removes none"
+        "objects come from the scene file: a script makes and removes dummies alone"
     ),
     r"sim\.setObject(?:Name|Alias)": "names are those of the scene file",
     r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "masses are those of the URDF and the scene file",
@@ -52,7 +52,6 @@ ABSENT: dict[str, str] = {
         "there are no collections and no collision or distance objects; a sensor of the kind contacts or range tells"
     ),
     r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
-    r"sim\.\w*(?:LinkDummy|DummyLink)\w*": "dummies are not linked to each other",
     r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
     r"simROS\.(?:advertiseService|shutdownServiceServer|serviceServerTreat\w+)": (
         "a child script offers no services: subscribe to a topic"

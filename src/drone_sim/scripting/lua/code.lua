@@ -1,7 +1,7 @@
 -- The script's code: how its files are compiled, and what it requires.
 local bridge, sandbox = ...
 
-local error, type, tostring = error, type, tostring
+local error, type, tostring, select = error, type, tostring, select
 local byte = string.byte
 local load, loadstring, setfenv = load, loadstring, setfenv
 local newer = _VERSION ~= 'Lua 5.1'
@@ -10,12 +10,16 @@ local sources, protected = sandbox.sources, sandbox.protected
 local env = {} -- the script's globals
 local modules, loaded = {}, {} -- the API's and Lua's own; what the script required, by name
 local texts = {} -- of the script and what it requires
-local LOADING = {}
+local chunk -- the file that is being required
+local seen, made, LOADING = {}, {}, {}
 sandbox.globals, sandbox.modules, sandbox.loaded, sandbox.texts = env, modules, loaded, texts
 
 local function compile(text, name)
   if byte(text) == 27 then return nil, 'precompiled code' end
-  texts[#texts + 1] = text
+  if not seen[text] then -- one may be run in every step
+    seen[text] = true
+    texts[#texts + 1] = text
+  end
   if newer then return load(text, name, 't', env) end
   local f, message = loadstring(text, name)
   if f then setfenv(f, env) end
@@ -31,13 +35,24 @@ local function load_module(name)
   local f, message = compile(text, '=' .. chunk_name)
   if not f then error(message, 0) end
   sources['=' .. chunk_name] = chunk_name
-  loaded[name] = LOADING
+  local outer = chunk
+  loaded[name], chunk = LOADING, f
   local ok, value = protected(f, name)
-  loaded[name] = nil
+  loaded[name], chunk = nil, outer
   if not ok then error(value, 0) end
-  if value == nil then value = true end
+  if value == nil then value = made[name] or true end
   loaded[name] = value
   return value
+end
+
+-- Lua 5.1's way to write a helper: what the file defines from here on belongs to a table, which is a global, too.
+function env.module(name, ...)
+  if newer then error('module is of Lua 5.1: let the file return a table instead', 2) end
+  if type(name) ~= 'string' or not chunk then error('module: only in a file that is required by its name', 2) end
+  local its = type(env[name]) == 'table' and env[name] or {}
+  its._NAME, its._M, env[name], made[name] = name, its, its, its
+  for i = 1, select('#', ...) do (select(i, ...))(its) end
+  setfenv(chunk, its)
 end
 
 function env.require(name)

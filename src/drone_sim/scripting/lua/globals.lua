@@ -27,6 +27,7 @@ for _, name in pairs{'_VERSION', 'assert', 'collectgarbage', 'error', 'getmetata
 end
 env._G = env
 env.package = {path = '', cpath = '', loaded = {}} -- which changes nothing: what a script requires lies beside it
+function env.package.seeall(its) setmetatable(its, {__index = env}) end
 env.debug = {traceback = sandbox.debug.traceback}
 env.os = {time = os.time, clock = os.clock, date = os.date, difftime = os.difftime}
 for _, name in pairs{'math', 'string', 'table', 'coroutine', 'os', 'utf8'} do modules[name] = env[name] end
@@ -153,4 +154,10 @@ math.cosh = math.cosh or function(x) return (math.exp(x) + math.exp(-x)) / 2 end
 math.tanh = math.tanh or function(x) return 1 - 2 / (math.exp(2 * x) + 1) end
 table.getn = table.getn or function(t) return #t end
 string.gfind = string.gmatch and (string.gfind or string.gmatch)
+local seed = math.randomseed
+function math.randomseed(number) -- newer Lua takes whole numbers alone, and without one any that comes
+  if number == nil then number = 1 end
+  if newer and type(number) == 'number' then number = math.floor(number) end
+  return seed(number)
+end
 math.randomseed(1) -- the same flight every time

@@ -1,4 +1,4 @@
-"""Helper files beside a Lua child script, which it requires by name."""
+"""Helper files beside a Lua child script, which it requires by name or loads as files."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from drone_sim.wording import near_names
 
 _CHUNK_LENGTH = 50  # Lua cuts longer chunk names
 _NAME = re.compile(r"[\w-]+(?:[./][\w-]+)*")
+_FILE = re.compile(r"[\w-]+(?:[./][\w-]+)*\.lua")
 _LONGEST, _MOST = 200, 1000  # characters of a name; helpers
 
 
@@ -43,6 +44,31 @@ class LuaHelpers:
             said = getattr(error, "strerror", None) or error
             return False, f"no module '{name.decode('utf-8', 'replace')[:80]}': {said}".encode("utf-8", "replace"), b""
         return True, text, chunk.encode("utf-8", "replace")
+
+    def read_file(self, name: bytes) -> tuple[bool, bytes, bytes]:
+        """Return true, text and chunk name of a .lua file; or false and a message."""
+        try:
+            text, chunk = self._read_file(name.decode("utf-8"))
+        except (OSError, ValueError) as error:
+            said = getattr(error, "strerror", None) or error
+            return (
+                False,
+                f"cannot load '{name.decode('utf-8', 'replace')[:80]}': {said}".encode("utf-8", "replace"),
+                b"",
+            )
+        return True, text, chunk.encode("utf-8", "replace")
+
+    def _read_file(self, name: str) -> tuple[bytes, str]:
+        inner = name.removeprefix("./")
+        if len(inner) > _LONGEST or not _FILE.fullmatch(inner):
+            raise ValueError(
+                "a .lua file beside the script, or in a folder there, is expected, such as helpers/pid.lua"
+            )
+        path = self._folder / inner
+        if not path.exists():
+            near = near_names(inner, [one.name for one in self._folder.glob("*.lua")])
+            raise ValueError(f"no such file beside the script; {near}")
+        return self._text(path), self._known(inner, path)
 
     def _read(self, name: str) -> tuple[bytes, str]:
         if len(name) > _LONGEST or not _NAME.fullmatch(name):

@@ -12,7 +12,7 @@ _LOOP_IN_C = (
     *("date", "utf8"),
 )
 _LOOPS_IN_C = re.compile(rb"\b(?:" + "|".join(_LOOP_IN_C).encode() + rb")\b")
-_REQUIRE = re.compile(rb"\brequire\b")  # a helper may name what it likes; these cannot
+_REQUIRE = re.compile(rb"\b(?:require|loadfile|dofile)\b")  # a helper may name what it likes; these cannot
 _REQUIRE_OWN = re.compile(rb"\brequire[ \t]{0,9}\(?[ \t]{0,9}['\"](?:sim|simROS|math|string|table|coroutine|os)['\"]")
 _PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|thread|threadmain)\b")
 _THREAD_TYPE = re.compile(rb"\b(?:syscb_thread(?:main)?|childscriptcall_threaded)\b")

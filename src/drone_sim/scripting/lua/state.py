@@ -36,9 +36,11 @@ _FILES = (
     "snapshots",
     "calls",
     "globals",
+    "files",
 )  # each uses those before it
 _CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
 
+Reader = Callable[[bytes], tuple[bool, bytes, bytes]]  # of a name: whether there is one, text, name of the chunk
 TIME, OVER_MEMORY = 1, 2  # why Lua stops a script (limits.lua)
 
 
@@ -83,7 +85,8 @@ def make_sandbox(runtime: Any, door: Door, limit: TimeLimit, values: Values, hel
         "default_ms": DEFAULT_MS,
         "shortest_ms": SHORTEST_MS,
         "longest_ms": LONGEST_MS,
-        "module": _reader(door, helpers),
+        "module": _reader(door, helpers.read),
+        "file": _reader(door, helpers.read_file),
     }
     table, sandbox = runtime.table_from({key.encode(): value for key, value in bridge.items()}), runtime.table()
     for name, text in _texts().items():
@@ -115,8 +118,8 @@ def _log(door: Door) -> Callable[[bytes], None]:
     return log
 
 
-def _reader(door: Door, helpers: LuaHelpers) -> Callable[[bytes], tuple[bool, bytes, bytes]]:
-    return lambda name: (False, b"stopped", b"") if door.closed else helpers.read(name)
+def _reader(door: Door, read: Reader) -> Reader:
+    return lambda name: (False, b"stopped", b"") if door.closed else read(name)
 
 
 def _phase_functions() -> tuple[bytes, ...]:

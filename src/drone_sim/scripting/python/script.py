@@ -180,7 +180,8 @@ class PythonScript:
             result = self._limit.run(function, *arguments)
         except BaseException as error:  # KeyboardInterrupt, too: whose it is cannot be told
             failed = self._error(phase, error)
-        script_log.end_call()
+        if script_log.lines.count:  # seldom: asked here, a call less in every phase
+            script_log.end_call()
         if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive
             raise failed
         return result

@@ -1,0 +1,106 @@
+-- Files and programs: a Lua script reads the code that lies beside it, writes none, and starts nothing.
+--
+-- What it would write goes nowhere, which is said once: a script that keeps a record of its flight flies. Whatever else
+-- it asks of io or os is refused in one line, with what to use instead.
+local bridge, sandbox = ...
+
+local error, type, tostring, select, pairs = error, type, tostring, select, pairs
+local concat, sub, setmetatable = table.concat, string.sub, setmetatable
+local env, modules, sources = sandbox.globals, sandbox.modules, sandbox.sources
+local log, compile, protected = bridge.log, sandbox.compile, sandbox.protected
+
+local READING = 'a Lua script reads no files: use script_parameters, simROS.getParamDouble, or a file of Lua beside it'
+local WRITING = 'a Lua script writes no files: print it, or simROS.publish it'
+local STARTING = 'a child script starts no programs: use a launch file'
+local ENVIRONMENT = 'a Lua script sees no environment: use script_parameters'
+local LONGEST = 80 -- characters of a name in a message
+
+local function refuse(where, names, why)
+  for _, name in pairs(names) do
+    local said = where .. '.' .. name
+    env[where][name] = function() error(said .. ': ' .. why, 2) end
+  end
+end
+
+local function line_of(...)
+  local words = {}
+  for i = 1, select('#', ...) do words[i] = tostring((select(i, ...))) end
+  local line = sub(concat(words), 1, bridge.longest_line)
+  if sub(line, -1) == '\n' then line = sub(line, 1, -2) end
+  log(line)
+end
+
+local function methods_of(write)
+  local methods = {}
+  methods.write = function(file, ...)
+    write(...)
+    return file
+  end
+  methods.close = function() return true end
+  methods.flush = function(file) return file end
+  methods.setvbuf, methods.seek = methods.close, function() return 0 end
+  methods.read = function() error('read: ' .. READING, 2) end
+  methods.lines = methods.read
+  return methods
+end
+
+local function a_file(methods)
+  return setmetatable({}, {__index = methods, __name = 'FILE*'})
+end
+
+local nowhere, words = methods_of(function() end), methods_of(line_of)
+local has_said = false
+
+env.io = {stdout = a_file(words), stderr = a_file(words), write = line_of}
+refuse('io', {'input', 'lines', 'read'}, READING)
+refuse('io', {'output', 'tmpfile'}, WRITING)
+refuse('io', {'popen'}, STARTING)
+refuse('os', {'execute'}, STARTING)
+refuse('os', {'exit'}, 'sim.stopSimulation() ends a flight')
+refuse('os', {'getenv', 'setlocale'}, ENVIRONMENT)
+refuse('os', {'remove', 'rename', 'tmpname'}, WRITING)
+
+function env.io.open(name, mode)
+  if type(name) ~= 'string' then error('io.open: the name of a file is expected', 2) end
+  local first = type(mode) == 'string' and sub(mode, 1, 1)
+  if first ~= 'w' and first ~= 'a' then error('io.open: ' .. READING, 2) end
+  if not has_said then
+    has_said = true
+    log("io.open: '" .. sub(name, 1, LONGEST) .. "' is not written: " .. WRITING .. ' (accepted and ignored)')
+  end
+  return a_file(nowhere)
+end
+
+function env.io.close() return true end
+
+function env.io.type(file)
+  return type(file) == 'table' and (type(file.write) == 'function' and 'file') or nil
+end
+
+modules.io = env.io
+
+---- code beside the script
+
+local function load_file(name)
+  if type(name) ~= 'string' then return nil, 'the name of a .lua file beside the script is expected' end
+  local found, text, chunk_name = bridge.file(name)
+  if not found then return nil, text end
+  local f, message = compile(text, '=' .. chunk_name)
+  if f then sources['=' .. chunk_name] = chunk_name end
+  return f, message
+end
+
+function env.loadfile(name)
+  return load_file(name)
+end
+
+local function results(ok, ...)
+  if not ok then error((...), 0) end
+  return ...
+end
+
+function env.dofile(name)
+  local f, message = load_file(name)
+  if not f then error(message, 0) end
+  return results(protected(f))
+end

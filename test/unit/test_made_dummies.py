@@ -1,0 +1,53 @@
+"""Dummies that scripts make: found by name, carried, taken away, gone after the run, and never too many."""
+
+import pytest
+
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.errors import ScriptError
+
+MADE = """
+def sysCall_init():
+    self.first, self.second = sim.createDummy(0.01), sim.createDummy(0.01, [1, 0, 0])
+    print(sim.getObjectName(self.first), sim.getObjectName(self.second), sim.getObjectAlias(self.second))
+    sim.setObjectParent(self.second, sim.getObject('/Quadcopter'), True)
+    sim.setObjectPosition(self.second, -11, [0, 0, 1])
+    sim.setObjectParent(self.first, self.second, False)
+
+def sysCall_actuation():
+    sim.removeObjects([self.second])
+    print(sim.getObjectParent(self.first), [round(one, 2) for one in sim.getObjectPosition(self.first, -1)])
+"""
+
+
+def simulate(tmp_path, text):
+    path = tmp_path / "made.py"
+    path.write_text(text, encoding="utf-8")
+    return Simulation(parameters.load({"gravity": 0.0, "drone": {"position": [0.0, 0.0, 2.0]}}), script=str(path))
+
+
+def test_a_script_makes_dummies_and_takes_them_away(tmp_path, caplog):
+    caplog.set_level("INFO")
+    simulation = simulate(tmp_path, MADE)
+    assert "Dummy0" in simulation.drone.objects
+    simulation.step()
+    assert "Dummy0" not in simulation.drone.objects and "Dummy" in simulation.drone.objects
+    simulation.stop()
+    simulation.start()
+    assert caplog.messages == ["Dummy Dummy0 Dummy", "-1 [0.0, 0.0, 3.0]", "Dummy Dummy0 Dummy"]
+    simulation.close()
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ("[sim.createDummy(0.01) for _ in range(2000)]", "scripts make at most 1000 dummies"),
+        ("sim.removeObject(sim.getObject('/Floor'))", "'Floor' is not a dummy that a script has made"),
+        ("sim.removeObjects(3)", "a table of handles is expected"),
+        ("sim.createDummy('large')", "a number is expected"),
+        ("sim.createPureShape(0, 0, [1, 1, 1], 1)", "a script makes and removes dummies alone"),
+    ],
+)
+def test_what_is_refused(tmp_path, call, words):
+    with pytest.raises(ScriptError, match=words):
+        simulate(tmp_path, f"def sysCall_init():\n    {call}\n")

@@ -1,0 +1,113 @@
+"""What a Lua script finds of files and programs: the code beside it, and clear words on the rest."""
+
+import logging
+
+import pytest
+
+from drone_sim.scripting import load
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.time_limit import TimeLimit
+
+FLAT = "local _ = function() simGetSimulationTime() end\n"  # which asks for Lua 5.1
+DIALECTS = pytest.mark.parametrize("dialect", ["", FLAT], ids=["newest", "5.1"])
+
+
+@pytest.fixture(name="run")
+def _run(tmp_path, caplog):
+    caplog.set_level(logging.INFO)
+
+    def run(text, **files):
+        """Run a script beside files; return what it printed."""
+        (tmp_path / "parts").mkdir(exist_ok=True)
+        for name, contents in files.items():
+            (tmp_path / name.replace("__", "/")).with_suffix(".lua").write_text(contents, encoding="utf-8")
+        path = tmp_path / "main.lua"
+        path.write_text(text, encoding="utf-8")
+        caplog.clear()
+        load.load(str(path), {}, TimeLimit(2.0)).close()
+        return caplog.messages
+
+    return run
+
+
+def refused(run, text, **files):
+    with pytest.raises(ScriptError) as error:
+        run(text, **files)
+    return str(error.value)
+
+
+@DIALECTS
+def test_what_is_written_goes_nowhere_and_the_script_goes_on(run, dialect, tmp_path):
+    record = (
+        "local f = io.open('./pid.txt', 'w')\n"
+        "f:write('alpha', 1, '\\n'):write('beta')\nf:flush()\nprint(io.type(f), f:seek('cur'))\nf:close()\n"
+        "io.open('other.txt', 'a'):write(2)\nio.write('gain ', 2, '\\n')\nio.stderr:write('careful')"
+    )
+    said = run(dialect + record)
+    assert said[0].startswith("io.open: './pid.txt' is not written: a Lua script writes no files: print it")
+    assert said[1:] == ["file\t0", "gain 2", "careful"]
+    assert not list(tmp_path.glob("*.txt"))
+
+
+@DIALECTS
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ("io.open('best.dat', 'r')", "io.open: a Lua script reads no files: use script_parameters"),
+        ("io.open('best.dat')", "io.open: a Lua script reads no files"),
+        ("for line in io.lines('best.dat') do end", "io.lines: a Lua script reads no files"),
+        ("io.open('a', 'w'):read()", "read: a Lua script reads no files"),
+        ("io.popen('ls')", "io.popen: a child script starts no programs: use a launch file"),
+        ("os.execute('clear')", "os.execute: a child script starts no programs"),
+        ("os.getenv('HOME')", "os.getenv: a Lua script sees no environment: use script_parameters"),
+        ("os.remove('a')", "os.remove: a Lua script writes no files"),
+        ("os.exit()", "os.exit: sim.stopSimulation() ends a flight"),
+    ],
+)
+def test_what_is_refused_says_so_in_one_line(run, dialect, call, words):
+    said = refused(run, dialect + "\n" + call)
+    assert f"main.lua:{2 + bool(dialect)}: {words}" in said and "\n" not in said
+
+
+@DIALECTS
+def test_code_beside_the_script_is_loaded_by_file(run, dialect):
+    main = (
+        "count = 0\nfor _ = 1, 3 do dofile('step.lua') end\n"
+        "print(count, dofile('./parts/gains.lua'), assert(loadfile('parts/gains.lua'))())"
+    )
+    assert run(dialect + main, step="count = count + 1", parts__gains="return 7") == ["3\t7\t7"]
+
+
+@DIALECTS
+@pytest.mark.parametrize("name", ["../main.lua", "/etc/passwd", "/main.lua", "notes.txt", "parts/../a.lua", "x\\0.lua"])
+def test_no_other_file_is_reached(run, dialect, name):
+    said = run(dialect + f"print(loadfile('{name}'))")
+    assert said[0].startswith("nil\tcannot load '") and "a .lua file beside the script, or in a folder there" in said[0]
+
+
+@DIALECTS
+def test_a_link_out_of_the_folder_is_not_followed(run, dialect, tmp_path):
+    (tmp_path / "out.lua").symlink_to("/etc/hostname")
+    assert "leads out of the script's folder" in refused(run, dialect + "dofile('out.lua')")
+
+
+@DIALECTS
+def test_errors_are_told_by_their_file(run, dialect, tmp_path):
+    assert f"{tmp_path}/step.lua:2: " in refused(run, dialect + "dofile('step.lua')", step="\nnothing.x = 1")
+    assert "no such file beside the script; near names are step.lua" in refused(run, dialect + "dofile('stp.lua')")
+    assert "step.lua:1: unexpected symbol" in refused(run, dialect + "assert(loadfile('step.lua'))", step="= 1")
+
+
+def test_a_helper_may_be_a_module_of_lua_5_1(run):
+    helper = "module(..., package.seeall)\nfunction new(height) return {height = math.max(height, 1)} end\n"
+    main = FLAT + "local q = require 'quad'\nprint(q.new(0.5).height, quad == q, new)"
+    assert run(main, quad=helper) == ["1\ttrue\tnil"]
+    assert "module is of Lua 5.1: let the file return a table instead" in refused(run, "require 'quad'", quad=helper)
+
+
+@DIALECTS
+def test_a_seed_may_have_a_fraction(run, dialect):
+    two = "math.randomseed(4711.8)\nlocal a = math.random()\nmath.randomseed(4711.8)\nprint(a == math.random())\n"
+    assert run(dialect + two + "math.randomseed()\nprint(math.random(1000))") == run(
+        dialect + two + "math.randomseed(1)\nprint(math.random(1000))"
+    )
