@@ -111,6 +111,21 @@ def plain_name(one: Placed) -> str:
     return one.object.name.partition("#")[0]
 
 
+def swings_on(one: Placed, root: Placed) -> Placed | None:
+    """Return the spherical joint nearest to a quadricopter by which a body of it swings; None where it is held.
+
+    What a pair of linked dummies ties together again below such a joint, as in a hand, does not swing.
+    """
+    for here in reversed(one.between(root)):
+        if isinstance(here.object.of, Joint) and here.object.of.kind == "spherical":
+            return None if any(_is_tied(below) for below in here.subtree()) else here
+    return None
+
+
+def _is_tied(one: Placed) -> bool:
+    return isinstance(one.object.of, Dummy) and one.object.of.linked >= 0
+
+
 def _propeller(link: Placed, body: Placed) -> Propeller:
     joints = [one for one in body.subtree() if isinstance(one.object.of, Joint)]
     return Propeller(link, body, joints[0] if joints else None)
