@@ -191,6 +191,16 @@ def test_propellers_with_scripts_of_their_own_keep_them(imported):
     assert "propellers" not in content["vehicles"]["drone"]
 
 
+def test_names_without_a_suffix_mean_the_objects_of_the_copy(imported):
+    code = "function sysCall_init() sim.getObjectHandle('{}_propeller_joint3') end"
+    one, other = (
+        quadricopter(first=first, end="#7", name=name, at=(first, 0, 1), code=code.format(name))
+        for first, name in ((0, "Left"), (40, "Right"))
+    )
+    imported(*one, *other)
+    Simulation(parameters.load({"scene_file": str(imported.scene)})).close()
+
+
 def test_several_keep_their_names_whatever_they_are_called(imported):
     content = imported(*quadricopter(), *quadricopter(40, "#3", (2, 0, 1), "UAV"))
     first, second = content["vehicles"]["Quadricopter"], content["vehicles"]["UAV_3"]

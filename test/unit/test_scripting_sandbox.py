@@ -104,7 +104,29 @@ def test_what_is_left_works(run):
     print(coroutine.wrap(function() coroutine.yield(5) end)())
     print(load('return 1 + 1')(), loadstring('return 3')(), #{table.unpack({1, 2, 3})})
     print(require'sim' == sim, require('simROS') == simROS)
+    math.randomseed(os.time() + 0.5)
     """
     said = run(source)
     assert said[0].startswith("true\ttrue\tstring\t3")
     assert said[1:] == ["false\tx", "false\ty!", "2", "5", "2\t3\t3", "true\ttrue"]
+
+
+def test_matrices_of_coppelia_sim(run):
+    source = """
+    local m = Matrix(2, -1, {1, 2, 3, 4, 5, 6})
+    print(m:rows(), m:cols(), m:count(), m:get(2, 1), unpack(m:slice(1, 2, 2, 3):data()))
+    print(unpack((m * m:t() + Matrix(2, 2, function(i, j) return i == j and 1 or 0 end) * 2 - Matrix(2, 2)):data()))
+    m:set(1, 3, 9)
+    print(unpack(m:row(1):data()), unpack(m:col(3):data()))
+    for _, wrong in ipairs{
+      function() return m:get(0, 1) end, function() return m:slice(1, 1, 3, 1) end, function() return m * m end,
+      function() return m + 1 end, function() return Matrix(2, 2, {1}) end, function() return Matrix('x', 1) end,
+    } do print(pcall(wrong)) end
+    """
+    said = run(source)
+    assert [line.split("\t") for line in said[:2]] == [
+        ["2", "3", "6", "4", "2", "3", "5", "6"],
+        ["16", "32", "32", "79"],
+    ]
+    assert said[2] == "1\t9\t6"
+    assert all(line.startswith("false") and "Matrix: " in line for line in said[3:]) and len(said) == 9

@@ -154,3 +154,8 @@ math.tanh = math.tanh or function(x) return 1 - 2 / (math.exp(2 * x) + 1) end
 table.getn = table.getn or function(t) return #t end
 string.gfind = string.gmatch and (string.gfind or string.gmatch)
 math.randomseed(1) -- the same flight every time
+local seed = math.randomseed
+function math.randomseed(number, ...) -- which Lua 5.3 takes whatever the number, and 5.4 if it is whole
+  if type(number) == 'number' and number % 1 ~= 0 then number = math.floor(number % 2 ^ 53) end
+  return seed(number, ...)
+end
