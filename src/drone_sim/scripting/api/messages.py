@@ -66,7 +66,8 @@ class MessageBus:
     def subscribe(self, topic: Name, kind: Name, callback: Callback, queue: int = 1, *_ignored: Any) -> int:
         """Call the script's function `callback` with each message on `topic`; return a handle.
 
-        Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1.
+        Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1. A script that
+        subscribes in every step, the same callback to the same topic, gets at last a handle that it has.
         """
         resolved, kept = self.resolve(topic), _length(queue)
 
@@ -76,6 +77,9 @@ class MessageBus:
             return self.backend.subscribe(resolved, kind, take)
 
         self._check_type(resolved, kind)
+        again = self._subscriptions.find(resolved, callback) if self._is_full else None
+        if again is not None:
+            return again
         handle = self._new_handle()
         self._subscriptions.add(handle, resolved, callback, kept, begin)
         return handle
@@ -174,8 +178,12 @@ class MessageBus:
         if not _TYPE.fullmatch(kind):
             raise ValueError(f"'{kind:.80}' is no message type; one is, for example, geometry_msgs/Twist")
 
+    @property
+    def _is_full(self) -> bool:
+        return len(self._subscriptions) + len(self._publishers) >= _MOST
+
     def _new_handle(self) -> int:
-        if len(self._subscriptions) + len(self._publishers) >= _MOST:
+        if self._is_full:
             raise ValueError(f"a script has at most {_MOST} subscriptions and publishers")
         self._last_handle += 1
         return self._last_handle

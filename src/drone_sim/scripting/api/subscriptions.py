@@ -43,6 +43,11 @@ class Subscriptions:
             self._by_handle[handle] = subscription
         self._new_callbacks.append(callback)
 
+    def find(self, topic: str, callback: Callback) -> int | None:
+        """Return the handle of a subscription of a callback to a topic, None where there is none."""
+        found = (handle for handle, one in self._by_handle.items() if (one.topic, one.callback) == (topic, callback))
+        return next(found, None)
+
     def check(self, handle: int) -> None:
         """Raise ValueError where no subscription has that handle."""
         if handle not in self._by_handle:

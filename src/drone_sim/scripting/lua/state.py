@@ -37,6 +37,7 @@ _FILES = (
     "calls",
     "globals",
     "matrix",
+    "files",
 )  # each uses those before it
 _CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
 
