@@ -67,6 +67,14 @@ def test_the_last_messages_are_kept(queue, kept):
         bus.shutdownSubscriber(handle)
 
 
+def test_who_subscribes_in_every_step_goes_on():
+    bus = MessageBus("drone")
+    handles = [bus.subscribe("x", "std_msgs/Int32", "f") for _ in range(300)]
+    assert len(set(handles)) == 200 and handles[-1] in handles[:200]
+    with pytest.raises(ValueError, match="at most 200"):
+        bus.subscribe("y", "std_msgs/Int32", "f")
+
+
 @pytest.mark.parametrize("backend", [None, Recorder()])
 def test_what_is_published(backend):
     bus = MessageBus("drone")
