@@ -191,6 +191,23 @@ def test_propellers_with_scripts_of_their_own_keep_them(imported):
     assert "propellers" not in content["vehicles"]["drone"]
 
 
+def test_a_target_in_the_world_is_the_target(imported):
+    target = shape(90, "Quadricopter_target", mesh("sphere", (0.1,) * 3), at=(1, 2, 3), respondable=False)
+    chunks = quadricopter()
+    del chunks[2]  # the one that hangs on it
+    vehicle = imported(*chunks, target)["vehicles"]["drone"]
+    assert vehicle["objects"]["DronePosition"] == {
+        "name": "Quadricopter_target",
+        "parent": "",
+        "position": [1.0, 2.0, 3.0],
+    }
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    tree = simulation._setting.shared.objects
+    place = tree.matrix(tree.handle("Quadricopter_target"))
+    simulation.close()
+    assert place[3::4] == (1.0, 2.0, 3.0)
+
+
 def test_names_without_a_suffix_mean_the_objects_of_the_copy(imported):
     code = "function sysCall_init() sim.getObjectHandle('{}_propeller_joint3') end"
     one, other = (

@@ -157,7 +157,9 @@ class ImportedVehicle:
         keys: dict[str, Any] = {"name": one.name}
         if one.object.alias:
             keys["alias"] = label(one.object.alias)
-        if ours != DRONE:
+        if ours == TARGET and one.above is None:
+            keys.update({"parent": "", "position": [0.0, 0.0, 0.0], **pose_keys(one.matrix)})
+        elif ours != DRONE:
             keys.update({"position": [0.0, 0.0, 0.0], **pose_keys(frames.relative(self._above(ours), one.matrix))})
         return keys
 
