@@ -103,6 +103,21 @@ def test_joints_and_what_hangs_on_them(imported):
     assert np.allclose(place[3::4], [np.cos(0.5), np.sin(0.5), 0], atol=1e-6)
 
 
+def test_a_path_of_4_x_is_a_path(imported):
+    corners = [(0, 0, 1), (2, 0, 1), (2, 2, 1)]
+    content = struct.pack("<21d", *(number for corner in corners for number in (*corner, 0, 0, 0, 1)))
+    blocks = [(b"CONF", b"abc"), (b"PATH", content)]
+    data = chunk("Cda", b"".join(chunk("Cdt", text(name) + text(block)) for name, block in blocks) + b"EOO")
+    track = scene_object("DMY", 0, "Track", base=data, own=numbers("_y2", "Dy2", 0.01))
+    assert objects(imported(track))["Track"] == {
+        "name": "Track",
+        "kind": "path",
+        "points": [list(map(float, corner)) for corner in corners],
+        "position": [0.0, 0.0, 0.0],
+    }
+    parameters.load({"scene_file": str(imported.scene)})
+
+
 def test_the_floor_the_step_and_gravity(imported):
     flat = shape(1, "Floor_part", mesh(size=(2, 2, 0.1)), parent=0)
     chunks = [shape(0, "ResizableFloor_5_25", mesh(size=(1, 1, 1))), flat]
@@ -176,6 +191,33 @@ def test_propellers_with_scripts_of_their_own_keep_them(imported):
     assert "propellers" not in content["vehicles"]["drone"]
 
 
+def test_a_target_in_the_world_is_the_target(imported):
+    target = shape(90, "Quadricopter_target", mesh("sphere", (0.1,) * 3), at=(1, 2, 3), respondable=False)
+    chunks = quadricopter()
+    del chunks[2]  # the one that hangs on it
+    vehicle = imported(*chunks, target)["vehicles"]["drone"]
+    assert vehicle["objects"]["DronePosition"] == {
+        "name": "Quadricopter_target",
+        "parent": "",
+        "position": [1.0, 2.0, 3.0],
+    }
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    tree = simulation._setting.shared.objects
+    place = tree.matrix(tree.handle("Quadricopter_target"))
+    simulation.close()
+    assert place[3::4] == (1.0, 2.0, 3.0)
+
+
+def test_names_without_a_suffix_mean_the_objects_of_the_copy(imported):
+    code = "function sysCall_init() sim.getObjectHandle('{}_propeller_joint3') end"
+    one, other = (
+        quadricopter(first=first, end="#7", name=name, at=(first, 0, 1), code=code.format(name))
+        for first, name in ((0, "Left"), (40, "Right"))
+    )
+    imported(*one, *other)
+    Simulation(parameters.load({"scene_file": str(imported.scene)})).close()
+
+
 def test_several_keep_their_names_whatever_they_are_called(imported):
     content = imported(*quadricopter(), *quadricopter(40, "#3", (2, 0, 1), "UAV"))
     first, second = content["vehicles"]["Quadricopter"], content["vehicles"]["UAV_3"]
@@ -208,6 +250,21 @@ def test_what_hangs_on_a_quadricopter_goes_with_it(imported):
     assert camera["mount"]["rpy"] == pytest.approx([0, 0, 0], abs=1e-5), "along +x"
     assert [(one["name"], one["parent"]) for one in content["objects"]] == [("Sonar", "Quadricopter_base")]
     parameters.load({"scene_file": str(imported.scene)})
+
+
+def test_a_rope_weighs_where_it_hangs_and_a_hand_is_of_one_piece(imported):
+    def link(handle, parent, name):
+        thread = {"dynamic": True, "wrapper": weight(0.05, (1e-4, 1e-4, 1e-4))}
+        ball = scene_object("JNT", handle, f"Ball{handle}", parent, (0, 0, -0.5), own=integers("Jtt", 12))
+        return [ball, shape(handle + 1, name, mesh(size=(0.01, 0.01, 1)), parent=handle, at=(0, 0, -0.5), **thread)]
+
+    tie = [scene_object("DMY", 86 + at, f"Tie{at}", 85 * (1 - at), own=integers("Lli", 87 - at)) for at in (0, 1)]
+    imported(*quadricopter(), *link(80, 0, "Upper"), *link(82, 81, "Lower"), *link(84, 0, "Finger"), *tie)
+    assert "Upper, Lower: on Quadricopter: weighs where it hangs, but does not swing" in imported.said
+    assert "Finger: on Quadricopter: is of one piece with it" in imported.said
+    body = urdf.read(str(next(imported.scene.parent.glob("*.urdf"))))
+    assert body.mass == pytest.approx(0.52 + 3 * 0.05)
+    assert body.centre_of_mass[2] == pytest.approx((4 * 0.1 * 0.002 - 0.1 * 0.5 - 0.05) / 0.67, abs=1e-4)
 
 
 def test_one_that_begins_tilted_and_without_a_script(imported):

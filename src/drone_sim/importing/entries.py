@@ -80,11 +80,12 @@ class Entries:
 
     def _dummy(self, one: Placed) -> dict[str, Any]:
         of = one.object.of
-        if isinstance(of, Dummy) and of.linked >= 0:
+        assert isinstance(of, Dummy)
+        if len(of.path) > 1:
+            return {"kind": "path", "points": [numbers(point) for point in of.path]}
+        if of.linked >= 0:
             self._report.add(one.name, "its link to another dummy is not brought")
-        return (
-            {"kind": "dummy", "size": number(of.size)} if isinstance(of, Dummy) and of.size > 0 else {"kind": "dummy"}
-        )
+        return {"kind": "dummy", "size": number(of.size)} if of.size > 0 else {"kind": "dummy"}
 
     def _joint(self, one: Placed) -> dict[str, Any]:
         joint = one.object.of

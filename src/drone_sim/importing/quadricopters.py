@@ -13,12 +13,14 @@ from dataclasses import dataclass
 
 from drone_sim.importing.placing import Placed
 from drone_sim.mechanics import frames
+from drone_sim.mechanics.object_names import split, suffixed
 from drone_sim.vrep_files.model import Dummy, Joint, Script
 
 COUNT = 4  # propellers
 _EQUAL = 0.1  # masses that differ by less than this part are the same
 _PROPELLER = re.compile(r"prop|rotor", re.IGNORECASE)
 _TARGET = re.compile(r"target", re.IGNORECASE)
+_OWN_TARGETS = ("Quadricopter_target", "Quadcopter_target")
 _NUMBER = re.compile(r"(\d+)$")
 # Quarters around the body, by the signs of x and y: V-REP's propellers 1 to 4.
 _QUARTERS = {(True, True): 1, (False, True): 2, (False, False): 3, (True, False): 4}
@@ -53,7 +55,9 @@ def find(objects: Sequence[Placed], scripts: Mapping[int, Sequence[Script]]) -> 
     built = {one: _propellers(one, scripts) for one in objects if one.is_dynamic}
     roots = frozenset(one for one, propellers in built.items() if propellers is not None)
     return [
-        Quadricopter(one, propellers, _base(one), _target(one, roots - {one}), roots - {one})
+        Quadricopter(
+            one, propellers, _base(one), _target(one, roots - {one}) or _free_target(one, objects), roots - {one}
+        )
         for one, propellers in built.items()
         if propellers is not None
     ]
@@ -111,6 +115,21 @@ def plain_name(one: Placed) -> str:
     return one.object.name.partition("#")[0]
 
 
+def swings_on(one: Placed, root: Placed) -> Placed | None:
+    """Return the spherical joint nearest to a quadricopter by which a body of it swings; None where it is held.
+
+    What a pair of linked dummies ties together again below such a joint, as in a hand, does not swing.
+    """
+    for here in reversed(one.between(root)):
+        if isinstance(here.object.of, Joint) and here.object.of.kind == "spherical":
+            return None if any(_is_tied(below) for below in here.subtree()) else here
+    return None
+
+
+def _is_tied(one: Placed) -> bool:
+    return isinstance(one.object.of, Dummy) and one.object.of.linked >= 0
+
+
 def _propeller(link: Placed, body: Placed) -> Propeller:
     joints = [one for one in body.subtree() if isinstance(one.object.of, Joint)]
     return Propeller(link, body, joints[0] if joints else None)
@@ -128,6 +147,14 @@ def _target(root: Placed, others: frozenset[Placed]) -> Placed | None:
         one for one in root.subtree(others) if one is not root and _TARGET.search(one.object.alias or one.object.name)
     ]
     return next((one for one in below if not one.is_dynamic), None)
+
+
+def _free_target(root: Placed, objects: Sequence[Placed]) -> Placed | None:
+    """Return the target that stands in the world, by the names that V-REP's targets have."""
+    plain, suffix = split(root.object.name)
+    names = [suffixed(name, suffix) for name in (f"{plain}_target", *_OWN_TARGETS)]
+    free = {one.object.name: one for one in objects if one.above is None and not one.is_dynamic}
+    return next((free[name] for name in names if name in free), None)
 
 
 def turned_over(one: Placed) -> float:

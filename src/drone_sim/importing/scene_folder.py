@@ -210,7 +210,7 @@ class _Import:
         """Tell whether a scene is the same without an object that nothing asks for and nothing hangs on."""
         of = one.object.of
         if isinstance(of, Dummy):
-            return bool(one.children)  # it held nothing but what is left out
+            return bool(one.children) and not of.path  # it held nothing but what is left out
         return (isinstance(of, Camera) and of.resolution is None) or (
             isinstance(of, Other) and of.kind in (*_ONLY_LOOKED_THROUGH, "script", "force sensor")
         )

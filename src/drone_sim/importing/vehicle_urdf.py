@@ -9,7 +9,7 @@ from drone_sim.importing.forms import simple_size
 from drone_sim.importing.meshes import MeshWriter, Surface, TooLarge, color, has_triangles
 from drone_sim.importing.numbers import number
 from drone_sim.importing.placing import Placed
-from drone_sim.importing.quadricopters import Propeller, Quadricopter
+from drone_sim.importing.quadricopters import Propeller, Quadricopter, swings_on
 from drone_sim.importing.report import Report
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
@@ -44,8 +44,13 @@ class VehicleUrdf:
         for place, propeller, blades in zip(PLACES, quadricopter.propellers, turning):
             self._add_propeller(place, propeller, [one for one in blades if one.is_visible and one in looks])
         for index, one in enumerate(parts, start=1):
-            self._link(f"part_{index}", one, one.matrix)
-            self._joint(f"part_{index}", "base_link", frames.relative(root.matrix, one.matrix))
+            swings = swings_on(one, root)
+            frame = one.matrix if swings is None else swings.matrix
+            if swings is None:
+                self._link(f"part_{index}", one, frame)
+            else:
+                self._add_load(f"part_{index}", one)
+            self._joint(f"part_{index}", "base_link", frames.relative(root.matrix, frame))
         self._add_front_camera()
         Xml.indent(self._robot)
         return f'<?xml version="1.0"?>\n{Xml.tostring(self._robot, encoding="unicode")}\n'
@@ -61,6 +66,11 @@ class VehicleUrdf:
             _add_inertial(link, 0.0, IDENTITY, (0.0, 0.0, 0.0))
             self._add_visuals(link, f"{propeller.body.name}_blades", blades, propeller.joint.matrix)
             self._joint(f"blades_{place}", name, frames.relative(frame, propeller.joint.matrix), "continuous")
+
+    def _add_load(self, name: str, body: Placed) -> None:
+        """Add the weight of a body that swings, where its joint holds it: the joint hands on no torque."""
+        mass = 0.0 if body.object.shape is None else body.object.shape.mass
+        _add_inertial(Xml.SubElement(self._robot, "link", name=name), mass, IDENTITY, (0.0, 0.0, 0.0))
 
     def _turning(self, propeller: Propeller) -> list[Placed]:
         """Return what turns with a propeller's joint."""

@@ -13,7 +13,7 @@ from drone_sim.importing.meshes import MeshWriter
 from drone_sim.importing.numbers import number, numbers, pose_keys
 from drone_sim.importing.placing import Placed
 from drone_sim.importing.propeller_scripts import built_in_law
-from drone_sim.importing.quadricopters import Quadricopter, plain_name
+from drone_sim.importing.quadricopters import Quadricopter, plain_name, swings_on
 from drone_sim.importing.report import Report
 from drone_sim.importing.script_files import ScriptFiles, values
 from drone_sim.importing.vehicle_urdf import VehicleUrdf
@@ -118,7 +118,9 @@ class ImportedVehicle:
         urdf = folder.free_name(self.root.name, ".urdf")
         folder.write(urdf, VehicleUrdf(self.quadricopter, writer, report).build(self.parts, self.looks))
         for one in self.parts:
-            report.add(one.name, f"is of one piece with {self.root.name}")
+            swings = swings_on(one, self.root) is not None
+            what = "weighs where it hangs, but does not swing" if swings else "is of one piece with it"
+            report.add(one.name, f"on {self.root.name}: {what}")
         entry: dict[str, Any] = {"urdf": urdf, "suffix": self.suffix, **self._place(report)}
         entry.update(self._script(files, report))
         if self.law is not None:
@@ -155,7 +157,9 @@ class ImportedVehicle:
         keys: dict[str, Any] = {"name": one.name}
         if one.object.alias:
             keys["alias"] = label(one.object.alias)
-        if ours != DRONE:
+        if ours == TARGET and one.above is None:
+            keys.update({"parent": "", "position": [0.0, 0.0, 0.0], **pose_keys(one.matrix)})
+        elif ours != DRONE:
             keys.update({"position": [0.0, 0.0, 0.0], **pose_keys(frames.relative(self._above(ours), one.matrix))})
         return keys
 

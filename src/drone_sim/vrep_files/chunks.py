@@ -90,13 +90,17 @@ class Texts:
         self._at += 4
         return value
 
-    def text(self) -> str:
-        """Return the text that comes next. Raises VrepFileError."""
+    def bytes(self) -> bytes:
+        """Return the bytes that come next. Raises VrepFileError."""
         length = self.integer()
         if not 0 <= length <= len(self._data) - self._at:
             raise VrepFileError(f"{self._tag}: a text of {length} bytes does not fit")
         self._at += length
-        return decoded(self._data[self._at - length : self._at])
+        return self._data[self._at - length : self._at]
+
+    def text(self) -> str:
+        """Return the text that comes next. Raises VrepFileError."""
+        return decoded(self.bytes())
 
 
 def decoded(text: bytes) -> str:

@@ -68,10 +68,11 @@ class Joint:
 
 @dataclass(frozen=True)
 class Dummy:
-    """A frame; the handle of the dummy that it is linked to, -1 for none."""
+    """A frame; the handle of the dummy that it is linked to, -1 for none; the points (m) of a path of 4.x."""
 
     size: float
     linked: int = -1
+    path: tuple[tuple[float, float, float], ...] = ()
 
 
 @dataclass(frozen=True)

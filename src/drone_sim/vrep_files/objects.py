@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from drone_sim.vrep_files.chunks import Level, finite, level, levels
+from drone_sim.vrep_files.custom_data import read_path
 from drone_sim.vrep_files.errors import VrepFileError, within
 from drone_sim.vrep_files.meshes import Pools
 from drone_sim.vrep_files.model import (
@@ -51,7 +53,7 @@ def read_object(tag: str, data: bytes, pools: Pools) -> SceneObject:
             name=name,
             alias=base.text("Ali"),
             pose=quaternion_first(base.numbers("_fq", "Cfq", 7), "_fq"),
-            of=_read(tag, own, pools),
+            of=_with_path(_read(tag, own, pools), base.find("Cda")),
             is_model=bool(base.bits("Va3", "Va2", "Var") & 1),
             model_flags=base.integer("Mpo") & ~0xF000,
             layers=base.integer("Lar", default=1, kind="H"),
@@ -76,6 +78,11 @@ def _read(tag: str, own: Level, pools: Pools) -> Kind:
     if tag == "SHP":
         return read_shape(own, pools)
     return _READERS[tag](own) if tag in _READERS else Other(_OTHERS[tag])
+
+
+def _with_path(kind: Kind, custom_data: bytes | None) -> Kind:
+    """Return a dummy with its points, where it is a path as 4.x has them."""
+    return replace(kind, path=read_path(custom_data)) if isinstance(kind, Dummy) else kind
 
 
 def _joint(own: Level) -> Kind:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import re
 
-from drone_sim.mechanics.object_names import plain, suffixed
+from drone_sim.mechanics.object_names import plain, split, suffixed
 from drone_sim.mechanics.object_tree import ObjectTree, SceneObject
 from drone_sim.wording import near_names
 
@@ -56,10 +56,19 @@ def _full_name(objects: ObjectTree, name: str, own: str, suffix: int) -> str:
     match = _SUFFIXED.fullmatch(name)
     if match is None:
         full = suffixed(name, suffix)
-        return full if full in objects or not _is_of_the_scene(objects, name, own) else name
+        if full in objects:
+            return full
+        by_its_names = (suffixed(name, split(one)[1]) for one in _names(objects, own))
+        found = next((one for one in by_its_names if one in objects and one != name), None)
+        return found or (full if not _is_of_the_scene(objects, name, own) else name)
     # A script that is copied out of a scene with several models names its own with a suffix.
     is_meant = name in objects or (match.group(2) and objects.is_copied(match.group(1)))
     return name if is_meant else match.group(1)
+
+
+def _names(objects: ObjectTree, own: str) -> tuple[str, ...]:
+    """Return the names of a script's object: in an imported scene its copy may have another suffix than the vehicle."""
+    return objects[objects.handle(own)].names if own in objects else ()
 
 
 def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:

@@ -161,3 +161,8 @@ function math.randomseed(number) -- newer Lua takes whole numbers alone, and wit
   return seed(number)
 end
 math.randomseed(1) -- the same flight every time
+local seed = math.randomseed
+function math.randomseed(number, ...) -- which Lua 5.3 takes whatever the number, and 5.4 if it is whole
+  if type(number) == 'number' and number % 1 ~= 0 then number = math.floor(number % 2 ^ 53) end
+  return seed(number, ...)
+end

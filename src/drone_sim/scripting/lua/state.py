@@ -36,6 +36,7 @@ _FILES = (
     "snapshots",
     "calls",
     "globals",
+    "matrix",
     "files",
 )  # each uses those before it
 _CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
