@@ -58,7 +58,8 @@ def _full_name(objects: ObjectTree, name: str, own: str, suffix: int) -> str:
         full = suffixed(name, suffix)
         if full in objects:
             return full
-        by_its_names = (suffixed(name, split(one)[1]) for one in _names(objects, own))
+        is_its_own = suffix == split(own)[1]  # and not one that setNameSuffix has set
+        by_its_names = (suffixed(name, split(one)[1]) for one in _names(objects, own) if is_its_own)
         found = next((one for one in by_its_names if one in objects and one != name), None)
         return found or (full if not _is_of_the_scene(objects, name, own) else name)
     # A script that is copied out of a scene with several models names its own with a suffix.
