@@ -1,6 +1,7 @@
 """The doctor finds what is wrong, says what to do, hangs nowhere and shows no traceback."""
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -206,3 +207,17 @@ def test_a_check_neither_hangs_nor_raises():
     (line,) = lines("broken", lambda: 1 / 0, 1.0)
     assert line == Line(WRONG, "broken", "cannot be checked: ZeroDivisionError: division by zero")
     assert "\n" not in str(Line(OK, "x", "two\nlines"))
+
+
+def test_a_check_leaves_the_timer_of_others_as_it_was():
+    rang = []
+    before = signal.signal(signal.SIGALRM, lambda *_: rang.append(True))
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.05, 0.02)
+        assert lines("nothing", lambda: [], 10.0) == []
+        assert signal.getitimer(signal.ITIMER_REAL)[1] == pytest.approx(0.02, abs=0.005)
+        while not rang:
+            signal.pause()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
