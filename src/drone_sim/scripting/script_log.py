@@ -20,7 +20,8 @@ class _Lines:
     def say(self, text: str, level: int) -> None:
         self.count += 1
         if self.count <= MOST:
-            LOG.log(level, "%s", text if len(text) <= LONGEST else text[:LONGEST] + "… (the rest of the line is left out)")
+            shortened = text if len(text) <= LONGEST else text[:LONGEST] + "… (the rest of the line is left out)"
+            LOG.log(level, "%s", shortened)
 
     def end(self) -> None:
         left_out, self.count = self.count - MOST, 0
