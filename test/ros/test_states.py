@@ -18,7 +18,7 @@ from drone_sim.files.resources import package_path
 
 FACTOR = 5
 PILOT = Path(__file__).with_name("safe_pilot.py")
-LEGS = {"simulated": 2.0, "real": 0.4}  # s of the pilot's time: as far as each flies, at FACTOR
+LEGS = {"real": 0.4, "simulated": 2.0}  # s of the pilot's time: as far as each flies, at FACTOR
 
 
 class States(unittest.TestCase):

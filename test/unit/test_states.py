@@ -9,6 +9,9 @@ import pytest
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline import timeline
 from drone_sim.run import parameters
+from drone_sim.run.diagnosis.command_log import CommandLog
+from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis
+from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 
 FORWARD = Twist(Vector3(0.5, 0.2, 0.0))
@@ -277,3 +280,18 @@ def test_a_timeline_with_more_than_it_takes(tmp_path: Path):
     file.write_text("- {at: 1, land: {x: 1}}\n")
     with pytest.raises(timeline.TimelineError, match=r"line 1: entry 1: land.x: unknown key; it takes none"):
         timeline.read(str(file), parameters.load())
+
+
+def test_the_diagnosis_says_the_state(landed):
+    again(landed)
+    player = Player(landed, landed.step, lambda _: None, False)
+    log = CommandLog()
+    log.take("cmd_vel", "/pilot")
+    landed.drone.receive(FORWARD)
+    found = VehicleDiagnosis(landed.drone, player, log, None).finding()
+    assert found.values["flight state"] == "landed"
+    assert found.message == "landed: commands of /pilot do not move it; `takeoff` first"
+    landed.drone.move(ON_ITS_BACK)
+    until(landed, "crashed")
+    found = VehicleDiagnosis(landed.drone, player, log, None).finding()
+    assert found.message.startswith("crashed: `reset` puts it back where it began")

@@ -94,7 +94,7 @@ class VehicleDiagnosis:
     def _is_on_its_own(self) -> list[Problem]:
         """Nobody hears the commands, or nobody is there any more who gave the one in force."""
         vehicle, taken = self._vehicle, self._log.taken.get(COMMAND)
-        if taken is None or not self._player.playing:
+        if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []
         if not any(bus.hears(COMMAND) for bus in (vehicle.bus, *vehicle.listening)):
             return [Problem(WARN, f"commands come in, but the child script does not subscribe to {COMMAND}")]
