@@ -11,6 +11,8 @@ from drone_sim.run import parameters
 
 PARAMETERS = parameters.load()
 
+KINDS = "twist, pose, push, goto, reset, takeoff, land, home, weather, faults"
+
 
 class DroneLog:
     """Stands in for a drone, and keeps what it is told."""
@@ -101,14 +103,14 @@ def test_end_counts_the_longest_push():
         ("[{at: 1, twist: ", "while parsing"),
         ("[{at: 0, twist: {}}, 3]", "entry 2: 3: must be a mapping"),
         ("[{twist: {}}]", "entry 1: at: missing"),
-        ("[{at: 1}]", "entry 1: must hold one of twist, pose, push, weather, faults; it holds none"),
+        ("[{at: 1}]", f"entry 1: must hold one of {KINDS}; it holds none"),
         (
             "[{at: 1, twist: {}, pose: {}}]",
-            "entry 1: must hold one of twist, pose, push, weather, faults; it holds twist and pose",
+            f"entry 1: must hold one of {KINDS}; it holds twist and pose",
         ),
         (
             "[{at: 1, twsit: {}}]",
-            "entry 1: twsit: unknown key; known are at, vehicle, twist, pose, push, weather, faults",
+            f"entry 1: twsit: unknown key; known are at, vehicle, {KINDS}",
         ),
         ("[{at: 1, twist: }]", "entry 1: twist = None: must be a mapping of linear, angular"),
         ("[{at: -0.1, twist: {}}]", "entry 1: at = -0.1: input should be greater than or equal to 0"),
@@ -161,7 +163,7 @@ def test_every_wrong_key_is_named_with_its_line(tmp_path):
         "3: entry 2: at = 'soon': input should be a valid number",
         "4: entry 2: push.duration: missing; it is a number of seconds",
         "8: entry 4: pose.position.z = -1.0: must lie within 0.0 and 1000.0 m",
-        "9: entry 5: pusch: unknown key; known are at, vehicle, twist, pose, push, weather, faults",
+        f"9: entry 5: pusch: unknown key; known are at, vehicle, {KINDS}",
     ]
 
 

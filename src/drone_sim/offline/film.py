@@ -9,6 +9,7 @@ from drone_sim.offline import video
 from drone_sim.offline.hud import Flight
 from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.vehicles.flight_state import UNKNOWN
 from drone_sim.vehicles.parameters import EquipmentParameters
 from drone_sim.wording import near_names, shown
 
@@ -45,8 +46,12 @@ class Film:
         """Take what the camera has seen in the last step, if it was its turn. Raises OSError."""
         if self._camera.image is not None:
             row = (simulation.time, *(number for part in self._vehicle.state for number in part))
-            state = "flying" if simulation.running else "stopped"
+            state = self._state(simulation)
             self._video.add(video.to_color(self._camera.image), Flight.of(row, state))
+
+    def _state(self, simulation: Simulation) -> str:
+        said = str(self._vehicle.flight_state)
+        return "stopped" if not simulation.running else "flying" if said.startswith(UNKNOWN) else said
 
     def __str__(self) -> str:
         """Return what it has become, in words."""

@@ -6,6 +6,8 @@
     - {at: 9.0, vehicle: drone2, twist: {linear: [0, 1, 0]}}               # of several; the first one otherwise
     - {at: 10.0, weather: {wind: [3, 0, 0]}}                               # other values for keys of `weather`
     - {at: 11.0, faults: {propellers: [1, 1, 0, 1]}}                       # and of `faults`; the others stay
+    - {at: 12.0, land: {}}                                                 # or takeoff, reset, home: docs/states.md
+    - {at: 20.0, goto: {position: [1, 0, 2], rpy: [0, 0, 1.57]}}           # m, rad
 
 `at` is in seconds of simulated time, in any order; three numbers that are left out are zeros.
 """
@@ -28,6 +30,7 @@ from drone_sim.offline.changes import CHANGES, Change, read_change
 from drone_sim.run.parameters import Parameters
 from drone_sim.vehicles import checks
 from drone_sim.vehicles.parameters import EquipmentParameters, VehicleParameters
+from drone_sim.vehicles.requests import EMPTY, REQUESTS
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.wording import near_names, shown
 
@@ -44,7 +47,7 @@ class Entry(NamedTuple):
     """What happens to a vehicle ('' is the first) at `at` seconds of simulated time."""
 
     at: float
-    action: Twist | Pose | Push | Change
+    action: Twist | Pose | Push | Change | Request
     vehicle: str = ""
 
     @property
@@ -61,8 +64,17 @@ class Entry(NamedTuple):
             vehicle.move(self.action)
         elif isinstance(self.action, Push):
             vehicle.push(*self.action)
+        elif isinstance(self.action, Request):
+            vehicle.ask(*self.action)
         else:
             self.action.apply(vehicle)
+
+
+class Request(NamedTuple):
+    """What a vehicle's script is asked for: the topic, and a pose where it needs one."""
+
+    topic: str
+    pose: Pose | None = None
 
 
 class Timeline:
@@ -157,6 +169,21 @@ class _Pose(_Model):
         return checks.pose(self.position, to_quaternion(from_rpy(_ZERO, self.rpy)), parameters)
 
 
+class _Goto(_Pose):
+    def checked(self, parameters: EquipmentParameters) -> Request:  # type: ignore[override]
+        return Request("goto", super().checked(parameters))
+
+
+def _asking(topic: str) -> type[_Model]:
+    """Return the model of a request that says no more than its name."""
+
+    class Asking(_Model):
+        def checked(self, _parameters: EquipmentParameters) -> Request:
+            return Request(topic)
+
+    return Asking
+
+
 class _Push(_Model):
     force: _Vector = _ZERO
     torque: _Vector = _ZERO
@@ -166,7 +193,10 @@ class _Push(_Model):
         return checks.push(self.force, self.torque, parameters)._replace(duration=self.duration)
 
 
-_KINDS: dict[str, type[_Twist | _Pose | _Push]] = {"twist": _Twist, "pose": _Pose, "push": _Push}
+_KINDS: dict[str, type[Any]] = {
+    **{"twist": _Twist, "pose": _Pose, "push": _Push, "goto": _Goto},
+    **{topic: _asking(topic) for topic, kind in REQUESTS.items() if kind == EMPTY},
+}
 _ALL_KINDS = (*_KINDS, *CHANGES)
 
 
@@ -197,9 +227,10 @@ def _entry(row: Any, parameters: Parameters) -> Entry:
     times = {key: row[key] for key in row if key == "at"}
     at, no_time = _checked(_Time, times, ())
     own, no_vehicle = _vehicle(row.get("vehicle", ""), parameters)
+    values = {} if row[kind] is None and REQUESTS.get(kind) == EMPTY else row[kind]
     is_change = kind in CHANGES
     action, no_action = (
-        read_change(kind, row[kind], parameters, own) if is_change else _checked(_KINDS[kind], row[kind], (kind,))
+        read_change(kind, values, parameters, own) if is_change else _checked(_KINDS[kind], values, (kind,))
     )
     wrong = [*unknown, *no_time, *no_vehicle, *no_action]
     if wrong:
@@ -233,10 +264,10 @@ def _one_line(error: Any, model: type[BaseModel], above: Location) -> str:
     key = readable_key((*above, *error["loc"])).replace("/", ".")
     known = ", ".join(model.model_fields)
     if error["type"] == "extra_forbidden":
-        return f"{key}: unknown key; known are {known}"
+        return f"{key}: unknown key; {f'known are {known}' if known else 'it takes none'}"
     if error["type"] == "missing":
         return f"{key}: missing; it is a number of seconds"
     if error["type"] == "model_type":
-        return f"{key} = {shown(error['input'])}: must be a mapping of {known}"
+        return f"{key} = {shown(error['input'])}: must be a mapping of {known or 'nothing'}"
     message = error["msg"].replace("Value error, ", "")
     return f"{key} = {shown(error['input'])}: {message[0].lower()}{message[1:]}"

@@ -17,7 +17,7 @@ from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.wording import near_names
 
 _BUILT_IN = Path(__file__).resolve().parents[1] / "child_scripts"
-DEFAULT = "tutorial"
+DEFAULT = "pilot"
 
 
 class Script(Protocol):
@@ -84,7 +84,7 @@ class NoScript:
 def script_path(script: str) -> str:
     """Return the path of a script: a file, a package:// address, or the name of a built-in one.
 
-    '' is the tutorial's. Raises ScriptError.
+    '' is the pilot's. Raises ScriptError.
     """
     name = script or DEFAULT
     if "/" not in name and not Path(name).suffix:

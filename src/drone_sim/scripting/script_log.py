@@ -17,10 +17,11 @@ class _Lines:
     def __init__(self) -> None:
         self.count = 0
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, level: int) -> None:
         self.count += 1
         if self.count <= MOST:
-            LOG.info("%s", text if len(text) <= LONGEST else text[:LONGEST] + "… (the rest of the line is left out)")
+            shortened = text if len(text) <= LONGEST else text[:LONGEST] + "… (the rest of the line is left out)"
+            LOG.log(level, "%s", shortened)
 
     def end(self) -> None:
         left_out, self.count = self.count - MOST, 0
@@ -31,9 +32,9 @@ class _Lines:
 lines = _Lines()  # of the call that is under way
 
 
-def say(text: Any) -> None:
+def say(text: Any, level: int = logging.INFO) -> None:
     """Write a line to the log, or count it where there were too many in this call of the script."""
-    lines.say(text if type(text) is str else shown(text))
+    lines.say(text if type(text) is str else shown(text), level)
 
 
 def end_call() -> None:

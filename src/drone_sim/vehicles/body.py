@@ -38,6 +38,18 @@ class Body:
         self.wrench = Wrench()  # of the next step
         self.refresh()
 
+    def begin_on_floor(self) -> None:
+        """Have its start on the floor below, which is at z = 0, and be there."""
+        (x, y, z), turn = self._start
+        self._start = Pose((x, y, z - self._world.lowest(self.number)), turn)
+        self.reset()
+
+    def begin_again(self) -> None:
+        """Return to the start in the middle of a run, as if it had touched nothing by then."""
+        self.jumps += 1
+        self._world.part(self.number)
+        self.reset()
+
     def refresh(self) -> None:
         """Read the state back from the world."""
         self.state = self._world.state(self.number)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr
 
@@ -106,6 +106,8 @@ class EquipmentParameters(Checked):
     """What a vehicle carries and obeys; of the only vehicle these keys stand at the top."""
 
     script: FileName
+    start: Literal["flying", "landed"]
+    takeoff_height: Annotated[Finite, Within(0.05, 1e3)]
     cmd_vel_timeout: Annotated[Finite, Within(1e-4, 1e6, or_zero=True)]
     cmd_vel_limits: TwistLimits
     position_limit: Annotated[Finite, Within(1e-3, 1e5)]

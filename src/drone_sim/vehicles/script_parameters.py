@@ -23,6 +23,7 @@ def script_parameters(vehicle: VehicleParameters, suffix: str) -> dict[str, dict
         "particleSize": 1.0,  # a factor, in the stock scripts
     }
     own = {**vehicle.control.model_dump(), **seen, **particles, "propeller_law": law.law}
+    own.update(start=vehicle.start, takeoff_height=vehicle.takeoff_height)
     return {
         DRONE + suffix: {**own, **vehicle.script_parameters},
         **{respondable(number) + suffix: {PARTICLE_VELOCITY: 0.0, **particles} for number in NUMBERS},

@@ -30,6 +30,7 @@ from drone_sim.vehicles.blades import Blades
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.child_script import Pictures, call_init, load_child_script, refuse_if_idle
 from drone_sim.vehicles.faults import Faults
+from drone_sim.vehicles.flight_state import LANDED, FlightState
 from drone_sim.vehicles.instruments import Carrying, Instruments
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.quadricopter_objects import (
@@ -40,6 +41,7 @@ from drone_sim.vehicles.quadricopter_objects import (
     QuadricopterObjects,
     respondable,
 )
+from drone_sim.vehicles.requests import RESET, request
 from drone_sim.vehicles.rotors import Rotors
 from drone_sim.vehicles.script_parameters import NUMBERS, PARTICLE_VELOCITY, bring_back, script_parameters
 from drone_sim.vehicles.shared import Shared
@@ -65,6 +67,8 @@ class Vehicle:
         turned = frames.from_rpy((0, 0, 0), (*parameters.tilt, parameters.yaw))
         start = Pose(parameters.position, frames.to_quaternion(turned))
         self.body = Body(rigid, start, shared.world)
+        if parameters.start == LANDED:
+            self.body.begin_on_floor()
         self.body.air = shared.weather.at
         shapes = [(respondable(number), link) for number, link in zip(NUMBERS, self._rotors.links)]
         self._shapes = {
@@ -73,6 +77,8 @@ class Vehicle:
         }
         self.blades = Blades(self._rotors, self.body, suffix, lambda: self._propellers.air)
         self.script: load.Script = load.NoScript()
+        self.listening: list[MessageBus] = []  # of scripts on its parts
+        self.flight_state = FlightState(lambda: (self.bus, *self.listening))
         self._tree: ObjectTree | None = None  # the one that its objects are in
         self._handles: list[int] = []  # of its objects
         self.script_parameters: dict[str, dict[str, Any]] = {}  # of its scripts, by their objects
@@ -94,17 +100,8 @@ class Vehicle:
         """Return to the starting place, at rest, with no script loaded, and its objects anew in the shared tree."""
         self.close()
         self.body.reset()
-        law, from_root = self.parameters.propellers, self.body.inertial_from_root
-        self._propellers = self._rotors.propellers(law, from_root, self._time_step, self._velocities)
-        self._pushes = Pushes(self._time_step)
-        others = [one.make() for one in self.parameters.forces.values()]
-        self._forces: list[Force] = [self._propellers, *(one for one in others if not one.every_sub_step)]
-        self.sub_step_forces = [one for one in others if one.every_sub_step]
-        self._has_drag = any(one.feels_wind for one in others)
-        self.feel_weather()
-        self.command = Twist()
-        self._command_age = 0.0
-        self.blades.reset()
+        self._begin_forces()
+        self.flight_state.begin()
         self._leave_tree()
         self._tree = self.objects
         self._handles = []
@@ -117,12 +114,25 @@ class Vehicle:
             self.scripts.add(name, values, is_law=name != self.own_script)
         self._commanded = [self.script_parameters[respondable(number) + self.suffix] for number in NUMBERS]
         self._driven = list(self._commanded)
-        self.listening: list[MessageBus] = []  # of scripts on its parts
+        self.listening = []
         for camera in self.cameras.values():
             camera.reset()
         self.instruments.reset()
         self.faults.begin(self._propellers)
         self._prepare()
+
+    def _begin_forces(self) -> None:
+        law, from_root = self.parameters.propellers, self.body.inertial_from_root
+        self._propellers = self._rotors.propellers(law, from_root, self._time_step, self._velocities)
+        self._pushes = Pushes(self._time_step)
+        others = [one.make() for one in self.parameters.forces.values()]
+        self._forces: list[Force] = [self._propellers, *(one for one in others if not one.every_sub_step)]
+        self.sub_step_forces = [one for one in others if one.every_sub_step]
+        self._has_drag = any(one.feels_wind for one in others)
+        self.feel_weather()
+        self.command = Twist()
+        self._command_age = 0.0
+        self.blades.reset()
 
     def feel_weather(self) -> None:
         """Have drag, once there is weather; what `forces` does not give has the coefficients of DragParameters."""
@@ -277,6 +287,18 @@ class Vehicle:
         self._command_age = 0.0
         for bus in (self.bus, *self.listening):
             bus.post("cmd_vel", twist)
+
+    def ask(self, topic: str, pose: Pose | None = None) -> None:
+        """Let the script do what a topic of `requests` asks for, if it offers that; `reset` puts it back before."""
+        before = self._begin_again if topic == RESET else lambda: None
+        self.flight_state.ask(topic, request(pose), before)
+
+    def _begin_again(self) -> None:
+        """Be where it began, at rest and sound, while time and sensors go on."""
+        self.body.begin_again()
+        self._begin_forces()
+        self.faults.begin(self._propellers)
+        self._prepare()
 
     def move(self, pose: Pose) -> None:
         """Put it somewhere else, at rest."""

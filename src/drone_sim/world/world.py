@@ -33,6 +33,7 @@ _NO_TURN = (0.0, 0.0, 0.0, 1.0)
 # (N s)², the square of the last change of an impulse after which Bullet holds the contacts for solved. With PyBullet's
 # 1e-7 what lies still rattles at some 1e-3 m/s², which only an accelerometer feels; this is less than 1e-6 m/s².
 _SOLVED = 1e-18
+_FAR_UP = 1e6  # m
 
 
 class World:
@@ -252,6 +253,15 @@ class World:
         self._pictures.moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
+
+    def part(self, body: int) -> None:
+        """Take a body out of every contact, which Bullet would remember wherever it goes; it is far up then."""
+        self.set_pose(body, Pose((0.0, 0.0, _FAR_UP)))
+        pybullet.performCollisionDetection(self._client)
+
+    def lowest(self, body: int) -> float:
+        """Return the height (m) of the lowest point that may touch something, of a body without joints."""
+        return float(pybullet.getAABB(body, -1, self._client)[0][2])
 
     def advance(
         self, wrenches: Mapping[int, Wrench], sub_steps: int, between: Callable[[int], None] | None = None

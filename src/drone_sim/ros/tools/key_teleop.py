@@ -34,7 +34,7 @@ HELP = (
     "UP / DOWN     forward / backward      s          start / stop the simulation",
     "LEFT / RIGHT  left / right            p          pause / go on",
     "e / r         turn left / right       backspace  restart",
-    "u / d         up / down",
+    "u / d         up / down               t / l / x  take off / land / reset the drone",
     "space         stop the drone          q, ESC     stop the drone and leave",
 )
 

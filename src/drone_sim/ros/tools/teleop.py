@@ -11,7 +11,7 @@ from typing import Any
 import rospy
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from std_msgs.msg import String
+from std_msgs.msg import Empty, String
 from std_srvs.srv import SetBool, Trigger
 
 from drone_sim.mechanics import frames
@@ -19,6 +19,7 @@ from drone_sim.ros.tools import keys
 from drone_sim.ros.tools.commands import Command, CommandInForce
 
 _SILENCE = 1.0  # s of real time; a simulator says something in every step, and while it stands, too
+_REQUESTS = {"t": "takeoff", "l": "land", "x": "reset"}  # topics, by key
 _FAREWELL = 0.2  # s; a message leaves in rospy's own time, and a node that is gone delivers nothing
 _FAILURES = (rospy.ServiceException, rospy.ROSException, rospy.exceptions.ROSInternalException, OSError)
 
@@ -39,9 +40,13 @@ class Teleop:
         self._odometry: Odometry | None = None
         self._heard = -math.inf  # when something came from the simulator
         self._told = ""  # the simulator's state
+        self._flight_state = ""  # the drone's
         self._calling = ""
         self._stopping = threading.Lock()
         self._publisher = rospy.Publisher(f"{drone}/cmd_vel", Twist, queue_size=1)
+        names = ((key, f"{drone}/{topic}") for key, topic in _REQUESTS.items())
+        self._requests = {key: rospy.Publisher(name, Empty, queue_size=1) for key, name in names}
+        rospy.Subscriber(f"{drone}/state", String, self._on_flight_state, queue_size=1)
         rospy.Subscriber(f"{drone}/odom", Odometry, self._on_odometry, queue_size=1)
         rospy.Subscriber(f"{drone}/command", TwistStamped, self._on_command, queue_size=1)
         self._states = rospy.Subscriber(f"{self._simulator}/state", String, self._on_state, queue_size=1)
@@ -57,6 +62,9 @@ class Teleop:
 
     def _on_state(self, message: String) -> None:
         self._told = message.data
+
+    def _on_flight_state(self, message: String) -> None:
+        self._flight_state = message.data
 
     # ---- keys
 
@@ -74,9 +82,17 @@ class Teleop:
             self._call("pause", SetBool, self._told != "paused")
         elif key == keys.BACKSPACE:
             self._call("restart", Trigger)
+        elif key in self._requests:
+            self._ask_for(key)
         else:
             return self._command(key)
         return True
+
+    def _ask_for(self, key: str) -> None:
+        publisher, name = self._requests[key], _REQUESTS[key]
+        listened = publisher.get_num_connections() > 0
+        self.said = f"{name} sent" if listened else f"nobody listens on {publisher.resolved_name}: nothing sent"
+        publisher.publish(Empty())
 
     def _command(self, key: str) -> bool:
         command = self._in_force.next.after(key)
@@ -145,7 +161,8 @@ class Teleop:
         known = self._states.get_num_connections() > 0
         silent = time.monotonic() - self._heard
         if silent < _SILENCE:
-            return self._told if known and self._told else "flying"
+            told = self._told if known and self._told else "flying"
+            return told if self._flight_state in ("", told) else f"{told}, the drone: {self._flight_state}"
         self._odometry = None
         if known:
             return f"no answer for {silent:.0f} s (it was {self._told})" if math.isfinite(silent) else self._told

@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Vector3Stamped, WrenchStamped
 from geometry_msgs.msg import Twist as TwistMessage
+from std_msgs.msg import Empty
 
 from drone_sim.config.changing import changed
 from drone_sim.config.types import ParameterError
@@ -22,6 +23,7 @@ from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
 from drone_sim.vehicles.parameters import EquipmentParameters, VehicleParameters
+from drone_sim.vehicles.requests import EMPTY, REQUESTS
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.wording import shown
 
@@ -42,6 +44,8 @@ class VehicleInputs:
             rospy.Subscriber(f"{self._name}/{topic}", kind, self._taking(topic, read), queue_size=1, tcp_nodelay=True)
             for topic, kind, read in (
                 ("cmd_vel", TwistMessage, self._twist),
+                ("goto", PoseStamped, self._goto),
+                *((topic, Empty, self._asking(topic)) for topic, kind in REQUESTS.items() if kind == EMPTY),
                 ("set_pose", PoseStamped, self._pose),
                 ("initialpose", PoseWithCovarianceStamped, self._pose_estimate),
                 ("target_pose", PoseStamped, self._target),
@@ -91,6 +95,14 @@ class VehicleInputs:
     def _twist(self, message: TwistMessage) -> _Job:
         twist = checks.twist(_numbers(message.linear), _numbers(message.angular), self._parameters)
         return lambda vehicle: vehicle.receive(twist)
+
+    def _goto(self, message: PoseStamped) -> _Job:
+        pose = checked_pose(message.header.frame_id, message.pose, self._parameters)
+        return lambda vehicle: vehicle.ask("goto", pose)
+
+    @staticmethod
+    def _asking(topic: str) -> Callable[[Empty], _Job]:
+        return lambda _message: lambda vehicle: vehicle.ask(topic)
 
     def _pose(self, message: PoseStamped) -> _Job:
         pose = checked_pose(message.header.frame_id, message.pose, self._parameters)

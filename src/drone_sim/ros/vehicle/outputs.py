@@ -8,7 +8,7 @@ import rospy
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float32MultiArray
+from std_msgs.msg import Float32MultiArray, String
 
 from drone_sim.ros.vehicle import messages
 from drone_sim.run.pacing import Throttle
@@ -19,7 +19,7 @@ _EYES = 1 / 30  # s of real time, between two messages that are for eyes
 
 
 class VehicleOutputs:
-    """Odometry, command, propellers and joint states of one vehicle."""
+    """Odometry, command, propellers, joint states and flight state of one vehicle."""
 
     def __init__(self, parameters: VehicleParameters):
         """Advertise in the vehicle's namespace."""
@@ -29,11 +29,13 @@ class VehicleOutputs:
         self._command = rospy.Publisher(f"{name}/command", TwistStamped, queue_size=10)
         self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=10)
         self._joints = rospy.Publisher(f"{name}/joint_states", JointState, queue_size=10)
+        self._flight_state = rospy.Publisher(f"{name}/state", String, queue_size=10, latch=True)
+        self._told = ""
         self._eyes = Throttle(_EYES)
 
     def close(self) -> None:
         """Advertise no more."""
-        for publisher in (self._odometry, self._command, self._propellers, self._joints):
+        for publisher in (self._odometry, self._command, self._propellers, self._joints, self._flight_state):
             publisher.unregister()
 
     def publish_state(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
@@ -43,6 +45,10 @@ class VehicleOutputs:
         if self._propellers.get_num_connections():
             stamp()  # /clock before the message
             self._propellers.publish(messages.propellers(vehicle.particle_velocities))
+        state = str(vehicle.flight_state)
+        if state != self._told:
+            self._told = state
+            self._flight_state.publish(state)
 
     def publish_joints(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
         """Publish the blades' angles, as often as eyes need them."""

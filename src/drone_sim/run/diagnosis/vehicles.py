@@ -9,7 +9,9 @@ from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.diagnosis.counts import Since
 from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, finding, numbers
 from drone_sim.run.player import Player
+from drone_sim.scripting import load
 from drone_sim.sensors.sensor import Contact
+from drone_sim.vehicles.flight_state import CRASHED, LANDED
 from drone_sim.vehicles.vehicle import Vehicle
 
 COMMAND = "cmd_vel"
@@ -34,6 +36,7 @@ class VehicleDiagnosis:
         """Return what was found."""
         problems = [
             *self._stands(),
+            *self._rests(),
             *self._refuses(),
             *self._leans(),
             *self._cannot(),
@@ -55,6 +58,15 @@ class VehicleDiagnosis:
             return [Problem(WARN, f"commands of {taken.sender} come in, but the simulation is {player.state}: {cure}")]
         return []
 
+    def _rests(self) -> list[Problem]:
+        """Tell of commands that do not move it, for it has landed or crashed."""
+        taken, state = self._log.taken.get(COMMAND), str(self._vehicle.flight_state)
+        if state == CRASHED:
+            return [Problem(WARN, "crashed: `reset` puts it back where it began")]
+        if state == LANDED and taken is not None and self._vehicle.command != Twist() and self._player.playing:
+            return [Problem(WARN, f"landed: commands of {taken.sender} do not move it; `takeoff` first")]
+        return []
+
     def _refuses(self) -> list[Problem]:
         refused = self._log.last_refusal()
         if refused is None or not self._log.is_refusing(refused.topic):
@@ -63,7 +75,7 @@ class VehicleDiagnosis:
         return [Problem(WARN, f"refused what {refused.sender} sends on {refused.topic}{kept}: {refused.why}")]
 
     def _leans(self) -> list[Problem]:
-        if self._tilt < _LEANING:
+        if self._tilt < _LEANING or str(self._vehicle.flight_state) == CRASHED:
             return []
         how = "lies on its back" if self._tilt > math.pi / 2 and self._contacts else "leans"
         return [Problem(WARN, f"{how} ({math.degrees(self._tilt):.0f} degrees): `restart` puts it upright")]
@@ -82,7 +94,7 @@ class VehicleDiagnosis:
     def _is_on_its_own(self) -> list[Problem]:
         """Nobody hears the commands, or nobody is there any more who gave the one in force."""
         vehicle, taken = self._vehicle, self._log.taken.get(COMMAND)
-        if taken is None or not self._player.playing:
+        if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []
         if not any(bus.hears(COMMAND) for bus in (vehicle.bus, *vehicle.listening)):
             return [Problem(WARN, f"commands come in, but the child script does not subscribe to {COMMAND}")]
@@ -109,6 +121,7 @@ class VehicleDiagnosis:
         limits = vehicle.parameters.propellers.velocity_limits
         return {
             "state": self._player.state,
+            "flight state": str(vehicle.flight_state),
             "command": _shown(vehicle.command),
             "command came": self._ago(taken.at) if taken else "never",
             "command sender": taken.sender if taken else "nobody",
@@ -125,7 +138,7 @@ class VehicleDiagnosis:
             "speed": f"{self._speed():.2f} m/s",
             "contacts": ", ".join(_names(self._contacts)) or "none",
             "put elsewhere": f"{vehicle.jumps} times",
-            "script": str(vehicle.parameters.script or self._player.simulation.script or "tutorial"),
+            "script": str(vehicle.parameters.script or self._player.simulation.script or load.DEFAULT),
             "frame": f"{vehicle.parameters.base_link}, in world",
         }
 

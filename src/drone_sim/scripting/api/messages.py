@@ -14,14 +14,19 @@ import numpy as np
 
 from drone_sim.scripting.api.backend import Backend, Image, Sender
 from drone_sim.scripting.api.calls import Function, WrongValue
-from drone_sim.scripting.api.publishers import Begin, Publishers
+from drone_sim.scripting.api.publishers import Begin, Kept, Publishers
 from drone_sim.scripting.api.script_values import refuse_if_too_large
 from drone_sim.scripting.api.subscriptions import Subscriptions
 from drone_sim.scripting.api.types import Callback, Handle, Name
 
 _MOST = 200  # subscriptions and publishers
 _LONGEST_QUEUE = 1000  # messages
-_OWN_TOPICS = {"cmd_vel": "geometry_msgs/Twist"}
+_OWN_TOPICS = {
+    "cmd_vel": "geometry_msgs/Twist",
+    **dict.fromkeys(("takeoff", "land", "reset", "home"), "std_msgs/Empty"),
+    "goto": "geometry_msgs/PoseStamped",
+    "state": "std_msgs/String",
+}
 _TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
 
 
@@ -29,11 +34,11 @@ class MessageBus:
     """What one drone's script subscribes to and publishes; relative names stand in the drone's namespace.
 
     `backend` may be set at any time; it serves what is subscribed and advertised after that. Topics in
-    `own_topics` are never asked of it: the drone itself posts them.
+    `own_topics` are never asked of it: the drone itself posts them, and hears what is published on them.
     """
 
     def __init__(self, namespace: str, own_topics: Mapping[str, str] | None = None):
-        """Take the namespace ('drone', '' is none), and topics that the drone posts itself, with their types."""
+        """Take the namespace ('drone', '' is none), and topics that the drone itself has, with their types."""
         self.backend: Backend | None = None
         self._prefix = f"/{namespace}" if namespace else ""
         own = _OWN_TOPICS if own_topics is None else own_topics
@@ -42,6 +47,7 @@ class MessageBus:
         # Asked for in every step: without another call in between.
         self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
         self._publishers = Publishers()
+        self.said: dict[str, Any] = {}  # what was last published on own topics, by their full names
         self._last_handle = 0
 
     def functions(self) -> dict[str, Function]:
@@ -93,6 +99,8 @@ class MessageBus:
         resolved, kept = self.resolve(topic), _length(queue)
 
         def begin() -> Sender | None:
+            if resolved in self._own_topics:
+                return Kept(self.said, resolved)
             return self.backend.advertise(resolved, kind, kept, bool(latch)) if self.backend else None
 
         self._check_type(resolved, kind)
@@ -161,11 +169,14 @@ class MessageBus:
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back what is subscribed and advertised now, and the messages that wait."""
         last, recalls = self._last_handle, (self._subscriptions.remember(), self._publishers.remember())
+        said = dict(self.said)
 
         def recall() -> None:
             for one in recalls:
                 one()
             self._last_handle = last
+            self.said.clear()
+            self.said.update(said)
 
         return recall
 

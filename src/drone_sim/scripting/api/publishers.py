@@ -15,6 +15,26 @@ class _Publisher(NamedTuple):
     sender: Sender | None
 
 
+class Kept:
+    """Takes what is published where the drone itself hears it, beside the topics of a Backend."""
+
+    def __init__(self, said: dict[str, Any], topic: str):
+        """Take where the last message of the topic is left."""
+        self._said, self._topic = said, topic
+
+    def publish(self, message: Any) -> None:
+        """Leave a message."""
+        self._said[self._topic] = message
+
+    def subscribers(self) -> int:
+        """Return how many listen: the drone."""
+        return 1
+
+    def shutdown(self) -> None:
+        """Forget what was said."""
+        self._said.pop(self._topic, None)
+
+
 class Publishers:
     """Advertised topics by handle."""
 

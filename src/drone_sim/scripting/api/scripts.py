@@ -23,6 +23,10 @@ _LOG = logging.getLogger(__name__)  # not the script's own words
 _MOST = 1000  # parameters of one script
 _NEAR = 0.8  # of difflib's ratio
 _LONGEST = 80  # characters of a name that is looked at
+_LEVELS = {
+    **{CONSTANTS[name]: logging.WARNING for name in ("verbosity_warnings", "verbosity_scriptwarnings")},
+    **{CONSTANTS[name]: logging.ERROR for name in ("verbosity_errors", "verbosity_scripterrors")},
+}
 _SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
 
 
@@ -123,9 +127,9 @@ class Scripts:
         """Write a line to the log."""
         say(message)
 
-    def addLog(self, _verbosity: int, message: Any) -> None:
-        """Write a line to the log."""
-        say(message)
+    def addLog(self, verbosity: int, message: Any) -> None:
+        """Write a line to the log: an error, a warning, or a word, by its verbosity."""
+        say(message, _LEVELS.get(verbosity, logging.INFO))
 
 
 def _set(parameters: ScriptParameters, name: Any, value: Any) -> None:

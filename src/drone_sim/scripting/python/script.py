@@ -161,6 +161,7 @@ class PythonScript:
                 for name in set(variables) - set(fresh) - set(_NOT_COPIED):
                     del variables[name]
                 variables.update(fresh)
+            self._helpers.builtins["self"] = self._globals["self"]  # which its modules find there
             for one in recalls:
                 one()
 

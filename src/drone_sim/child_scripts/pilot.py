@@ -1,0 +1,199 @@
+"""The tutorial's child script with a pilot: it takes off, lands, goes places, and begins anew when asked to.
+
+The flying is the tutorial's, unchanged: the pilot only sets its commands, and stops the propellers on the ground.
+Topics, in the drone's namespace: takeoff, land, reset, home (std_msgs/Empty), goto (geometry_msgs/PoseStamped,
+world); state (std_msgs/String) says which of the five states it is in.
+"""
+
+import math
+
+import tutorial
+from tutorial import sysCall_actuation  # noqa: F401 -- a phase, called as it is
+
+# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
+
+LANDED, TAKING_OFF, FLYING, LANDING, CRASHED = "landed", "taking off", "flying", "landing", "crashed"
+AT_REST = (LANDED, CRASHED)
+
+CLIMB = 0.5  # m/s
+AT_HEIGHT, SETTLED = 0.01, 0.05  # m, m/s: the take-off is over
+DESCENT, SLOWEST_DESCENT, DESCENT_PER_HEIGHT = 0.4, 0.2, 0.5  # m/s, m/s, 1/s: slower towards the floor
+STANDS, STANDS_FOR = 0.1, 0.8  # m/s, s: so slow so long while it is to descend, it stands on something
+FASTEST, LIFT, TURN = 1.0, 0.5, 1.0  # m/s, m/s, rad/s, on the way to somewhere
+APPROACH, TURNING = 0.5, 1.0  # 1/s, speed per distance that is left
+NEAR = 0.3  # m of height, from which the tutorial's law holds it by itself
+LEANING = 0.5  # cosine of 60 degrees: no flight leans so far
+LIES, LIES_FOR = 0.1, 1.0  # m/s, s: leaning and so slow so long, it lies there
+
+
+def sysCall_init():
+    """Begin as the tutorial does, or on the ground."""
+    # Before the tutorial's own subscription: a reset forgets the twists that came with it.
+    self.requests = [
+        simROS.subscribe("reset", "std_msgs/Empty", "on_reset"),
+        simROS.subscribe("takeoff", "std_msgs/Empty", "on_takeoff"),
+        simROS.subscribe("land", "std_msgs/Empty", "on_land"),
+        simROS.subscribe("home", "std_msgs/Empty", "on_home"),
+        simROS.subscribe("goto", "geometry_msgs/PoseStamped", "on_goto"),
+    ]
+    self.state_publisher = simROS.advertise("state", "std_msgs/String", 1, True)
+    tutorial.sysCall_init()
+    self.takeoff_height = sim.getScriptSimulationParameter(sim.handle_self, "takeoff_height")
+    x, y, z = sim.getObjectPosition(self.d, -1)
+    yaw = sim.getObjectOrientation(self.d, -1)[2]
+    self.still = 0.0  # s, that it stands or lies where it should move
+    self.goal = None  # x, y, z (m), yaw (rad)
+    if sim.getScriptSimulationParameter(sim.handle_self, "start") == LANDED:
+        self.home = (x, y, z + self.takeoff_height, yaw)
+        rest(LANDED)
+    else:
+        self.home = (x, y, z, yaw)
+        enter(FLYING)
+
+
+def sysCall_sensing():
+    """Compute thrust and corrections as the tutorial does; then do what the state asks for."""
+    tutorial.sysCall_sensing()
+    if math.cos(self.roll_prev) * math.cos(self.pitch_prev) < LEANING:
+        watch_lean()
+    if self.work is not None:
+        self.work()
+
+
+def sysCall_cleanup():
+    """End all that was begun."""
+    for handle in self.requests:
+        simROS.shutdownSubscriber(handle)
+    simROS.shutdownPublisher(self.state_publisher)
+    tutorial.sysCall_cleanup()
+
+
+# ---- what is asked for
+
+
+def on_twist(msg):
+    """Obey in flight; a command that comes during the take-off counts after it."""
+    if self.state == TAKING_OFF:
+        self.waiting = msg
+    elif self.state == FLYING:
+        self.work = self.goal = None
+        tutorial.on_twist(msg)
+    elif any((msg.linear.x, msg.linear.y, msg.linear.z, msg.angular.z)):
+        refuse("cmd_vel")
+
+
+def on_takeoff(_msg):
+    """Climb, and hold the height."""
+    if self.state in (LANDED, LANDING):
+        enter(TAKING_OFF, climb)
+        z = sim.getObjectPosition(self.d, -1)[2]
+        self.zref, self.top = z, z + self.takeoff_height
+    elif self.state == CRASHED:
+        refuse("takeoff")
+
+
+def on_land(_msg):
+    """Descend, whatever is below, and stop the propellers there."""
+    if self.state in (FLYING, TAKING_OFF):
+        enter(LANDING, descend)
+
+
+def on_goto(msg):
+    """Fly to a place, turn as the pose is turned, and hold both until the next command."""
+    p, q = msg.pose.position, msg.pose.orientation
+    go((p.x, p.y, p.z, math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))), "goto")
+
+
+def on_home(_msg):
+    """Fly to where it began."""
+    go(self.home, "home")
+
+
+def on_reset(_msg):
+    """Begin anew: the drone has been put back already."""
+    sysCall_cleanup()
+    sysCall_init()
+
+
+def go(goal, topic):
+    """Fly to a goal, as far as it flies at all."""
+    if self.state == FLYING:
+        self.goal, self.work = goal, approach
+    else:
+        refuse(topic)
+
+
+def refuse(topic):
+    """Say once in each state why nothing moves."""
+    if topic not in self.refused:
+        self.refused.append(topic)
+        cures = {LANDED: "`takeoff` first", CRASHED: "`reset` puts it back", LANDING: "`takeoff` breaks that off"}
+        said = f"{topic} does not move the drone: it is {self.state}; {cures.get(self.state, 'wait until it flies')}"
+        sim.addLog(sim.verbosity_scriptwarnings, said)
+
+
+# ---- the states
+
+
+def enter(state, work=None):
+    """Be in a state, and do the work in every step; commands of the one before are over."""
+    self.state, self.work = state, work
+    self.refused, self.waiting, self.still = [], None, 0.0
+    self.vx = self.vy = self.vz = self.rz = 0
+    simROS.publish(self.state_publisher, {"data": state})
+
+
+def rest(state):
+    """Stop the propellers."""
+    enter(state, stop)
+    stop()
+
+
+def stop():
+    """Command no thrust, whatever the controller has computed."""
+    self.thrust = 0
+
+
+def climb():
+    """Let the height to be held rise, and wait until the drone is there."""
+    self.zref = min(self.zref + CLIMB * self.dt, self.top)
+    vz = sim.getObjectVelocity(self.d)[0][2]
+    if abs(sim.getObjectPosition(self.d, -1)[2] - self.top) < AT_HEIGHT and abs(vz) < SETTLED:
+        waiting = self.waiting
+        enter(FLYING)
+        if waiting is not None:
+            tutorial.on_twist(waiting)
+
+
+def descend():
+    """Sink, more slowly near the floor, until the drone stands."""
+    z = sim.getObjectPosition(self.d, -1)[2]
+    self.vz = -min(max(DESCENT_PER_HEIGHT * z, SLOWEST_DESCENT), DESCENT)
+    vz = sim.getObjectVelocity(self.d)[0][2]
+    self.still = self.still + self.dt if abs(vz) < STANDS else 0.0
+    if self.still > STANDS_FOR:
+        rest(LANDED)
+
+
+def approach():
+    """Fly towards the goal, the slower the nearer."""
+    x, y, z, yaw = self.goal
+    here, (_, _, heading) = sim.getObjectPosition(self.d, -1), sim.getObjectOrientation(self.d, -1)
+    dx, dy, dz = x - here[0], y - here[1], z - here[2]
+    distance = math.hypot(dx, dy)
+    speed = min(APPROACH, FASTEST / distance) if distance else 0
+    ahead, left = math.cos(heading), math.sin(heading)
+    self.vx, self.vy = speed * (ahead * dx + left * dy), speed * (ahead * dy - left * dx)
+    if abs(dz) < NEAR:
+        self.vz, self.zref = 0, z
+    else:
+        self.vz = math.copysign(LIFT, dz)
+    turn = math.remainder(yaw - heading, 2 * math.pi)
+    self.rz = min(max(TURNING * turn, -TURN), TURN)
+
+
+def watch_lean():
+    """Take the drone for crashed that leans so far, and has not moved for a while."""
+    self.still = self.still + self.dt if math.hypot(*sim.getObjectVelocity(self.d)[0]) < LIES else 0.0
+    if self.still > LIES_FOR and self.state != CRASHED:
+        rest(CRASHED)

@@ -1,0 +1,297 @@
+"""Flight states: the script `pilot` takes off, lands, goes places, and begins anew, to the bit."""
+
+import logging
+import math
+from pathlib import Path
+
+import pytest
+
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.offline import timeline
+from drone_sim.run import parameters
+from drone_sim.run.diagnosis.command_log import CommandLog
+from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis
+from drone_sim.run.player import Player
+from drone_sim.run.simulation import Simulation
+
+FORWARD = Twist(Vector3(0.5, 0.2, 0.0))
+ON_ITS_BACK = Pose((0.3, 0.2, 0.03), (1.0, 0.0, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def flying():
+    simulation = Simulation(parameters.load())
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture(scope="module")
+def landed():
+    simulation = Simulation(parameters.load({"start": "landed"}))
+    yield simulation
+    simulation.close()
+
+
+def fly(simulation, seconds):
+    """Return the states after each step."""
+    states = []
+    for _ in range(round(seconds / 0.05)):
+        simulation.step()
+        states.append(simulation.drone.state)
+    return states
+
+
+def until(simulation, state, seconds=20.0):
+    states = []
+    while str(simulation.drone.flight_state) != state:
+        states += fly(simulation, 0.05)
+        assert len(states) * 0.05 < seconds, f"still {simulation.drone.flight_state}"
+    return states
+
+
+def again(simulation):
+    simulation.drone.ask("reset")
+    fly(simulation, 0.05)
+
+
+def test_it_hovers_from_the_start(flying):
+    again(flying)
+    assert str(flying.drone.flight_state) == "flying"
+    flying.drone.ask("takeoff")  # it flies already
+    assert fly(flying, 0.5)[-1].position[2] == pytest.approx(0.8, abs=0.02)
+
+
+def test_landed_stands_on_the_floor(landed):
+    again(landed)
+    states = fly(landed, 1.0)
+    assert str(landed.drone.flight_state) == "landed"
+    assert landed.drone.particle_velocities == (0, 0, 0, 0)
+    assert all(0 < one.position[2] < 0.02 and math.hypot(*one.linear_velocity) < 0.1 for one in states)
+
+
+def test_take_off_climbs_to_its_height_and_holds(landed):
+    again(landed)
+    fly(landed, 0.5)
+    stood = landed.drone.state.position[2]
+    landed.drone.ask("takeoff")
+    climbed = until(landed, "flying", 3.0)
+    held = fly(landed, 2.0)
+    assert max(one.position[2] for one in (*climbed, *held)) < stood + 0.82
+    assert all(one.position[2] == pytest.approx(stood + 0.8, abs=0.02) for one in held)
+
+
+def test_a_twist_during_take_off_counts_after_it(landed):
+    again(landed)
+    landed.drone.ask("takeoff")
+    fly(landed, 0.5)
+    landed.drone.receive(FORWARD)
+    assert until(landed, "flying")[-1].position[0] == pytest.approx(0, abs=0.01)
+    assert fly(landed, 2.0)[-1].position[0] > 0.3
+
+
+@pytest.mark.parametrize("height", [0.8, 3.0])
+def test_landing_touches_softly_and_stops_the_propellers(flying, height):
+    again(flying)
+    flying.drone.move(Pose((0, 0, height)))
+    flying.drone.receive(FORWARD)
+    fly(flying, 0.5)
+    flying.drone.ask("land")
+    states = until(flying, "landed")
+    touched = next(number for number, one in enumerate(states) if one.position[2] < 0.016)
+    assert max(abs(one.linear_velocity[2]) for one in states[touched - 3 : touched + 1]) < 0.5
+    assert max(one.position[2] for one in states[touched:]) - min(one.position[2] for one in states[touched:]) < 0.02
+    fly(flying, 0.1)
+    assert flying.drone.particle_velocities == (0, 0, 0, 0)
+
+
+def test_landing_ends_on_what_it_meets():
+    table = {"shape": "box", "size": [1, 1, 0.4], "position": [0, 0, 0.2]}
+    simulation = Simulation(parameters.load({"scene": {"objects": [table]}}))
+    simulation.drone.ask("land")
+    assert until(simulation, "landed")[-1].position[2] == pytest.approx(0.411, abs=0.01)
+    simulation.close()
+
+
+def test_a_landing_is_broken_off(flying):
+    again(flying)
+    flying.drone.ask("land")
+    fly(flying, 1.0)
+    flying.drone.ask("takeoff")
+    assert min(one.position[2] for one in until(flying, "flying")) > 0.3
+
+
+def test_a_twist_does_not_move_what_has_landed_and_says_why_once(landed, caplog):
+    again(landed)
+    before = fly(landed, 0.5)[-1].position
+    caplog.set_level(logging.WARNING)
+    for _ in range(5):
+        landed.drone.receive(FORWARD)
+        after = fly(landed, 0.2)[-1].position
+    assert after == pytest.approx(before, abs=1e-3)
+    assert [one.getMessage() for one in caplog.records] == [
+        "cmd_vel does not move the drone: it is landed; `takeoff` first"
+    ]
+
+
+def test_goto_and_home(flying):
+    again(flying)
+    flying.drone.ask("goto", Pose((1.0, -0.5, 1.5), (0.0, 0.0, math.sin(0.6), math.cos(0.6))))
+    there = fly(flying, 14.0)[-20:]
+    assert all(one.position == pytest.approx((1.0, -0.5, 1.5), abs=0.05) for one in there)
+    assert flying.drone.matrix[0] == pytest.approx(math.cos(1.2), abs=0.05)
+    flying.drone.ask("home")
+    assert fly(flying, 14.0)[-1].position == pytest.approx((0, 0, 0.8), abs=0.05)
+    flying.drone.ask("goto", Pose((5.0, 0.0, 1.0)))
+    fly(flying, 1.0)
+    flying.drone.receive(Twist())
+    here = fly(flying, 4.0)[-1].position
+    assert fly(flying, 2.0)[-1].position == pytest.approx(here, abs=0.1)
+    assert here[0] < 3
+
+
+def test_goto_is_refused_on_the_ground(landed, caplog):
+    again(landed)
+    landed.drone.ask("goto", Pose((1.0, 0.0, 1.0)))
+    fly(landed, 0.5)
+    assert "goto does not move the drone: it is landed" in caplog.text
+
+
+def test_a_crash_stops_the_propellers_until_reset(flying, caplog):
+    again(flying)
+    flying.drone.move(ON_ITS_BACK)
+    until(flying, "crashed", 3.0)
+    fly(flying, 0.1)
+    assert flying.drone.particle_velocities == (0, 0, 0, 0)
+    flying.drone.ask("takeoff")
+    flying.drone.receive(FORWARD)
+    fly(flying, 0.5)
+    assert str(flying.drone.flight_state) == "crashed"
+    assert "`reset` puts it back" in caplog.text
+    again(flying)
+    assert str(flying.drone.flight_state) == "flying"
+
+
+@pytest.mark.parametrize("start", ["flying", "landed"])
+def test_every_flight_after_a_reset_is_the_first_one(start):
+    simulation = Simulation(parameters.load({"start": start}))
+    drone = simulation.drone
+
+    def flight():
+        drone.ask("takeoff")
+        states = fly(simulation, 1.0)
+        drone.receive(FORWARD)
+        return [*states, *fly(simulation, 0.5)]
+
+    def upside_down():
+        drone.move(ON_ITS_BACK)
+        fly(simulation, 1.5)
+
+    def half_landed():
+        drone.ask("land")
+        drone.push((0.5, 0, 0), (0, 0.01, 0), 1.0)
+        fly(simulation, 0.4)
+
+    first = flight()
+    for number in range(50):
+        (lambda: None, upside_down, half_landed)[number % 3]()
+        drone.ask("reset")
+        assert flight() == first, f"after reset {number + 1}"
+    simulation.close()
+
+
+def test_a_reset_leaves_others_where_they_are():
+    simulation = Simulation(parameters.load({"vehicles": 2}))
+    one, other = simulation.vehicles.values()
+    for vehicle in (one, other):
+        vehicle.receive(FORWARD)
+    fly(simulation, 1.0)
+    before = other.state.position
+    one.ask("reset")
+    fly(simulation, 0.05)
+    assert one.state.position == pytest.approx(one.parameters.position, abs=0.01)
+    assert other.state.position == pytest.approx(before, abs=0.05)
+    simulation.close()
+
+
+def test_a_snapshot_brings_back_the_pilot_too(landed):
+    again(landed)
+    landed.drone.ask("takeoff")
+    fly(landed, 0.5)
+    snapshot = landed.snapshot()
+    flown = fly(landed, 3.0)
+    landed.drone.ask("land")
+    fly(landed, 0.5)
+    landed.restore(snapshot)
+    assert str(landed.drone.flight_state) == "taking off"
+    assert fly(landed, 3.0) == flown
+    landed.forget(snapshot)
+
+
+def test_another_script_has_no_states_and_that_is_said(caplog):
+    simulation = Simulation(parameters.load(), script="tutorial")
+    assert str(simulation.drone.flight_state) == "unknown"
+    for topic in ("takeoff", "land", "reset"):
+        simulation.drone.ask(topic)
+    assert str(simulation.drone.flight_state) == "unknown: the script does not subscribe to takeoff"
+    assert [one.getMessage() for one in caplog.records] == [
+        "takeoff: nothing happens: the child script does not subscribe to it; `pilot` does"
+    ]
+    simulation.close()
+
+
+def test_a_lua_script_may_have_states(tmp_path):
+    script = tmp_path / "own.lua"
+    script.write_text("""
+function sysCall_init()
+    publisher = simROS.advertise('state', 'std_msgs/String', 1, true)
+    simROS.publish(publisher, {data = 'waiting'})
+    simROS.subscribe('land', 'std_msgs/Empty', 'on_land')
+    simROS.subscribe('goto', 'geometry_msgs/PoseStamped', 'on_goto')
+end
+function on_land(message) simROS.publish(publisher, {data = 'landing'}) end
+function on_goto(message) simROS.publish(publisher, {data = 'at ' .. message.pose.position.x}) end
+function sysCall_actuation() end
+""")
+    simulation = Simulation(parameters.load(), script=str(script))
+    said = [str(simulation.drone.flight_state)]
+    for topic, pose in (("land", None), ("goto", Pose((1.5, 0, 1)))):
+        simulation.drone.ask(topic, pose)
+        simulation.step()
+        said.append(str(simulation.drone.flight_state))
+    assert said == ["waiting", "landing", "at 1.5"]
+    simulation.close()
+
+
+def test_the_timeline_asks(tmp_path: Path):
+    file = tmp_path / "flight.yaml"
+    file.write_text("- {at: 0, takeoff: {}}\n- {at: 3, goto: {position: [0.5, 0, 1]}}\n- {at: 8, land: }\n")
+    simulation = Simulation(parameters.load({"start": "landed"}))
+    found = timeline.read(str(file), simulation.parameters)
+    for step in range(14 * 20):
+        found.apply(step, simulation.vehicles)
+        simulation.step()
+    assert str(simulation.drone.flight_state) == "landed"
+    assert simulation.drone.state.position == pytest.approx((0.5, 0, 0.011), abs=0.05)
+    simulation.close()
+
+
+def test_a_timeline_with_more_than_it_takes(tmp_path: Path):
+    file = tmp_path / "flight.yaml"
+    file.write_text("- {at: 1, land: {x: 1}}\n")
+    with pytest.raises(timeline.TimelineError, match=r"line 1: entry 1: land.x: unknown key; it takes none"):
+        timeline.read(str(file), parameters.load())
+
+
+def test_the_diagnosis_says_the_state(landed):
+    again(landed)
+    player = Player(landed, landed.step, lambda _: None, False)
+    log = CommandLog()
+    log.take("cmd_vel", "/pilot")
+    landed.drone.receive(FORWARD)
+    found = VehicleDiagnosis(landed.drone, player, log, None).finding()
+    assert found.values["flight state"] == "landed"
+    assert found.message == "landed: commands of /pilot do not move it; `takeoff` first"
+    landed.drone.move(ON_ITS_BACK)
+    until(landed, "crashed")
+    found = VehicleDiagnosis(landed.drone, player, log, None).finding()
+    assert found.message.startswith("crashed: `reset` puts it back where it began")
