@@ -15,7 +15,7 @@ from tutorial import sysCall_actuation  # noqa: F401 -- a phase, called as it is
 LANDED, TAKING_OFF, FLYING, LANDING, CRASHED = "landed", "taking off", "flying", "landing", "crashed"
 AT_REST = (LANDED, CRASHED)
 
-CLIMB = 0.5  # m/s
+CLIMB = 0.6  # m/s
 AT_HEIGHT, SETTLED = 0.01, 0.05  # m, m/s: the take-off is over
 DESCENT, SLOWEST_DESCENT, DESCENT_PER_HEIGHT = 0.4, 0.2, 0.5  # m/s, m/s, 1/s: slower towards the floor
 STANDS, STANDS_FOR = 0.1, 0.8  # m/s, s: so slow so long while it is to descend, it stands on something
