@@ -112,6 +112,20 @@ def test_landing_ends_on_what_it_meets():
     simulation.close()
 
 
+def test_landed_stands_on_what_is_below():
+    table = {"shape": "box", "size": [1, 1, 0.4], "position": [0, 0, 0.2]}
+    simulation = Simulation(parameters.load({"start": "landed", "scene": {"objects": [table]}}))
+    simulation.drone.ask("takeoff")
+    until(simulation, "flying")
+    simulation.drone.ask("reset")
+    assert fly(simulation, 1.0)[-1].position[2] == pytest.approx(0.411, abs=0.01)
+    simulation.stop()
+    simulation.drone.ask("takeoff")  # nobody is there to hear it
+    simulation.start()
+    assert str(simulation.drone.flight_state) == "landed"
+    simulation.close()
+
+
 def test_a_landing_is_broken_off(flying):
     again(flying)
     flying.drone.ask("land")
@@ -184,7 +198,7 @@ def test_every_flight_after_a_reset_is_the_first_one(start):
 
     def upside_down():
         drone.move(ON_ITS_BACK)
-        fly(simulation, 1.5)
+        until(simulation, "crashed")
 
     def half_landed():
         drone.ask("land")

@@ -15,14 +15,14 @@ from tutorial import sysCall_actuation  # noqa: F401 -- a phase, called as it is
 LANDED, TAKING_OFF, FLYING, LANDING, CRASHED = "landed", "taking off", "flying", "landing", "crashed"
 AT_REST = (LANDED, CRASHED)
 
-CLIMB = 0.5  # m/s
+CLIMB = 0.6  # m/s
 AT_HEIGHT, SETTLED = 0.01, 0.05  # m, m/s: the take-off is over
 DESCENT, SLOWEST_DESCENT, DESCENT_PER_HEIGHT = 0.4, 0.2, 0.5  # m/s, m/s, 1/s: slower towards the floor
 STANDS, STANDS_FOR = 0.1, 0.8  # m/s, s: so slow so long while it is to descend, it stands on something
 FASTEST, LIFT, TURN = 1.0, 0.5, 1.0  # m/s, m/s, rad/s, on the way to somewhere
 APPROACH, TURNING = 0.5, 1.0  # 1/s, speed per distance that is left
 NEAR = 0.3  # m of height, from which the tutorial's law holds it by itself
-LEANING = 0.5  # cosine of 60 degrees: no flight leans so far
+LEANING = math.radians(60)  # no flight leans so far
 LIES, LIES_FOR = 0.1, 1.0  # m/s, s: leaning and so slow so long, it lies there
 
 
@@ -54,7 +54,7 @@ def sysCall_init():
 def sysCall_sensing():
     """Compute thrust and corrections as the tutorial does; then do what the state asks for."""
     tutorial.sysCall_sensing()
-    if math.cos(self.roll_prev) * math.cos(self.pitch_prev) < LEANING:
+    if not (-LEANING < self.roll_prev < LEANING and -LEANING < self.pitch_prev < LEANING):
         watch_lean()
     if self.work is not None:
         self.work()

@@ -39,9 +39,11 @@ class Body:
         self.refresh()
 
     def begin_on_floor(self) -> None:
-        """Have its start on the floor below, which is at z = 0, and be there."""
+        """Have its start on what is below, the floor's height where nothing is, and be there."""
         (x, y, z), turn = self._start
-        self._start = Pose((x, y, z - self._world.lowest(self.number)), turn)
+        below = self._world.ray((x, y, z), (x, y, 0.0), ignoring=self.number)
+        ground = z - below.distance if below else 0.0
+        self._start = Pose((x, y, z - self._world.lowest(self.number) + ground), turn)
         self.reset()
 
     def begin_again(self) -> None:

@@ -289,7 +289,12 @@ class Vehicle:
             bus.post("cmd_vel", twist)
 
     def ask(self, topic: str, pose: Pose | None = None) -> None:
-        """Let the script do what a topic of `requests` asks for, if it offers that; `reset` puts it back before."""
+        """Let the script do what a topic of `requests` asks for, if it offers that; `reset` puts it back before.
+
+        While the simulation is stopped, and has no script, nothing happens.
+        """
+        if isinstance(self.script, load.NoScript):
+            return
         before = self._begin_again if topic == RESET else lambda: None
         self.flight_state.ask(topic, request(pose), before)
 
