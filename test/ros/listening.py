@@ -31,10 +31,10 @@ class Listener:
         raise AssertionError(f"nothing such on {self._subscriber.resolved_name} in {timeout} s")
 
 
-def connected(publisher):
-    """Wait until somebody listens, and return the publisher."""
+def connected(publisher, listeners=1):
+    """Wait until so many listen, and return the publisher."""
     patience = threading.Event()
-    while not publisher.get_num_connections():
+    while publisher.get_num_connections() < listeners:
         assert not rospy.is_shutdown()
         patience.wait(0.02)
     return publisher

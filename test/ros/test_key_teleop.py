@@ -153,7 +153,8 @@ class KeyTeleop(unittest.TestCase):
         self.wait_for_command(0.1)
         other = Twist()
         other.linear.y = 0.5
-        connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1)).publish(other)
+        # Two: the simulator, and this test itself.
+        connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1), listeners=2).publish(other)
         self.wait_for_command(0.0, 0.5)
         self.terminal.wait_for("command  vx +0.00  vy +0.50")
         self.terminal.type(UP)
