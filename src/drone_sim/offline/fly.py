@@ -252,7 +252,7 @@ def _status_of(action: Callable[[], int | None]) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
-    parser.add_argument("--script", metavar="FILE", help="child script (default: the tutorial's)")
+    parser.add_argument("--script", metavar="FILE", help="child script (default: pilot, the built-in one)")
     parser.add_argument(
         "--scene", metavar="FILE", help="floor, objects and the drone's place, .yaml or .ttt, as scene:="
     )

@@ -61,7 +61,7 @@ class Simulation:
     ):
         """Build the scene and, if `started`, run the init of the child scripts.
 
-        `script` flies the vehicles that name none of their own; '' is the parameters', or the tutorial's. `backend`
+        `script` flies the vehicles that name none of their own; '' is the parameters', or the pilot. `backend`
         carries what scripts subscribe to and publish; without it the messages go nowhere.
         `drawings` takes what scripts draw; without it that is ignored.
 

@@ -49,7 +49,7 @@ def load_child_script(
     shared: Shared,
     guarded: Callable[[load.Script], load.Script] = lambda script: script,
 ) -> load.Script:
-    """Load a script ('' for the tutorial's) on the object that `host` names; `guarded` wraps it. Raises ScriptError."""
+    """Load a script ('' for the pilot) on the object that `host` names; `guarded` wraps it. Raises ScriptError."""
     limit, turns = TimeLimit(shared.script_time_limit), Turns()
     around = surroundings(seen, shared, limit, turns)
     modules = {"sim": make_sim(host, around), "simROS": make_sim_ros(bus, shared.time), **make_plugins(host)}

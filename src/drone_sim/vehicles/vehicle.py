@@ -342,7 +342,7 @@ class Vehicle:
     # ---- script
 
     def load_script(self, path: str) -> None:
-        """Load a child script ('' for the tutorial's) and call its init. Raises ScriptError."""
+        """Load a child script ('' for the pilot) and call its init. Raises ScriptError."""
         self.close()
         self.script = load_child_script(path, self, self.bus, [self], self._shared)
         refuse_if_idle(self.script, path, self.bus)
