@@ -85,7 +85,10 @@ def zeros(values, step):
 
 def test_joints_move_as_mechanics_says(simulation):
     assert found(simulation, "Axle").velocity_along == 0
-    told = run(simulation, 6)
+    told = run(simulation, 2)
+    rolling = found(simulation, "Cart").matrix()[3]
+    for name, positions in run(simulation, 4).items():
+        told[name] += positions
     first, *_, last = crossings = zeros(told["Pivot"], 0.05)
     period = 2 * math.pi * math.sqrt((2 * 1 + 0.1) / (2 * 9.81)) * (1 + 0.1**2 / 16)
     assert (last - first) / (len(crossings) - 1) == pytest.approx(period, rel=0.002), "a physical pendulum"
@@ -93,8 +96,7 @@ def test_joints_move_as_mechanics_says(simulation):
     assert found(simulation, "Lift").drive.force() == pytest.approx(3 * 9.81, rel=1e-3)
     assert found(simulation, "Axle").velocity_along == pytest.approx(0.5 * 6 / 1.0, rel=1e-6), "0.5 N m on 1 kg m2"
     assert found(simulation, "Left").velocity_along == pytest.approx(2, abs=0.01)
-    velocity, _ = found(simulation, "Cart").velocity()
-    assert velocity[0] == pytest.approx(2 * 0.2, rel=0.05), "it rolls"
+    assert found(simulation, "Cart").matrix()[3] - rolling == pytest.approx(4 * 2 * 0.2, rel=0.02), "it rolls, nodding"
     assert found(simulation, "Loose").matrix()[11] < 0.1, "the tree does not weld"
     wheel, lamp = (found(simulation, name).matrix()[3::4] for name in ("LeftWheel", "Lamp"))
     assert math.dist(wheel, lamp) == pytest.approx(0.2), "what hangs on it turns with it"
