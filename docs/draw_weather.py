@@ -182,7 +182,7 @@ def _with_propeller(share, steps):
 def _torque(drone):
     """Return the torque (N m, body) of the propellers: r × f of each, and its reaction."""
     torque = np.zeros(3)
-    blown = zip(_points(drone), drone._propellers.thrusts, drone.faults.now.propellers, drone.particle_velocities)
+    blown = zip(_points(drone), drone.propulsion.thrusts, drone.faults.now.propellers, drone.particle_velocities)
     for (_, sense), (point, thrust, share, velocity) in zip(PROPELLERS, blown):
         torque += np.cross(point, (0, 0, thrust))
         torque[2] += sense * 0.002 * share * velocity
@@ -192,7 +192,7 @@ def _torque(drone):
 def _points(drone):
     """Return where the propellers push (m, inertial frame)."""
     from_root = drone.body.inertial_from_root
-    return [frames.position(frames.multiply(from_root, link)) for link in drone._rotors.links]
+    return [frames.position(frames.multiply(from_root, link)) for link in drone.propulsion.rotors.links]
 
 
 def _draw_a_tenth_less(figure, grid, times, states):

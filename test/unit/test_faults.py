@@ -61,9 +61,9 @@ def test_a_weak_propeller_turns_the_drone_as_its_lever_and_inertia_say(simulate,
     drone.change_faults({"propellers": shares})
     fly(simulation, 1)
     torque = np.zeros(3)
-    for one, (_, sense), link in zip(range(4), PROPELLERS, drone._rotors.links):
+    for one, (_, sense), link in zip(range(4), PROPELLERS, drone.propulsion.rotors.links):
         velocity = shares[one] * drone.particle_velocities[one]
-        thrust = drone._propellers.thrusts[one]
+        thrust = drone.propulsion.thrusts[one]
         point = frames.position(frames.multiply(drone.body.inertial_from_root, link))
         torque += np.cross(point, (0, 0, thrust))
         torque[2] += sense * 0.002 * velocity
@@ -83,14 +83,14 @@ def test_a_tenth_less_of_one_propeller_leaves_a_turn_and_a_drift(simulate):
     # Level: Pangle (Kvcorr (0 - v)) = d, forwards; the same to the side.
     assert track[0] == pytest.approx(-correction / 0.3 / 0.5, rel=0.05)
     assert math.hypot(*state.angular_velocity[:2]) < 1e-3
-    thrusts = simulation.drone._propellers.thrusts
+    thrusts = simulation.drone.propulsion.thrusts
     assert thrusts == pytest.approx([thrusts[0]] * 4, rel=1e-3)
 
 
 def test_limits_are_of_what_is_commanded(simulate):
     simulation = simulate(propellers={"velocity_limits": [4, 5]}, faults={"propellers": [0.5, 0, 1, 1]})
     fly(simulation, 1)
-    weak, stopped, *sound = simulation.drone._propellers.thrusts
+    weak, stopped, *sound = simulation.drone.propulsion.thrusts
     assert stopped == 0
     assert sound == [2 * weak] * 2
 

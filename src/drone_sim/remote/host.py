@@ -6,24 +6,22 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from drone_sim.mechanics.frames import Vector
-from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import Readable, Surroundings
 from drone_sim.scripting.api.registry import Attachment, Callee, Scripts
-from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.api.turns import Turns
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.vehicles.child_script import surroundings
+from drone_sim.vehicles.shared_view import SharedView
 from drone_sim.vehicles.vehicle import Vehicle
 
 
-class ClientHost:
+class ClientHost(SharedView):
     """Names without a suffix mean the first vehicle's objects, as in its script."""
 
     def __init__(self, simulation: Simulation):
         """Take the simulation as it is in this era."""
-        self._shared = simulation.shared
+        super().__init__(simulation.shared)
         self._vehicles = list(simulation.vehicles.values())
         self._first = self._vehicles[0]
 
@@ -37,29 +35,14 @@ class ClientHost:
         return {name: sensor for one in self._vehicles for name, sensor in one.sensors.items()}
 
     @property
-    def objects(self) -> ObjectTree:
-        """The objects of the scene."""
-        return self._shared.objects
-
-    @property
     def scripts(self) -> Scripts:
         """The scripts of the simulation."""
         return _FromOutside(self._shared.scripts)
 
     @property
-    def signals(self) -> Signals:
-        """The signals of all scripts."""
-        return self._shared.signals
-
-    @property
     def own_script(self) -> str:
         """Name of the object whose script `sim.handle_self` means: the first vehicle's."""
         return self._first.own_script
-
-    @property
-    def drawings(self) -> Drawings:
-        """What is drawn, by all together."""
-        return self._shared.drawings
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m)."""

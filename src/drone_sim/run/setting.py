@@ -130,8 +130,9 @@ class Setting:
 
     def _show_blades(self) -> None:
         """Turn the blades of all vehicles in the world's pictures to where they are, once for all cameras."""
-        if self._blades_shown == self.world.changes and not any(one.blades.turned for one in self.vehicles.values()):
+        blades = [vehicle.propulsion.blades for vehicle in self.vehicles.values()]
+        if self._blades_shown == self.world.changes and not any(one.turned for one in blades):
             return
-        for vehicle in self.vehicles.values():
-            vehicle.blades.show()
+        for one in blades:
+            one.show()
         self._blades_shown = self.world.changes

@@ -8,33 +8,30 @@ from collections import ChainMap
 from collections.abc import Callable, Mapping
 
 from drone_sim.mechanics.frames import Vector
-from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scripting import load
-from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.registry import Scripts
-from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.guarded import GuardedScript, tell_failure
 from drone_sim.sensors.sensor import Instrument
 from drone_sim.vehicles.child_script import call_init, check_callbacks, load_child_script
 from drone_sim.vehicles.script_parameters import bring_back, propeller_script_parameters
 from drone_sim.vehicles.shared import Shared
+from drone_sim.vehicles.shared_view import SharedView
 from drone_sim.vehicles.vehicle import Vehicle
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
 _EVERYWHERE = ""  # namespace of the topics of what belongs to no vehicle
 
 
-class AttachedScript:
+class AttachedScript(SharedView):
     """The script of an object, as the simulation calls it, and what the script finds (scripting.api.host.Host)."""
 
     def __init__(
         self, parameters: AttachedScriptParameters, handle: int, vehicles: Mapping[str, Vehicle], shared: Shared
     ):
         """Attach it to the object of a handle, without loading it. The vehicles are those of the simulation."""
-        self._shared = shared
+        super().__init__(shared)
         self._vehicles = vehicles
         self.file = parameters.script
         here = shared.objects[handle]
@@ -47,40 +44,20 @@ class AttachedScript:
         self.bus = MessageBus(name, None if self.vehicle else {})
         self.bus.backend = shared.backend
         if self.vehicle:
-            self.vehicle.listening.append(self.bus)
+            self.vehicle.commands.listening.append(self.bus)
         self.parameters = self._attach()
         self.parameters.update(copy.deepcopy(parameters.parameters))
         self.scripts.add(self.own_script, self.parameters)
 
     def _attach(self) -> dict[str, object]:
         """Return the parameters that V-REP's script has there; a propeller's built-in law gives way to it."""
-        law = self.vehicle.give_way(self.own_script) if self.vehicle else None
+        law = self.vehicle.propulsion.give_way(self.own_script) if self.vehicle else None
         if law is None:
             return {}
         law.update({**propeller_script_parameters(), **law})
         return law
 
     # ---- what scripts see
-
-    @property
-    def objects(self) -> ObjectTree:
-        """The objects of the scene."""
-        return self._shared.objects
-
-    @property
-    def scripts(self) -> Scripts:
-        """The scripts of the simulation."""
-        return self._shared.scripts
-
-    @property
-    def signals(self) -> Signals:
-        """The signals that scripts leave for each other."""
-        return self._shared.signals
-
-    @property
-    def drawings(self) -> Drawings:
-        """What scripts draw."""
-        return self._shared.drawings
 
     @property
     def sensors(self) -> Mapping[str, Instrument]:
@@ -103,7 +80,7 @@ class AttachedScript:
     def turn_joint(self, joint: str, angle: float | None = None) -> float:
         """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError for what is none."""
         for one in self._vehicles.values():
-            if one.blades.has(joint):
+            if one.propulsion.blades.has(joint):
                 return one.turn_joint(joint, angle)
         raise ValueError(f"'{joint}' is not a joint")
 

@@ -58,7 +58,7 @@ def count(player: Player, pacer: Pacer, at: float) -> Counts:
         pictures=vision.pictures,
         drawing=vision.seconds,
         shown=shown,
-        clipped={name: vehicle.clipped_steps for name, vehicle in vehicles.items()},
+        clipped={name: vehicle.propulsion.law.clipped for name, vehicle in vehicles.items()},
     )
 
 

@@ -96,7 +96,7 @@ class VehicleDiagnosis:
         vehicle, taken = self._vehicle, self._log.taken.get(COMMAND)
         if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []
-        if not any(bus.hears(COMMAND) for bus in (vehicle.bus, *vehicle.listening)):
+        if not any(bus.hears(COMMAND) for bus in vehicle.commands.buses):
             return [Problem(WARN, f"commands come in, but the child script does not subscribe to {COMMAND}")]
         gone = taken.sender not in self._log.senders()
         if gone and vehicle.command != Twist() and not vehicle.parameters.cmd_vel_timeout:
