@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """A node that flies as teleoperation nodes of real drones do: reset, a second, takeoff, three, twists at 10 Hz, land.
 
-It flies a square, hands over to what comes on cmd_vel_in, and is silent before it lands.
+It flies a square, then hands on what an outside controller sends on cmd_vel_in, as long as that goes on sending, and is
+silent before it lands.
 """
 
 import rospy
@@ -10,6 +11,7 @@ from listening import connected
 from std_msgs.msg import Empty
 
 RATE = 10  # Hz, of its time
+WATCHDOG = 0.25  # s of its time, after which an outside controller counts as gone
 CORNERS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
@@ -23,11 +25,15 @@ class SafePilot:
             connected(rospy.Publisher(topic, Empty, queue_size=1)) for topic in ("reset", "takeoff", "land")
         )
         self._twists = connected(rospy.Publisher("cmd_vel", Twist, queue_size=1))
-        self._outside = Twist()
+        self._outside, self._came = Twist(), rospy.Time()
         rospy.Subscriber("cmd_vel_in", Twist, self._take)
 
     def _take(self, message):
-        self._outside = message
+        self._outside, self._came = message, rospy.Time.now()
+
+    def _handed_on(self):
+        gone = (rospy.Time.now() - self._came).to_sec() > WATCHDOG
+        return Twist() if gone else self._outside
 
     def fly(self):
         """Fly from the reset to the landing."""
@@ -37,7 +43,7 @@ class SafePilot:
         rospy.sleep(3)
         rate = rospy.Rate(RATE)
         for number in range(5 * self._ticks):
-            twist = self._outside
+            twist = self._handed_on()
             if number < 4 * self._ticks:
                 twist = Twist()
                 twist.linear.x, twist.linear.y = (0.5 * part for part in CORNERS[number // self._ticks])

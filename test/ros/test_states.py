@@ -5,6 +5,7 @@ import subprocess
 import sys
 import unittest
 from pathlib import Path
+from typing import NamedTuple
 
 import rospy
 import rostest
@@ -16,32 +17,53 @@ from std_msgs.msg import Empty, Float32MultiArray, String
 
 from drone_sim.files.resources import package_path
 
-FACTOR = 5
 PILOT = Path(__file__).with_name("safe_pilot.py")
-LEGS = {"real": 0.4, "simulated": 2.0}  # s of the pilot's time: as far as each flies, at FACTOR
+
+
+class Flight(NamedTuple):
+    """How fast one simulator flies, by which time its pilot goes, and how long a leg of the square takes (s of that)."""
+
+    factor: float
+    simulated: bool
+    leg: float
+
+
+FLIGHTS = {
+    "slow_real": Flight(1, False, 0.8),
+    "slow_simulated": Flight(1, True, 0.8),
+    "real": Flight(5, False, 0.4),
+    "simulated": Flight(5, True, 2.0),
+}
+QUICK = ("real", "simulated")
+TURN = 0.6  # rad/s, of the outside controller
 
 
 class States(unittest.TestCase):
-    """Two simulators with a drone each; /use_sim_time counts when a node begins."""
+    """Four simulators with a drone each, at once; /use_sim_time counts when a node begins."""
 
     @classmethod
     def setUpClass(cls):
         cls.processes, cls.odometry, cls.states, cls.pilots = [], {}, {}, {}
         cls.log = Listener("/rosout", Log)
-        handing_over = Twist()
-        handing_over.angular.z = 0.6
-        cls.publishers = []
-        for name, leg in LEGS.items():
-            rospy.set_param("/use_sim_time", name == "simulated")
+        for name, flight in FLIGHTS.items():
+            rospy.set_param("/use_sim_time", flight.simulated)
             cls.odometry[name] = Listener(f"/{name}/odom", Odometry)
             cls.states[name] = Listener(f"/{name}/state", String)
-            cls.publishers.append(rospy.Publisher(f"/{name}/cmd_vel_in", Twist, queue_size=1, latch=True))
-            cls.publishers[-1].publish(handing_over)
-            settings = (f"_drone/name:={name}", f"_real_time_factor:={FACTOR}", "_start:=landed")
-            cls.begin(str(package_path() / "scripts/simulator"), f"__name:=sim_{name}", *settings)
-            cls.pilots[name] = cls.begin(str(PILOT), f"__name:=pilot_{name}", f"__ns:=/{name}", str(leg))
+            cls.control_from_outside(name)
+            clock = f"/clock:=/{name}/clock"  # each has its own
+            settings = (f"_drone/name:={name}", f"_real_time_factor:={flight.factor}", "_start:=landed")
+            cls.begin(str(package_path() / "scripts/simulator"), f"__name:=sim_{name}", clock, *settings)
+            cls.pilots[name] = cls.begin(str(PILOT), f"__name:=pilot_{name}", f"__ns:=/{name}", clock, str(flight.leg))
+        for name in FLIGHTS:
             cls.odometry[name].wait_for(after=0)
-            connected(cls.publishers[-1])
+
+    @staticmethod
+    def control_from_outside(name):
+        """Answer every odometry with a command, whatever time goes by: the pilot decides whether it counts."""
+        turning = Twist()
+        turning.angular.z = TURN
+        publisher = rospy.Publisher(f"/{name}/cmd_vel_in", Twist, queue_size=1)
+        rospy.Subscriber(f"/{name}/odom", Odometry, lambda _message: publisher.publish(turning))
 
     @classmethod
     def begin(cls, *command):
@@ -55,23 +77,27 @@ class States(unittest.TestCase):
         for process in cls.processes:
             process.wait()
 
-    def test_1_take_off_square_landing(self):
-        for name, pilot in self.pilots.items():
+    def test_1_quick(self):
+        for name in QUICK:
             with self.subTest(name):
-                self.assertEqual(pilot.wait(30), 0)
-                self.states[name].wait_for(lambda m, one=name: len(self.states[one].messages) == 5, after=0)
-                said = [message.data for message in self.states[name].messages]
-                self.assertEqual(said, ["landed", "taking off", "flying", "landing", "landed"])
-                flown = [message.pose.pose.position for message in self.odometry[name].messages]
-                for axis in "xy":
-                    places = [getattr(one, axis) for one in flown]
-                    self.assertGreater(max(places) - min(places), 0.4)
-                self.assertAlmostEqual(max(one.z for one in flown), 0.81, delta=0.1)
-                turning = max(message.twist.twist.angular.z for message in self.odometry[name].messages)
-                self.assertAlmostEqual(turning, 0.6, delta=0.2)
-                self.odometry[name].wait_for(lambda m: m.pose.pose.position.z < 0.02)
-                rest = Listener(f"/{name}/propellers", Float32MultiArray).wait_for(after=0)
-                self.assertEqual(list(rest.data), [0, 0, 0, 0])
+                self.check_flight(name)
+
+    def check_flight(self, name):
+        """Check that a pilot took off, flew a square, handed over, and landed."""
+        self.assertEqual(self.pilots[name].wait(30), 0)
+        self.states[name].wait_for(lambda m: len(self.states[name].messages) == 5, after=0)
+        said = [message.data for message in self.states[name].messages]
+        self.assertEqual(said, ["landed", "taking off", "flying", "landing", "landed"])
+        flown = [message.pose.pose.position for message in self.odometry[name].messages]
+        for axis in "xy":
+            places = [getattr(one, axis) for one in flown]
+            self.assertGreater(max(places) - min(places), 0.15)
+        self.assertAlmostEqual(max(one.z for one in flown), 0.81, delta=0.1)
+        turning = [message.twist.twist.angular.z for message in self.odometry[name].messages]
+        self.assertAlmostEqual(max(turning), TURN, delta=0.2)
+        self.odometry[name].wait_for(lambda m: m.pose.pose.position.z < 0.02)
+        rest = Listener(f"/{name}/propellers", Float32MultiArray).wait_for(after=0)
+        self.assertEqual(list(rest.data), [0, 0, 0, 0])
 
     def test_2_a_twist_on_the_ground_says_why(self):
         twists = connected(rospy.Publisher("/real/cmd_vel", Twist, queue_size=1))
@@ -99,6 +125,11 @@ class States(unittest.TestCase):
         asks["reset"].publish()
         self.states["real"].wait_for(lambda m: m.data == "landed", after=-1)
         self.odometry["real"].wait_for(lambda m: m.pose.pose.position.z < 0.02)
+
+    def test_4_slow(self):
+        for name in FLIGHTS.keys() - set(QUICK):
+            with self.subTest(name):
+                self.check_flight(name)
 
 
 if __name__ == "__main__":
