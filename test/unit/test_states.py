@@ -112,7 +112,7 @@ def test_landing_ends_on_what_it_meets():
     simulation.close()
 
 
-def test_landed_stands_on_what_is_below():
+def test_landed_stands_on_what_is_below(caplog):
     table = {"shape": "box", "size": [1, 1, 0.4], "position": [0, 0, 0.2]}
     simulation = Simulation(parameters.load({"start": "landed", "scene": {"objects": [table]}}))
     simulation.drone.ask("takeoff")
@@ -120,7 +120,12 @@ def test_landed_stands_on_what_is_below():
     simulation.drone.ask("reset")
     assert fly(simulation, 1.0)[-1].position[2] == pytest.approx(0.411, abs=0.01)
     simulation.stop()
-    simulation.drone.ask("takeoff")  # nobody is there to hear it
+    for topic in ("takeoff", "takeoff", "reset"):
+        simulation.drone.ask(topic)
+    assert [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING] == [
+        "takeoff: nothing happens: the simulation is stopped; `start` it first",
+        "reset: nothing happens: the simulation is stopped; `start` it first",
+    ]
     simulation.start()
     assert str(simulation.drone.flight_state) == "landed"
     simulation.close()
@@ -165,9 +170,12 @@ def test_goto_and_home(flying):
 
 def test_goto_is_refused_on_the_ground(landed, caplog):
     again(landed)
-    landed.drone.ask("goto", Pose((1.0, 0.0, 1.0)))
-    fly(landed, 0.5)
-    assert "goto does not move the drone: it is landed" in caplog.text
+    for _ in range(3):
+        landed.drone.ask("goto", Pose((1.0, 0.0, 1.0)))
+        fly(landed, 3.0)
+    assert [one.getMessage() for one in caplog.records] == 2 * [
+        "goto does not move the drone: it is landed; `takeoff` first"
+    ]
 
 
 def test_a_crash_stops_the_propellers_until_reset(flying, caplog):
@@ -225,6 +233,65 @@ def test_a_reset_leaves_others_where_they_are():
     assert one.state.position == pytest.approx(one.parameters.position, abs=0.01)
     assert other.state.position == pytest.approx(before, abs=0.05)
     simulation.close()
+
+
+def test_resets_of_one_of_three_disturb_no_flight_by_a_bit():
+    def flights(resets):
+        """Return the flights of the middle one, one for each reset, and that of its neighbours."""
+        simulation = Simulation(parameters.load({"vehicles": 3}))
+        left, one, right = simulation.vehicles.values()
+        own, others = [], []
+        for vehicle in (left, right):
+            vehicle.receive(FORWARD)
+        for number in range(20):
+            if resets and number % 5 == 4:
+                one.move(Pose((one.parameters.position[0], 0.1, 0.03), ON_ITS_BACK.orientation))
+            elif resets:
+                one.receive(FORWARD)
+            for _ in range(30 if number % 5 == 4 else 5):
+                simulation.step()
+                others.append((left.state, right.state))
+            if resets:
+                assert str(one.flight_state) == ("crashed" if number % 5 == 4 else "flying")
+                one.ask("reset")
+            own.append([])
+            for _ in range(10):
+                simulation.step()
+                own[-1].append(one.state)
+                others.append((left.state, right.state))
+        simulation.close()
+        return own, others
+
+    own, others = flights(resets=True)
+    assert all(flight == own[0] for flight in own)
+    assert others == flights(resets=False)[1]
+
+
+def test_requests_at_the_wrong_moment(landed, caplog):
+    again(landed)
+    landed.drone.ask("reset")
+    landed.drone.ask("reset")
+    landed.drone.ask("land")  # it has
+    fly(landed, 0.5)
+    assert str(landed.drone.flight_state) == "landed"
+    for _ in range(3):
+        landed.drone.ask("takeoff")
+        fly(landed, 0.3)
+    landed.drone.ask("goto", Pose((1.0, 0.0, 1.0)))
+    fly(landed, 0.1)
+    assert str(landed.drone.flight_state) == "taking off"
+    landed.drone.ask("land")
+    assert max(one.position[2] for one in until(landed, "landed")) < 0.6
+    landed.drone.move(ON_ITS_BACK)
+    until(landed, "crashed")
+    for topic in ("land", "takeoff", "home"):
+        landed.drone.ask(topic)
+    fly(landed, 0.1)
+    crashed = "does not move the drone: it is crashed; `reset` puts it back"
+    assert [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING] == [
+        "goto does not move the drone: it is taking off; wait until it flies",
+        *(f"{topic} {crashed}" for topic in ("takeoff", "land", "home")),
+    ]
 
 
 def test_a_snapshot_brings_back_the_pilot_too(landed):

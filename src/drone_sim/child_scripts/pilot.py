@@ -23,6 +23,7 @@ FASTEST, LIFT, TURN = 1.0, 0.5, 1.0  # m/s, m/s, rad/s, on the way to somewhere
 APPROACH, TURNING = 0.5, 1.0  # 1/s, speed per distance that is left
 NEAR = 0.3  # m of height, from which the tutorial's law holds it by itself
 LEANING = math.radians(60)  # no flight leans so far
+AGAIN = 5.0  # s, until it is said again that a request is refused; of twists, which come all the time, it is said once
 LIES, LIES_FOR = 0.1, 1.0  # m/s, s: leaning and so slow so long, it lies there
 
 
@@ -96,6 +97,8 @@ def on_land(_msg):
     """Descend, whatever is below, and stop the propellers there."""
     if self.state in (FLYING, TAKING_OFF):
         enter(LANDING, descend)
+    elif self.state == CRASHED:
+        refuse("land")
 
 
 def on_goto(msg):
@@ -124,9 +127,10 @@ def go(goal, topic):
 
 
 def refuse(topic):
-    """Say once in each state why nothing moves."""
-    if topic not in self.refused:
-        self.refused.append(topic)
+    """Say why nothing moves."""
+    now = sim.getSimulationTime()
+    if now - self.refused.get(topic, -math.inf) >= AGAIN:
+        self.refused[topic] = math.inf if topic == "cmd_vel" else now
         cures = {LANDED: "`takeoff` first", CRASHED: "`reset` puts it back", LANDING: "`takeoff` breaks that off"}
         said = f"{topic} does not move the drone: it is {self.state}; {cures.get(self.state, 'wait until it flies')}"
         sim.addLog(sim.verbosity_scriptwarnings, said)
@@ -138,7 +142,7 @@ def refuse(topic):
 def enter(state, work=None):
     """Be in a state, and do the work in every step; commands of the one before are over."""
     self.state, self.work = state, work
-    self.refused, self.waiting, self.still = [], None, 0.0
+    self.refused, self.waiting, self.still = {}, None, 0.0  # refused: when that was last said (s), by topic
     self.vx = self.vy = self.vz = self.rz = 0
     simROS.publish(self.state_publisher, {"data": state})
 

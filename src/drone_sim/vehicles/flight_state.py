@@ -26,6 +26,7 @@ class FlightState:
     def begin(self) -> None:
         """Forget what was asked in vain: another script may be there."""
         self._missing = ""
+        self._dropped: set[str] = set()
 
     def __str__(self) -> str:
         """Return the state, as a script says it; `unknown` where none does."""
@@ -45,3 +46,9 @@ class FlightState:
             _LOG.warning("%s: nothing happens: the child script does not subscribe to it; `pilot` does", topic)
         for bus in hearing:
             bus.post(topic, message)
+
+    def drop(self, topic: str) -> None:
+        """Say that a request comes to nothing while the simulation is stopped: once for each topic and stop."""
+        if topic not in self._dropped:
+            self._dropped.add(topic)
+            _LOG.warning("%s: nothing happens: the simulation is stopped; `start` it first", topic)

@@ -218,9 +218,10 @@ class Vehicle(SharedView):
     def ask(self, topic: str, pose: Pose | None = None) -> None:
         """Let the script do what a topic of `requests` asks for, if it offers that; `reset` puts it back before.
 
-        While the simulation is stopped, and has no script, nothing happens.
+        While the simulation is stopped, and has no script, nothing happens but a line in the log.
         """
         if isinstance(self.script, load.NoScript):
+            self.flight_state.drop(topic)
             return
         before = self._begin_again if topic == RESET else lambda: None
         self.flight_state.ask(topic, request(pose), before)

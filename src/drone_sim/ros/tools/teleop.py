@@ -20,6 +20,7 @@ from drone_sim.ros.tools.commands import Command, CommandInForce
 
 _SILENCE = 1.0  # s of real time; a simulator says something in every step, and while it stands, too
 _REQUESTS = {"t": "takeoff", "l": "land", "x": "reset"}  # topics, by key
+_STANDING = {"stopped": ", in vain: s starts the simulation", "paused": ": done once p lets the simulation go on"}
 _FAREWELL = 0.2  # s; a message leaves in rospy's own time, and a node that is gone delivers nothing
 _FAILURES = (rospy.ServiceException, rospy.ROSException, rospy.exceptions.ROSInternalException, OSError)
 
@@ -91,7 +92,8 @@ class Teleop:
     def _ask_for(self, key: str) -> None:
         publisher, name = self._requests[key], _REQUESTS[key]
         listened = publisher.get_num_connections() > 0
-        self.said = f"{name} sent" if listened else f"nobody listens on {publisher.resolved_name}: nothing sent"
+        sent = f"{name} sent{_STANDING.get(self._told, '')}"
+        self.said = sent if listened else f"nobody listens on {publisher.resolved_name}: nothing sent"
         publisher.publish(Empty())
 
     def _command(self, key: str) -> bool:
