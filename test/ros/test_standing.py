@@ -127,6 +127,19 @@ class Standing(unittest.TestCase):
         heights = [o.pose.pose.position.z for o in self.odometry.messages[before:]]
         self.assertTrue(all(abs(height - 8.0) < 1e-6 for height in heights), heights)
 
+    def test_who_comes_while_the_clock_stands_is_told_what_is(self):
+        now = self.stamp(0)
+        for name, topic, kind in (("clock", "/clock", Clock), ("transforms", "/tf", TFMessage)):
+            getattr(self, name).close()
+            setattr(type(self), name, Listener(topic, kind))
+        self.assertEqual(self.clock.wait_for(after=0).clock, now)
+        told = self.transforms.wait_for(after=0).transforms
+        self.assertEqual({one.header.stamp for one in told}, {now})
+        self.assertIn("base_link", [one.child_frame_id for one in told])
+        pictures = Listener("/drone/track/image", Image)
+        self.addCleanup(pictures.close)
+        self.assertEqual(pictures.wait_for(after=0).header.stamp, now)
+
 
 if __name__ == "__main__":
     rospy.init_node("test_standing", disable_rostime=True)

@@ -21,7 +21,7 @@ PILOT = Path(__file__).with_name("safe_pilot.py")
 
 
 class Flight(NamedTuple):
-    """How fast one simulator flies, by which time its pilot goes, and how long a leg of the square takes (s of that)."""
+    """How fast one simulator flies, by which time its pilot goes, and how long a leg of its square takes (s)."""
 
     factor: float
     simulated: bool

@@ -233,6 +233,7 @@ def test_pictures_are_recorded_by_choice_and_never_raw():
         "/drone/contacts": "visualization_msgs/MarkerArray",
         "/rosout": "rosgraph_msgs/Log",
         "/rosout_agg": "rosgraph_msgs/Log",
+        "/clock": "rosgraph_msgs/Clock",
     }
     small = ["/drone/cmd_vel", "/drone/odom", "/rosout"]
     assert chosen(kinds, images=False) == small

@@ -235,36 +235,39 @@ def test_a_reset_leaves_others_where_they_are():
     simulation.close()
 
 
-def test_resets_of_one_of_three_disturb_no_flight_by_a_bit():
-    def flights(resets):
-        """Return the flights of the middle one, one for each reset, and that of its neighbours."""
-        simulation = Simulation(parameters.load({"vehicles": 3}))
-        left, one, right = simulation.vehicles.values()
-        own, others = [], []
-        for vehicle in (left, right):
-            vehicle.receive(FORWARD)
-        for number in range(20):
-            if resets and number % 5 == 4:
-                one.move(Pose((one.parameters.position[0], 0.1, 0.03), ON_ITS_BACK.orientation))
-            elif resets:
-                one.receive(FORWARD)
-            for _ in range(30 if number % 5 == 4 else 5):
-                simulation.step()
-                others.append((left.state, right.state))
-            if resets:
-                assert str(one.flight_state) == ("crashed" if number % 5 == 4 else "flying")
-                one.ask("reset")
-            own.append([])
-            for _ in range(10):
-                simulation.step()
-                own[-1].append(one.state)
-                others.append((left.state, right.state))
-        simulation.close()
-        return own, others
+def fleet_flights(resets):
+    """Return 20 flights of the middle one of three, each after a reset, and all that its neighbours fly meanwhile."""
+    simulation = Simulation(parameters.load({"vehicles": 3}))
+    left, one, right = simulation.vehicles.values()
+    own, others = [], []
 
-    own, others = flights(resets=True)
+    def go(steps):
+        for _ in range(steps):
+            simulation.step()
+            others.append((left.state, right.state))
+            yield one.state
+
+    left.receive(FORWARD)
+    right.receive(FORWARD)
+    for number in range(20):
+        crashes = number % 5 == 4
+        if resets and crashes:
+            one.move(Pose((one.parameters.position[0], 0.1, 0.03), ON_ITS_BACK.orientation))
+        elif resets:
+            one.receive(FORWARD)
+        list(go(30 if crashes else 5))
+        assert str(one.flight_state) == ("crashed" if resets and crashes else "flying")
+        if resets:
+            one.ask("reset")
+        own.append(list(go(10)))
+    simulation.close()
+    return own, others
+
+
+def test_resets_of_one_of_three_disturb_no_flight_by_a_bit():
+    own, others = fleet_flights(resets=True)
     assert all(flight == own[0] for flight in own)
-    assert others == flights(resets=False)[1]
+    assert others == fleet_flights(resets=False)[1]
 
 
 def test_requests_at_the_wrong_moment(landed, caplog):

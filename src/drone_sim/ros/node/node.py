@@ -180,10 +180,11 @@ class Node:
         self._show_to_eyes()
 
     def _show_at_the_same_time(self) -> None:
-        """Show what has changed under a stamp that was used before: no transforms, which tf2 takes only once."""
+        """Show what has changed under a stamp used before: transforms, of which tf2 takes one, to newcomers."""
         self._topics.follow()
         self._time.end(at_once=True)
-        if self.simulation.world.changes != self._shown:
+        self._time.tell_newcomers()
+        if self._topics.tell_newcomers(self._time.stamp) or self.simulation.world.changes != self._shown:
             self.simulation.look()
             self._show_state()
         self._show_to_eyes()

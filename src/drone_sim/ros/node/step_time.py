@@ -7,6 +7,7 @@ from typing import Protocol
 import rospy
 from rosgraph_msgs.msg import Clock
 
+from drone_sim.ros.node.newcomers import Newcomers
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 
@@ -32,7 +33,10 @@ class StepTime:
         """Advertise /clock, if the time is `simulated`."""
         self.simulated = simulated
         self._simulation = simulation
-        self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if simulated else None
+        self._newcomers = Newcomers()
+        self._clock = (
+            rospy.Publisher("/clock", Clock, subscriber_listener=self._newcomers, queue_size=10) if simulated else None
+        )
         self._throttle = Throttle(_CLOCK_PERIOD)
         self._began = rospy.Time()
         self._pace = 0.0  # s of the stamps for a second of simulated time
@@ -58,6 +62,11 @@ class StepTime:
             if time:
                 self._clock.publish(stamp)
         return rospy.Time.from_sec(max(0.0, time - ago)) if ago else stamp
+
+    def tell_newcomers(self) -> None:
+        """Tell whoever has begun to listen while the clock stands still what time it is."""
+        for tell in self._newcomers.take() if self._said else ():
+            tell(Clock(rospy.Time.from_sec(self._said)))
 
     def end(self, at_once: bool = False) -> None:
         """Say that the step has been shown; `at_once`: /clock tells of it in any case."""

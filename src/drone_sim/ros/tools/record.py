@@ -27,7 +27,7 @@ _NAME = "record"
 _PERIOD = 0.1  # s, between two questions to the master
 _LARGE = r"sensor_msgs/(Image|PointCloud2?)|visualization_msgs/.*|dynamic_reconfigure/.*|theora_image_transport/.*"
 _IMAGES = r"sensor_msgs/(CompressedImage|CameraInfo)"  # a twentieth of the raw ones
-_TWICE = "/rosout_agg"
+_OF_OTHERS = ("/rosout_agg", "/clock")  # said twice; told by `rosbag play --clock`, and in the times of all messages
 _LAST_SERVICE = "pause"  # that the simulator advertises: its topics are there by then
 
 
@@ -46,7 +46,7 @@ def main() -> int:
 def chosen(kinds: Mapping[str, str], images: bool) -> list[str]:
     """Return the topics to record, of all with their kinds of message."""
     left_out = _LARGE if images else f"{_LARGE}|{_IMAGES}"
-    return sorted(name for name, kind in kinds.items() if name != _TWICE and not re.fullmatch(left_out, kind))
+    return sorted(name for name, kind in kinds.items() if name not in _OF_OTHERS and not re.fullmatch(left_out, kind))
 
 
 def _record(options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:

@@ -7,6 +7,7 @@ import rospy
 from cv_bridge import CvBridge
 from sensor_msgs.msg import CameraInfo, Image
 
+from drone_sim.ros.node.newcomers import Newcomers
 from drone_sim.ros.node.step_time import Stamp
 from drone_sim.ros.vehicle import messages
 from drone_sim.ros.vehicle.compression import CompressedPublisher
@@ -20,14 +21,19 @@ _ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
 class CameraOutput:
     """One camera: `<topic>`, `<topic>/compressed` (colour), and camera_info in the same namespace."""
 
-    def __init__(self, vehicle: VehicleParameters, camera: Camera, parameters: CameraParameters):
-        """Advertise in the vehicle's namespace; the camera takes pictures only while somebody listens."""
+    def __init__(
+        self, vehicle: VehicleParameters, camera: Camera, parameters: CameraParameters, newcomers: Newcomers
+    ):
+        """Advertise in the vehicle's namespace; the camera takes pictures only while somebody listens.
+
+        `newcomers` notes who begins to.
+        """
         topic = f"{vehicle.name}/{parameters.topic}"
         self._frame = f"{vehicle.frame_prefix}{parameters.frame}"
         info_topic = topic.rpartition("/")[0] + "/camera_info"  # image_transport's rule
         self._bridge = CvBridge()
-        self._image = rospy.Publisher(topic, Image, queue_size=1)
-        self._compressed = CompressedPublisher(topic) if parameters.kind == "color" else None
+        self._image = rospy.Publisher(topic, Image, subscriber_listener=newcomers, queue_size=1)
+        self._compressed = CompressedPublisher(topic, newcomers) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
         self._info = messages.camera_info(camera.intrinsics, self._frame)
         self.follow(camera)

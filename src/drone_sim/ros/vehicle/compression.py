@@ -13,6 +13,8 @@ import rospy
 from dynamic_reconfigure.server import Server
 from sensor_msgs.msg import CompressedImage
 
+from drone_sim.ros.node.newcomers import Newcomers
+
 
 def _parameter(name: str, kind: str, default: Any, lowest: Any, highest: Any, description: str) -> dict[str, Any]:
     return {
@@ -60,10 +62,10 @@ class CompressedPublisher:
     while it is busy are left out, but for the latest.
     """
 
-    def __init__(self, base: str):
-        """Advertise, and open the dynamic_reconfigure server at `<base>/compressed`."""
+    def __init__(self, base: str, newcomers: Newcomers):
+        """Advertise, and open the dynamic_reconfigure server at `<base>/compressed`; `newcomers` notes who listens."""
         topic = rospy.resolve_name(f"{base}/compressed")
-        self._publisher = rospy.Publisher(topic, CompressedImage, queue_size=1)
+        self._publisher = rospy.Publisher(topic, CompressedImage, subscriber_listener=newcomers, queue_size=1)
         self._settings: dict[str, Any] = {}
         self._server = Server(_plugin_parameters(), self._keep, topic)
         self._waiting: deque[_Picture] = deque(maxlen=1)

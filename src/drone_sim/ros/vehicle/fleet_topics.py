@@ -63,6 +63,11 @@ class FleetTopics:
             topics.publish_joints(stamp)
         self._transforms.publish(self._simulation.vehicles.values(), stamp)
 
+    def tell_newcomers(self, stamp: Callable[[], rospy.Time]) -> bool:
+        """Tell transforms to those who have not heard them; return whether somebody waits for pictures or state."""
+        self._transforms.tell_newcomers(self._simulation.vehicles.values(), stamp)
+        return any([topics.have_newcomers() for topics in self._topics.values()])
+
     def publish_command(self, stamp: Callable[[], rospy.Time]) -> None:
         """Publish the commands in force; they may change while the simulation stands."""
         for topics in self._topics.values():

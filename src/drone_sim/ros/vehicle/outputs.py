@@ -10,6 +10,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray, String
 
+from drone_sim.ros.node.newcomers import Newcomers
 from drone_sim.ros.vehicle import messages
 from drone_sim.run.pacing import Throttle
 from drone_sim.vehicles.parameters import VehicleParameters
@@ -21,11 +22,11 @@ _EYES = 1 / 30  # s of real time, between two messages that are for eyes
 class VehicleOutputs:
     """Odometry, command, propellers, joint states and flight state of one vehicle."""
 
-    def __init__(self, parameters: VehicleParameters):
-        """Advertise in the vehicle's namespace."""
+    def __init__(self, parameters: VehicleParameters, newcomers: Newcomers):
+        """Advertise in the vehicle's namespace; `newcomers` notes who begins to listen to odometry."""
         name = parameters.name
         self._base_link, self._track_base = parameters.base_link, parameters.track_base
-        self._odometry = rospy.Publisher(f"{name}/odom", Odometry, queue_size=10)
+        self._odometry = rospy.Publisher(f"{name}/odom", Odometry, subscriber_listener=newcomers, queue_size=10)
         self._command = rospy.Publisher(f"{name}/command", TwistStamped, queue_size=10)
         self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=10)
         self._joints = rospy.Publisher(f"{name}/joint_states", JointState, queue_size=10)

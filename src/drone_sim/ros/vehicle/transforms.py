@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 import rospy
-import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from drone_sim.mechanics import frames
+from drone_sim.ros.node.newcomers import Newcomers
 from drone_sim.ros.vehicle import messages
 from drone_sim.run.pacing import Throttle
 from drone_sim.vehicles.vehicle import Vehicle
@@ -26,7 +26,8 @@ class Transforms:
 
     def __init__(self) -> None:
         """Advertise."""
-        self._moving = tf2_ros.TransformBroadcaster()
+        self._newcomers = Newcomers()
+        self._moving = rospy.Publisher("/tf", TFMessage, subscriber_listener=self._newcomers, queue_size=100)
         self._fixed = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)
         self._eyes = Throttle(_EYES)
 
@@ -45,12 +46,19 @@ class Transforms:
 
     def publish(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
         """Publish all that moves under what `stamp` returns: tf2 takes but one for each stamp."""
-        if not self._moving.pub_tf.get_num_connections():
+        if not self._moving.get_num_connections():
             return
+        self._newcomers.forget()
         now = stamp()
-        self._moving.sendTransform([one for vehicle in vehicles for one in _moving(now, vehicle)])
+        self._moving.publish(TFMessage([one for vehicle in vehicles for one in _moving(now, vehicle)]))
         if self._eyes.passes():
-            self._moving.sendTransform([one for vehicle in vehicles for one in _turning(now, vehicle)])
+            self._moving.publish(TFMessage([one for vehicle in vehicles for one in _turning(now, vehicle)]))
+
+    def tell_newcomers(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
+        """Tell those who have not heard what moves under the stamp that there is already."""
+        for tell in self._newcomers.take():
+            now = stamp()
+            tell(TFMessage([one for vehicle in vehicles for one in (*_moving(now, vehicle), *_turning(now, vehicle))]))
 
 
 def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:

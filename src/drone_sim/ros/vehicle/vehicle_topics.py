@@ -7,6 +7,7 @@ from collections.abc import Callable
 import rospy
 
 from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.node.newcomers import Newcomers
 from drone_sim.ros.node.step_time import Stamp
 from drone_sim.ros.vehicle.cameras import CameraOutput
 from drone_sim.ros.vehicle.description import set_description
@@ -25,9 +26,10 @@ class VehicleTopics:
         """Advertise, subscribe, and set its robot_description."""
         self.vehicle = vehicle
         self._inputs = VehicleInputs(simulation, vehicle.parameters, inbox)
-        self._outputs = VehicleOutputs(vehicle.parameters)
+        self._newcomers = Newcomers()
+        self._outputs = VehicleOutputs(vehicle.parameters, self._newcomers)
         self._cameras = {
-            name: CameraOutput(vehicle.parameters, camera, vehicle.parameters.cameras[name])
+            name: CameraOutput(vehicle.parameters, camera, vehicle.parameters.cameras[name], self._newcomers)
             for name, camera in vehicle.cameras.items()
         }
         self._sensors = {
@@ -60,6 +62,10 @@ class VehicleTopics:
             camera.close()
         for sensor in self._sensors.values():
             sensor.close()
+
+    def have_newcomers(self) -> bool:
+        """Tell, once, whether somebody has begun to listen to pictures or state."""
+        return bool(self._newcomers.take())
 
     def publish_state(self, stamp: Stamp) -> None:
         """Publish pictures and state."""
