@@ -21,9 +21,7 @@ _ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
 class CameraOutput:
     """One camera: `<topic>`, `<topic>/compressed` (colour), and camera_info in the same namespace."""
 
-    def __init__(
-        self, vehicle: VehicleParameters, camera: Camera, parameters: CameraParameters, newcomers: Newcomers
-    ):
+    def __init__(self, vehicle: VehicleParameters, camera: Camera, parameters: CameraParameters, newcomers: Newcomers):
         """Advertise in the vehicle's namespace; the camera takes pictures only while somebody listens.
 
         `newcomers` notes who begins to.
