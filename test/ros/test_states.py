@@ -1,19 +1,25 @@
 #!/usr/bin/env python3
 """A pilot that knows the topics of real drones flies from take-off to landing, whatever time it goes by."""
 
+import itertools
+import math
+import signal
 import subprocess
 import sys
+import tempfile
+import threading
 import unittest
 from pathlib import Path
 from typing import NamedTuple
 
 import rospy
 import rostest
-from geometry_msgs.msg import PoseStamped, Twist
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from listening import Listener, connected
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import Empty, Float32MultiArray, String
+from std_srvs.srv import Trigger
 
 from drone_sim.files.resources import package_path
 
@@ -35,7 +41,28 @@ FLIGHTS = {
     "simulated": Flight(5, True, 2.0),
 }
 QUICK = ("real", "simulated")
+RECORDED = "simulated"
 TURN = 0.6  # rad/s, of the outside controller
+SPEED, STEP = 0.5, 0.05  # m/s, s
+
+
+def clock(name):
+    """Return the remapping that gives a simulator and all that goes by its time a /clock of their own."""
+    return f"/clock:=/{name}/clock"
+
+
+def path(messages):
+    """Return where a drone was at each step since it was first told to go, and the steps at which that changed."""
+    odometry, commands = messages
+    told = {}
+    for message in commands:
+        linear, angular = message.twist.linear, message.twist.angular
+        told[round(message.header.stamp.to_sec() / STEP)] = (linear.x, linear.y, angular.z)
+    steps = sorted(told)
+    changes = [now for before, now in itertools.pairwise(steps) if told[now] != told[before]]
+    places = {round(m.header.stamp.to_sec() / STEP): m.pose.pose.position for m in odometry}
+    flown = [(places[step].x, places[step].y) for step in sorted(places) if step >= changes[0]]
+    return flown, [step - changes[0] for step in changes]
 
 
 class States(unittest.TestCase):
@@ -45,25 +72,49 @@ class States(unittest.TestCase):
     def setUpClass(cls):
         cls.processes, cls.odometry, cls.states, cls.pilots = [], {}, {}, {}
         cls.log = Listener("/rosout", Log)
-        for name, flight in FLIGHTS.items():
-            rospy.set_param("/use_sim_time", flight.simulated)
-            cls.odometry[name] = Listener(f"/{name}/odom", Odometry)
-            cls.states[name] = Listener(f"/{name}/state", String)
-            cls.control_from_outside(name)
-            clock = f"/clock:=/{name}/clock"  # each has its own
-            settings = (f"_drone/name:={name}", f"_real_time_factor:={flight.factor}", "_start:=landed")
-            cls.begin(str(package_path() / "scripts/simulator"), f"__name:=sim_{name}", clock, *settings)
-            cls.pilots[name] = cls.begin(str(PILOT), f"__name:=pilot_{name}", f"__ns:=/{name}", clock, str(flight.leg))
-        for name in FLIGHTS:
-            cls.odometry[name].wait_for(after=0)
+        cls.folder = tempfile.TemporaryDirectory()
+        for simulated in (False, True):
+            rospy.set_param("/use_sim_time", simulated)
+            names = [name for name, flight in FLIGHTS.items() if flight.simulated == simulated]
+            for name in names:
+                cls.begin_simulator(name)
+            for name in names:
+                cls.odometry[name].wait_for(after=0)
+            if RECORDED in names:
+                cls.begin_recorder()
+            controls = [cls.begin_pilot(name) for name in names]
+            for publisher in controls:
+                connected(publisher)
 
-    @staticmethod
-    def control_from_outside(name):
-        """Answer every odometry with a command, whatever time goes by: the pilot decides whether it counts."""
+    @classmethod
+    def begin_simulator(cls, name):
+        cls.odometry[name] = Listener(f"/{name}/odom", Odometry)
+        cls.states[name] = Listener(f"/{name}/state", String)
+        settings = (f"_drone/name:={name}", f"_real_time_factor:={FLIGHTS[name].factor}", "_start:=landed")
+        cls.begin(str(package_path() / "scripts/simulator"), f"__name:=sim_{name}", clock(name), *settings)
+
+    @classmethod
+    def begin_recorder(cls):
+        """Begin a bag, and wait until it has begun."""
+        cls.commands = Listener(f"/{RECORDED}/command", TwistStamped)
+        arguments = ("--simulator", f"sim_{RECORDED}", "--folder", cls.folder.name, clock(RECORDED))
+        cls.recorder = cls.begin(str(package_path() / "scripts/record"), *arguments)
+        while not any(Path(cls.folder.name).iterdir()):
+            threading.Event().wait(0.02)
+
+    @classmethod
+    def begin_pilot(cls, name):
+        """Begin a pilot, and what controls the drone from outside; return that's publisher.
+
+        It answers every odometry with a command, whatever time goes by: the pilot decides whether it counts.
+        """
         turning = Twist()
         turning.angular.z = TURN
         publisher = rospy.Publisher(f"/{name}/cmd_vel_in", Twist, queue_size=1)
         rospy.Subscriber(f"/{name}/odom", Odometry, lambda _message: publisher.publish(turning))
+        leg = str(FLIGHTS[name].leg)
+        cls.pilots[name] = cls.begin(str(PILOT), f"__name:=pilot_{name}", f"__ns:=/{name}", clock(name), leg)
+        return publisher
 
     @classmethod
     def begin(cls, *command):
@@ -76,6 +127,7 @@ class States(unittest.TestCase):
             process.terminate()
         for process in cls.processes:
             process.wait()
+        cls.folder.cleanup()
 
     def test_1_quick(self):
         for name in QUICK:
@@ -126,7 +178,26 @@ class States(unittest.TestCase):
         self.states["real"].wait_for(lambda m: m.data == "landed", after=-1)
         self.odometry["real"].wait_for(lambda m: m.pose.pose.position.z < 0.02)
 
-    def test_4_slow(self):
+    def test_4_a_bag_played_into_a_fresh_simulation(self):
+        self.recorder.send_signal(signal.SIGINT)
+        self.recorder.wait(20)
+        (bag,) = Path(self.folder.name).iterdir()
+        heard = (self.odometry[RECORDED], self.commands)
+        flown, changes = path([one.messages[:] for one in heard])
+        self.assertTrue(rospy.ServiceProxy(f"/sim_{RECORDED}/restart", Trigger)().success)
+        self.odometry[RECORDED].wait_for(lambda m: m.header.stamp.to_sec() < 1)
+        before = [len(one.messages) for one in heard]
+        topics = (f"/{RECORDED}/{topic}" for topic in ("takeoff", "cmd_vel", "land"))
+        pace = str(FLIGHTS[RECORDED].factor)
+        subprocess.run(["rosbag", "play", "--quiet", "-r", pace, str(bag), "--topics", *topics], check=True, timeout=60)
+        self.states[RECORDED].wait_for(lambda m: m.data == "landed", after=-1)
+        again, changes_again = path([one.messages[count:] for one, count in zip(heard, before)])
+        self.assertEqual(len(changes_again), len(changes))
+        late = max(abs(one - other) for one, other in zip(changes, changes_again))
+        for (x, y), (x_again, y_again) in zip(flown, again):  # each command holds a little longer or shorter
+            self.assertLess(math.hypot(x - x_again, y - y_again), SPEED * STEP * max(late, 1) * len(changes))
+
+    def test_5_slow(self):
         for name in FLIGHTS.keys() - set(QUICK):
             with self.subTest(name):
                 self.check_flight(name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ _TICK = 1e-6  # s, between stamps that are the same
 _UNIT = 1e-3  # by which a quaternion's norm may be off
 _PUSH = 0.2  # s, that a push lasts unless a parameter says otherwise, which a bag does not know
 _STEP = 0.05  # s, of simulations as they mostly are
+_REAL = 1e8  # s; stamps so late are of real time, which counts from 1970
 
 
 class BagFlight:
@@ -102,10 +103,48 @@ class BagFlight:
 
     # ---- at a moment
 
+    def steps(self) -> BagSteps:
+        """Return the simulation's steps. Raises BagRefused where it was started anew meanwhile."""
+        if np.any(np.diff(self._came) < 0):
+            raise BagRefused(f"{self._bag.path}: time goes back in it, as at every start: one flight in one bag")
+        return BagSteps(self._stamps, self._commands())
+
     def row_at(self, stamp: float) -> tuple[float, ...]:
         """Return time, position, quaternion and velocities as of a stamp (s)."""
         index = max(0, int(np.searchsorted(self._stamps, stamp + _TICK, "right")) - 1)
         return stamp - self.start, *self._rows[index]
+
+
+class BagSteps:
+    """The steps of a flight: a row for each that was recorded, numbered from 0.
+
+    In simulated time a stamp says which step it was; in real time the first one that was recorded counts as the first.
+    """
+
+    def __init__(self, stamps: np.ndarray, commands: np.ndarray):
+        """Take the stamps (s), and the command in force in each."""
+        self._stamps, self._commands = stamps, commands
+        self._step = float(np.median(np.diff(stamps))) if len(stamps) > 1 and stamps[0] < _REAL else _STEP
+        self._before = round(float(stamps[0]) / self._step) - 1 if stamps[0] < _REAL else 0
+
+    def row_after(self, moment: float) -> int:
+        """Return the first row that is later than a moment (s, of the recorder's clock)."""
+        return int(np.searchsorted(self._stamps, moment + _TICK, "right"))
+
+    def begins(self, row: int, command: Sequence[float]) -> bool:
+        """Tell whether a command came into force in a row."""
+        if not 0 <= row < len(self._commands):
+            return False
+        before = self._commands[row - 1] if row else np.zeros(4)
+        return np.array_equal(self._commands[row], command) and not np.array_equal(before, command)
+
+    def time(self, row: int) -> float:
+        """Return the simulated time (s) at which the step of a row began; rows beyond the last one go on."""
+        if row < len(self._stamps) and self._stamps[0] < _REAL:
+            number = round(float(self._stamps[row]) / self._step) - 1
+        else:
+            number = self._before + row
+        return round(number * self._step, 9)
 
 
 def _held(values: list[tuple[float, list[float]]], times: np.ndarray, before: float) -> np.ndarray:

@@ -1,0 +1,137 @@
+"""Write what a vehicle was told in a bag as a timeline, with which `fly --commands` flies it again, step by step."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from typing import Any
+
+import yaml
+
+from drone_sim.files import writing, yaml_files
+from drone_sim.mechanics import frames
+from drone_sim.offline.command_line import Parser, status_of
+from drone_sim.ros.tools.bag_flights import BagFlight, BagSteps
+from drone_sim.ros.tools.bags import Bag, BagRefused, Heard
+from drone_sim.ros.vehicle.messages import WORLD_FRAME
+from drone_sim.vehicles.requests import EMPTY, REQUESTS
+
+_NAME = "bag_commands"
+_NEAR = 2  # steps, by which the recorder may have heard of a command earlier or later than the simulator
+_Action = dict[str, Any]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write it; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
+    parser = Parser(prog=_NAME, description=__doc__)
+    parser.add_argument("bag", metavar="BAG", help="what rosbag recorded, odometry among it")
+    parser.add_argument("timeline", metavar="OUT.yaml")
+    parser.add_argument("--vehicle", metavar="NAME", help="the one of several (default: the first)")
+    options = parser.parse_args(arguments)
+    return status_of(_NAME, lambda: _write(options))
+
+
+def _write(options: argparse.Namespace) -> None:
+    if not options.timeline.endswith((".yaml", ".yml")):
+        raise ValueError(f"{options.timeline}: must end in .yaml, .yml")
+    writing.check(options.timeline)
+    with closing(Bag(options.bag)) as bag:
+        flight = BagFlight(bag, options.vehicle)
+        entries = sorted(_entries(bag, flight), key=lambda one: one["at"])
+        begins = next((one.message.data for one in bag.read(f"{flight.namespace}/state")), "")
+    if not entries:
+        raise BagRefused(f"{options.bag}: nothing was commanded in it on {flight.namespace}/cmd_vel and the like")
+    landed = " --set start=landed" if begins == "landed" else ""
+    lines = [yaml.safe_dump(one, default_flow_style=True, sort_keys=False, width=math.inf) for one in entries]
+    writing.write(options.timeline, f"# fly --commands{landed}\n{''.join(f'- {line}' for line in lines)}")
+    print(f"{_NAME}: wrote {options.timeline}, {len(entries)} commands: fly --commands {options.timeline}{landed}")
+
+
+def _entries(bag: Bag, flight: BagFlight) -> Iterator[_Action]:
+    """Yield the entries of the timeline. Raises BagRefused."""
+    steps = flight.steps()
+    yield from _twists(bag.read(f"{flight.namespace}/cmd_vel"), steps)
+    for topic, read in _READ.items():
+        for heard in bag.read(f"{flight.namespace}/{topic}"):
+            action = read(heard.message)
+            if action is not None:
+                yield {"at": steps.time(steps.row_after(heard.at)), **action}
+
+
+def _twists(messages: Iterator[Heard], steps: BagSteps) -> Iterator[_Action]:
+    """Yield twists at the step that obeyed them, as far as the commands in force tell it."""
+    before: tuple[float, ...] = ()
+    for heard in messages:
+        linear, angular = _xyz(heard.message.linear), _xyz(heard.message.angular)
+        if _finite(*linear, *angular):
+            now, row = (*linear, angular[2]), steps.row_after(heard.at)
+            if now != before:
+                around = sorted(range(row - _NEAR, row + _NEAR + 1), key=lambda one: abs(one - row))
+                row = next((one for one in around if steps.begins(one, now)), row)
+            before = now
+            yield {"at": steps.time(row), "twist": {"linear": [*linear], "angular": [*angular]}}
+
+
+# ---- messages as actions of a timeline; None for one that the simulator refused
+
+
+def _asking(topic: str) -> Callable[[Any], _Action | None]:
+    return lambda _message: {topic: {}}
+
+
+def _pose(kind: str) -> Callable[[Any], _Action | None]:
+    def read(message: Any) -> _Action | None:
+        turn, place = message.pose.orientation, _xyz(message.pose.position)
+        quaternion = (turn.x, turn.y, turn.z, turn.w)
+        if not _in_world(message) or not _finite(*place, *quaternion) or abs(math.hypot(*quaternion) - 1) > 0.01:
+            return None
+        rpy = frames.to_rpy(frames.from_quaternion((0, 0, 0), quaternion))
+        return {kind: {"position": [*place], "rpy": [*rpy]}}
+
+    return read
+
+
+def _push(message: Any) -> _Action | None:
+    force, torque = _xyz(message.wrench.force), _xyz(message.wrench.torque)
+    if not _in_world(message) or not _finite(*force, *torque):
+        return None
+    return {"push": {"force": [*force], "torque": [*torque], "duration": 0.2}}  # config/drone.yaml's
+
+
+def _wind(message: Any) -> _Action | None:
+    wind = _xyz(message.vector)
+    return {"weather": {"wind": [*wind]}} if _in_world(message) and _finite(*wind) else None
+
+
+def _change(kind: str) -> Callable[[Any], _Action | None]:
+    def read(message: Any) -> _Action | None:
+        try:
+            value = yaml_files.parse(message.value)
+        except yaml_files.YamlError:
+            return None
+        for part in reversed(message.key.strip("/").split("/")):
+            value = {part: value} if part else value
+        return {kind: value}
+
+    return read
+
+
+_READ: dict[str, Callable[[Any], _Action | None]] = {
+    **{topic: _asking(topic) for topic, kind in REQUESTS.items() if kind == EMPTY},
+    **{"goto": _pose("goto"), "set_pose": _pose("pose"), "push": _push, "set_wind": _wind},
+    **{"weather": _change("weather"), "faults": _change("faults")},
+}
+
+
+def _xyz(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
+
+
+def _finite(*values: float) -> bool:
+    return all(map(math.isfinite, values))
+
+
+def _in_world(message: Any) -> bool:
+    return message.header.frame_id.lstrip("/") in ("", WORLD_FRAME)

@@ -1,0 +1,129 @@
+"""What was commanded in a bag flies again as a timeline, to the bit, although the recorder heard of it late."""
+
+import pytest
+
+pytest.importorskip("rosbag", reason="needs ROS")
+
+import rosbag
+import rospy
+from diagnostic_msgs.msg import KeyValue
+from geometry_msgs.msg import PoseStamped, Vector3Stamped, WrenchStamped
+from geometry_msgs.msg import Twist as TwistMessage
+from std_msgs.msg import Empty, String
+
+from drone_sim.mechanics.state import Pose, State, Twist, Vector3
+from drone_sim.offline import timeline
+from drone_sim.ros.tools import bag_commands
+from drone_sim.ros.vehicle import messages
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+STEPS = 300
+SETTINGS = {"start": "landed"}
+STILL = State((0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def goto(x, z, frame="world"):
+    message = PoseStamped()
+    message.header.frame_id = frame
+    message.pose.position.x, message.pose.position.z, message.pose.orientation.w = x, z, 1.0
+    return message
+
+
+def wind(x):
+    message = Vector3Stamped()
+    message.vector.x = x
+    return message
+
+
+def twist(vx, wz=0.0):
+    message = TwistMessage()
+    message.linear.x, message.angular.z = vx, wz
+    return message
+
+
+TOLD = {  # by step: topic, message, and how many steps late the recorder heard of it
+    4: ("takeoff", Empty(), 0),
+    70: ("cmd_vel", twist(0.5), 1),
+    90: ("cmd_vel", twist(float("nan")), 0),
+    95: ("cmd_vel", twist(0.1, 0.3), 0),
+    120: ("set_wind", wind(0.5), 0),
+    130: ("goto", goto(1.0, 1.2), 0),
+    131: ("goto", goto(5.0, 5.0, "map"), 0),
+    170: ("push", WrenchStamped(), 0),
+    180: ("cmd_vel", twist(0.1, 0.3), 0),  # the same once more ends the goto
+    190: ("faults", KeyValue("propellers", "[1, 0.97, 1, 1]"), 0),
+    220: ("land", Empty(), 0),
+}
+
+
+def obey(simulation, topic, message):
+    drone = simulation.drone
+    if topic == "cmd_vel" and message.linear.x == message.linear.x:
+        drone.receive(Twist(Vector3(message.linear.x, 0, 0), Vector3(0, 0, message.angular.z)))
+    elif topic == "goto" and message.header.frame_id == "world":
+        drone.ask(topic, Pose((message.pose.position.x, 0, message.pose.position.z)))
+    elif topic == "set_wind":
+        drone.change_weather({"wind": [message.vector.x, 0, 0]})
+    elif topic == "faults":
+        drone.change_faults({"propellers": [1, 0.97, 1, 1]})
+    elif topic in ("takeoff", "land"):
+        drone.ask(topic)
+
+
+def record(path, began):
+    """Fly, and write what a recorder would hear; return the states."""
+    simulation, states = Simulation(parameters.load(SETTINGS)), []
+    with rosbag.Bag(str(path), "w") as bag:
+        for step in range(STEPS):
+            if step in TOLD:
+                topic, message, late = TOLD[step]
+                bag.write(f"/drone/{topic}", message, rospy.Time.from_sec(began + 0.05 * (step + late) + 0.01))
+                obey(simulation, topic, message)
+            simulation.step()
+            at = rospy.Time.from_sec(began + simulation.time)
+            drone = simulation.drone
+            bag.write("/drone/odom", messages.odometry(at, drone.state, "base_link"), at)
+            bag.write("/drone/command", messages.command(at, drone.command, "Track_base"), at)
+            if step == 0:
+                bag.write("/drone/state", String(str(drone.flight_state)), at)
+            states.append(drone.state)
+    simulation.close()
+    return states
+
+
+@pytest.mark.parametrize("began", [0.0, 1.7e9])
+def test_the_same_flight_to_the_bit(tmp_path, capsys, began):
+    states = record(tmp_path / "flight.bag", began)
+    out = tmp_path / "flight.yaml"
+    assert bag_commands.main([str(tmp_path / "flight.bag"), str(out)]) == 0
+    assert "9 commands: fly" in capsys.readouterr().out
+    assert out.read_text().startswith("# fly --commands --set start=landed\n- {at: 0.2, takeoff: {}}\n")
+    simulation = Simulation(parameters.load(SETTINGS))
+    found = timeline.read(str(out), simulation.parameters)
+    for step, state in enumerate(states):
+        found.apply(step, simulation.vehicles)
+        simulation.step()
+        assert simulation.drone.state == state, f"step {step}"
+    simulation.close()
+
+
+def one_line(capsys, *arguments):
+    assert bag_commands.main([str(one) for one in arguments]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    return line
+
+
+def test_mistakes_get_a_line(tmp_path, capsys):
+    path, out = tmp_path / "flight.bag", tmp_path / "out.yaml"
+    drone = parameters.load().fleet[0]
+    with rosbag.Bag(str(path), "w") as bag:
+        for at, stamp in ((5, 5), (6, 6)):
+            message = messages.odometry(rospy.Time(stamp), STILL, drone.base_link)
+            bag.write("/drone/odom", message, rospy.Time(at))
+    assert "nothing was commanded in it on /drone/cmd_vel" in one_line(capsys, path, out)
+    assert "must end in .yaml" in one_line(capsys, path, tmp_path / "out.txt")
+    assert "near names are /drone/odom" in one_line(capsys, path, out, "--vehicle", "dron")
+    with rosbag.Bag(str(path), "a") as bag:
+        bag.write("/drone/odom", messages.odometry(rospy.Time(1), STILL, drone.base_link), rospy.Time(7))
+    assert "time goes back in it" in one_line(capsys, path, out)
