@@ -19,7 +19,7 @@ from std_msgs.msg import String
 from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.recording import Recording
-from drone_sim.ros.tools import bag_video, plot_flight
+from drone_sim.ros.tools import bag_video, plot_flight, record
 from drone_sim.ros.tools.bag_flights import BagFlight
 from drone_sim.ros.tools.bags import Bag, BagRefused
 from drone_sim.ros.tools.record import chosen
@@ -238,3 +238,25 @@ def test_pictures_are_recorded_by_choice_and_never_raw():
     small = ["/drone/cmd_vel", "/drone/odom", "/rosout"]
     assert chosen(kinds, images=False) == small
     assert chosen(kinds, images=True) == sorted([*small, "/drone/camera_info", "/drone/front/compressed"])
+
+
+def test_record_says_once_what_it_waits_for(monkeypatch, capsys):
+    class Master:
+        asked = 0
+
+        def __init__(self, _name):
+            pass
+
+        def lookupService(self, _name):
+            Master.asked += 1
+            if Master.asked < 200:
+                raise record.rosgraph.MasterError("not yet")
+
+        def getTopicTypes(self):
+            return []
+
+    monkeypatch.setattr(record.rosgraph, "Master", Master)
+    monkeypatch.setattr(record.time, "sleep", lambda _: None)
+    monkeypatch.setattr(record.time, "monotonic", lambda: 0.1 * Master.asked)
+    assert record._kinds("/drone_sim") == {}
+    assert capsys.readouterr().err == "record: waits for /drone_sim, which does not run yet\n"

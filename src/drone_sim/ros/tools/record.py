@@ -25,6 +25,7 @@ from drone_sim.ros.node.paths import from_shell
 
 _NAME = "record"
 _PERIOD = 0.1  # s, between two questions to the master
+_PATIENCE = 5.0  # s, for a simulator that is just being started
 _LARGE = r"sensor_msgs/(Image|PointCloud2?)|visualization_msgs/.*|dynamic_reconfigure/.*|theora_image_transport/.*"
 _IMAGES = r"sensor_msgs/(CompressedImage|CameraInfo)"  # a twentieth of the raw ones
 _OF_OTHERS = ("/rosout_agg", "/clock")  # said twice; told by `rosbag play --clock`, and in the times of all messages
@@ -76,9 +77,13 @@ def _file(folder: str) -> Path:
 def _kinds(simulator: str) -> dict[str, str]:
     """Wait for the simulator, and return all topics with their kinds. Raises OSError without a master."""
     master = rosgraph.Master(f"/{_NAME}")
+    began, said = time.monotonic(), False
     try:
         while not _is_there(master, f"{simulator}/{_LAST_SERVICE}"):
             time.sleep(_PERIOD)
+            if not said and time.monotonic() - began > _PATIENCE:
+                said = True
+                print(f"{_NAME}: waits for {simulator}, which does not run yet", file=sys.stderr, flush=True)
         return dict(master.getTopicTypes())
     except (OSError, rosgraph.MasterException) as error:
         raise OSError(f"the ROS master at {rosgraph.get_master_uri()} does not answer: {error}") from None
