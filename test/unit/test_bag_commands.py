@@ -43,7 +43,7 @@ def twist(vx, wz=0.0):
 
 
 TOLD = {  # by step: topic, message, and how many steps late the recorder heard of it
-    4: ("takeoff", Empty(), 0),
+    4: ("takeoff", Empty(), 1),
     70: ("cmd_vel", twist(0.5), 1),
     90: ("cmd_vel", twist(float("nan")), 0),
     95: ("cmd_vel", twist(0.1, 0.3), 0),
@@ -53,7 +53,8 @@ TOLD = {  # by step: topic, message, and how many steps late the recorder heard 
     170: ("push", WrenchStamped(), 0),
     180: ("cmd_vel", twist(0.1, 0.3), 0),  # the same once more ends the goto
     190: ("faults", KeyValue("propellers", "[1, 0.97, 1, 1]"), 0),
-    220: ("land", Empty(), 0),
+    200: ("weather", KeyValue("a/" * 10_000, "1"), 0),
+    220: ("land", Empty(), -1),
 }
 
 
@@ -73,7 +74,7 @@ def obey(simulation, topic, message):
 
 def record(path, began):
     """Fly, and write what a recorder would hear; return the states."""
-    simulation, states = Simulation(parameters.load(SETTINGS)), []
+    simulation, states, state = Simulation(parameters.load(SETTINGS)), [], ""
     with rosbag.Bag(str(path), "w") as bag:
         for step in range(STEPS):
             if step in TOLD:
@@ -85,8 +86,9 @@ def record(path, began):
             drone = simulation.drone
             bag.write("/drone/odom", messages.odometry(at, drone.state, "base_link"), at)
             bag.write("/drone/command", messages.command(at, drone.command, "Track_base"), at)
-            if step == 0:
-                bag.write("/drone/state", String(str(drone.flight_state)), at)
+            if state != str(drone.flight_state):
+                state = str(drone.flight_state)
+                bag.write("/drone/state", String(state), at)
             states.append(drone.state)
     simulation.close()
     return states

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
@@ -10,16 +11,21 @@ from typing import Any
 
 import yaml
 
-from drone_sim.files import writing, yaml_files
+from drone_sim.config.types import Checked
+from drone_sim.files import writing
 from drone_sim.mechanics import frames
 from drone_sim.offline.command_line import Parser, status_of
 from drone_sim.ros.tools.bag_flights import BagFlight, BagSteps
 from drone_sim.ros.tools.bags import Bag, BagRefused, Heard
+from drone_sim.ros.vehicle.conditions import read_changes
 from drone_sim.ros.vehicle.messages import WORLD_FRAME
+from drone_sim.run import parameters
+from drone_sim.vehicles.checks import Refused
 from drone_sim.vehicles.requests import EMPTY, REQUESTS
 
 _NAME = "bag_commands"
 _NEAR = 2  # steps, by which the recorder may have heard of a command earlier or later than the simulator
+_LEADS_TO = {"takeoff": "taking off", "land": "landing"}  # states, which are said in the step that obeys
 _Action = dict[str, Any]
 
 
@@ -53,11 +59,14 @@ def _entries(bag: Bag, flight: BagFlight) -> Iterator[_Action]:
     """Yield the entries of the timeline. Raises BagRefused."""
     steps = flight.steps()
     yield from _twists(bag.read(f"{flight.namespace}/cmd_vel"), steps)
+    states = [(steps.row_after(one.at) - 1, one.message.data) for one in bag.read(f"{flight.namespace}/state")]
     for topic, read in _READ.items():
+        rows = [row for row, state in states if state == _LEADS_TO.get(topic)]
         for heard in bag.read(f"{flight.namespace}/{topic}"):
-            action = read(heard.message)
+            action, row = read(heard.message), steps.row_after(heard.at)
+            row = next((one for one in rows if abs(one - row) <= _NEAR), row)
             if action is not None:
-                yield {"at": steps.time(steps.row_after(heard.at)), **action}
+                yield {"at": steps.time(row), **action}
 
 
 def _twists(messages: Iterator[Heard], steps: BagSteps) -> Iterator[_Action]:
@@ -108,14 +117,17 @@ def _wind(message: Any) -> _Action | None:
 def _change(kind: str) -> Callable[[Any], _Action | None]:
     def read(message: Any) -> _Action | None:
         try:
-            value = yaml_files.parse(message.value)
-        except yaml_files.YamlError:
+            return {kind: read_changes(message, _allowed()[kind])}
+        except Refused:
             return None
-        for part in reversed(message.key.strip("/").split("/")):
-            value = {part: value} if part else value
-        return {kind: value}
 
     return read
+
+
+@functools.cache
+def _allowed() -> dict[str, Checked]:
+    default = parameters.load()
+    return {"weather": default.weather, "faults": default.fleet[0].faults}
 
 
 _READ: dict[str, Callable[[Any], _Action | None]] = {
