@@ -22,8 +22,10 @@ STANDING = {"start": "landed"}
 class Topic:
     """What is sent; somebody listens, or nobody."""
 
+    watched = True
+
     def __init__(self, name, _period):
-        self.name, self.messages, self.watched = name, [], True
+        self.name, self.messages = name, []
 
     def due(self):
         return self.watched
@@ -168,9 +170,10 @@ def test_what_has_not_changed_is_not_sent_again_and_each_vehicle_has_its_place(s
     assert len(markers._topic.messages) == 2
 
 
-def pressed(simulation, markers):
-    """Fly it against a wall, and on; return all its states."""
+def crashed(simulation, markers):
+    """Let it fall against a wall, and lie; return all its states."""
     simulation.drone.receive(Twist(Vector3(1.0, 0, 0)))
+    simulation.drone.change_faults({"propellers": [0, 1, 1, 1]})
     states = []
     for _ in range(80):
         simulation.step()
@@ -184,9 +187,10 @@ def test_whoever_looks_changes_nothing_and_nothing_is_read_for_nobody(shown, mon
     read = World.contacts
     monkeypatch.setattr(World, "contacts", lambda *of: (next(asked), read(*of))[1])
     wall = {"scene": {"objects": [WALL]}}
-    seen, unseen = shown(**wall), shown(**wall)
-    unseen[1]._topic.watched = False
-    before, states = next(asked), pressed(*unseen)
-    assert next(asked) == before + 1
-    assert pressed(*seen) == states
-    assert sum(message[4] is not None for message in seen[1]._topic.messages) > 10, "it was pressed against it"
+    monkeypatch.setattr(Topic, "watched", False)
+    states = crashed(*shown(**wall))
+    assert next(asked) == 0
+    monkeypatch.setattr(Topic, "watched", True)
+    seen = shown(**wall)
+    assert crashed(*seen) == states
+    assert sum(message[4] is not None for message in seen[1]._topic.messages) > 30, "it lay there"
