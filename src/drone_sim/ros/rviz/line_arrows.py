@@ -1,4 +1,4 @@
-"""Arrows of lines for rviz: it turns lines to who looks, and lights them from everywhere; its own arrows it does not."""
+"""Arrows of lines for rviz, which turns lines to who looks and lights them from everywhere; not so its own arrows."""
 
 from __future__ import annotations
 
