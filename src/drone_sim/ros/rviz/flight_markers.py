@@ -101,7 +101,7 @@ class StateText:
         if not simulation.running:
             return "stopped"
         said = str(vehicle.flight_state)
-        doing = "running" if said.startswith(UNKNOWN) else said
+        doing = "flying" if said.startswith(UNKNOWN) else said
         doing = f"paused, {doing}" if self._player.paused else doing
         speed = math.hypot(*state.linear_velocity)
         who = "" if vehicle.parameters.is_alone else f"{vehicle.name}  "
