@@ -1,4 +1,4 @@
-"""Film what docs/weather.md says of a propeller that stops at hover, as an animated GIF; needs neither ROS nor a display.
+"""Film what docs/weather.md says of a propeller that stops at hover: an animated GIF; needs neither ROS nor a display.
 
 PYTHONPATH=src .venv/bin/python docs/film_weather.py [FOLDER]
 """
