@@ -26,7 +26,7 @@ from drone_sim.files import writing
 from drone_sim.files.resources import package_path
 from drone_sim.offline.command_line import Parser, status_of
 from drone_sim.ros.node.paths import from_shell
-from drone_sim.ros.vehicle.transforms import FIRST_FRAME
+from drone_sim.ros.vehicle.messages import FIRST_FRAME
 
 _NAME = "show"
 _PERIOD = 0.1  # s, between two questions to the master

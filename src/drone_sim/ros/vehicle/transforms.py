@@ -14,7 +14,6 @@ from drone_sim.ros.vehicle import messages
 from drone_sim.run.pacing import Throttle
 from drone_sim.vehicles.vehicle import Vehicle
 
-FIRST_FRAME = "drone_sim/first"  # which rviz follows
 _EYES = 1 / 30  # s of real time, between two turns of the blades, which are for eyes
 
 
@@ -22,8 +21,8 @@ class Transforms:
     """Broadcasts where the vehicles are, once a step, and where the links of their URDFs sit on them.
 
     world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says, and sensors
-    on what carries them. What does not move on base_link is told once, by /tf_static; so is FIRST_FRAME, which is
-    Track_base of the first vehicle, whatever that is called.
+    on what carries them. What does not move on base_link is told once, by /tf_static; so is the frame that
+    rviz follows, Track_base of the first vehicle, whatever that is called.
     """
 
     def __init__(self) -> None:
@@ -36,7 +35,7 @@ class Transforms:
         """Say where the links are that do not move; of vehicles that are new, or no longer there."""
         now = rospy.Time.now()
         first = next(iter(vehicles)).parameters
-        told = [messages.transform(now, first.track_base, FIRST_FRAME, frames.IDENTITY)]
+        told = [messages.transform(now, first.track_base, messages.FIRST_FRAME, frames.IDENTITY)]
         for one in vehicles:
             told += [_link(now, one, name) for name in one.body.links if name not in one.body.rigid.blade_joints]
             own = one.parameters
