@@ -28,8 +28,11 @@ plots() {
 # The flight of docs/remote_api.md; needs the client that ./dev.sh test installs.
 remote() { "$python" docs/remote/without_ros.py --plot "$pictures/remote_circle.png"; }
 
-# The flights of docs/weather.md, beside their theory; prints the numbers that the page quotes.
-weather() { "$python" docs/draw_weather.py "$pictures"; }
+# The flights of docs/weather.md, beside their theory, and one as a film; prints the numbers that the page quotes.
+weather() {
+  "$python" docs/draw_weather.py "$pictures"
+  "$python" docs/film_weather.py "$pictures"
+}
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.
 rviz() { docs/take_rviz_pictures.sh "$pictures"; }

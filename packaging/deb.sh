@@ -16,7 +16,7 @@ python=$(/usr/bin/python3 -c 'import sys; print("{}.{}".format(*sys.version_info
 
 # What Debian has, the package depends on; the environment sees it.
 DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), libegl1, libgl1, libgl1-mesa-dri,
- python3-cv-bridge, python3-diagnostic-updater, python3-dynamic-reconfigure, python3-genpy, python3-geometry-msgs,
+ python3-av, python3-cv-bridge, python3-diagnostic-updater, python3-dynamic-reconfigure, python3-genpy, python3-geometry-msgs,
  python3-interactive-markers, python3-matplotlib, python3-nav-msgs, python3-numpy, python3-opencv, python3-pil,
  python3-roslaunch, python3-rospy, python3-rosbag, python3-rosmsg, python3-rosnode, python3-rosservice,
  python3-rostopic, python3-sensor-msgs, python3-std-msgs,
@@ -31,7 +31,7 @@ DESTDIR=$stage make -C "$out/build" install >"$out/install.log" 2>&1
 /usr/bin/python3 -m venv --system-site-packages --without-pip "$stage$own"
 printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" >"$stage$own/pyvenv.cfg"
 rm -f "$stage$own"/bin/[aA]ctivate*
-grep -v '^opencv' requirements.txt >"$out/requirements.txt" # Debian's own will do
+grep -Ev '^(opencv|av)\b' requirements.txt >"$out/requirements.txt" # Debian's own will do
 .venv/bin/python -m pip --python "$stage$own/bin/python" install -q --disable-pip-version-check \
   --find-links "$wheels" --no-compile -r "$out/requirements.txt"
 site=$stage$own/lib/python$python/site-packages
@@ -39,7 +39,8 @@ rm -rf "$site"/pybullet_{data,envs,examples,utils,robots} "$site"/eglRenderer* "
 find "$site" -name '*.so' -exec strip --strip-unneeded {} +
 find "$stage$own/bin" -type f -delete
 find "$stage" -name __pycache__ -prune -exec rm -rf {} +
-programs=(simulator key_teleop joy_teleop view fly record plot_flight bag_commands video import_scene doctor)
+programs=(simulator key_teleop joy_teleop view show fly record plot_flight bag_commands video import_scene
+  doctor)
 sed -i "1s:.*:#!$own/bin/python:" "${programs[@]/#/$stage/usr/lib/drone_sim/}"
 
 mkdir "$stage/DEBIAN"

@@ -63,6 +63,7 @@ class Fleet(unittest.TestCase):
                     parents.setdefault(one.child_frame_id, set()).add(one.header.frame_id)
             listener.close()
         self.assertTrue(all(len(above) == 1 for above in parents.values()), "no frame has two parents")
+        self.assertEqual(parents["drone_sim/first"], {"drone1/Track_base"})
         for name in THREE:
             for frame in ("base_link", "Track_base", "front_optical", "track_optical", "blades_front_left"):
                 self.assertEqual(self.root_of(f"{name}/{frame}", parents), "world")

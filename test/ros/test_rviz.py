@@ -180,6 +180,12 @@ class Rviz(unittest.TestCase):
         turn = frames.multiply_quaternions(tilt, (q.x, q.y, q.z, q.w))
         self.assertGreater(frames.turned(turn, (0, 0, 1))[2], 0.98)
 
+    def test_forces_are_drawn_on_the_drone_for_who_listens(self):
+        thrust, *others = self.listen("view/forces").wait_for(lambda m: m.markers[0].action == Marker.ADD).markers
+        self.assertEqual((thrust.ns, thrust.header.frame_id, thrust.type), ("thrust", "base_link", Marker.LINE_LIST))
+        self.assertEqual(len(thrust.points), 4 * 10)
+        self.assertEqual([one.action for one in others], [Marker.DELETE] * 4)
+
     def test_the_text_says_what_the_simulation_does(self):
         state = self.listen("view/state")
         text = state.wait_for(lambda m: "flying" in m.markers[0].text, after=0).markers[0].text

@@ -15,6 +15,7 @@ SOURCE = ROOT / "src"
 KEYS = {
     "PIL": "python3-pil",
     "annotated_types": "python3-pydantic-pip",
+    "av": "python3-av-pip",
     "cbor2": "python3-cbor2-pip",
     "cv2": "python3-opencv",
     "greenlet": "python3-greenlet-pip",

@@ -13,7 +13,7 @@ from drone_sim.shapes.box import Box
 from drone_sim.shapes.sphere import Sphere
 from drone_sim.world import World
 
-KEYS = "datum, drone, floor, gravity, magnetic_field, objects, scripts, sub_step, time_step, vehicles"
+KEYS = "datum, drone, floor, gravity, magnetic_field, objects, scripts, sub_step, time_step, vehicles, weather"
 
 URDF = """<robot name="barrel"><link name="barrel">
   <inertial><mass value="2"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>

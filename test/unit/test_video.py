@@ -2,6 +2,7 @@
 
 import math
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -47,6 +48,9 @@ def test_a_flight_is_filmed_as_its_camera_saw_it(tmp_path):
     assert main([*flight, "--set", *small, "--video", str(out), "--camera", "track"]) == 0
     pictures, rate = decoded(out)
     assert (len(pictures), rate, pictures[0].shape) == (10, 10.0, (240, 320, 3))
+    with av.open(str(out)) as made:
+        codec = made.streams.video[0].codec_context
+        assert (codec.name, codec.pix_fmt) == ("h264", "yuv420p"), "what browsers play"
     assert not list(tmp_path.glob(".*"))
 
     simulation = Simulation(parameters.load({"cameras": {"track": {"width": 320, "height": 240}}}))
@@ -109,7 +113,7 @@ def test_a_film_that_cannot_be_written_whole_is_told(tmp_path):
     said = r"out\.mp4: 0 of 3 pictures could be written"
     with pytest.raises(OSError, match=said), video.writing_to(str(path), 20) as film:
         film.add(grey(), None, times=3)
-        film.pictures, film._path = 3, str(tmp_path / "elsewhere.mp4")
+        film._writer._path = str(tmp_path / "elsewhere.mp4")
     assert not list(tmp_path.iterdir())
 
 

@@ -227,3 +227,35 @@ def test_an_anemometer_says_what_blows_at_each_vehicle(simulate):
     assert first.std() > 0.3
     # 4 m at 4 m/s: 20 steps; both drift, a bit.
     assert np.corrcoef(first[:-20], later[20:])[0, 1] > 0.95 > np.corrcoef(first, later)[0, 1]
+
+
+# ---- in a scene file
+
+
+def test_a_scene_file_may_hold_weather_which_goes_with_the_scene(simulate, tmp_path):
+    windy, calm = tmp_path / "windy.yaml", tmp_path / "calm.yaml"
+    windy.write_text("weather: {wind: [3, 0, 0], gusts: {deviation: [1, 1, 0.5]}}\n", encoding="utf-8")
+    calm.write_text("objects: []\n", encoding="utf-8")
+    hall = simulate(scene_file=str(windy), weather={"gusts": {"seed": 3}})
+    same = {"wind": [3, 0, 0], "gusts": {"deviation": [1, 1, 0.5], "seed": 3}}
+    assert fly(hall, 20) == fly(simulate(weather=same), 20)
+    hall.start(str(calm))
+    assert fly(hall, 20) == fly(simulate(weather={"gusts": {"seed": 3}}), 20)
+    windy.write_text("objects: []\nweather: {wind: [300, 0, 0]}\n", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"windy\.yaml: line 2: parameter weather/wind/0 = 300: "):
+        hall.start(str(windy))
+
+
+def test_a_saved_scene_has_the_weather_that_it_had_or_that_came(simulate, tmp_path):
+    windy, saved = tmp_path / "windy.yaml", tmp_path / "saved.yaml"
+    windy.write_text("weather: {wind: [3, 0, 0]}\n", encoding="utf-8")
+    hall, field = simulate(scene_file=str(windy)), simulate(weather={"wind": [1, 0, 0]})
+    for simulation, change, wind in (
+        (hall, {}, (3, 0, 0)),
+        (hall, {"wind": [0, 2, 0]}, (0, 2, 0)),
+        (field, {}, (0, 0, 0)),  # which is the parameters', and is not in the file
+        (field, {"wind": [0, 1, 0]}, (0, 1, 0)),
+    ):
+        simulation.drone.change_weather(change)
+        simulation.save_scene(saved)
+        assert parameters.load({"scene_file": str(saved)}).weather.wind == wind

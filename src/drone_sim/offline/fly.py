@@ -26,6 +26,7 @@ from drone_sim.offline.command_line import FAILED, SIGNALLED, Parser
 from drone_sim.offline.film import Film
 from drone_sim.offline.recording import Recording, TableError
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
+from drone_sim.offline.video import VideoError
 from drone_sim.run import parameters as parameters_module
 from drone_sim.run.guardian import Guardian
 from drone_sim.run.parameters import ParameterError, Parameters
@@ -240,7 +241,7 @@ def _status_of(action: Callable[[], int | None]) -> int:
         return action() or 0
     except KeyboardInterrupt:
         return SIGNALLED + signal.SIGINT
-    except TableError:  # ends the writing of the table, which then says so
+    except (TableError, VideoError):  # ends the writing of the file, which then says so
         raise
     except _EXPECTED as error:
         print(f"fly: {' '.join(str(error).split())}", file=sys.stderr, flush=True)

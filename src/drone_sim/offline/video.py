@@ -1,10 +1,11 @@
-"""Pictures as an MP4 file, through OpenCV's FFmpeg."""
+"""Pictures as an MP4 file, with what the drone does written over them."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -12,12 +13,17 @@ import numpy as np
 from drone_sim.files import writing
 from drone_sim.offline import hud
 
-# FFmpeg's names; the first that this OpenCV has. Debian's has H.264, which plays everywhere, the one on PyPI has not.
-_CODECS = {"avc1": "H.264", "mp4v": "MPEG-4 Part 2"}
+if TYPE_CHECKING:
+    from drone_sim.offline.mp4 import Mp4
+
 _SMALLEST = 240  # px, of width and height; smaller pictures are enlarged, or nobody could read the display
 _LARGEST = 4096  # px, that it makes of their sides
 _HALF = 3.0  # m, at which depth is shown half as bright as right in front
 MAX_RATE = 240.0  # pictures per second
+
+
+class VideoError(OSError):
+    """The video cannot be written on; what there is of it is not kept."""
 
 
 class Video:
@@ -26,11 +32,10 @@ class Video:
     def __init__(self, path: str, rate: float):
         """Take the file, and how many pictures a second it has."""
         self.pictures = 0
-        self.codec = ""
         self.size = 0, 0  # px, width and height
         self.rate = rate
         self._path = path
-        self._writer: cv2.VideoWriter | None = None
+        self._writer: Mp4 | None = None
 
     def add(self, picture: np.ndarray, flight: hud.Flight | None, times: int = 1) -> None:
         """Add a picture, BGR (height, width, 3), so many times, with the display over it where there is a flight.
@@ -46,42 +51,32 @@ class Video:
         elif self.size != (shown.shape[1], shown.shape[0]):
             shown = cv2.resize(shown, self.size)
         for _ in range(times):
-            self._writer.write(shown)
+            self._writer.add(shown)
             self.pictures += 1
 
-    def _opened(self) -> cv2.VideoWriter:
-        level = cv2.getLogLevel()
-        cv2.setLogLevel(0)  # of the codecs that are not there
-        try:
-            for word, self.codec in _CODECS.items():
-                code = cv2.VideoWriter.fourcc(*word)
-                writer = cv2.VideoWriter(self._path, cv2.CAP_FFMPEG, code, self.rate, self.size)
-                if writer.isOpened():
-                    return writer
-        finally:
-            cv2.setLogLevel(level)
-        raise OSError(0, f"this OpenCV ({cv2.__version__}) writes no {' and no '.join(_CODECS.values())}")
+    def _opened(self) -> Mp4:
+        from drone_sim.offline.mp4 import Mp4  # PyAV takes a while to import, and most flights are not filmed
+
+        return Mp4(self._path, self.rate, *self.size)
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write what is left. Raises OSError."""
         if self._writer is not None:
-            self._writer.release()
+            self._writer.close()
 
     def finish(self) -> None:
         """Close it. Raises OSError without a picture, and where not all could be written."""
         if self._writer is None:
             raise OSError(0, "no picture came, nothing is written")
         self.close()
-        reader = cv2.VideoCapture(self._path, cv2.CAP_FFMPEG)
-        there = round(reader.get(cv2.CAP_PROP_FRAME_COUNT))
-        reader.release()
+        there = self._writer.count()
         if there != self.pictures:
             raise OSError(0, f"{there} of {self.pictures} pictures could be written; is the disk full?")
 
     def __str__(self) -> str:
         """Return what it is, in words."""
         width, height = self.size
-        return f"{width} x {height}, {self.pictures} pictures, {self.pictures / self.rate:.2f} s, {self.codec}"
+        return f"{width} x {height}, {self.pictures} pictures, {self.pictures / self.rate:.2f} s, H.264"
 
 
 def check(path: str) -> None:

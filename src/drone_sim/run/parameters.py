@@ -97,7 +97,7 @@ class Parameters(EquipmentParameters):
 
     @property
     def in_scene_file(self) -> Mapping[str, Any]:
-        """What the scene file says beside the scene: `drone`, `vehicles`, `time_step`, ..."""
+        """What the scene file says beside the scene: `drone`, `vehicles`, `weather`, `time_step`, ..."""
         return self._in_scene_file
 
     @property

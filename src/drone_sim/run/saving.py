@@ -10,6 +10,7 @@ import yaml
 
 from drone_sim.config.types import Checked, FoundFile, ParameterError
 from drone_sim.files import writing, yaml_files
+from drone_sim.forces.weather import WeatherParameters
 from drone_sim.mechanics import frames
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene import scene_parameters, state_now
@@ -19,8 +20,10 @@ from drone_sim.vehicles.vehicle import Vehicle
 _UNITS = "# metres, radians; the datum in degrees, the magnetic field in tesla\n"
 
 
-def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Vehicle]) -> None:
-    """Write floor, objects and vehicles as they stand now. The scene's own files keep their names.
+def save(
+    path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Vehicle], weather: WeatherParameters
+) -> None:
+    """Write floor, objects, vehicles and weather as they are now. The scene's own files keep their names.
 
     Raises ParameterError where that would be no scene that can be loaded, such as with the drone below the
     floor, and OSError; what was in the file is then still there.
@@ -28,6 +31,8 @@ def save(path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Ve
     own = scene.parameters
     said = parameters.in_scene_file
     content: dict[str, Any] = {key: said[key] for key in scene_parameters.WORLD if key in said}
+    if "weather" in said or weather != parameters.weather:
+        content["weather"] = weather.model_dump(mode="json")
     content.update(datum=own.datum.model_dump(), magnetic_field=list(own.magnetic_field))
     content["floor"] = _plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))

@@ -358,5 +358,5 @@ class Simulation:
             self.world.forget(snapshot.world)
 
     def save_scene(self, path: Path) -> None:
-        """Write floor, objects and vehicles as they stand now, as a scene file. Raises ParameterError and OSError."""
-        saving.save(path, self.parameters, self.scene, self._flying)
+        """Write floor, objects, vehicles and weather as they are now: a scene file. Raises ParameterError, OSError."""
+        saving.save(path, self.parameters, self.scene, self._flying, self.shared.weather.now)

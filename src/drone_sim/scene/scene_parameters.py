@@ -1,4 +1,4 @@
-"""What a scene file may say: floor, objects, and where the drone stands."""
+"""What a scene file may say: floor, objects, where the drone stands, and the weather."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from drone_sim.wording import shown
 
 MAX_OBJECTS = 1000
 WORLD = ("time_step", "sub_step", "gravity")  # what a scene file may say of these comes before the parameters
-BESIDE = ("drone", "vehicles", *WORLD)  # what a scene file holds besides the scene
+BESIDE = ("drone", "vehicles", "weather", *WORLD)  # what a scene file holds besides the scene
 
 
 class FloorParameters(Checked):
@@ -86,7 +86,7 @@ def _is_above_itself(one: EntryParameters, entries: Mapping[str, tuple[int, Entr
 
 
 def read(file: str) -> dict[str, Any]:
-    """Return a scene file's floor, objects and drone as they stand among the parameters.
+    """Return a scene file's floor, objects, drone and weather as they stand among the parameters.
 
     Its own files (mesh, urdf, texture) are relative to it. Raises ParameterError.
     """

@@ -13,7 +13,7 @@ RESERVED_TOPICS = (
     *("cmd_vel", "set_pose", "initialpose", "push", "target_pose", "odom", "propellers", "joint_states"),
     *("set_wind", "weather", "faults", "takeoff", "land", "reset", "home", "goto", "state"),
     *("command", "scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
-    *(f"view/{what}" for what in ("surroundings", "bodies", "path", "height", "command", "state")),
+    *(f"view/{what}" for what in ("surroundings", "bodies", "path", "height", "command", "forces", "state")),
 )
 
 

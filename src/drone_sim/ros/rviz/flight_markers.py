@@ -18,6 +18,7 @@ from drone_sim.ros.rviz.marker_topic import EYES, WORDS, MarkerTopic, beside, na
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.flight_state import UNKNOWN
 from drone_sim.vehicles.vehicle import Vehicle
 
 _ABOVE_FLOOR = 0.004  # m, so that the shadow is not hidden by it
@@ -72,7 +73,7 @@ class CommandMarkers:
 
 
 class StateText:
-    """What the simulation does, its time, and the vehicle's height and speed, above each."""
+    """The vehicle's flight state, the simulated time, height and speed, above each."""
 
     def __init__(self, simulation: Simulation, player: Player):
         """Advertise."""
@@ -99,7 +100,9 @@ class StateText:
         simulation, state = self._simulation, vehicle.state
         if not simulation.running:
             return "stopped"
-        doing = "paused" if self._player.paused else "flying"
+        said = str(vehicle.flight_state)
+        doing = "flying" if said.startswith(UNKNOWN) else said
+        doing = f"paused, {doing}" if self._player.paused else doing
         speed = math.hypot(*state.linear_velocity)
         who = "" if vehicle.parameters.is_alone else f"{vehicle.name}  "
         return f"{who}{doing}  {simulation.time:.1f} s\nheight {state.position[2]:.2f} m  speed {speed:.2f} m/s"

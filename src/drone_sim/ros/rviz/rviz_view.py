@@ -5,6 +5,7 @@ from __future__ import annotations
 from drone_sim.ros.rviz.bodies import Bodies
 from drone_sim.ros.rviz.drawing_markers import DrawingMarkers
 from drone_sim.ros.rviz.flight_markers import CommandMarkers, HeightMarkers, StateText
+from drone_sim.ros.rviz.force_markers import ForceMarkers
 from drone_sim.ros.rviz.marker_topic import namespace
 from drone_sim.ros.rviz.path_markers import PathMarkers
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
@@ -29,6 +30,7 @@ class RvizView:
             PathMarkers(simulation),
             HeightMarkers(simulation),
             CommandMarkers(simulation),
+            ForceMarkers(simulation),
             StateText(simulation, player),
         )
 

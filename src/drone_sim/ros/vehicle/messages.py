@@ -16,6 +16,7 @@ from drone_sim.mechanics.state import State, Twist
 from drone_sim.render.intrinsics import Intrinsics
 
 WORLD_FRAME = "world"
+FIRST_FRAME = "drone_sim/first"  # Track_base of the first vehicle, which rviz follows
 
 
 def odometry(stamp: rospy.Time, state: State, child: str) -> Odometry:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 
 import rospy
 from geometry_msgs.msg import TransformStamped
@@ -21,7 +21,8 @@ class Transforms:
     """Broadcasts where the vehicles are, once a step, and where the links of their URDFs sit on them.
 
     world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says, and sensors
-    on what carries them. What does not move on base_link is told once, by /tf_static.
+    on what carries them. What does not move on base_link is told once, by /tf_static; so is the frame that
+    rviz follows, Track_base of the first vehicle, whatever that is called.
     """
 
     def __init__(self) -> None:
@@ -31,10 +32,11 @@ class Transforms:
         self._fixed = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)
         self._eyes = Throttle(_EYES)
 
-    def tell_fixed(self, vehicles: Iterable[Vehicle]) -> None:
+    def tell_fixed(self, vehicles: Collection[Vehicle]) -> None:
         """Say where the links are that do not move; of vehicles that are new, or no longer there."""
         now = rospy.Time.now()
-        told = []
+        first = next(iter(vehicles)).parameters
+        told = [messages.transform(now, first.track_base, messages.FIRST_FRAME, frames.IDENTITY)]
         for one in vehicles:
             told += [_link(now, one, name) for name in one.body.links if name not in one.body.rigid.blade_joints]
             own = one.parameters

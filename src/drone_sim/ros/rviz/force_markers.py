@@ -1,0 +1,156 @@
+"""What pushes the vehicles, in rviz: `view/forces`, with the namespaces `thrust`, `wind` and `contacts`.
+
+Forces are drawn to the scale of the vehicle's own weight: of four propellers that hold it, each has an arrow of HOVER.
+Wind has a scale of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.state import State
+from drone_sim.ros.rviz.line_arrows import arrow, cross
+from drone_sim.ros.rviz.marker_topic import EYES, MarkerTopic, beside, namespace, new_marker
+from drone_sim.run.simulation import Simulation
+from drone_sim.sensors.sensor import Contact
+from drone_sim.vehicles.vehicle import Vehicle
+
+HOVER = 0.2  # m, an arrow of a quarter of the vehicle's weight
+LONGEST = 1.0  # m, of a contact's arrow: a crash has forces of a hundred weights
+WIND = 0.07  # m for each m/s
+_EARTH = 9.81  # m/s², the scale's where there is no gravity
+_SHORTEST = 1e-3  # m; what is shorter is not drawn
+_WIDTH, _POINT = 0.009, 0.025  # m, of a line and of a contact
+_CROSS = 0.07  # m, half of a lost propeller's
+_ABOVE, _TEXT_SIZE = 0.47, 0.042  # m: the wind is drawn over the words of `view/state`
+_GREEN, _RED = (0.05, 0.55, 0.15, 1.0), (0.85, 0.08, 0.05, 1.0)
+_TEAL, _PURPLE = (0.0, 0.45, 0.55, 1.0), (0.75, 0.0, 0.6, 1.0)
+
+
+class _Felt(NamedTuple):
+    """What acts on a vehicle."""
+
+    state: State
+    thrusts: tuple[float, ...]  # N
+    effectiveness: tuple[float, ...]
+    wind: Vector | None  # m/s, world; None without weather
+    contacts: tuple[Contact, ...]
+
+
+class ForceMarkers:
+    """Arrows for what the propellers give, for the wind, and for what the vehicle touches; drawn for who listens.
+
+    Contacts are those of the step's last sub-step: they are read from the world after it, which changes nothing there.
+    """
+
+    def __init__(self, simulation: Simulation):
+        """Advertise."""
+        self._simulation = simulation
+        self._topic = MarkerTopic(f"{namespace(simulation)}/view/forces", EYES)
+        self._touched = _Touched(simulation)
+        self._shown: list[_Felt] = []
+
+    def update(self) -> None:
+        """Publish what has changed, if anybody listens."""
+        if not self._topic.due():
+            return
+        vehicles = self._simulation.vehicles.values()
+        felt = [self._felt(vehicle) for vehicle in vehicles]
+        if felt != self._shown:
+            self._shown = felt
+            gravity = self._simulation.parameters.gravity
+            self._topic.show([one for pair in zip(vehicles, felt) for one in drawn(*pair, gravity)])
+
+    def _felt(self, vehicle: Vehicle) -> _Felt:
+        law = vehicle.propulsion.law
+        wind = vehicle.body.wind if self._simulation.shared.weather.is_felt else None
+        return _Felt(vehicle.state, tuple(law.thrusts), law.effectiveness, wind, self._touched.by(vehicle))
+
+
+class _Touched:
+    """What vehicles touched in the last step. One that was put elsewhere since then touches nothing yet."""
+
+    def __init__(self, simulation: Simulation):
+        self._simulation = simulation
+        self._seen: dict[str, tuple[tuple[int, int], int]] = {}  # run and step, and the vehicle's jumps
+
+    def by(self, vehicle: Vehicle) -> tuple[Contact, ...]:
+        now = self._simulation.run, self._simulation.steps
+        seen, jumps = self._seen.get(vehicle.name, (None, 0))
+        if seen != now:
+            jumps = vehicle.jumps
+            self._seen[vehicle.name] = now, jumps
+        if not self._simulation.steps or jumps != vehicle.jumps:
+            return ()
+        return tuple(vehicle.instruments.carrier.contacts())
+
+
+def drawn(vehicle: Vehicle, felt: _Felt, gravity: float) -> list[Marker | None]:
+    """Return the markers of one vehicle: always as many, None for what is not there. `gravity` in m/s²."""
+    scale = metres_per_newton(vehicle.body.mass, gravity)
+    return [_thrusts(vehicle, felt, scale), *_wind(vehicle, felt.wind), *_contacts(felt.contacts, scale)]
+
+
+def metres_per_newton(mass: float, gravity: float) -> float:
+    """Return the scale of forces on a vehicle of so many kg, under a gravity in m/s²."""
+    return HOVER / (mass * (abs(gravity) or _EARTH) / 4)
+
+
+def _thrusts(vehicle: Vehicle, felt: _Felt, scale: float) -> Marker | None:
+    """Return the arrows of all propellers; red where one is weak, a cross where it is lost."""
+    points: list[Sequence[float]] = []
+    colors: list[ColorRGBA] = []
+    for link, thrust, share in zip(vehicle.propulsion.rotors.links, felt.thrusts, felt.effectiveness):
+        place, axis = np.array(frames.position(link)), np.array((link[2], link[6], link[10]))
+        lines = arrow(place, scale * thrust * axis) if abs(scale * thrust) > _SHORTEST else []
+        lines += [] if share else cross(place, frames.rotate(link, (_CROSS, 0, 0)), frames.rotate(link, (0, _CROSS, 0)))
+        points += lines
+        colors += [ColorRGBA(*(_GREEN if share == 1 else _RED))] * len(lines)
+    if not points:
+        return None
+    marker = _named("thrust", new_marker(Marker.LINE_LIST, _GREEN, (_WIDTH, 0, 0), points))
+    marker.colors = colors
+    marker.header.frame_id, marker.frame_locked = vehicle.parameters.base_link, True
+    return marker
+
+
+def _wind(vehicle: Vehicle, wind: Vector | None) -> list[Marker | None]:
+    """Return an arrow above the vehicle, and its speed in words."""
+    if wind is None:
+        return [None, None]
+    speed = math.hypot(*wind)
+    start, way = np.array((0.0, 0.0, _ABOVE)), WIND * np.array(wind)
+    text = new_marker(Marker.TEXT_VIEW_FACING, _TEAL, (0, 0, _TEXT_SIZE))
+    text.text = f"wind {speed:.1f} m/s"
+    text.pose.position.x, text.pose.position.y, text.pose.position.z = start + way + (0, 0, _TEXT_SIZE)
+    lines = arrow(start, way) if WIND * speed > _SHORTEST else []
+    shaft = beside(vehicle, new_marker(Marker.LINE_LIST, _TEAL, (_WIDTH, 0, 0), lines)) if lines else None
+    return [shaft and _named("wind", shaft), _named("wind", beside(vehicle, text))]
+
+
+def _contacts(contacts: Sequence[Contact], scale: float) -> list[Marker | None]:
+    """Return the points, and arrows for the forces on the vehicle, in the world."""
+    if not contacts:
+        return [None, None]
+    lines: list[Sequence[float]] = []
+    for one in contacts:
+        way = scale * np.array(one.force)
+        length = float(np.linalg.norm(way))
+        if length > _SHORTEST:
+            lines += arrow(np.array(one.point), way * min(1.0, LONGEST / length))
+    points = new_marker(Marker.SPHERE_LIST, _PURPLE, [_POINT] * 3, [one.point for one in contacts])
+    forces = new_marker(Marker.LINE_LIST, _PURPLE, (_WIDTH, 0, 0), lines) if lines else None
+    return [_named("contacts", points), forces and _named("contacts", forces)]
+
+
+def _named(name: str, marker: Marker) -> Marker:
+    marker.ns = name
+    return marker

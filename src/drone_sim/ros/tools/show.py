@@ -1,0 +1,130 @@
+"""Open rviz on what flies: on all of it, whatever its names are, from behind the first vehicle.
+
+It waits for the simulator, asks the master where the topics for rviz are and /tf_static which vehicle is the first,
+lays those names over rviz/drone.rviz, or over rviz/fleet.rviz where several fly, and then becomes rviz.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import signal
+import sys
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+import rosgraph
+import roslib.packages
+import rospy
+from tf2_msgs.msg import TFMessage
+
+from drone_sim.files import writing
+from drone_sim.files.resources import package_path
+from drone_sim.offline.command_line import Parser, status_of
+from drone_sim.ros.node.paths import from_shell
+from drone_sim.ros.vehicle.messages import FIRST_FRAME
+
+_NAME = "show"
+_PERIOD = 0.1  # s, between two questions to the master
+_PATIENCE = 5.0  # s, after which it says that it waits
+_TOPIC = "/view/state"  # that the simulator advertises for rviz: the last one
+_ALONE, _FIRST, _SIMULATOR = "drone", "drone1", "drone_sim"  # as the files of the package name them
+_NAMES = re.compile(rf"\b{_FIRST}\b|(?<=/)(?:{_ALONE}|{_SIMULATOR})(?=/)")
+_TITLES = re.compile(rf"^ *Name: (.*\b{_FIRST})$", re.MULTILINE)
+
+
+def main() -> int:
+    """Become rviz; return 1, after a line on stderr, where that cannot be."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is to be put in order
+    parser = Parser(prog=_NAME, description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--config", metavar="FILE", default="", help="what rviz shows instead, as that file says it")
+    parser.add_argument("--simulator", metavar="NODE", default=_SIMULATOR, help="(default: %(default)s)")
+    options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
+    remappings = [one for one in sys.argv[1:] if ":=" in one]
+    return status_of(_NAME, lambda: _show(options, remappings))
+
+
+def _show(options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:
+    """Raises OSError and ValueError."""
+    rviz = roslib.packages.find_node("rviz", "rviz")
+    if not rviz:
+        raise OSError("rviz is not installed (on Debian: rviz)")
+    config = from_shell(options.config)
+    if config and not Path(config).is_file():
+        raise OSError(f"--config {config}: no such file")
+    config = config or str(_fitting(options.simulator.strip("/")))
+    os.execv(rviz[0], [rviz[0], "-d", config, *remappings])
+
+
+def _fitting(simulator: str) -> Path:
+    """Return a file for what flies: one of the package's, or one made of it."""
+    above = _topics_of(simulator)
+    alone = above != simulator
+    names = {_ALONE: above} if alone else {_SIMULATOR: simulator, _FIRST: _first_vehicle()}
+    template = package_path() / "rviz" / ("drone.rviz" if alone else "fleet.rviz")
+    if all(name == given for name, given in names.items()):
+        return template
+    made = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "drone_sim" / "rviz" / template.name
+    made.parent.mkdir(parents=True, exist_ok=True)
+    writing.write(made, renamed(template.read_text(encoding="utf-8"), names))
+    return made
+
+
+def renamed(text: str, names: Mapping[str, str]) -> str:
+    """Return the text of a file of rviz with other names in its topics, frames and titles.
+
+    Where the docks are is in it too: Qt writes their titles as UTF-16 in hexadecimal digits, each after its length.
+    """
+    for title in _TITLES.findall(text):
+        text = text.replace(_as_dock(title), _as_dock(_renamed(title, names)))
+    return _renamed(text, names)
+
+
+def _renamed(text: str, names: Mapping[str, str]) -> str:
+    return _NAMES.sub(lambda found: names.get(found[0], found[0]), text)
+
+
+def _as_dock(title: str) -> str:
+    coded = title.encode("utf-16-be")
+    return f"{len(coded):08x}{coded.hex()}"
+
+
+def _topics_of(simulator: str) -> str:
+    """Wait for the simulator, and return the namespace of its topics for rviz. Raises OSError without a master."""
+    master = rosgraph.Master(f"/{_NAME}")
+    began, told = time.monotonic(), False
+    try:
+        while True:
+            for topic, nodes in master.getSystemState()[0]:
+                if topic.endswith(_TOPIC) and f"/{simulator}" in nodes:
+                    return str(topic)[: -len(_TOPIC)].strip("/")
+            if not told and time.monotonic() - began > _PATIENCE:
+                print(f"{_NAME}: waits for the node /{simulator}", file=sys.stderr, flush=True)
+                told = True
+            time.sleep(_PERIOD)
+    except (OSError, rosgraph.MasterException) as error:
+        raise OSError(f"the ROS master at {rosgraph.get_master_uri()} does not answer: {error}") from None
+
+
+def _first_vehicle() -> str:
+    """Return the name of the vehicle, one of several, that the view follows. Raises OSError."""
+    found: list[str] = []
+    come = threading.Event()
+
+    def look(message: TFMessage) -> None:
+        for one in message.transforms:
+            if one.child_frame_id == FIRST_FRAME:
+                found.append(one.header.frame_id.partition("/")[0])
+                come.set()
+
+    rospy.init_node(_NAME, argv=[], anonymous=True, disable_signals=True)
+    rospy.Subscriber("/tf_static", TFMessage, look)
+    in_time = come.wait(_PATIENCE)
+    rospy.signal_shutdown("done")
+    if not in_time:
+        raise OSError(f"nobody broadcasts the frame {FIRST_FRAME}")
+    return found[-1]

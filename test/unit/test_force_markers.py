@@ -1,0 +1,196 @@
+"""What rviz is shown of forces, wind and contacts: which arrows, where, how long; and that looking changes nothing."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.world import World
+
+force_markers = pytest.importorskip("drone_sim.ros.rviz.force_markers")
+pytestmark = pytest.mark.ros
+
+SOUND = (1.0, 1.0, 1.0, 1.0)
+WALL = {"shape": "box", "size": [0.2, 3, 3], "position": [0.6, 0, 1.5]}
+STANDING = {"start": "landed"}
+
+
+class Topic:
+    """What is sent; somebody listens, or nobody."""
+
+    watched = True
+
+    def __init__(self, name, _period):
+        self.name, self.messages = name, []
+
+    def due(self):
+        return self.watched
+
+    def show(self, markers):
+        self.messages.append(markers)
+
+
+@pytest.fixture(name="shown")
+def _shown(monkeypatch):
+    monkeypatch.setattr(force_markers, "MarkerTopic", Topic)
+    made = []
+
+    def shown(steps=0, **overrides):
+        simulation = Simulation(parameters.load(overrides))
+        markers = force_markers.ForceMarkers(simulation)
+        made.append(simulation)
+        for _ in range(steps):
+            simulation.step()
+        markers.update()
+        return simulation, markers
+
+    yield shown
+    for simulation in made:
+        simulation.close()
+
+
+def arrows(marker):
+    """Return start and way of each arrow of a marker: a shaft and four barbs from its tip; all (3,)."""
+    points = np.array([(one.x, one.y, one.z) for one in marker.points]).reshape(-1, 10, 3)
+    for lines in points:
+        assert (lines[2::2] == lines[1]).all(), "every barb begins at the tip"
+        assert all((lines[3::2] - lines[1]) @ (lines[1] - lines[0]) < 0), "and goes back"
+    return [(lines[0], lines[1] - lines[0]) for lines in points]
+
+
+def in_world(marker, vehicle):
+    """Return where the points of a marker on base_link are in the world, (n, 3)."""
+    place, turn = marker.pose.position, marker.pose.orientation
+    pose = Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
+    matrix = frames.multiply(vehicle.matrix, pose.matrix)
+    return np.array([frames.transform(matrix, (one.x, one.y, one.z)) for one in marker.points])
+
+
+def scale_of(vehicle):
+    return force_markers.metres_per_newton(vehicle.body.mass, -9.81)
+
+
+def red(color):
+    return color.r > 2 * color.g
+
+
+def test_at_hover_the_thrusts_hold_the_weight_where_the_propellers_are(shown):
+    simulation, markers = shown(steps=40)
+    drone, sums = simulation.drone, []
+    for _ in range(20):
+        simulation.step()
+        markers.update()
+        thrust, *others = markers._topic.messages[-1]
+        assert others == [None] * 4, "neither wind nor contacts"
+        found = arrows(thrust)
+        for (start, way), link, newtons in zip(found, drone.propulsion.rotors.links, drone.propulsion.thrusts):
+            assert start == pytest.approx(frames.position(link))
+            assert way == pytest.approx(np.array((link[2], link[6], link[10])) * newtons * scale_of(drone))
+        sums.append(sum(np.linalg.norm(way) for _, way in found))
+    assert (thrust.header.frame_id, thrust.frame_locked, thrust.ns) == ("base_link", True, "thrust")
+    assert np.mean(sums) / scale_of(drone) == pytest.approx(drone.body.mass * 9.81, rel=0.005)
+    assert np.mean(sums) / 4 == pytest.approx(force_markers.HOVER, rel=0.005)
+    assert not any(red(color) for color in thrust.colors)
+
+
+def test_a_weak_propeller_is_red_and_a_lost_one_a_cross(shown):
+    simulation, markers = shown(faults={"propellers": [0.8, 1, 0, 1]}, steps=1)
+    thrust = markers._topic.messages[-1][0]
+    assert len(thrust.points) == len(thrust.colors) == 3 * 10 + 4
+    assert [red(one) for one in thrust.colors] == [True] * 10 + [False] * 10 + [True] * 4 + [False] * 10
+    corners = np.array([(one.x, one.y, one.z) for one in thrust.points[20:24]])
+    middle = frames.position(simulation.drone.propulsion.rotors.links[2])
+    assert corners.mean(axis=0) == pytest.approx(middle)
+    assert np.ptp(corners, axis=0)[2] == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("gusts", [{}, {"deviation": [3, 3, 1.5]}])
+def test_the_wind_is_an_arrow_as_long_as_it_is_fast_however_the_drone_leans(shown, gusts):
+    simulation, markers = shown(weather={"wind": [3, -4, 0], "gusts": gusts}, drone={"yaw": 1.0}, steps=30)
+    drone = simulation.drone
+    _, arrow, text, *_ = markers._topic.messages[-1]
+    start, tip = in_world(arrow, drone)[:2]
+    assert tip - start == pytest.approx(force_markers.WIND * np.array(drone.body.wind))
+    assert start[:2] == pytest.approx(drone.state.position[:2])
+    assert abs(frames.to_euler(drone.matrix)[0]) > 0.01, "it leans"
+    assert text.text == f"wind {np.linalg.norm(drone.body.wind):.1f} m/s"
+    assert (arrow.ns, text.ns) == ("wind", "wind")
+    assert gusts or text.text == "wind 5.0 m/s"
+
+
+def test_where_the_wind_has_dropped_there_is_no_arrow_and_its_speed_is_0(shown):
+    simulation, markers = shown()
+    simulation.drone.change_weather({"wind": [0, 0, 0]})
+    simulation.step()
+    markers.update()
+    _, arrow, text, *_ = markers._topic.messages[-1]
+    assert arrow is None and text.text == "wind 0.0 m/s"
+
+
+def test_what_it_stands_on_pushes_with_its_weight(shown):
+    simulation, markers = shown(**STANDING, steps=20)
+    thrust, *_, points, forces = markers._topic.messages[-1]
+    drone, found = simulation.drone, arrows(forces)
+    assert thrust is None
+    assert all(abs(one.z) < 0.01 for one in points.points) and len(points.points) >= 3
+    assert {tuple(start) for start, _ in found} <= {(one.x, one.y, one.z) for one in points.points}
+    pushed = sum(way for _, way in found) / scale_of(drone)
+    assert pushed == pytest.approx([0, 0, drone.body.mass * 9.81], abs=0.03 * drone.body.mass * 9.81)
+
+
+def test_a_crash_is_drawn_no_longer_than_it_fits():
+    hit = force_markers.Contact("Wall", (1.0, 2.0, 3.0), (0.0, 1.0, 0.0), (0.0, 5000.0, 0.0))
+    _, forces = force_markers._contacts([hit], 0.1)
+    assert arrows(forces)[0][1] == pytest.approx([0, force_markers.LONGEST, 0])
+
+
+def test_what_was_put_elsewhere_touches_nothing_before_the_next_step(shown):
+    simulation, markers = shown(**STANDING, steps=5)
+    simulation.drone.move(Pose((3.0, 0.0, 2.0)))
+    markers.update()
+    assert markers._topic.messages[-1][3:] == [None, None]
+    simulation.stop()
+    markers.update()
+    assert markers._topic.messages[-1][3:] == [None, None]
+
+
+def test_what_has_not_changed_is_not_sent_again_and_each_vehicle_has_its_place(shown, monkeypatch):
+    monkeypatch.setattr(force_markers, "namespace", lambda _simulation: "drone_sim")
+    simulation, markers = shown(vehicles={"a": {}, "b": {"position": [0, 2, 0.8]}}, steps=2)
+    markers.update()
+    (message,) = markers._topic.messages
+    assert markers._topic.name == "drone_sim/view/forces"
+    assert [one and one.header.frame_id for one in message] == ["a/base_link", *[None] * 4, "b/base_link", *[None] * 4]
+    simulation.step()
+    markers.update()
+    assert len(markers._topic.messages) == 2
+
+
+def crashed(simulation, markers):
+    """Let it fall against a wall, and lie; return all its states."""
+    simulation.drone.receive(Twist(Vector3(1.0, 0, 0)))
+    simulation.drone.change_faults({"propellers": [0, 1, 1, 1]})
+    states = []
+    for _ in range(80):
+        simulation.step()
+        markers.update()
+        states.append(simulation.drone.state)
+    return states
+
+
+def test_whoever_looks_changes_nothing_and_nothing_is_read_for_nobody(shown, monkeypatch):
+    asked = itertools.count()
+    read = World.contacts
+    monkeypatch.setattr(World, "contacts", lambda *of: (next(asked), read(*of))[1])
+    wall = {"scene": {"objects": [WALL]}}
+    monkeypatch.setattr(Topic, "watched", False)
+    states = crashed(*shown(**wall))
+    assert next(asked) == 0
+    monkeypatch.setattr(Topic, "watched", True)
+    seen = shown(**wall)
+    assert crashed(*seen) == states
+    assert sum(message[4] is not None for message in seen[1]._topic.messages) > 30, "it lay there"

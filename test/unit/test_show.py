@@ -1,0 +1,54 @@
+"""`rosrun drone_sim show`: the files of rviz with the names of what flies."""
+
+import re
+
+import pytest
+import yaml
+
+from drone_sim.files.resources import package_path
+
+show = pytest.importorskip("drone_sim.ros.tools.show")
+pytestmark = pytest.mark.ros
+
+FOLDER = package_path() / "rviz"
+
+
+def docks(view):
+    """Return the titles of the docks in Qt's own record of the window, as Qt reads them: a length, then UTF-16."""
+    state = bytes.fromhex(view["Window Geometry"]["QMainWindow State"])
+    titles = re.findall(rb"\xfb(....)((?:\x00[ -~])+)", state, re.DOTALL)
+    assert all(int.from_bytes(length, "big") == len(title) for length, title in titles)
+    return {title.decode("utf-16-be") for _, title in titles}
+
+
+def texts(value):
+    """Yield every text of a value, keys included."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from (key, *texts(inner))
+    elif isinstance(value, list):
+        for inner in value:
+            yield from texts(inner)
+    elif isinstance(value, str):
+        yield value
+
+
+def test_a_fleet_with_other_names_has_its_topics_frames_and_docks():
+    text = show.renamed((FOLDER / "fleet.rviz").read_text(), {"drone1": "alpha", "drone_sim": "sim2"})
+    view = yaml.safe_load(text)
+    topics = {one for one in texts(view) if one.startswith("/")}
+    assert {"/sim2/view/forces", "/sim2/markers/update", "/alpha/front", "/alpha/initialpose"} <= topics
+    assert not any(one.startswith(("/drone1/", "/drone_sim/")) for one in topics)
+    assert view["Visualization Manager"]["Views"]["Current"]["Target Frame"] == "drone_sim/first"
+    assert {"Front camera of alpha", "Track camera of alpha"} <= docks(view)
+    assert docks(view) - {"Displays"} <= set(texts(view))
+    assert not re.search(r"\bdrone1\b", text) and "alpha/base_link" in set(texts(view))
+
+
+def test_one_with_another_name_has_its_topics():
+    text = show.renamed((FOLDER / "drone.rviz").read_text(), {"drone": "hawk"})
+    before, after = (yaml.safe_load(one) for one in ((FOLDER / "drone.rviz").read_text(), text))
+    changed = {(one, other) for one, other in zip(texts(before), texts(after)) if one != other}
+    assert ("/drone/view/forces", "/hawk/view/forces") in changed
+    assert all(one.replace("/drone/", "/hawk/") == other for one, other in changed)
+    assert docks(before) == docks(after)
