@@ -1,19 +1,19 @@
 """What may be changed of a vehicle while it flies, and what it is called.
 
-The names are the keys of the YAML files with slashes, a part of a list by a name of its own: weather/wind/x. Gains, which
-are changed most often, go without their key: Kzref.
+The names are the keys of the YAML files with slashes, a part of a list by a name of its own: weather/wind/x. Gains,
+which are changed most often, go without their key: Kzref.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, get_args
 
 from drone_sim.config.comments import comments
 from drone_sim.config.leaves import Leaf, leaves
-from drone_sim.config.types import Key, Location
+from drone_sim.config.types import Checked, Key
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.failing import Failure
@@ -52,15 +52,15 @@ def _of_cameras(vehicle: VehicleParameters) -> Iterator[Leaf]:
 
 def _of_sensors(vehicle: VehicleParameters) -> Iterator[Leaf]:
     for name, sensor in vehicle.sensors.items():
-        for one in leaves(type(sensor), ("sensors", name)):
+        kind: type[Checked] = type(sensor)
+        for one in leaves(kind, ("sensors", name)):
             if one.location[2] == "noise" and one.location[-1] not in _LEFT_OUT:
                 yield one
 
 
 def _of_failures(vehicle: VehicleParameters) -> Iterator[Leaf]:
     for name in (*vehicle.sensors, *vehicle.cameras):
-        said = "how it fails"
-        yield Leaf(("faults", "sensors", name), str, choices=get_args(Failure), said=said)
+        yield Leaf(("faults", "sensors", name), str, choices=get_args(Failure), said="whether and how it fails")
 
 
 def _of_script(parameters: Mapping[str, Any]) -> dict[str, Leaf]:
@@ -87,7 +87,7 @@ def _explained(leaf: Leaf) -> Leaf:
 # ---- values
 
 
-def value_at(tree: Any, location: Location) -> Any:
+def value_at(tree: Any, location: Sequence[Key]) -> Any:
     """Return what stands at a location of models, mappings and lists; None where nothing does."""
     for key in location:
         if isinstance(tree, Mapping):

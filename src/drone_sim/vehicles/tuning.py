@@ -1,4 +1,4 @@
-"""What is changed of a vehicle while it flies: gains, limits, noise, cameras, weather, faults, a script's parameters."""
+"""What is changed of a vehicle while it flies: gains, limits, noise, cameras, weather, faults, script parameters."""
 
 from __future__ import annotations
 
@@ -84,7 +84,10 @@ class Tuning:
         own = self._vehicle
         present = {key: getattr(own.parameters, key) for key in EquipmentParameters.model_fields}
         present.update(weather=own.weather, faults=own.faults.now)
-        return _Checked(laid, changed(TunedParameters.model_construct(**present), laid))
+        try:
+            return _Checked(laid, changed(TunedParameters.model_construct(**present), laid))
+        except ParameterError as error:
+            raise ParameterError(_by_name(str(error), known)) from None
 
     def change(self, changes: Mapping[str, Any]) -> None:
         """Let other values hold, by name, from the next step on: all of them, or none. Raises ParameterError."""
@@ -136,11 +139,12 @@ class Tuning:
             _LOG.warning("%s is not tuned as it was: %s", self._vehicle.name, error)
 
     def begin(self) -> None:
-        """Give what the script has declared in its init the values that were chosen before."""
+        """Give the script's parameters the values that files or tuning say: those of its init are only defaults."""
         own = self._vehicle.script_parameters[self._vehicle.own_script]
+        own.update(self._vehicle.parameters.script_parameters)
         for name, leaf in self.known.items() if self.chosen else ():
             if name in self.chosen and leaf.location[0] == SCRIPT and _fits(leaf, self.chosen[name]):
-                own[leaf.location[1]] = self.chosen[name]
+                own[str(leaf.location[1])] = self.chosen[name]
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back what was changed; commands, cameras, sensors have theirs themselves."""
@@ -158,4 +162,11 @@ def _fits(leaf: Leaf, value: Any) -> bool:
     if leaf.kind in (float, int):
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         return is_number and (leaf.location[0] != SCRIPT or math.isfinite(value))
-    return isinstance(value, leaf.kind) and (leaf.kind is bool or len(value) <= _LONGEST)
+    return isinstance(value, leaf.kind) and (not isinstance(value, str) or len(value) <= _LONGEST)
+
+
+def _by_name(said: str, known: Mapping[str, Leaf]) -> str:
+    """Return what is wrong with values named as they are tuned."""
+    for name, leaf in known.items():
+        said = said.replace(f"parameter {'/'.join(map(str, leaf.location))} = ", f"parameter {name} = ")
+    return said

@@ -1,8 +1,8 @@
 """dynamic_reconfigure for a vehicle: `rosrun dynamic_reconfigure dynparam set /drone Kzref 2`, and rqt_reconfigure.
 
 Of the library only its messages and their encoding are used. Its Server brings what is not allowed silently within the
-limits, takes what an earlier node has left on the parameter server, cannot change its description when a script declares
-a parameter, and asks the master twice for each.
+limits, takes what an earlier node has left on the parameter server, cannot change its description when a script
+declares a parameter, and asks the master twice for each of them.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest, ReconfigureResponse
 
 from drone_sim.config.leaves import Leaf
-from drone_sim.config.types import ParameterError
 from drone_sim.ros.node.inbox import Inbox
+from drone_sim.vehicles.tuning_message import TOPIC
 from drone_sim.vehicles.vehicle import Vehicle
 
 _GROUPS, _REST = ("control", "weather", "faults", "cameras", "sensors", "script_parameters"), "limits"
@@ -32,8 +32,10 @@ class TuningServer:
         """Advertise, and say what there is."""
         self._vehicle, self._inbox = vehicle, inbox
         name = self._name = rospy.resolve_name(vehicle.name)
-        self._description = rospy.Publisher(f"{name}/parameter_descriptions", ConfigDescription, queue_size=1, latch=True)
-        self._updates = rospy.Publisher(f"{name}/parameter_updates", Config, queue_size=1, latch=True)
+        self._description, self._updates = (
+            rospy.Publisher(f"{name}/{topic}", kind, queue_size=1, latch=True)
+            for topic, kind in (("parameter_descriptions", ConfigDescription), (TOPIC, Config))
+        )
         self._known: dict[str, Leaf] = {}
         self._said: dict[str, Any] = {}
         self._config = Config()
