@@ -11,13 +11,17 @@ from drone_sim.config.types import ParameterError, read_yaml
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import read_bytes
 from drone_sim.vehicles.tunable import SCRIPT, common, nested
+from drone_sim.wording import shown
 
 _BEGIN = b"!!python/object/new:dynamic_reconfigure.encoding.Config"
 _VALUES = "dictitems"
 
 
-def read_config(path: Path) -> dict[str, Any]:
-    """Return the keys in a file of parameters, which may be a dump. Raises ParameterError."""
+def read_config(path: Path, below: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys in a file of parameters, which may be a dump; `below` has those that it is laid over.
+
+    Raises ParameterError.
+    """
     try:
         content = read_bytes(path, yaml_files.MAX_SIZE)
     except (OSError, ValueError):
@@ -32,7 +36,12 @@ def read_config(path: Path) -> dict[str, Any]:
     values = values.get(_VALUES) if isinstance(values, dict) else None
     if not isinstance(values, dict):
         raise ParameterError(f"{path}: what dynparam has dumped holds `{_VALUES}:` with a value for each name")
-    return _keys(values, path)
+    keys = _keys(values, path)
+    strange = [str(one) for one in keys.get("sensors", ()) if one not in below.get("sensors", ())]
+    if strange:
+        said = f"it was dumped of a drone with other sensors: {', '.join(map(shown, strange[:8]))}"
+        raise ParameterError(f"{path}: {said}; name the file that has them before it, config:=FILE,{path.name}")
+    return keys
 
 
 def _keys(values: Mapping[str, Any], path: Path) -> dict[str, Any]:

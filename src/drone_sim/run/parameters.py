@@ -185,7 +185,7 @@ def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
     if not isinstance(config, str):
         raise ParameterError(f"parameter config = {shown(config)}: must be the name of a file")
     for name in filter(None, config.split(",")):
-        given = merged(given, _config(name))
+        given = merged(given, _config(name, given))
         _checked(given, "", {}, name)
     if overrides.get("vehicles") == 0:  # roslaunch's arguments cannot be left out
         overrides = {key: value for key, value in overrides.items() if key != "vehicles"}
@@ -193,13 +193,13 @@ def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
     return _in_scene(given, given["scene_file"])
 
 
-def _config(name: str) -> dict[str, Any]:
-    """Return what a file says. Raises ParameterError."""
+def _config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a file says, which is laid over what stands `below`. Raises ParameterError."""
     try:
         path = resolve(name)
     except FileNotFoundError as error:
         raise ParameterError(f"parameter config = {shown(name)}: {error}") from None
-    values = read_config(path)
+    values = read_config(path, below)
     if "config" in values:
         raise ParameterError(f"{name}: a config file names no other `config`")
     scene_parameters.find_files_beside(path.parent, values)

@@ -23,7 +23,7 @@ _LOG = logging.getLogger(__name__)
 _CONDITIONS = ("weather", "faults")  # of a flight: the next one begins with its own
 _HEIGHT = "takeoff_height"  # which scripts read, too
 _LONGEST = 1000  # characters of a text
-_WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+_WORDS = {float: "a finite number", int: "a whole number", bool: "true or false", str: "a text"}
 
 
 class TunedParameters(EquipmentParameters):
@@ -91,7 +91,9 @@ class Tuning:
 
     def change(self, changes: Mapping[str, Any]) -> None:
         """Let other values hold, by name, from the next step on: all of them, or none. Raises ParameterError."""
-        laid, new = self.check(changes)
+        now = self.values()
+        changes = {name: value for name, value in changes.items() if name not in now or now[name] != value}
+        laid, new = self.check(changes)  # without what holds already: a wind of 0 would bring air
         vehicle = self._vehicle
         self._keep(laid, new)
         vehicle.commands.timeout = new.cmd_vel_timeout
