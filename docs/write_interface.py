@@ -8,6 +8,8 @@ import re
 from pathlib import Path
 
 from drone_sim.config.comments import CONFIG, rows
+from drone_sim.run import parameters
+from drone_sim.vehicles.tunable import tunables
 
 PAGE = Path(__file__).resolve().parents[1] / "docs/interface.md"
 BEGIN, END = "<!-- parameters: begin -->\n", "<!-- parameters: end -->\n"
@@ -15,9 +17,19 @@ BEGIN, END = "<!-- parameters: begin -->\n", "<!-- parameters: end -->\n"
 _CAMERA = re.compile(r"^cameras/(\w+)/")
 
 
+def tuned_names() -> dict[str, list[str]]:
+    """Return what each parameter is called where it is tuned, by its name in the table."""
+    found: dict[str, list[str]] = {}
+    for name, leaf in tunables(parameters.load().fleet[0], {}).items():
+        keys = [one for one in leaf.location if isinstance(one, str)]
+        found.setdefault("/".join(keys), []).append(name)
+    return found
+
+
 def table() -> str:
     """Return the table. Of the cameras, which are all of one kind, the keys that the first has stand for all."""
-    lines, cameras = ["| parameter | default | |", "|---|---|---|"], set()
+    lines, cameras = ["| parameter | default | in flight | |", "|---|---|---|---|"], set()
+    tuned = tuned_names()
     for name, default, comment in rows(CONFIG.read_text(encoding="utf-8")):
         camera = _CAMERA.match(name)
         if camera:
@@ -26,7 +38,8 @@ def table() -> str:
                 continue
             cameras.add(key)
             name = f"cameras/{camera[1]}/{key}"
-        cells = (f"`{name}`", f"`{default}`" if default else "", comment.replace("|", "\\|").replace("<", "&lt;"))
+        live = ", ".join(f"`{one}`" for one in tuned.get(name, ()))
+        cells = (f"`{name}`", f"`{default}`" if default else "", live, comment.replace("|", "\\|").replace("<", "&lt;"))
         lines.append(f"| {' | '.join(cells)} |".replace("|  |", "| |"))
     return "\n".join(lines) + "\n"
 

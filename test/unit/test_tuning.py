@@ -272,7 +272,7 @@ def test_the_flight_of_a_dump_is_the_flight_that_was_tuned(simulate, tmp_path):
         ("Kzref: 5.0", "cmd_vel_limits: 5", "dump.yaml: a name is the beginning of others"),
         ("Kzref: 5.0", "groups: !!python/object/new:os.system [ls]", "the tag 'tag:yaml.org,2002:python/object/new"),
         ("  weather/wind/y: 0.0\n", "", "dump.yaml: parameter weather/wind/y: missing beside the other parts"),
-        ("Kzref: 5.0", "sensors/imu/noise/deviation: 1.0", "dumped of a drone with other sensors: 'imu'; name the file"),
+        ("Kzref: 5.0", "sensors/imu/noise/deviation: 1.0", "of a drone with other sensors: 'imu'; name the file"),
         ("dictitems", "items", "dump.yaml: what dynparam has dumped holds `dictitems:`"),
         ("encoding.Config", "encoding.Else", "dump.yaml: the tag"),
     ],
