@@ -77,7 +77,7 @@ class Tuning:
         known = self.known
         for name, value in changes.items():
             if name not in known:
-                raise ParameterError(f"parameter {shown(name)}: cannot be changed in flight; {near_names(name, known)}")
+                raise ParameterError(f"parameter {shown(name)}: cannot be changed in flight; {near_names(name[:80], known)}")
             if not _fits(known[name], value):
                 raise ParameterError(f"parameter {name} = {shown(value)}: must be {_WORDS[known[name].kind]}")
         laid = nested(known, self.values(), changes)
