@@ -23,7 +23,8 @@ _LOG = logging.getLogger(__name__)
 _CONDITIONS = ("weather", "faults")  # of a flight: the next one begins with its own
 _HEIGHT = "takeoff_height"  # which scripts read, too
 _LONGEST = 1000  # characters of a text
-_WORDS = {float: "a finite number", int: "a whole number", bool: "true or false", str: "a text"}
+_TEXT = f"a text of at most {_LONGEST} characters"
+_WORDS = {float: "a finite number", int: "a whole number", bool: "true or false", str: _TEXT}
 
 
 class TunedParameters(EquipmentParameters):
@@ -77,7 +78,8 @@ class Tuning:
         known = self.known
         for name, value in changes.items():
             if name not in known:
-                raise ParameterError(f"parameter {shown(name)}: cannot be changed in flight; {near_names(name[:80], known)}")
+                near = near_names(name[:80], known)
+                raise ParameterError(f"parameter {shown(name)}: cannot be changed in flight; {near}")
             if not _fits(known[name], value):
                 raise ParameterError(f"parameter {name} = {shown(value)}: must be {_WORDS[known[name].kind]}")
         laid = nested(known, self.values(), changes)
