@@ -26,6 +26,7 @@ def sysCall_init():
     sim.setScriptSimulationParameter(sim.handle_self, "careful", True)
     sim.setScriptSimulationParameter(sim.handle_self, "mood", "calm")
     sim.setScriptSimulationParameter(sim.handle_self, "way", [1, 2])
+    sim.setScriptSimulationParameter(sim.handle_self, "tale", "and then " * 1000)
     self.seen = []
     simROS.subscribe("parameter_updates", "dynamic_reconfigure/Config", "on_parameters")
 
@@ -269,6 +270,7 @@ def test_the_flight_of_a_dump_is_the_flight_that_was_tuned(simulate, tmp_path):
     [
         ("Kzref: 5.0", "Kzref: 20000", "dump.yaml: parameter control/Kzref = 20000: input should be less than"),
         ("Kzref: 5.0", "Kzreff: 5.0", "dump.yaml: parameter Kzreff: unknown key"),
+        ("Kzref: 5.0", f"{'a/' * 400}b: 5.0", "dump.yaml: parameter a: unknown key"),
         ("Kzref: 5.0", "Kzref: [", "dump.yaml: as what dynparam has dumped: "),
         ("Kzref: 5.0", "cmd_vel_limits: 5", "dump.yaml: a name is the beginning of others"),
         ("Kzref: 5.0", "groups: !!python/object/new:os.system [ls]", "the tag 'tag:yaml.org,2002:python/object/new"),

@@ -15,6 +15,7 @@ from drone_sim.wording import shown
 
 _BEGIN = b"!!python/object/new:dynamic_reconfigure.encoding.Config"
 _VALUES = "dictitems"
+_DEEPEST = 8  # keys within each other
 
 
 def read_config(path: Path, below: Mapping[str, Any]) -> dict[str, Any]:
@@ -58,4 +59,4 @@ def _keys(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
 def _location(name: str) -> tuple[str, ...]:
     """Return the keys of what not every vehicle has; a script's parameter may have slashes in its name."""
     first, slash, rest = name.partition("/")
-    return (first, rest) if slash and first == SCRIPT else tuple(name.split("/"))
+    return (first, rest) if slash and first == SCRIPT else tuple(name.split("/", _DEEPEST))

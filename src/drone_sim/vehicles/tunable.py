@@ -21,6 +21,7 @@ from drone_sim.vehicles.fault_parameters import FaultParameters
 from drone_sim.vehicles.parameters import ControlParameters, EquipmentParameters, VehicleParameters
 
 CONTROL, SCRIPT = "control", "script_parameters"
+LONGEST = 1000  # characters of a text
 _LIMITS = ("takeoff_height", "cmd_vel_timeout", "cmd_vel_limits", "push", "position_limit")
 _OF_CAMERAS = ("every", "horizontal_fov")
 _LEFT_OUT = ("seed", "variance")  # the one is of a whole flight, the other only said
@@ -64,12 +65,12 @@ def _of_failures(vehicle: VehicleParameters) -> Iterator[Leaf]:
 
 
 def _of_script(parameters: Mapping[str, Any]) -> dict[str, Leaf]:
-    """Return those that dynamic_reconfigure has a type for: numbers, switches, texts."""
+    """Return those that dynamic_reconfigure has a type for: numbers, switches, texts that are not too long."""
     bounds: dict[type, tuple[Any, Any]] = {float: (-math.inf, math.inf), bool: (False, True), str: (0.0, 0.0)}
     found = {}
     for key, value in parameters.items():
         kind = float if type(value) is int else type(value)
-        if kind in bounds:
+        if kind in bounds and not (isinstance(value, str) and len(value) > LONGEST):
             low, high = bounds[kind]
             one = Leaf((SCRIPT, key), kind, low=low, high=high, said="of the child script")
             found[one.name] = one

@@ -12,7 +12,7 @@ from drone_sim.config.leaves import Leaf
 from drone_sim.config.types import ParameterError
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.vehicles.parameters import EquipmentParameters
-from drone_sim.vehicles.tunable import CONTROL, SCRIPT, nested, tunables, value_at
+from drone_sim.vehicles.tunable import CONTROL, LONGEST, SCRIPT, nested, tunables, value_at
 from drone_sim.vehicles.tuning_message import TOPIC, message_of
 from drone_sim.wording import near_names, shown
 
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 _CONDITIONS = ("weather", "faults")  # of a flight: the next one begins with its own
 _HEIGHT = "takeoff_height"  # which scripts read, too
-_LONGEST = 1000  # characters of a text
-_TEXT = f"a text of at most {_LONGEST} characters"
+_TEXT = f"a text of at most {LONGEST} characters"
 _WORDS = {float: "a finite number", int: "a whole number", bool: "true or false", str: _TEXT}
 
 
@@ -166,7 +165,7 @@ def _fits(leaf: Leaf, value: Any) -> bool:
     if leaf.kind in (float, int):
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         return is_number and (leaf.location[0] != SCRIPT or math.isfinite(value))
-    return isinstance(value, leaf.kind) and (not isinstance(value, str) or len(value) <= _LONGEST)
+    return isinstance(value, leaf.kind) and (not isinstance(value, str) or len(value) <= LONGEST)
 
 
 def _by_name(said: str, known: Mapping[str, Leaf]) -> str:
