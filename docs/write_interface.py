@@ -1,48 +1,35 @@
 #!/usr/bin/env python3
-"""Write the table of parameters in docs/interface.md, from config/drone.yaml: its keys, values and comments."""
+"""Write the table of parameters in docs/interface.md, from config/drone.yaml: its keys, values and comments.
+
+PYTHONPATH=src python docs/write_interface.py
+"""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parents[1]
-PAGE, CONFIG = ROOT / "docs/interface.md", ROOT / "config/drone.yaml"
+from drone_sim.config.comments import CONFIG, rows
+from drone_sim.run import parameters
+from drone_sim.vehicles.tunable import tunables
+
+PAGE = Path(__file__).resolve().parents[1] / "docs/interface.md"
 BEGIN, END = "<!-- parameters: begin -->\n", "<!-- parameters: end -->\n"
 
-_ENTRY = re.compile(r"^( *)(\w+):(?: +((?:\"[^\"]*\"|\[.*?\]|\{.*?\}|[^#\s])*))?(?: *# *(.*))?$")
-_MORE = re.compile(r"^ +# *(.*)$")
 _CAMERA = re.compile(r"^cameras/(\w+)/")
 
 
-class Row(NamedTuple):
-    """A parameter: its name with slashes, its default as the file writes it, what the file says of it."""
-
-    name: str
-    default: str
-    comment: str
-
-
-def rows(text: str) -> Iterator[Row]:
-    """Yield the parameters of a file such as config/drone.yaml."""
-    found: list[list[str]] = []
-    above: list[tuple[int, str]] = []
-    for line in text.splitlines():
-        entry, more = _ENTRY.match(line), _MORE.match(line)
-        if entry:
-            indent, key, value, comment = len(entry[1]), entry[2], entry[3] or "", entry[4] or ""
-            above = [(depth, name) for depth, name in above if depth < indent]
-            found.append(["/".join([*(name for _, name in above), key]), value, comment])
-            above.append((indent, key))
-        elif more and found:
-            found[-1][2] += f" {more[1]}"
-    groups = {name.rpartition("/")[0] for name, _, _ in found}
-    return (Row(*one) for one in found if one[0] not in groups)
+def tuned_names() -> dict[str, list[str]]:
+    """Return what each parameter is called where it is tuned, by its name in the table."""
+    found: dict[str, list[str]] = {}
+    for name, leaf in tunables(parameters.load().fleet[0], {}).items():
+        keys = [one for one in leaf.location if isinstance(one, str)]
+        found.setdefault("/".join(keys), []).append(name)
+    return found
 
 
 def table() -> str:
     """Return the table. Of the cameras, which are all of one kind, the keys that the first has stand for all."""
-    lines, cameras = ["| parameter | default | |", "|---|---|---|"], set()
+    lines, cameras = ["| parameter | default | in flight | |", "|---|---|---|---|"], set()
+    tuned = tuned_names()
     for name, default, comment in rows(CONFIG.read_text(encoding="utf-8")):
         camera = _CAMERA.match(name)
         if camera:
@@ -51,7 +38,8 @@ def table() -> str:
                 continue
             cameras.add(key)
             name = f"cameras/{camera[1]}/{key}"
-        cells = (f"`{name}`", f"`{default}`" if default else "", comment.replace("|", "\\|").replace("<", "&lt;"))
+        live = ", ".join(f"`{one}`" for one in tuned.get(name, ()))
+        cells = (f"`{name}`", f"`{default}`" if default else "", live, comment.replace("|", "\\|").replace("<", "&lt;"))
         lines.append(f"| {' | '.join(cells)} |".replace("|  |", "| |"))
     return "\n".join(lines) + "\n"
 

@@ -53,7 +53,7 @@ Section: science
 Priority: optional
 Installed-Size: $(du -sk "$stage/usr" | cut -f1)
 Depends: $DEPENDS
-Recommends: rviz, python3-tk
+Recommends: rviz, python3-tk, libdynamic-reconfigure-config-init-mutex-dev
 Description: drone of a V-REP tutorial, without V-REP
  PyBullet underneath, ROS 1 around it: roslaunch drone_sim drone.launch
 CONTROL

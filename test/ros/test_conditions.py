@@ -1,14 +1,20 @@
 #!/usr/bin/env python3
-"""Weather and faults by topic: wind that blows, a link that is slow, a camera that fails, and what is refused."""
+"""What changes in flight: wind that blows, a link that is slow, a gain that is tuned, and what is refused."""
 
+import math
 import sys
+import tempfile
 import threading
 import unittest
+from pathlib import Path
 
 import rospy
 import rostest
+import yaml
 from diagnostic_msgs.msg import KeyValue
-from geometry_msgs.msg import Twist, TwistStamped, Vector3Stamped
+from dynamic_reconfigure.client import Client
+from dynamic_reconfigure.msg import Config
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, Vector3Stamped
 from listening import Listener, connected
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
@@ -84,6 +90,42 @@ class Conditions(unittest.TestCase):
         publisher.publish(twist)
         obeyed = command.wait_for(lambda said: said.twist.linear.y == 0.25)
         self.assertGreaterEqual((obeyed.header.stamp - sent).to_sec(), 1.0)
+
+    def test_tuning(self):
+        """What `dynparam set`, `get` and `dump` do, by the library that they use."""
+        client, told = Client("/drone", timeout=20), Listener("/drone/parameter_updates", Config)
+        self.assertEqual(client.get_configuration(timeout=20)["Kzref"], 5.0)
+        self.assertEqual(client.update_configuration({"Kzref": 0.0})["Kzref"], 0.0)
+        higher = PoseStamped()
+        higher.pose.position.z, higher.pose.orientation.w = 1.5, 1.0
+        connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=1)).publish(higher)
+        there = self.odometry.wait_for(lambda said: said.pose.pose.position.z > 1.45).header.stamp
+        later = self.odometry.wait_for(lambda said: (said.header.stamp - there).to_sec() > 2)
+        self.assertAlmostEqual(later.pose.pose.position.z, 1.5, delta=0.1, msg="nothing holds its height")
+        info = Listener("/drone/camera_info", CameraInfo)
+        changes = {"Kzref": 4.0, "cameras/front/horizontal_fov": 0.5, "thrust_limits/highest": 9.0}
+        self.assertEqual({name: client.update_configuration(changes)[name] for name in changes}, changes)
+        self.odometry.wait_for(lambda said: said.pose.pose.position.z < 0.9)
+        info.wait_for(lambda said: abs(said.K[0] - 32 / math.tan(0.25)) < 1e-6)
+        for wrong, said in (
+            ({"Kzref": 1e6}, "Kzref = 1000000.0: input should be less than or equal to 10000"),
+            ({"Kzref": math.nan}, "Kzref = nan: input should be a finite number"),
+            ({"Kzref": 3.0, "thrust_limits/lowest": 9.5}, "thrust_limits = [9.5, 9.0]: must be [lowest, highest]"),
+        ):
+            held = client.update_configuration(wrong)
+            self.assertEqual((held["Kzref"], held["thrust_limits/lowest"]), (4.0, 3.0))
+            line = self.log.wait_for(lambda line, said=said: said in line.msg, after=0).msg
+            self.assertTrue(line.startswith("/drone refused, nothing is changed: "), line)
+        self.faults.publish("propellers", "[1, 0.99, 1, 1]")
+        told.wait_for(lambda m: any(one.name.endswith("back_left") and one.value == 0.99 for one in m.doubles), after=0)
+        with tempfile.TemporaryDirectory() as folder:
+            sensors, dump = Path(folder) / "sensors.yaml", Path(folder) / "dump.yaml"
+            sensors.write_text(yaml.dump({"sensors": WIND}), encoding="utf-8")
+            dump.write_text(yaml.dump(client.get_configuration()), encoding="utf-8")
+            dumped = parameters.load({"config": f"{sensors},{dump}"})
+        self.assertEqual((dumped.control.Kzref, dumped.faults.propellers[1]), (4.0, 0.99))
+        self.assertEqual(dumped.cameras["front"].horizontal_fov, 0.5)
+        client.close()
 
     def test_a_fault_that_there_is_not(self):
         self.faults.publish("sensors/frnt", "ok")

@@ -39,7 +39,7 @@ def sysCall_init():
     ]
     self.state_publisher = simROS.advertise("state", "std_msgs/String", 1, True)
     tutorial.sysCall_init()
-    self.takeoff_height = sim.getScriptSimulationParameter(sim.handle_self, "takeoff_height")
+    read_height()
     x, y, z = sim.getObjectPosition(self.d, -1)
     yaw = sim.getObjectOrientation(self.d, -1)[2]
     self.still = 0.0  # s, that it stands or lies where it should move
@@ -81,6 +81,17 @@ def on_twist(msg):
         tutorial.on_twist(msg)
     elif any((msg.linear.x, msg.linear.y, msg.linear.z, msg.angular.z)):
         refuse("cmd_vel")
+
+
+def on_parameters(msg):
+    """Obey what was tuned in flight."""
+    tutorial.on_parameters(msg)
+    read_height()
+
+
+def read_height():
+    """Know how far up a take-off goes."""
+    self.takeoff_height = sim.getScriptSimulationParameter(sim.handle_self, "takeoff_height")
 
 
 def on_takeoff(_msg):

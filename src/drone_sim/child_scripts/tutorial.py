@@ -34,9 +34,7 @@ def sysCall_init():
     sim.setObjectParent(self.trackBase, -1, True)
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
 
-    for name in GAINS:
-        setattr(self, name, sim.getScriptSimulationParameter(sim.handle_self, name))
-    self.most_lean = self.angle_max + self.recovery_margin if self.recovery_margin else math.inf
+    read_gains()
     self.dt = sim.getSimulationTimeStep()
     self.thrust = self.thrust_gravity
     self.pitch_corr = self.yaw_corr = self.roll_corr = 0
@@ -45,6 +43,19 @@ def sysCall_init():
     self.vx = self.vy = self.vz = self.rz = 0  # current twist command
 
     self.twist_subscriber = simROS.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist", 1)
+    self.gains_subscriber = simROS.subscribe("parameter_updates", "dynamic_reconfigure/Config", "on_parameters", 1)
+
+
+def read_gains():
+    """Set the gains as they are now."""
+    for name in GAINS:
+        setattr(self, name, sim.getScriptSimulationParameter(sim.handle_self, name))
+    self.most_lean = self.angle_max + self.recovery_margin if self.recovery_margin else math.inf
+
+
+def on_parameters(_msg):
+    """Obey what was tuned in flight."""
+    read_gains()
 
 
 def on_twist(msg):
@@ -134,5 +145,6 @@ def target_angle(command, speed):
 
 
 def sysCall_cleanup():
-    """End the subscription."""
+    """End the subscriptions."""
     simROS.shutdownSubscriber(self.twist_subscriber)
+    simROS.shutdownSubscriber(self.gains_subscriber)

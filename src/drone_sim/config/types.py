@@ -82,6 +82,13 @@ class Within(GroupedMetadata):
         return value
 
 
+@dataclass(frozen=True)
+class Parts:
+    """Beside a tuple in Annotated: what its numbers are called where each stands alone."""
+
+    names: tuple[str, ...]
+
+
 def _increasing(pair: tuple[float, float] | None) -> tuple[float, float] | None:
     if pair is not None and not pair[0] < pair[1]:
         raise ValueError("must be [lowest, highest] with lowest < highest")
@@ -117,6 +124,7 @@ Limits = Annotated[
     tuple[Velocity, Velocity] | None,
     BeforeValidator(_none_from_word),
     AfterValidator(_increasing),
+    Parts(("lowest", "highest")),
     Field(description="2 numbers, [lowest, highest] in m/s, or none"),
 ]
 Switch = Annotated[bool, Field(strict=True)]

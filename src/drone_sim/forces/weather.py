@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from drone_sim.config.changing import changed
-from drone_sim.config.types import Checked, Finite, Within
+from drone_sim.config.types import Checked, Finite, Parts, Within
 from drone_sim.forces.dryden import Gusts
 from drone_sim.mechanics.frames import Vector
 
@@ -25,13 +25,14 @@ _Speed = Annotated[Finite, Within(-100, 100)]
 _Deviation = Annotated[Finite, Within(0, 50)]
 _Length = Annotated[Finite, Within(1, 1e4)]
 _COMPONENTS = "3 numbers, [along the wind, across it, up]"
+_PARTS = Parts(("along", "across", "up"))
 
 
 class GustParameters(Checked):
     """Dryden's gusts (see forces.dryden); of deviation 0 there are none."""
 
-    deviation: Annotated[tuple[_Deviation, _Deviation, _Deviation], Field(description=f"{_COMPONENTS} in m/s")]
-    length: Annotated[tuple[_Length, _Length, _Length], Field(description=f"{_COMPONENTS} in m, 1 to 10000")]
+    deviation: Annotated[tuple[_Deviation, _Deviation, _Deviation], _PARTS, Field(description=f"{_COMPONENTS} in m/s")]
+    length: Annotated[tuple[_Length, _Length, _Length], _PARTS, Field(description=f"{_COMPONENTS} in m, 1 to 10000")]
     speed: Annotated[Finite, Within(0, 100)]
     seed: Annotated[int, Within(0, 2**63 - 1)]
 
@@ -39,7 +40,11 @@ class GustParameters(Checked):
 class WeatherParameters(Checked):
     """What the air does."""
 
-    wind: Annotated[tuple[_Speed, _Speed, _Speed], Field(description="3 numbers, [x, y, z] in m/s, in the world")]
+    wind: Annotated[
+        tuple[_Speed, _Speed, _Speed],
+        Parts(("x", "y", "z")),
+        Field(description="3 numbers, [x, y, z] in m/s, in the world"),
+    ]
     gusts: GustParameters
 
 

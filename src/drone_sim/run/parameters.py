@@ -31,6 +31,7 @@ from drone_sim.files import yaml_files
 from drone_sim.files.resources import package_path, resolve
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.importing.cache import imported_scene
+from drone_sim.run.dumps import read_config
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.sensors.camera_parameters import CameraParameters
@@ -172,8 +173,9 @@ def _entries(given: Any, drone: Any) -> Any:
 def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
     """Return config/drone.yaml with a file and `overrides` (nested mappings of the same shape) laid over it.
 
-    The file is named by the overrides' key `config`; '' is none. The files that it names are relative to it, those
-    in `overrides` to where the process runs. Raises ParameterError.
+    The file is named by the overrides' key `config`; '' is none, and of several, parted by commas, the later are laid
+    over the earlier. The files that it names are relative to it, those in `overrides` to where the process runs.
+    Raises ParameterError.
     """
     overrides = {} if overrides is None else overrides
     if not isinstance(overrides, Mapping):
@@ -182,22 +184,22 @@ def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
     config = overrides.get("config") or ""
     if not isinstance(config, str):
         raise ParameterError(f"parameter config = {shown(config)}: must be the name of a file")
-    if config:
-        given = merged(given, _config(config))
-        _checked(given, "", {}, config)
+    for name in filter(None, config.split(",")):
+        given = merged(given, _config(name, given))
+        _checked(given, "", {}, name)
     if overrides.get("vehicles") == 0:  # roslaunch's arguments cannot be left out
         overrides = {key: value for key, value in overrides.items() if key != "vehicles"}
     given = merged(given, overrides)
     return _in_scene(given, given["scene_file"])
 
 
-def _config(name: str) -> dict[str, Any]:
-    """Return what a file says. Raises ParameterError."""
+def _config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a file says, which is laid over what stands `below`. Raises ParameterError."""
     try:
         path = resolve(name)
     except FileNotFoundError as error:
         raise ParameterError(f"parameter config = {shown(name)}: {error}") from None
-    values = read_yaml(path)
+    values = read_config(path, below)
     if "config" in values:
         raise ParameterError(f"{name}: a config file names no other `config`")
     scene_parameters.find_files_beside(path.parent, values)

@@ -61,6 +61,12 @@ class Setting:
         self._name_objects()
         self.cast.begin_anew()
 
+    def tune_as(self, before: Setting) -> None:
+        """Let what was tuned of the vehicles in another setting be so here, too."""
+        for name, vehicle in self.vehicles.items():
+            if name in before.vehicles:
+                vehicle.tuning.take_over(before.vehicles[name].tuning)
+
     def end_scripts(self, clean_up: bool) -> None:
         """Let go of every script; `clean_up`: let its thread end and call its cleanup before, whatever the others' do.
 

@@ -118,6 +118,7 @@ class Simulation:
             built = self._built(parameters, self.world)
         else:
             self.world.close()
+        built.tune_as(self._setting)
         self._take(built)
         self.vision.look_at(self.world)
 
@@ -148,6 +149,7 @@ class Simulation:
     def _feel_weather(self) -> None:
         for vehicle in self._flying:
             vehicle.feel_weather()
+        self._setting.shared.tunings += 1
         self._any_between = any(vehicle.sub_step_forces or vehicle.instruments for vehicle in self._flying)
         self._changed_scripts()
 

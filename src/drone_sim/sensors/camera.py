@@ -124,9 +124,7 @@ class Camera(Sensor):
         """Take what it is, from where it looks (world from optical frame), and what draws."""
         super().__init__(parameters.every)
         self.kind = parameters.kind
-        self.intrinsics = Intrinsics(
-            parameters.width, parameters.height, parameters.horizontal_fov, parameters.near, parameters.far
-        )
+        self.change(parameters)
         self.watched: Callable[[], bool] = lambda: False
         self.shown = 0  # pictures, to those who look
         self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
@@ -136,6 +134,12 @@ class Camera(Sensor):
         self.over: Callable[[np.ndarray | None], tuple[float, np.ndarray | None]] | None = None
         self.age = 0.0  # s, of `image`
         self._vision = vision
+
+    def change(self, parameters: CameraParameters) -> None:
+        """Look as often, and see as much, as these parameters say."""
+        own = parameters
+        self.period = own.every
+        self.intrinsics = Intrinsics(own.width, own.height, own.horizontal_fov, own.near, own.far)
         self._last: tuple[int, Matrix, np.ndarray] | None = None  # the scene's changes, the pose, the picture
 
     def take(self) -> np.ndarray:
@@ -177,10 +181,12 @@ class Camera(Sensor):
         self.age = 0.0
 
     def remember(self) -> Callable[[], None]:
-        """Return a function that brings back the last picture that was shown."""
+        """Return a function that brings back the last picture that was shown, and how it was taken."""
         image, age, latest, last = self.image, self.age, self.latest, self._last
+        period, intrinsics = self.period, self.intrinsics
 
         def recall() -> None:
+            self.period, self.intrinsics = period, intrinsics
             self.image, self.age, self.latest, self._last = image, age, latest, last
 
         return recall

@@ -21,21 +21,27 @@ from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 from numpy.random import Generator
+from pydantic import Field
 
 from drone_sim.config.types import Checked, Finite, Within
 
 _Amount = Annotated[Finite, Within(0, 1e6)]  # in the unit of what is measured; any of them left out is 0
+_Time = Annotated[Finite, Within(1e-3, 1e9, or_zero=True)]
+
+
+def _said(text: str) -> Any:
+    return Field(default=0.0, description=text)
 
 
 class NoiseParameters(Checked):
     """What is wrong with every axis of a measurement in some unit u; what is left out is 0."""
 
-    deviation: _Amount = 0.0  # u, standard deviation of a sample
-    density: _Amount = 0.0  # u/√Hz, the same in proportion to the square root of the rate
-    bias: _Amount = 0.0  # u, standard deviation of the constant bias
-    bias_walk: _Amount = 0.0  # u/s/√Hz
-    bias_time: Annotated[Finite, Within(1e-3, 1e9, or_zero=True)] = 0.0  # s, in which what wanders forgets; 0: never
-    quantisation: _Amount = 0.0  # u, of a step
+    deviation: _Amount = _said("u, standard deviation of a sample; u is the unit of what is measured")
+    density: _Amount = _said("u/√Hz, the same in proportion to the square root of the rate")
+    bias: _Amount = _said("u, standard deviation of the constant bias")
+    bias_walk: _Amount = _said("u/s/√Hz")
+    bias_time: _Time = _said("s, in which what wanders forgets; 0: never")
+    quantisation: _Amount = _said("u, of a step")
     variance: Annotated[Finite, Within(0, 1e12)] | None = None  # u², what messages say; what the others come to if none
 
 
@@ -44,8 +50,15 @@ class Noise:
 
     def __init__(self, parameters: NoiseParameters, axes: int, interval: float):
         """Take what it is like, for samples `interval` seconds apart; `restart` comes before the first."""
-        own = self._parameters = parameters
-        self._axes = axes
+        self._axes, self._interval = axes, interval
+        self._random: Generator | None = None
+        self._constant = [0.0] * axes
+        self._bias = [0.0] * axes  # that wanders
+        self._be(parameters)
+
+    def _be(self, parameters: NoiseParameters) -> None:
+        own, interval = parameters, self._interval
+        self.parameters = parameters
         self._white = math.sqrt(own.deviation**2 + own.density**2 / interval)
         self._spread = own.bias_walk * math.sqrt(own.bias_time / 2)  # of the Gauss-Markov process
         if own.bias_time:
@@ -53,9 +66,14 @@ class Noise:
             self._walk = self._spread * math.sqrt(1 - self._keep**2)
         else:
             self._keep, self._walk = 1.0, own.bias_walk * math.sqrt(interval)
-        self._random: Generator | None = None
-        self._constant = [0.0] * axes
-        self._bias = [0.0] * axes  # that wanders
+
+    def change(self, parameters: NoiseParameters) -> None:
+        """Be like this from the next sample on; the constant bias grows or shrinks with its standard deviation."""
+        before = self.parameters.bias
+        if self._random is not None and parameters.bias != before:
+            drawn = [one / before for one in self._constant] if before else _drawn(self._random, self._axes)
+            self._constant = [parameters.bias * one for one in drawn]
+        self._be(parameters)
 
     @property
     def variance(self) -> float:
@@ -63,7 +81,7 @@ class Noise:
 
         A random walk, whose variance has no end, counts for nothing in it. 0 where there is no noise at all.
         """
-        own = self._parameters
+        own = self.parameters
         if own.variance is not None:
             return own.variance
         return self._white**2 + own.bias**2 + self._spread**2 + own.quantisation**2 / 12
@@ -73,7 +91,7 @@ class Noise:
         self._random = random
         self._constant, self._bias = (
             [spread * one for one in _drawn(random, self._axes)] if spread else [0.0] * self._axes
-            for spread in (self._parameters.bias, self._spread)
+            for spread in (self.parameters.bias, self._spread)
         )
 
     def add(self, truth: Sequence[float]) -> list[float]:
@@ -88,15 +106,16 @@ class Noise:
         if self._walk:
             keep, walk, drawn = self._keep, self._walk, _drawn(self._random, self._axes)
             self._bias = [keep * one + walk * by for one, by in zip(self._bias, drawn)]
-        step = self._parameters.quantisation
+        step = self.parameters.quantisation
         return [round(one / step) * step for one in measured] if step else measured
 
     def remember(self) -> Callable[[], None]:
-        """Return a function that brings the present bias back; the random generator is the sensor's to restore."""
-        bias = self._bias  # never changed, only replaced
+        """Return a function that brings back bias and parameters; the random generator is the sensor's to restore."""
+        own, constant, bias = self.parameters, self._constant, self._bias  # never changed, only replaced
 
         def recall() -> None:
-            self._bias = bias
+            self._be(own)
+            self._constant, self._bias = constant, bias
 
         return recall
 

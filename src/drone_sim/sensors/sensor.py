@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from drone_sim.config.place import DatumParameters
+from drone_sim.config.types import Checked
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.state import State
 from drone_sim.sensors.noise import Noise, NoiseParameters
@@ -158,6 +159,14 @@ class Instrument(Sensor):
         self._noises.append(noise)
         return noise
 
+    def change_noise(self, parameters: SensorParameters) -> None:
+        """Measure with the noise of these parameters, which are its own in all else."""
+        changed = dict(_noises(parameters))
+        paths = {id(one): path for path, one in _noises(self.parameters)}
+        for noise in self._noises:
+            noise.change(changed[paths[id(noise.parameters)]])
+        self.parameters = parameters
+
     @property
     def frame(self) -> str:
         """Name of the frame that its messages are in."""
@@ -190,8 +199,10 @@ class Instrument(Sensor):
         latest, readings, queue = self.latest, list(self.readings), list(self._queue)
         random = self._random.bit_generator.state
         noises = [noise.remember() for noise in self._noises]
+        parameters = self.parameters
 
         def recall() -> None:
+            self.parameters = parameters
             self.latest = latest
             self.readings[:] = readings
             self._queue = deque(queue)
@@ -210,6 +221,15 @@ class Instrument(Sensor):
         if self.latest is None:
             return None
         return self.outputs[0].fields(self.latest.value, self.header(self.latest))
+
+
+def _noises(model: Checked, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], NoiseParameters]]:
+    """Yield the noises in a sensor's parameters, by the keys that lead to them."""
+    for key, value in model:
+        if isinstance(value, NoiseParameters):
+            yield (*above, key), value
+        elif isinstance(value, Checked):
+            yield from _noises(value, (*above, key))
 
 
 def xyz(vector: Sequence[float]) -> dict[str, float]:

@@ -12,6 +12,7 @@ from drone_sim.sensors.parameters import SensorParameters
 RESERVED_TOPICS = (
     *("cmd_vel", "set_pose", "initialpose", "push", "target_pose", "odom", "propellers", "joint_states"),
     *("set_wind", "weather", "faults", "takeoff", "land", "reset", "home", "goto", "state"),
+    *("parameter_descriptions", "parameter_updates"),
     *("command", "scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
     *(f"view/{what}" for what in ("surroundings", "bodies", "path", "height", "command", "forces", "state")),
 )

@@ -57,9 +57,9 @@ class Commands:
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back the command; what is under way is brought back by the faults."""
-        now, age = self.now, self.age
+        now, age, timeout = self.now, self.age, self.timeout
 
         def recall() -> None:
-            self.now, self.age = now, age
+            self.now, self.age, self.timeout = now, age, timeout
 
         return recall

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from drone_sim.config.types import Checked, Fraction, Name, ParameterError, Within
+from drone_sim.config.types import Checked, Fraction, Name, ParameterError, Parts, Within
 from drone_sim.sensors.failing import Failure
 from drone_sim.vehicles.link import LinkParameters
 from drone_sim.wording import near_names, shown
@@ -20,6 +20,7 @@ class FaultParameters(Checked):
 
     propellers: Annotated[
         tuple[Fraction, Fraction, Fraction, Fraction],
+        Parts(("front_left", "back_left", "back_right", "front_right")),
         Field(description="4 numbers from 0 to 1, the share that each propeller still gives"),
     ]
     commands: LinkParameters

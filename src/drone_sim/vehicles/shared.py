@@ -48,4 +48,5 @@ class Shared:
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
+    tunings: int = 0  # grows whenever something is other than it was that may be tuned
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are

@@ -12,6 +12,7 @@ import numpy as np
 from drone_sim.forces.drag import DragParameters
 from drone_sim.forces.force import Force
 from drone_sim.forces.pushes import Push, Pushes
+from drone_sim.forces.weather import WeatherParameters
 from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.inertia import Inertia
@@ -37,6 +38,7 @@ from drone_sim.vehicles.rotors import Rotors
 from drone_sim.vehicles.script_parameters import bring_back, script_parameters
 from drone_sim.vehicles.shared import Shared
 from drone_sim.vehicles.shared_view import SharedView
+from drone_sim.vehicles.tuning import Tuning
 
 
 class Vehicle(SharedView):
@@ -68,6 +70,7 @@ class Vehicle(SharedView):
         self._tree: ObjectTree | None = None  # the one that its objects are in
         self._handles: list[int] = []  # of its objects
         self.script_parameters: dict[str, dict[str, Any]] = {}  # of its scripts, by their objects
+        self.tuning = Tuning(self)
         self.cameras = {
             name: Camera(one, partial(self.optical, one), shared.vision) for name, one in parameters.cameras.items()
         }
@@ -232,6 +235,7 @@ class Vehicle(SharedView):
         self._begin_forces()
         self.faults.begin(self.propulsion.law)
         self._prepare()
+        self.count_change()
 
     def move(self, pose: Pose) -> None:
         """Put it somewhere else, at rest."""
@@ -249,10 +253,20 @@ class Vehicle(SharedView):
         """Let other things be wrong with it: keys of `faults`, as in YAML. Raises ParameterError."""
         self.faults.change(changes)
         self._prepare()
+        self.count_change()
 
     def change_weather(self, changes: Mapping[str, Any]) -> None:
         """Let another weather be where it and all others are: keys of `weather`, as in YAML. Raises ParameterError."""
         self._shared.weather.change(changes)
+
+    @property
+    def weather(self) -> WeatherParameters:
+        """The weather that it and all others are in."""
+        return self._shared.weather.now
+
+    def count_change(self) -> None:
+        """Let those know that show what may be tuned."""
+        self._shared.tunings += 1
 
     def has_shape(self, name: str) -> bool:
         """Tell whether that is the name of a dynamic shape of it."""
@@ -276,6 +290,7 @@ class Vehicle(SharedView):
         self.script = load_child_script(path, self, self.bus, [self], self._shared)
         refuse_if_idle(self.script, path, self.bus)
         call_init(self.script, self.bus)
+        self.tuning.begin()
 
     @property
     def pictures(self) -> Pictures:
@@ -360,6 +375,7 @@ class Vehicle(SharedView):
             self.bus,
             self.script,
             *self.cameras.values(),
+            self.tuning,
         )
         others = [one.remember() for one in parts]
         instruments, faults = self.instruments.remember(), self.faults.remember()

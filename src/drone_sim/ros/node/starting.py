@@ -92,7 +92,8 @@ def read_parameters() -> Parameters:
         raise ParameterError(f"parameter {name} = {str(given)[:80]}: must hold parameters, such as {name}/script")
     for key in ("config", "script", "scene_file"):
         if isinstance(given.get(key), str):
-            given[key] = from_shell(given[key])
+            names = given[key].split(",") if key == "config" else [given[key]]
+            given[key] = ",".join(map(from_shell, names))
     parameters = parameters_module.load(given)
     script_path(parameters.script)  # a file that is not there ends the node; an error in one that is stops the flight
     return parameters

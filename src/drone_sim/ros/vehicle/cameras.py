@@ -33,13 +33,17 @@ class CameraOutput:
         self._image = rospy.Publisher(topic, Image, subscriber_listener=newcomers, queue_size=1)
         self._compressed = CompressedPublisher(topic, newcomers) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
-        self._info = messages.camera_info(camera.intrinsics, self._frame)
         self.follow(camera)
 
     def follow(self, camera: Camera) -> None:
         """Publish what this camera sees from now on; it has taken the place of the last one."""
         self._camera = camera
+        self._describe()
         camera.watched = self._watched
+
+    def _describe(self) -> None:
+        self._intrinsics = self._camera.intrinsics
+        self._info = messages.camera_info(self._intrinsics, self._frame)
 
     def close(self) -> None:
         """Advertise no more."""
@@ -59,6 +63,8 @@ class CameraOutput:
         camera = self._camera
         is_there = camera.image is not None or (camera.over is None and camera.failure != "silent")
         if is_there and self._info_publisher.get_num_connections():
+            if self._intrinsics is not camera.intrinsics:
+                self._describe()
             self._info.header.stamp = stamp(camera.age)
             self._info_publisher.publish(self._info)
         if camera.image is not None:

@@ -23,13 +23,20 @@ class FleetTopics:
         self._inbox = inbox
         self._topics: dict[str, VehicleTopics] = {}
         self._transforms = Transforms()
-        self._era = -1
+        self._era = self._tunings = -1
         self.follow()
 
     def follow(self) -> None:
-        """Advertise for vehicles that have come, and no more for those that have gone."""
-        if self._era == self._simulation.era:
-            return
+        """Advertise for vehicles that have come, and no more for those that have gone; say what has been tuned."""
+        simulation = self._simulation
+        if self._era != simulation.era:
+            self._follow_vehicles()
+        elif self._tunings != simulation.shared.tunings:
+            for topics in self._topics.values():
+                topics.show_tuning()
+        self._tunings = simulation.shared.tunings
+
+    def _follow_vehicles(self) -> None:
         self._era = self._simulation.era
         vehicles = self._simulation.vehicles
         for name, topics in list(self._topics.items()):

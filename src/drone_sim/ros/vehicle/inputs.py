@@ -37,7 +37,7 @@ class VehicleInputs:
     def __init__(self, simulation: Simulation, parameters: VehicleParameters, inbox: Inbox):
         """Subscribe."""
         self._simulation = simulation
-        self._name, self._parameters = parameters.name, parameters
+        self._name, self._at_first = parameters.name, parameters
         self._inbox = inbox
         self.log = CommandLog()
         self._subscribers = [
@@ -60,6 +60,12 @@ class VehicleInputs:
     def _commanders(self) -> list[str]:
         """Return the nodes that are connected to cmd_vel."""
         return sorted({one.callerid_pub for one in self._subscribers[0].impl.connections})
+
+    @property
+    def _parameters(self) -> VehicleParameters:
+        """Those of the vehicle, which may be tuned."""
+        vehicle = self._simulation.vehicles.get(self._name)
+        return self._at_first if vehicle is None else vehicle.parameters
 
     def close(self) -> None:
         """Listen no more."""

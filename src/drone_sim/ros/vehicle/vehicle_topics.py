@@ -14,6 +14,7 @@ from drone_sim.ros.vehicle.description import set_description
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.ros.vehicle.outputs import VehicleOutputs
 from drone_sim.ros.vehicle.sensors import SensorOutput
+from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
@@ -35,6 +36,7 @@ class VehicleTopics:
         self._sensors = {
             name: SensorOutput(vehicle.parameters, sensor) for name, sensor in vehicle.instruments.by_name.items()
         }
+        self._tuning = TuningServer(vehicle, inbox)
         set_description(vehicle.parameters)
 
     @property
@@ -53,11 +55,17 @@ class VehicleTopics:
             self._cameras[name].follow(camera)
         for name, sensor in vehicle.instruments.by_name.items():
             self._sensors[name].follow(sensor)
+        self.show_tuning()
+
+    def show_tuning(self) -> None:
+        """Say what holds now of what may be tuned, where that is news."""
+        self._tuning.follow(self.vehicle)
 
     def close(self) -> None:
         """Hear and publish no more."""
         self._inputs.close()
         self._outputs.close()
+        self._tuning.close()
         for camera in self._cameras.values():
             camera.close()
         for sensor in self._sensors.values():

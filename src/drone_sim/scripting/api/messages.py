@@ -26,6 +26,7 @@ _OWN_TOPICS = {
     **dict.fromkeys(("takeoff", "land", "reset", "home"), "std_msgs/Empty"),
     "goto": "geometry_msgs/PoseStamped",
     "state": "std_msgs/String",
+    "parameter_updates": "dynamic_reconfigure/Config",
 }
 _TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
 

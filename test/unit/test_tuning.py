@@ -1,0 +1,302 @@
+"""What is tuned in flight holds from the next step on, all or nothing, and stays; a dump brings it back."""
+
+import math
+import struct
+
+import pytest
+import yaml
+
+from drone_sim.config.comments import comments
+from drone_sim.mechanics.state import Pose, Twist, Vector3
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.run import parameters
+from drone_sim.run.parameters import ParameterError
+from drone_sim.run.simulation import Simulation
+
+SMALL = {name: {"width": 16, "height": 12} for name in ("front", "depth", "track", "floor")}
+SENSORS = {"imu": {"kind": "imu", "rate": 20}, "fix": {"kind": "fix", "rate": 20, "noise": {"vertical": {"bias": 2.0}}}}
+FORWARD = Twist(Vector3(0.5, 0.2, 0.0))
+TUNED = {
+    **{"Kzref": 2.0, "thrust_limits/highest": 7.0, "recovery_margin": 0.0, "cmd_vel_limits/linear": 1.0},
+    **{"takeoff_height": 1.5, "cameras/front/every": 2, "sensors/imu/noise/orientation/deviation": 0.1},
+}
+PYTHON = """
+def sysCall_init():
+    sim.setScriptSimulationParameter(sim.handle_self, "speed", 0.5)
+    sim.setScriptSimulationParameter(sim.handle_self, "careful", True)
+    sim.setScriptSimulationParameter(sim.handle_self, "mood", "calm")
+    sim.setScriptSimulationParameter(sim.handle_self, "way", [1, 2])
+    sim.setScriptSimulationParameter(sim.handle_self, "tale", "and then " * 1000)
+    self.seen = []
+    simROS.subscribe("parameter_updates", "dynamic_reconfigure/Config", "on_parameters")
+
+def on_parameters(msg):
+    said = {one.name: one.value for one in [*msg.doubles, *msg.bools, *msg.strs, *msg.ints]}
+    sim.setStringSignal("said", f"{said['script_parameters/speed']} {said['cameras/front/every']}")
+
+def sysCall_actuation():
+    sim.setStringSignal("speed", str(sim.getScriptSimulationParameter(sim.handle_self, "speed")))
+"""
+
+
+@pytest.fixture(name="simulate")
+def _simulate():
+    made = []
+
+    def simulate(script="", **overrides):
+        made.append(Simulation(parameters.load({"cameras": SMALL, "sensors": SENSORS, **overrides}), script=script))
+        return made[-1]
+
+    yield simulate
+    for simulation in made:
+        simulation.close()
+
+
+def fly(simulation, steps):
+    """Return what the states and the readings of a flight are, to the bit."""
+    flown = []
+    for _ in range(steps):
+        simulation.step()
+        flown.append(struct.pack("13d", *(x for part in simulation.drone.state for x in part)))
+        flown.append(repr([one.latest for one in simulation.drone.sensors.values()]))
+    return flown
+
+
+def thrust(drone):
+    return sum(drone.particle_velocities) / 4
+
+
+def dumped(values, path):
+    """Write what `dynparam dump` writes."""
+    body = {"dictitems": values, "state": []}
+    text = "!!python/object/new:dynamic_reconfigure.encoding.Config\n" + yaml.dump(body)
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+# ---- what there is
+
+
+def test_each_says_what_it_is_and_what_it_may_be(simulate):
+    tuning = simulate().drone.tuning
+    assert not [name for name, one in tuning.known.items() if not one.said]
+    assert tuning.known["Kzref"].said == comments()["control/Kzref"] == "(m/s) per m"
+    assert [(one.low, one.high) for one in (tuning.known["Kzref"], tuning.known["cmd_vel_timeout"])] == [
+        (0, 1e4),
+        (0, 1e6),
+    ]
+    values = tuning.values()
+    for name, one in tuning.known.items():
+        fits = values[name] in one.choices if one.choices else one.low <= values[name] <= one.high
+        assert type(values[name]) is one.kind and fits, name
+    wanted = {"thrust_limits/lowest", "weather/wind/x", "weather/gusts/deviation/across", "faults/commands/loss"}
+    wanted |= {"faults/propellers/front_left", "faults/sensors/imu", "faults/sensors/floor", "push/force_limit"}
+    assert wanted | {"sensors/fix/noise/vertical/bias", "cameras/track/horizontal_fov"} <= set(values)
+    assert not [name for name in values if name.endswith(("seed", "variance"))]
+
+
+# ---- changing
+
+
+def test_a_gain_counts_from_the_next_step_on(simulate):
+    simulation = simulate()
+    drone = simulation.drone
+    fly(simulation, 3)
+    for gain in (5.0, 2.0):
+        drone.tuning.change({"Kzref": gain})
+        drone.move(Pose((0, 0, 0.9), (0, 0, 0, 1)))
+        simulation.step()
+        state = drone.state
+        simulation.step()
+        wanted = 5.33 + gain * (0.8 - state.position[2]) - 3 * state.linear_velocity[2]
+        assert thrust(drone) == pytest.approx(wanted, abs=1e-3)
+
+
+def test_limits_height_and_cameras_change_with_it(simulate):
+    drone = simulate().drone
+    camera = drone.cameras["front"]
+    drone.tuning.change({"cmd_vel_timeout": 0.5, "cameras/front/horizontal_fov": 0.5, "cameras/front/every": 3})
+    assert camera.intrinsics == Intrinsics(16, 12, 0.5, 0.01, 100.0) and camera.period == 3
+    assert drone.commands.timeout == 0.5 and drone.parameters.cmd_vel_timeout == 0.5
+
+
+def test_noise_is_that_of_its_own_measurement(simulate):
+    simulation = simulate()
+    drone = simulation.drone
+    imu, fix = drone.sensors["imu"], drone.sensors["fix"]
+    fly(simulation, 2)
+    before = fix.latest.value
+    drone.tuning.change(
+        {"sensors/imu/noise/angular_velocity/quantisation": 100.0, "sensors/fix/noise/vertical/bias": 4.0}
+    )
+    drone.tuning.change({"sensors/imu/noise/linear_acceleration/bias": 3.0})
+    fly(simulation, 1)
+    assert imu.latest.value.angular_velocity == (0, 0, 0) and abs(imu.latest.value.specific_force[0]) > 0.1
+    assert fix.latest.value[2] - 488.8 == pytest.approx(2 * (before[2] - 488.8), abs=0.01)
+    assert imu.latest.value.orientation == pytest.approx(drone.state.orientation, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"Kzref": 2e4}, "parameter Kzref = 20000.0: input should be less than or equal to 10000"),
+        ({"Kzref": math.nan}, "Kzref = nan: input should be a finite number"),
+        ({"Kzref": "2"}, "Kzref = '2': must be a finite number"),
+        ({"Kzreff": 2.0}, "'Kzreff': cannot be changed in flight; near names are Kzref"),
+        ({"gravity": 0.0}, "'gravity': cannot be changed in flight"),
+        ({"thrust_limits/lowest": 8.5}, "thrust_limits = [8.5, 8.0]: must be [lowest, highest] with lowest < highest"),
+        ({"weather/wind/y": 101.0, "Kzref": 1.0}, "weather/wind/y = 101.0: input should be less than or equal to 100"),
+        ({"faults/propellers/back_left": -1.0}, "faults/propellers/back_left = -1.0"),
+        ({"faults/sensors/imu": "mad"}, "faults/sensors/imu = 'mad': input should be 'ok', 'silent' or 'frozen'"),
+        ({"cameras/front/every": 0}, "cameras/front/every = 0"),
+        ({"cameras/front/every": 1.5}, "cameras/front/every = 1.5"),
+        ({"cmd_vel_timeout": 1e-9}, "cmd_vel_timeout = 1e-09: must be 0, or from 0.0001 to 1e+06"),
+        ({"recovery_margin": 2.0}, "recovery_margin = 2.0"),
+        ({"script_parameters/text": "x" * 2000}, "script_parameters/text = "),
+        ({"script_parameters/rate": math.inf}, "script_parameters/rate = inf: must be a finite number"),
+        ({"x" * 10_000: 1.0}, "cannot be changed in flight"),
+    ],
+)
+def test_what_is_wrong_changes_nothing_and_says_why(simulate, changes, said):
+    drone = simulate(script_parameters={"text": "a", "rate": 1}).drone
+    before = drone.tuning.values(), drone.parameters
+    with pytest.raises(ParameterError) as refused:
+        drone.tuning.change({"Dzref": 1.0, **changes})
+    assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
+    assert (drone.tuning.values(), drone.parameters) == before
+
+
+def test_what_comes_otherwise_is_seen_and_what_holds_already_is_no_change(simulate):
+    simulation = simulate()
+    drone, shared = simulation.drone, simulation.shared
+    drone.tuning.change(drone.tuning.values())
+    assert not shared.weather.is_felt and not drone.tuning.chosen
+    counted = shared.tunings
+    drone.change_weather({"wind": [1, 2, 3]})
+    drone.change_faults({"propellers": [1, 1, 0.5, 1]})
+    assert shared.tunings == counted + 2
+    drone.tuning.change({"weather/wind/z": 0.0, "weather/gusts/speed": 3.0})
+    values = drone.tuning.values()
+    assert [values[f"weather/wind/{axis}"] for axis in "xyz"] == [1, 2, 0]
+    assert values["faults/propellers/back_right"] == 0.5 and shared.weather.now.gusts.speed == 3
+
+
+# ---- starts and snapshots
+
+
+def test_what_is_tuned_stays_through_every_start_and_conditions_do_not(simulate):
+    simulation = simulate()
+    for begin in (simulation.start, simulation.stop, lambda: simulation.drone.ask("reset")):
+        simulation.start()
+        simulation.drone.tuning.change({**TUNED, "weather/wind/x": 1.0, "faults/propellers/front_left": 0.9})
+        begin()
+        values = simulation.drone.tuning.values()
+        assert {name: values[name] for name in TUNED} == TUNED
+        assert values["faults/propellers/front_left"] == 1
+    assert simulation.drone.parameters.cmd_vel_limits.linear == 1 and simulation.drone.parameters.is_alone
+
+
+def test_a_snapshot_brings_back_what_was_tuned(simulate):
+    simulation = simulate()
+    drone = simulation.drone
+    drone.receive(FORWARD)
+    fly(simulation, 3)
+    snapshot, before, held = simulation.snapshot(), drone.tuning.values(), drone.parameters
+    flown = fly(simulation, 5)
+    simulation.restore(snapshot)
+    changes = {"Pangle": 0.1, "weather/wind/x": 2.0, "sensors/imu/noise/angular_velocity/bias": 1.0}
+    drone.tuning.change({**TUNED, **changes, "cmd_vel_timeout": 0.1})
+    assert fly(simulation, 5) != flown
+    simulation.restore(snapshot)
+    assert (drone.tuning.values(), drone.parameters, drone.tuning.chosen) == (before, held, {})
+    assert drone.cameras["front"].period == 1
+    assert fly(simulation, 5) == flown
+    simulation.start()
+    assert simulation.drone.tuning.values()["Kzref"] == 5
+
+
+# ---- scripts
+
+
+def test_a_script_declares_parameters_and_hears_of_new_values(simulate, tmp_path):
+    script = tmp_path / "own.py"
+    script.write_text(PYTHON, encoding="utf-8")
+    simulation = simulate(str(script), script_parameters={"mood": "bright", "rate": 3})
+    names = {name for name in simulation.drone.tuning.values() if name.startswith("script_parameters/")}
+    assert names == {f"script_parameters/{name}" for name in ("speed", "careful", "mood", "rate")}
+    simulation.drone.tuning.change({"script_parameters/speed": 2.0, "script_parameters/careful": False})
+    simulation.step()
+    assert [simulation.drone.signals.getStringSignal(name) for name in ("speed", "said")] == ["2.0", "2.0 1"]
+    simulation.start()
+    own = simulation.drone.script_parameters[simulation.drone.own_script]
+    assert [own[name] for name in ("speed", "careful", "mood", "rate")] == [2.0, False, "bright", 3.0]
+    script.write_text("def sysCall_actuation():\n    pass\n", encoding="utf-8")
+    simulation.start()
+    assert "script_parameters/speed" not in simulation.drone.tuning.values()
+
+
+def test_what_a_script_puts_where_a_gain_was_breaks_nothing(simulate):
+    drone = simulate().drone
+    own = drone.script_parameters[drone.own_script]
+    own.update(Kzref="much", Dzref=7.0, thrust_limits=[1])
+    values = drone.tuning.values()
+    assert [values["Kzref"], values["Dzref"], values["thrust_limits/lowest"]] == [5.0, 7.0, 1.0]
+    drone.tuning.change({"Kzref": 2.0})
+    assert own["Kzref"] == 2 and own["Dzref"] == 7
+
+
+# ---- dump
+
+
+def test_the_flight_of_a_dump_is_the_flight_that_was_tuned(simulate, tmp_path):
+    before = tmp_path / "before.yaml"
+    before.write_text(yaml.dump({"sensors": SENSORS, "control": {"Kzref": 9}}), encoding="utf-8")
+    first = simulate(config=str(before))
+    first.drone.tuning.change({**TUNED, "thrust_limits/lowest": 1.0})
+    first.start()
+    file = dumped(first.drone.tuning.values(), tmp_path / "tuned.yaml")
+    second = simulate(config=f"{before},{file}")
+    flights = []
+    for simulation in (first, second, simulate()):
+        simulation.drone.receive(FORWARD)
+        flights.append(fly(simulation, 30))
+    assert second.drone.tuning.values() == first.drone.tuning.values()
+    assert flights[0] == flights[1] != flights[2]
+    assert second.parameters.control.recovery_margin is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("Kzref: 5.0", "Kzref: 20000", "dump.yaml: parameter control/Kzref = 20000: input should be less than"),
+        ("Kzref: 5.0", "Kzreff: 5.0", "dump.yaml: parameter Kzreff: unknown key"),
+        ("Kzref: 5.0", f"{'a/' * 400}b: 5.0", "dump.yaml: parameter a: unknown key"),
+        ("Kzref: 5.0", "Kzref: [", "dump.yaml: as what dynparam has dumped: "),
+        ("Kzref: 5.0", "cmd_vel_limits: 5", "dump.yaml: a name is the beginning of others"),
+        ("Kzref: 5.0", "groups: !!python/object/new:os.system [ls]", "the tag 'tag:yaml.org,2002:python/object/new"),
+        ("  weather/wind/y: 0.0\n", "", "dump.yaml: parameter weather/wind/y: missing beside the other parts"),
+        ("Kzref: 5.0", "sensors/imu/noise/deviation: 1.0", "of a drone with other sensors: 'imu'; name the file"),
+        ("dictitems", "items", "dump.yaml: what dynparam has dumped holds `dictitems:`"),
+        ("encoding.Config", "encoding.Else", "dump.yaml: the tag"),
+    ],
+)
+def test_a_mistake_in_a_dump_says_where(simulate, tmp_path, old, new, said):
+    file = tmp_path / "dump.yaml"
+    dumped(simulate(sensors={}).drone.tuning.values(), file)
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(ParameterError) as refused:
+        parameters.load({"config": str(file)})
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_vehicles_are_tuned_one_by_one_in_one_air(simulate):
+    simulation = simulate(vehicles={"a": {}, "b": {"position": [0, 2, 0.8]}}, sensors={})
+    a, b = simulation.vehicles.values()
+    a.tuning.change({"Kzref": 1.0, "weather/wind/x": 3.0})
+    assert [one.tuning.values()["Kzref"] for one in (a, b)] == [1, 5]
+    assert b.tuning.values()["weather/wind/x"] == 3
+    simulation.set_vehicles({"a": {}, "c": {"position": [0, 4, 0.8]}})
+    simulation.start()
+    assert [one.tuning.values()["Kzref"] for one in simulation.vehicles.values()] == [1, 5]
