@@ -15,32 +15,28 @@ import numpy as np
 import rosgraph
 import rospy
 import viser
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Twist
-from rosgraph_msgs.msg import Log
-from std_msgs.msg import String
 
 from drone_sim.files.resources import package_path
+from drone_sim.ros.cockpit.commanding import Commanding
 from drone_sim.ros.cockpit.editing import Editing
 from drone_sim.ros.cockpit.flying import Flying
 from drone_sim.ros.cockpit.found import Found, find
 from drone_sim.ros.cockpit.gate import Gate
+from drone_sim.ros.cockpit.hearing import Hearing
 from drone_sim.ros.cockpit.page import Page
 from drone_sim.ros.cockpit.panel import Panel
 from drone_sim.ros.cockpit.scene_view import SceneView
 from drone_sim.ros.cockpit.shelf import Shelf
 from drone_sim.ros.cockpit.sight import Sight
-from drone_sim.ros.cockpit.simulator import Simulator, script_failure
+from drone_sim.ros.cockpit.simulator import Simulator
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.node.starting import init_node, reported
-from drone_sim.ros.tools.commands import Command
 
 _NAME = "cockpit"
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
 _PERIOD = 0.05  # s between two looks: 20 a second
 _ASKING = 2.0  # s between two questions to the master
-_LEVELS = {Log.WARN: "warning: ", Log.ERROR: "error: ", Log.FATAL: "error: "}
 
 
 class Cockpit:
@@ -51,10 +47,11 @@ class Cockpit:
         self._simulator = Simulator(rospy.get_param("~simulator", "drone_sim"))
         self._found = Found()
         self._view: SceneView | None = None
+        self._hearing: Hearing | None = None
         self._asked = 0.0
-        self._publishers: dict[str, rospy.Publisher] = {}
+        self._commanding = Commanding()
         self._sight = Sight()
-        flying = Flying(self._send)
+        flying = Flying(self._commanding.send)
         shelf = Shelf(Path(rospy.get_param("~scripts", "~/drone_sim")).expanduser())
         self._wire = Wire(flying, Editing(shelf, self._simulator).answers)
         token = secrets.token_urlsafe(16)
@@ -69,11 +66,8 @@ class Cockpit:
         panel.dock_right()
         panel.set_width(_WIDTH)
         self.address = f"http://{host}:{self._server.get_port()}/?token={token}"
-        self._panel = Panel(self._server.gui, self._simulator, self._sight)
+        self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight)
         threading.Thread(target=flying.watch, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
-        rospy.Subscriber("/rosout_agg", Log, self._on_log, queue_size=20)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=2)
-        rospy.Subscriber(f"{self._simulator.node}/state", String, lambda one: self._panel.show_state(one.data))
 
     def run(self) -> None:
         """Show what is new, again and again."""
@@ -98,17 +92,20 @@ class Cockpit:
             self._view.handles.show_all(self._panel.handles.value)
             self._view.strength = self._panel.strength.value
             self._view.show()
-        prefix = "" if self._found.namespace.strip("/") == self._panel.vehicle else f"{self._panel.vehicle}/"
+        vehicle = self._commanding.vehicle
+        prefix = "" if self._found.namespace.strip("/") == vehicle else f"{vehicle}/"
         self._sight.follow(clients.values(), self._view.frames.place(f"{prefix}Track_base"))
-        self._panel.plots.follow(self._panel.vehicle)
+        self._panel.plots.follow(vehicle)
         self._panel.plots.show()
         self._panel.cameras.show()
 
     def _open(self, namespace: str) -> None:
         """Show another simulation, '' for none."""
-        if self._view is not None:
-            self._view.close()
+        for one in (self._view, self._hearing):
+            if one is not None:
+                one.close()
         self._view = SceneView(self._server.scene, namespace) if namespace else None
+        self._hearing = Hearing(self._simulator.node, self._panel, self._wire) if namespace else None
         self._panel.cameras.rest(not namespace)
         if not namespace:
             self._panel.plots.follow("")
@@ -123,33 +120,11 @@ class Cockpit:
         scenes = tuple(f"package://drone_sim/config/scenes/{one.name}" for one in _scenes())
         self._panel.offer(self._found, ("", *scenes), str(self._simulator.parameter("scene_file", "")))
 
-    def _send(self, command: Command) -> None:
-        vehicle = self._panel.vehicle
-        if vehicle not in self._publishers:
-            self._publishers[vehicle] = rospy.Publisher(f"/{vehicle}/cmd_vel", Twist, queue_size=1)
-        twist = Twist()
-        twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.z = command
-        self._publishers[vehicle].publish(twist)
-
-    def _on_log(self, message: Log) -> None:
-        if message.name != self._simulator.node:
-            return
-        self._panel.log(f"{_LEVELS.get(message.level, '')}{message.msg}")
-        failure = script_failure(message.msg) if message.level >= Log.ERROR else None
-        if failure is not None:
-            self._wire.tell({"failure": failure._asdict()})
-
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        lines = [
-            f"{one.name.rpartition(': ')[2]}: {one.message}" for one in message.status if one.level != DiagnosticStatus.OK
-        ]
-        self._panel.diagnose("\n".join(lines) or "nothing is wrong")
-
 
 def _sky() -> np.ndarray:
     """Return a column of the sky, paler towards the horizon."""
     height = np.linspace(1.0, 0.0, 64)[:, None, None]
-    return np.uint8(_HORIZON + height * (np.array(_ZENITH) - _HORIZON))
+    return np.asarray(_HORIZON + height * (np.array(_ZENITH) - _HORIZON), dtype=np.uint8)
 
 
 def _scenes() -> list[Path]:

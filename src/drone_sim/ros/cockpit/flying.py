@@ -10,7 +10,7 @@ from typing import Any
 from drone_sim.ros.tools.commands import Command
 
 _PERIOD = 0.1  # s between two commands while keys are held
-_SILENCE = 0.5  # s without a word from a browser after which its keys are released
+_SILENCE = 1.5  # s without a word from a browser after which its keys are released
 _FASTEST = 20.0  # m/s, rad/s; more is no speed that a page of ours asks for
 
 

@@ -60,6 +60,8 @@ class Frames:
 
     def show_axes(self, shown: bool) -> None:
         """Let the axes of all frames be seen, or not."""
+        if shown == self._axes:
+            return
         self._axes = shown
         for node in self._nodes.values():
             node.show_axes = shown
@@ -82,5 +84,3 @@ def _path(frame: str, parents: dict[str, str]) -> str:
         names.append(here)
         here = parents.get(here)
     return "/frames/" + "/".join(name.replace("/", "_") for name in reversed(names))
-
-

@@ -32,7 +32,7 @@ Handler = Callable[[ServerConnection], Awaitable[None]]
 
 
 class Gate:
-    """What stands before viser's server: its port serves our page and our socket, too, and only to who has the token."""
+    """What stands before viser's server: its port serves our page and socket, too, to who has the token."""
 
     def __init__(self, token: str, page: Page, wire: Handler):
         """Take what is served beside the scene: a page, and a socket that speaks `WIRE`."""

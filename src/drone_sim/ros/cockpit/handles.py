@@ -66,6 +66,8 @@ class Handles:
 
     def show_all(self, visible: bool) -> None:
         """Let the handles be seen, or not."""
+        if visible == self._visible:
+            return
         self._visible = visible
         for control in self._shown.values():
             control.visible = visible

@@ -84,9 +84,7 @@ def _line_list(scene: Any, name: str, marker: Marker) -> Any:
 
 
 def _lines(scene: Any, name: str, marker: Marker, ends: np.ndarray) -> Any:
-    return scene.add_line_segments(
-        name, points=ends, colors=_rgb(marker.color), line_width=_PIXELS, **place(marker)
-    )
+    return scene.add_line_segments(name, points=ends, colors=_rgb(marker.color), line_width=_PIXELS, **place(marker))
 
 
 def _point_cloud(scene: Any, name: str, marker: Marker) -> Any:
@@ -150,10 +148,10 @@ def _take_paint(loaded: Any) -> bool:
     """Let textures count as they are, whatever light a material asks rviz for; tell whether there are any."""
     painted = False
     for mesh in loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]:
-        material = getattr(mesh.visual, "material", None)
+        material: Any = getattr(mesh.visual, "material", None)
         image = getattr(material, "image", None)
         if image is not None:
-            glow = 255 * np.array([*material.kwargs.get("ke", (0, 0, 0)), 0], dtype=float)
+            glow = 255 * np.asarray([*material.kwargs.get("ke", (0, 0, 0)), 0], dtype=np.float64)
             tint = np.clip(np.add(material.ambient, material.diffuse, dtype=float) + glow, 0, 255).astype(np.uint8)
             mesh.visual.material = PBRMaterial(baseColorTexture=image, baseColorFactor=tint, doubleSided=True)
             painted = True

@@ -4,28 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
-import rospy
-from std_msgs.msg import Empty
-
 from drone_sim.ros.cockpit import sight
 from drone_sim.ros.cockpit.cameras import Cameras
+from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
 from drone_sim.ros.cockpit.found import Found
 from drone_sim.ros.cockpit.plots import Plots
 from drone_sim.ros.cockpit.simulator import Simulator
 
-_REQUESTS = ("takeoff", "land", "home", "reset")
 _LINES = 12  # of the log that are shown
 
 
 class Panel:
     """Buttons that call the simulation's services, and what it says."""
 
-    def __init__(self, gui: Any, simulator: Simulator, eyes: sight.Sight):
+    def __init__(self, gui: Any, simulator: Simulator, commanding: Commanding, eyes: sight.Sight):
         """Draw it."""
         self._gui = gui
         self._simulator = simulator
-        self.vehicle = ""
-        self._requests: dict[str, rospy.Publisher] = {}
+        self._commanding = commanding
         self._lines: list[str] = []
         gui.set_panel_label("drone_sim")
         self._state = gui.add_text("State", "no simulation", disabled=True)
@@ -54,9 +50,9 @@ class Panel:
         self._scene = gui.add_dropdown("Scene", ("",))
         self._scene.on_update(lambda event: self._load(event))
         self._vehicles = gui.add_dropdown("Vehicle", ("",))
-        self._vehicles.on_update(lambda event: self._choose(event.target.value))
-        ask = gui.add_button_group("Flight", _REQUESTS)
-        ask.on_click(lambda event: self._request(event.target.value))
+        self._vehicles.on_update(lambda event: self._commanding.choose(event.target.value))
+        ask = gui.add_button_group("Flight", REQUESTS)
+        ask.on_click(lambda event: self.say(self._commanding.request(event.target.value)))
 
     def _view(self, eyes: sight.Sight) -> None:
         gui = self._gui
@@ -80,18 +76,6 @@ class Panel:
             return
         self._simulator.set_parameter("scene_file", event.target.value)
         self._call("load_scene")
-
-    def _choose(self, vehicle: str) -> None:
-        self.vehicle = vehicle
-
-    def _request(self, topic: str) -> None:
-        name = f"/{self.vehicle}/{topic}"
-        if name not in self._requests:
-            self._requests[name] = rospy.Publisher(name, Empty, queue_size=1)
-            rospy.Timer(rospy.Duration(0.3), lambda _event: self._requests[name].publish(Empty()), oneshot=True)
-        else:
-            self._requests[name].publish(Empty())
-        self.say(f"{topic} sent to {self.vehicle}")
 
     # ---- what is said
 
@@ -119,12 +103,10 @@ class Panel:
         vehicles = found.vehicles or ("",)
         if tuple(self._vehicles.options) != vehicles:
             self._vehicles.options = vehicles
-            self._choose(self._vehicles.value)
+            self._commanding.choose(self._vehicles.value)
         choice = scenes if scene in scenes else (*scenes, scene)
         if tuple(self._scene.options) != choice:
             self._scene.options = choice
         if self._scene.value != scene:
             self._scene.value = scene
         self.cameras.offer(found.cameras)
-
-

@@ -104,7 +104,8 @@ class Shelf:
 def _scripts(folder: Path) -> list[Path]:
     if not folder.is_dir():
         return []
-    return [file for file in sorted(folder.iterdir()) if file.suffix in _ENDINGS and not file.name.startswith(("_", "."))]
+    files = [file for file in sorted(folder.iterdir()) if file.suffix in _ENDINGS]
+    return [file for file in files if not file.name.startswith(("_", "."))]
 
 
 def _version(path: Path) -> str:

@@ -12,6 +12,7 @@ from drone_sim.mechanics import frames
 FREE, BEHIND = "free", "behind the drone"
 _BACK, _UP = 1.6, 0.7  # m: where the one behind is, in the level frame of the drone
 _AHEAD = 0.4  # m, where it looks at
+_STILL = 1e-4  # m
 
 
 class Sight:
@@ -27,10 +28,9 @@ class Sight:
             return
         at, turn = track.translation, track.rotation
         matrix = frames.from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
-        eye = np.array(frames.transform(matrix, (-_BACK, 0.0, _UP)))
-        aim = np.array(frames.transform(matrix, (_AHEAD, 0.0, 0.0)))
-        for client in clients:
-            if np.linalg.norm(client.camera.position - eye) > 1e-4 or np.linalg.norm(client.camera.look_at - aim) > 1e-4:
-                with client.atomic():
-                    client.camera.position = eye
-                    client.camera.look_at = aim
+        eye, aim = (np.array(frames.transform(matrix, point)) for point in ((-_BACK, 0, _UP), (_AHEAD, 0, 0)))
+        for camera in (client.camera for client in clients):
+            if max(np.linalg.norm(camera.position - eye), np.linalg.norm(camera.look_at - aim)) > _STILL:
+                with camera.client.atomic():
+                    camera.position = eye
+                    camera.look_at = aim
