@@ -36,7 +36,7 @@ class Frames:
         """Have an empty tree: another simulation begins, or nobody looks."""
         with self._lock:
             self._heard, self._changed = {}, set()
-        for node in reversed(list(self._nodes.values())):  # those that hang on others first
+        for node in sorted(self._nodes.values(), key=lambda one: -one.name.count("/")):  # what hangs on others first
             node.remove()
         self._nodes, self._names = {}, {}
 

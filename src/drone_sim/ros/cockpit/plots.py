@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections import deque
 from typing import Any
@@ -17,6 +16,7 @@ from drone_sim.mechanics import frames
 
 _KEPT = 600  # steps: half a minute
 _EVERY = 5  # ticks between two drawings
+_SCALES = {"x": {"time": False, "auto": True}, "y": {"auto": True}}
 _COLORS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd")
 _CHARTS = {
     "velocity in the track frame, m/s": ("commanded vx", "vx", "commanded vy", "vy"),
@@ -33,7 +33,7 @@ class Plots:
         """Draw empty charts."""
         self._lock = threading.Lock()
         self._rows: deque[tuple[float, ...]] = deque(maxlen=_KEPT)
-        self._command, self._propellers = (math.nan, math.nan), (math.nan,) * 4
+        self._command, self._propellers = (0.0, 0.0), (0.0,) * 4
         self._vehicle = ""
         self._listening: list[rospy.Subscriber] = []
         self._ticks = 0
@@ -43,7 +43,7 @@ class Plots:
     def _chart(gui: Any, title: str, names: tuple[str, ...]) -> Any:
         empty = tuple(np.array([0.0, 1.0]) for _ in range(len(names) + 1))
         lines = [{"label": name, "stroke": color, "width": 1.5} for name, color in zip(names, _COLORS)]
-        return gui.add_uplot(empty, ({"label": "t, s"}, *lines), title=title, height=150)
+        return gui.add_uplot(empty, ({"label": "t, s"}, *lines), title=title, height=150, scales=_SCALES)
 
     def follow(self, vehicle: str) -> None:
         """Listen to a vehicle, '' for none."""
