@@ -94,7 +94,8 @@ class Cockpit:
             self._view.show()
         vehicle = self._commanding.vehicle
         prefix = "" if self._found.namespace.strip("/") == vehicle else f"{vehicle}/"
-        self._sight.follow(clients.values(), self._view.frames.place(f"{prefix}Track_base"))
+        self._panel.offer_sights(self._sight.choices(self._view.frames, prefix))
+        self._sight.follow(clients.values(), self._view.frames, prefix)
         self._panel.plots.follow(vehicle)
         self._panel.plots.show()
         self._panel.cameras.show()

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import threading
+from functools import reduce
 from typing import Any
 
 from geometry_msgs.msg import Transform
 
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Matrix
+
 ROOT = "world"
+_OPTICAL = "_optical"  # REP 103: how the name of a camera's own frame ends
 _AXES = {"axes_length": 0.15, "axes_radius": 0.004}  # m
 
 
@@ -70,10 +75,23 @@ class Frames:
         """Return the scene's name of a frame; None while it is not known."""
         return "" if frame == ROOT else self._names.get(frame)
 
-    def place(self, frame: str) -> Transform | None:
-        """Return where a frame is in its parent, None while it is not known."""
-        found = self._heard.get(frame)
-        return found[1] if found else None
+    def place(self, frame: str) -> Matrix | None:
+        """Return where a frame is in the world, None while that is not known."""
+        chain: list[Matrix] = []
+        with self._lock:
+            while frame != ROOT:
+                found = self._heard.get(frame)
+                if found is None or len(chain) > len(self._heard):
+                    return None
+                frame, (at, turn) = found[0], (found[1].translation, found[1].rotation)
+                chain.append(frames.from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w)))
+        return reduce(frames.multiply, reversed(chain), frames.IDENTITY)
+
+    @property
+    def eyes(self) -> list[str]:
+        """The frames of cameras that are known: z forward, x right, y down."""
+        with self._lock:
+            return sorted(frame for frame in self._heard if frame.endswith(_OPTICAL))
 
 
 def _path(frame: str, parents: dict[str, str]) -> str:

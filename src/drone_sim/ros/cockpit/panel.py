@@ -56,8 +56,8 @@ class Panel:
 
     def _view(self, eyes: sight.Sight) -> None:
         gui = self._gui
-        look = gui.add_dropdown("Look", (sight.BEHIND, sight.FREE), initial_value=eyes.choice)
-        look.on_update(lambda event: setattr(eyes, "choice", event.target.value))
+        self._look = gui.add_dropdown("Look", (sight.BEHIND, sight.FREE), initial_value=eyes.choice)
+        self._look.on_update(lambda event: setattr(eyes, "choice", event.target.value))
         self.axes = gui.add_checkbox("Frames", False)
         self.handles = gui.add_checkbox("Handles", True)
         self.strength = gui.add_slider("Push by a click, N", min=0.1, max=3.0, step=0.1, initial_value=0.5)
@@ -97,6 +97,11 @@ class Panel:
         """Show what /diagnostics says."""
         if self._diagnosis.value != text:
             self._diagnosis.value = text
+
+    def offer_sights(self, choices: tuple[str, ...]) -> None:
+        """Offer where to look from."""
+        if tuple(self._look.options) != choices:
+            self._look.options = choices
 
     def offer(self, found: Found, scenes: tuple[str, ...], scene: str) -> None:
         """Offer vehicles, cameras and scenes that there are."""
