@@ -40,7 +40,7 @@ find "$site" -name '*.so' -exec strip --strip-unneeded {} +
 find "$stage$own/bin" -type f -delete
 find "$stage" -name __pycache__ -prune -exec rm -rf {} +
 programs=(simulator key_teleop joy_teleop view show fly record plot_flight bag_commands video import_scene
-  doctor)
+  doctor cockpit)
 sed -i "1s:.*:#!$own/bin/python:" "${programs[@]/#/$stage/usr/lib/drone_sim/}"
 
 mkdir "$stage/DEBIAN"

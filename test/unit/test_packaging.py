@@ -24,6 +24,8 @@ KEYS = {
     "pydantic": "python3-pydantic-pip",
     "tkinter": "python3-tk",
     "trimesh": "python3-trimesh-pip",
+    "viser": "python3-viser-pip",
+    "websockets": "python3-websockets-pip",
 }
 # Imported by name, by trimesh, and what the launch file starts.
 INDIRECT = {"python3-lupa-pip", "python3-pycollada-pip", "rviz"}

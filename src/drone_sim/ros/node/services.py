@@ -15,6 +15,7 @@ from drone_sim.run.parameters import ParameterError
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Snapshot
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.load import script_path
 
 _HOME = Path("~/.ros/drone_sim/scene.yaml")
 
@@ -22,8 +23,8 @@ _HOME = Path("~/.ros/drone_sim/scene.yaml")
 class Services:
     """~start, ~stop, ~restart, ~step, ~pause; ~save_scene, ~load_scene; ~set_vehicles; ~snapshot, ~restore.
 
-    Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`, the vehicles
-    are those of the private parameter `vehicles`.
+    Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`, the script
+    that of `script`, the vehicles are those of the private parameter `vehicles`.
     """
 
     def __init__(self, player: Player, inbox: Inbox, follow: Callable[[], None]):
@@ -54,7 +55,8 @@ class Services:
     # ---- carried out in the simulation's thread
 
     def start(self) -> str:
-        """Read scene and script from disk, and begin at time 0."""
+        """Read scene and the script of `script` from disk, and begin at time 0."""
+        self._take_script()
         return self._player.start()
 
     def stop(self) -> str:
@@ -63,6 +65,7 @@ class Services:
 
     def restart(self) -> str:
         """Stop, and start."""
+        self._take_script()
         return self._player.restart()
 
     def step(self) -> str:
@@ -82,7 +85,14 @@ class Services:
     def load_scene(self) -> str:
         """Start anew in the scene of `scene_file`."""
         file = _scene_parameter()
+        self._take_script()
         return f"{self._player.start(file)} in {file or 'the scene of the parameters'}"
+
+    def _take_script(self) -> None:
+        """Let the script fly that the parameter `script` names now. Raises ScriptError where it is not there."""
+        script = from_shell(str(rospy.get_param("~script", "")))
+        script_path(script)
+        self._player.simulation.script = script
 
     def set_vehicles(self) -> str:
         """Let those fly that the parameter `vehicles` says; who was there and still is flies on."""

@@ -1,0 +1,149 @@
+"""`rosrun drone_sim cockpit`: the simulation in a browser, from a node that only knows its topics and services."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import secrets
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rosgraph
+import rospy
+import viser
+
+from drone_sim.files.resources import package_path
+from drone_sim.ros.cockpit.commanding import Commanding
+from drone_sim.ros.cockpit.editing import Editing
+from drone_sim.ros.cockpit.flying import Flying
+from drone_sim.ros.cockpit.found import Found, find
+from drone_sim.ros.cockpit.gate import Gate
+from drone_sim.ros.cockpit.hearing import Hearing
+from drone_sim.ros.cockpit.page import Page
+from drone_sim.ros.cockpit.panel import Panel
+from drone_sim.ros.cockpit.scene_view import SceneView
+from drone_sim.ros.cockpit.shelf import Shelf
+from drone_sim.ros.cockpit.sight import Sight
+from drone_sim.ros.cockpit.simulator import Simulator
+from drone_sim.ros.cockpit.wire import Wire
+from drone_sim.ros.node.starting import init_node, reported
+
+_NAME = "cockpit"
+_WIDTH = 270  # pixels of the panel
+_HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
+_PERIOD = 0.05  # s between two looks: 20 a second
+_ASKING = 2.0  # s between two questions to the master
+
+
+class Cockpit:
+    """One page for one simulation. While no browser is open, it listens to nothing."""
+
+    def __init__(self) -> None:
+        """Serve; init_node must have been called. Raises OSError where no port is free."""
+        self._simulator = Simulator(rospy.get_param("~simulator", "drone_sim"))
+        self._found = Found()
+        self._view: SceneView | None = None
+        self._hearing: Hearing | None = None
+        self._asked = 0.0
+        self._commanding = Commanding()
+        self._sight = Sight()
+        flying = Flying(self._commanding.send)
+        shelf = Shelf(Path(rospy.get_param("~scripts", "~/drone_sim")).expanduser())
+        self._wire = Wire(flying, Editing(shelf, self._simulator).answers)
+        token = secrets.token_urlsafe(16)
+        gate = Gate(token, Page(), self._wire.serve)
+        host, port = rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080)
+        with gate.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
+            self._server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
+        self._server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self._server.scene.set_up_direction("+z")
+        self._server.scene.set_background_image(_sky())
+        panel = self._server.gui.main_panel
+        panel.dock_right()
+        panel.set_width(_WIDTH)
+        self.address = f"http://{host}:{self._server.get_port()}/?token={token}"
+        self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight)
+        threading.Thread(target=flying.watch, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
+
+    def run(self) -> None:
+        """Show what is new, again and again."""
+        while not rospy.is_shutdown():
+            began = time.monotonic()
+            self._look(began)
+            time.sleep(max(0.0, _PERIOD - (time.monotonic() - began)))
+        self._server.stop()
+
+    def _look(self, now: float) -> None:
+        clients = self._server.get_clients()
+        if now - self._asked > _ASKING:
+            self._asked = now
+            self._ask_master()
+        wanted = self._found.namespace if clients else ""
+        if (self._view.namespace if self._view else "") != wanted:
+            self._open(wanted)
+        if self._view is None:
+            return
+        with self._server.atomic():
+            self._view.frames.show_axes(self._panel.axes.value)
+            self._view.handles.show_all(self._panel.handles.value)
+            self._view.strength = self._panel.strength.value
+            self._view.show()
+        vehicle = self._commanding.vehicle
+        prefix = "" if self._found.namespace.strip("/") == vehicle else f"{vehicle}/"
+        self._panel.offer_sights(self._sight.choices(self._view.frames, prefix))
+        self._sight.follow(clients.values(), self._view.frames, prefix)
+        self._panel.plots.follow(vehicle)
+        self._panel.plots.show()
+        self._panel.cameras.show()
+
+    def _open(self, namespace: str) -> None:
+        """Show another simulation, '' for none."""
+        for one in (self._view, self._hearing):
+            if one is not None:
+                one.close()
+        self._view = SceneView(self._server.scene, namespace) if namespace else None
+        self._hearing = Hearing(self._simulator.node, self._panel, self._wire) if namespace else None
+        self._panel.cameras.rest(not namespace)
+        if not namespace:
+            self._panel.plots.follow("")
+
+    def _ask_master(self) -> None:
+        try:
+            self._found = find(rospy.get_published_topics())
+        except (OSError, rosgraph.MasterException):
+            self._found = Found()
+        if not self._found.namespace:
+            self._panel.show_state("no simulation")
+        scenes = tuple(f"package://drone_sim/config/scenes/{one.name}" for one in _scenes())
+        self._panel.offer(self._found, ("", *scenes), str(self._simulator.parameter("scene_file", "")))
+
+
+def _sky() -> np.ndarray:
+    """Return a column of the sky, paler towards the horizon."""
+    height = np.linspace(1.0, 0.0, 64)[:, None, None]
+    return np.asarray(_HORIZON + height * (np.array(_ZENITH) - _HORIZON), dtype=np.uint8)
+
+
+def _scenes() -> list[Path]:
+    return sorted((package_path() / "config" / "scenes").glob("*.yaml"))
+
+
+def main() -> int:
+    """Serve until the node ends; return the exit status."""
+    return reported(_NAME, _serve)
+
+
+def _serve() -> Any:
+    if not init_node(_NAME):
+        return 1
+    cockpit = Cockpit()
+    rospy.loginfo(f"the cockpit is at {cockpit.address}")
+    return cockpit.run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

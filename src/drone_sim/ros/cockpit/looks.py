@@ -1,0 +1,200 @@
+"""What rviz's markers look like in the browser: one marker, one node of viser's scene."""
+
+from __future__ import annotations
+
+import logging
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import numpy as np
+import trimesh
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual.material import PBRMaterial
+from visualization_msgs.msg import Marker
+
+from drone_sim.files.resources import resolve
+
+_LOG = logging.getLogger(__name__)
+_PIXELS = 3.0  # width of lines
+_LARGEST = 64 << 20  # bytes of a mesh file
+_UNLIT = "KHR_materials_unlit"
+
+
+def show(scene: Any, name: str, marker: Marker) -> Any:
+    """Put a marker into viser's scene under a name, where its pose says; return its handle, None for nothing to see."""
+    make = _MAKERS.get(marker.type)
+    return make(scene, name, marker) if make else None
+
+
+def place(marker: Marker) -> dict[str, tuple[float, ...]]:
+    """Return position (m) and orientation (wxyz) of a marker in its frame."""
+    at, turn = marker.pose.position, marker.pose.orientation
+    wxyz = (turn.w, turn.x, turn.y, turn.z)
+    return {"position": (at.x, at.y, at.z), "wxyz": wxyz if any(wxyz) else (1.0, 0.0, 0.0, 0.0)}
+
+
+def _rgb(color: Any) -> tuple[float, float, float]:
+    return color.r, color.g, color.b
+
+
+def _box(scene: Any, name: str, marker: Marker) -> Any:
+    size = marker.scale.x, marker.scale.y, marker.scale.z
+    return scene.add_box(name, dimensions=size, color=_rgb(marker.color), opacity=_opacity(marker), **place(marker))
+
+
+def _sphere(scene: Any, name: str, marker: Marker) -> Any:
+    size = marker.scale.x, marker.scale.y, marker.scale.z
+    look = {"color": _rgb(marker.color), "opacity": _opacity(marker)}
+    return scene.add_icosphere(name, radius=0.5, scale=size, **look, **place(marker))
+
+
+def _cylinder(scene: Any, name: str, marker: Marker) -> Any:
+    # viser's stands along z, too; rviz's may be an ellipse
+    size = marker.scale.x, marker.scale.y, marker.scale.z
+    look = {"color": _rgb(marker.color), "opacity": _opacity(marker)}
+    return scene.add_cylinder(name, radius=0.5, height=1.0, scale=size, **look, **place(marker))
+
+
+def _opacity(marker: Marker) -> float | None:
+    return marker.color.a if marker.color.a < 1 else None
+
+
+def _arrow(scene: Any, name: str, marker: Marker) -> Any:
+    """Return an arrow between two points, whose scale is shaft and head, or along x, whose scale is its size."""
+    if len(marker.points) == 2:
+        ends, width = _points(marker), marker.scale.x
+    else:
+        ends, width = np.array([(0.0, 0.0, 0.0), (marker.scale.x, 0.0, 0.0)]), marker.scale.y
+    if not np.linalg.norm(ends[1] - ends[0]) > 0:
+        return None
+    look = {"shaft_radius": width / 2, "head_radius": width, "head_length": 2 * width}
+    return scene.add_arrows(name, points=ends[None], colors=_rgb(marker.color), **look, **place(marker))
+
+
+def _line_strip(scene: Any, name: str, marker: Marker) -> Any:
+    points = _points(marker)
+    return _lines(scene, name, marker, np.stack((points[:-1], points[1:]), axis=1)) if len(points) > 1 else None
+
+
+def _line_list(scene: Any, name: str, marker: Marker) -> Any:
+    points = _points(marker)
+    return _lines(scene, name, marker, points[: len(points) // 2 * 2].reshape(-1, 2, 3)) if len(points) > 1 else None
+
+
+def _lines(scene: Any, name: str, marker: Marker, ends: np.ndarray) -> Any:
+    return scene.add_line_segments(name, points=ends, colors=_rgb(marker.color), line_width=_PIXELS, **place(marker))
+
+
+def _point_cloud(scene: Any, name: str, marker: Marker) -> Any:
+    points = _points(marker)
+    if not len(points):
+        return None
+    same = len(marker.colors) == len(points)
+    colors = [_rgb(one) for one in marker.colors] if same else [_rgb(marker.color)] * len(points)
+    look = {"point_size": max(marker.scale.x, 1e-3), "point_shape": "circle"}
+    return scene.add_point_cloud(name, points=points, colors=np.array(colors), **look, **place(marker))
+
+
+def _text(scene: Any, name: str, marker: Marker) -> Any:
+    return scene.add_label(name, marker.text, anchor="bottom-center", **place(marker))
+
+
+def _triangles(scene: Any, name: str, marker: Marker) -> Any:
+    corners = _points(marker) * (marker.scale.x, marker.scale.y, marker.scale.z)
+    corners = corners[: len(corners) // 3 * 3]
+    if not len(corners):
+        return None
+    colors = marker.colors if len(marker.colors) == len(corners) else [marker.color] * len(corners)
+    rgba = np.array([(one.r, one.g, one.b, one.a) for one in colors])
+    mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+    mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=np.uint8(np.clip(rgba, 0, 1) * 255))
+    glb = as_glb(mesh, is_lit=True, is_clear=bool((rgba[:, 3] < 1).any()))
+    return scene.add_glb(name, glb, cast_shadow=False, receive_shadow=False, **place(marker))
+
+
+def _mesh(scene: Any, name: str, marker: Marker) -> Any:
+    color = None if marker.mesh_use_embedded_materials else (*_rgb(marker.color), marker.color.a)
+    glb = _glb(marker.mesh_resource, color)
+    size = marker.scale.x, marker.scale.y, marker.scale.z
+    return scene.add_glb(name, glb, scale=size, **place(marker)) if glb else None
+
+
+@lru_cache(maxsize=64)
+def _glb(resource: str, rgba: tuple[float, ...] | None) -> bytes | None:
+    """Return a mesh file as glTF, None for one that cannot be read; that is said."""
+    try:
+        url = urlsplit(resource)
+        path = Path(unquote(url.path)) if url.scheme == "file" else resolve(resource)
+        if path.stat().st_size > _LARGEST:
+            raise ValueError(f"larger than {_LARGEST} bytes")
+        loaded = trimesh.load(path, process=False)
+        if rgba is not None:
+            _tint(loaded, rgba)
+        return as_glb(loaded, is_lit=_take_paint(loaded), is_clear=rgba is not None and rgba[3] < 1)
+    except Exception as error:  # trimesh raises what it likes on other people's files
+        _LOG.warning("the cockpit cannot show %s: %s", resource, " ".join(str(error).split()))
+        return None
+
+
+def _tint(loaded: Any, rgba: tuple[float, ...]) -> None:
+    color = np.uint8(np.clip(rgba, 0, 1) * 255)
+    for mesh in loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]:
+        mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(color, (len(mesh.faces), 1)))
+
+
+def _take_paint(loaded: Any) -> bool:
+    """Let textures count as they are, whatever light a material asks rviz for; tell whether there are any."""
+    painted = False
+    for mesh in loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]:
+        material: Any = getattr(mesh.visual, "material", None)
+        image = getattr(material, "image", None)
+        if image is not None:
+            glow = 255 * np.asarray([*material.kwargs.get("ke", (0, 0, 0)), 0], dtype=np.float64)
+            tint = np.clip(np.add(material.ambient, material.diffuse, dtype=float) + glow, 0, 255).astype(np.uint8)
+            mesh.visual.material = PBRMaterial(baseColorTexture=image, baseColorFactor=tint, doubleSided=True)
+            painted = True
+    return painted
+
+
+def as_glb(mesh: Any, is_lit: bool, is_clear: bool = False) -> bytes:
+    """Return a mesh as glTF, of no metal; one that `is_lit` has its light in its colours, and needs none."""
+
+    def finish(tree: dict[str, Any]) -> None:
+        materials = tree.setdefault("materials", [])
+        for primitive in (one for mesh in tree["meshes"] for one in mesh["primitives"]):
+            if "material" not in primitive:
+                primitive["material"] = len(materials)
+                materials.append({"doubleSided": True})
+        for material in materials:
+            material.setdefault("pbrMetallicRoughness", {}).update(metallicFactor=0.0, roughnessFactor=0.9)
+            if is_clear:
+                material["alphaMode"] = "BLEND"
+            if is_lit:
+                material["extensions"] = {_UNLIT: {}}
+        if is_lit:
+            tree["extensionsUsed"] = [*tree.get("extensionsUsed", []), _UNLIT]
+
+    whole = mesh if isinstance(mesh, trimesh.Scene) else trimesh.Scene(mesh)
+    return bytes(export_glb(whole, tree_postprocessor=finish))
+
+
+def _points(marker: Marker) -> np.ndarray:
+    return np.array([(one.x, one.y, one.z) for one in marker.points], dtype=float).reshape(-1, 3)
+
+
+_MAKERS = {
+    Marker.ARROW: _arrow,
+    Marker.CUBE: _box,
+    Marker.SPHERE: _sphere,
+    Marker.CYLINDER: _cylinder,
+    Marker.LINE_STRIP: _line_strip,
+    Marker.LINE_LIST: _line_list,
+    Marker.CUBE_LIST: _point_cloud,
+    Marker.SPHERE_LIST: _point_cloud,
+    Marker.POINTS: _point_cloud,
+    Marker.TEXT_VIEW_FACING: _text,
+    Marker.TRIANGLE_LIST: _triangles,
+    Marker.MESH_RESOURCE: _mesh,
+}

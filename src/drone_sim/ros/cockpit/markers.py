@@ -1,0 +1,107 @@
+"""MarkerArrays, which the simulation makes for rviz, in the browser's scene."""
+
+from __future__ import annotations
+
+import copy
+import io
+import threading
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from geometry_msgs.msg import Pose
+from std_msgs.msg import Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from drone_sim.ros.cockpit import looks
+from drone_sim.ros.cockpit.frames import Frames
+
+_HIDDEN = {"sky"}  # namespaces that the browser has in another way
+_Key = tuple[str, int]
+
+
+class _Shown(NamedTuple):
+    handle: Any  # None where there is nothing to see
+    look: bytes
+    marker: Marker
+
+
+class Markers:
+    """The markers of one topic. Messages are taken in any thread, and shown in the one that calls `show`."""
+
+    def __init__(self, scene: Any, topic: str, frames: Frames, on_new: Callable[[Marker, Any], None] = lambda *_: None):
+        """Begin with nothing; `on_new` is called with every marker that is made anew, and its handle."""
+        self._scene = scene
+        self._name = topic.replace("/", "_")
+        self._frames = frames
+        self._on_new = on_new
+        self._wanted: dict[_Key, Marker] = {}
+        self._lock = threading.Lock()
+        self._changed = False
+        self._shown: dict[_Key, _Shown] = {}
+
+    def hear(self, message: MarkerArray) -> None:
+        """Take a message."""
+        with self._lock:
+            for marker in message.markers:
+                key = marker.ns, marker.id
+                if marker.action == Marker.DELETEALL:
+                    self._wanted.clear()
+                elif marker.action == Marker.DELETE:
+                    self._wanted.pop(key, None)
+                elif marker.ns not in _HIDDEN:
+                    self._wanted[key] = marker
+            self._changed = True
+
+    def forget(self) -> None:
+        """Show nothing."""
+        with self._lock:
+            self._wanted.clear()
+        self._changed = True
+        self.show()
+
+    def show(self, frames_changed: bool = False) -> None:
+        """Put into the scene what has changed; what hangs on a frame that is not known yet waits for it."""
+        if not (self._changed or frames_changed):
+            return
+        with self._lock:
+            wanted, self._changed = dict(self._wanted), False
+        for key in self._shown.keys() - wanted.keys():
+            self._remove(key)
+        for key, marker in wanted.items():
+            self._put(key, marker)
+
+    def _put(self, key: _Key, marker: Marker) -> None:
+        before, look = self._shown.get(key), _look(marker)
+        if before is not None and before.look == look:
+            if before.handle is not None and before.marker.pose != marker.pose:
+                place = looks.place(marker)
+                before.handle.position, before.handle.wxyz = place["position"], place["wxyz"]
+            self._shown[key] = before._replace(marker=marker)
+            return
+        parent = self._frames.name(marker.header.frame_id)
+        if parent is None:
+            return
+        namespace = marker.ns.replace("/", "_")
+        name = f"{parent}/{self._name}/{namespace}/{marker.id}"
+        if before is not None and before.handle is not None and before.handle.name != name:
+            self._remove(key)
+        handle = looks.show(self._scene, name, marker)
+        if handle is None:
+            self._remove(key)
+        else:
+            self._on_new(marker, handle)
+        self._shown[key] = _Shown(handle, look, marker)
+
+    def _remove(self, key: _Key) -> None:
+        gone = self._shown.pop(key, None)
+        if gone is not None and gone.handle is not None:
+            gone.handle.remove()
+
+
+def _look(marker: Marker) -> bytes:
+    """Return what differs between two markers that look different; their poses, times and ids do not."""
+    bare = copy.copy(marker)
+    bare.header, bare.pose = Header(frame_id=marker.header.frame_id), Pose()
+    data = io.BytesIO()
+    bare.serialize(data)
+    return data.getvalue()

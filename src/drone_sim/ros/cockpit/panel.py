@@ -1,0 +1,117 @@
+"""The panel beside the scene: toolbar, view, cameras, what is said. viser draws it, the same in every browser."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from drone_sim.ros.cockpit import sight
+from drone_sim.ros.cockpit.cameras import Cameras
+from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
+from drone_sim.ros.cockpit.found import Found
+from drone_sim.ros.cockpit.plots import Plots
+from drone_sim.ros.cockpit.simulator import Simulator
+
+_LINES = 12  # of the log that are shown
+
+
+class Panel:
+    """Buttons that call the simulation's services, and what it says."""
+
+    def __init__(self, gui: Any, simulator: Simulator, commanding: Commanding, eyes: sight.Sight):
+        """Draw it."""
+        self._gui = gui
+        self._simulator = simulator
+        self._commanding = commanding
+        self._lines: list[str] = []
+        gui.set_panel_label("drone_sim")
+        self._state = gui.add_text("State", "no simulation", disabled=True)
+        self._said = gui.add_text("Says", "", disabled=True, multiline=True)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Fly"):
+            self._toolbar()
+        with tabs.add_tab("View"):
+            self._view(eyes)
+        with tabs.add_tab("Cameras"):
+            self.cameras = Cameras(gui)
+        with tabs.add_tab("Plots"):
+            self.plots = Plots(gui)
+        with tabs.add_tab("Log"):
+            self._log = gui.add_text("Log", "", disabled=True, multiline=True)
+            self._diagnosis = gui.add_text("Why", "", disabled=True, multiline=True)
+
+    def _toolbar(self) -> None:
+        gui = self._gui
+        run = gui.add_button_group("Run", ("start", "stop", "restart"))
+        run.on_click(lambda event: self._call(event.target.value))
+        stand = gui.add_button_group("Stand still", ("pause", "go on", "step"))
+        stand.on_click(lambda event: self._stand(event.target.value))
+        keep = gui.add_button_group("Remember", ("snapshot", "restore"))
+        keep.on_click(lambda event: self._call(event.target.value))
+        self._scene = gui.add_dropdown("Scene", ("",))
+        self._scene.on_update(lambda event: self._load(event))
+        self._vehicles = gui.add_dropdown("Vehicle", ("",))
+        self._vehicles.on_update(lambda event: self._commanding.choose(event.target.value))
+        ask = gui.add_button_group("Flight", REQUESTS)
+        ask.on_click(lambda event: self.say(self._commanding.request(event.target.value)))
+
+    def _view(self, eyes: sight.Sight) -> None:
+        gui = self._gui
+        self._look = gui.add_dropdown("Look", (sight.BEHIND, sight.FREE), initial_value=eyes.choice)
+        self._look.on_update(lambda event: setattr(eyes, "choice", event.target.value))
+        self.axes = gui.add_checkbox("Frames", False)
+        self.handles = gui.add_checkbox("Handles", True)
+        self.strength = gui.add_slider("Push by a click, N", min=0.1, max=3.0, step=0.1, initial_value=0.5)
+
+    def _stand(self, what: str) -> None:
+        self._call("step") if what == "step" else self._call("pause", what == "pause")
+
+    def _call(self, service: str, *request: Any) -> None:
+        self.say(f"{service} ...")
+        self._simulator.call_aside(
+            service, *request, then=lambda done, said: self.say(f"{service}: {'' if done else 'failed: '}{said}")
+        )
+
+    def _load(self, event: Any) -> None:
+        if event.client is None:  # the server itself has set it
+            return
+        self._simulator.set_parameter("scene_file", event.target.value)
+        self._call("load_scene")
+
+    # ---- what is said
+
+    def say(self, line: str) -> None:
+        """Show one line."""
+        self._said.value = line
+
+    def show_state(self, state: str) -> None:
+        """Show what the simulation does."""
+        if self._state.value != state:
+            self._state.value = state
+
+    def log(self, line: str) -> None:
+        """Add a line to the log."""
+        self._lines = [*self._lines[1 - _LINES :], line]
+        self._log.value = "\n".join(self._lines)
+
+    def diagnose(self, text: str) -> None:
+        """Show what /diagnostics says."""
+        if self._diagnosis.value != text:
+            self._diagnosis.value = text
+
+    def offer_sights(self, choices: tuple[str, ...]) -> None:
+        """Offer where to look from."""
+        if tuple(self._look.options) != choices:
+            self._look.options = choices
+
+    def offer(self, found: Found, scenes: tuple[str, ...], scene: str) -> None:
+        """Offer vehicles, cameras and scenes that there are."""
+        vehicles = found.vehicles or ("",)
+        if tuple(self._vehicles.options) != vehicles:
+            self._vehicles.options = vehicles
+            self._commanding.choose(self._vehicles.value)
+        choice = scenes if scene in scenes else (*scenes, scene)
+        if tuple(self._scene.options) != choice:
+            self._scene.options = choice
+        if self._scene.value != scene:
+            self._scene.value = scene
+        self.cameras.offer(found.cameras)

@@ -1,0 +1,95 @@
+"""What a vehicle does against what it is told, over the last half minute."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Any
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Float32MultiArray
+
+from drone_sim.mechanics import frames
+
+_KEPT = 600  # steps: half a minute
+_EVERY = 5  # ticks between two drawings
+_SCALES = {"x": {"time": False, "auto": True}, "y": {"auto": True}}
+_COLORS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd")
+_CHARTS = {
+    "velocity in the track frame, m/s": ("commanded vx", "vx", "commanded vy", "vy"),
+    "height, m": ("z",),
+    "attitude, rad": ("roll", "pitch", "yaw"),
+    "propellers, m/s": ("front left", "back left", "back right", "front right"),
+}
+
+
+class Plots:
+    """Charts of one vehicle's topics."""
+
+    def __init__(self, gui: Any):
+        """Draw empty charts."""
+        self._lock = threading.Lock()
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=_KEPT)
+        self._command, self._propellers = (0.0, 0.0), (0.0,) * 4
+        self._vehicle = ""
+        self._listening: list[rospy.Subscriber] = []
+        self._ticks = 0
+        self._charts = [self._chart(gui, title, names) for title, names in _CHARTS.items()]
+
+    @staticmethod
+    def _chart(gui: Any, title: str, names: tuple[str, ...]) -> Any:
+        empty = tuple(np.array([0.0, 1.0]) for _ in range(len(names) + 1))
+        lines = [{"label": name, "stroke": color, "width": 1.5} for name, color in zip(names, _COLORS)]
+        return gui.add_uplot(empty, ({"label": "t, s"}, *lines), title=title, height=150, scales=_SCALES)
+
+    def follow(self, vehicle: str) -> None:
+        """Listen to a vehicle, '' for none."""
+        if vehicle == self._vehicle:
+            return
+        for one in self._listening:
+            one.unregister()
+        self._vehicle, self._listening = vehicle, []
+        with self._lock:
+            self._rows.clear()
+        if vehicle:
+            self._listening = [
+                rospy.Subscriber(f"/{vehicle}/command", TwistStamped, self._on_command, queue_size=5),
+                rospy.Subscriber(f"/{vehicle}/propellers", Float32MultiArray, self._on_propellers, queue_size=5),
+                rospy.Subscriber(f"/{vehicle}/odom", Odometry, self._on_odometry, queue_size=5),
+            ]
+
+    def _on_command(self, message: TwistStamped) -> None:
+        self._command = message.twist.linear.x, message.twist.linear.y
+
+    def _on_propellers(self, message: Float32MultiArray) -> None:
+        self._propellers = tuple(message.data)
+
+    def _on_odometry(self, message: Odometry) -> None:
+        at, turn, linear = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist.linear
+        matrix = frames.from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
+        roll, pitch, yaw = frames.to_rpy(matrix)
+        level = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, -yaw))
+        vx, vy, _ = frames.rotate(level, frames.rotate(matrix, (linear.x, linear.y, linear.z)))
+        (command_x, command_y), time = self._command, message.header.stamp.to_sec()
+        row = (time, command_x, vx, command_y, vy, at.z, roll, pitch, yaw, *self._propellers)
+        with self._lock:
+            if self._rows and time <= self._rows[-1][0]:
+                self._rows.clear()  # another run
+            self._rows.append(row)
+
+    def show(self) -> None:
+        """Draw what has come, a few times a second."""
+        self._ticks += 1
+        if self._ticks % _EVERY:
+            return
+        with self._lock:
+            columns = np.array(self._rows).T
+        if len(columns) == 0 or columns.shape[1] < 2:
+            return
+        first = 1
+        for chart, names in zip(self._charts, _CHARTS.values()):
+            chart.data = (columns[0] - columns[0][-1], *columns[first : first + len(names)])
+            first += len(names)

@@ -1,0 +1,327 @@
+"""The parts of the cockpit that need no browser: who comes in, who flies, which files may be written, what is shown."""
+
+import http.client
+import json
+import threading
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+pytest.importorskip("viser")
+
+import trimesh
+import viser
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from drone_sim.ros.cockpit import looks
+from drone_sim.ros.cockpit.flying import Flying, read_command
+from drone_sim.ros.cockpit.found import Found, find
+from drone_sim.ros.cockpit.frames import Frames
+from drone_sim.ros.cockpit.gate import WIRE, Gate
+from drone_sim.ros.cockpit.markers import Markers
+from drone_sim.ros.cockpit.page import Page
+from drone_sim.ros.cockpit.shelf import Shelf, ShelfError
+from drone_sim.ros.cockpit.simulator import script_failure
+from drone_sim.ros.cockpit.wire import Wire
+from drone_sim.ros.tools.commands import Command
+
+TOKEN = "secret-token"
+
+
+# ---- who comes in
+
+
+class Served:
+    def __init__(self):
+        self.sent = []
+        self.flying = Flying(self.sent.append, lambda: 0.0)
+        self.wire = Wire(self.flying, {"double": lambda message: {"twice": 2 * message["number"]}})
+        with Gate(TOKEN, Page(), self.wire.serve).before_viser():
+            self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self.host = f"127.0.0.1:{self.server.get_port()}"
+
+    def get(self, path, **headers):
+        connection = http.client.HTTPConnection(self.host, timeout=5)
+        connection.request("GET", path, headers=headers)
+        answer = connection.getresponse()
+        return answer.status, answer, answer.read()
+
+    @property
+    def cookie(self):
+        return f"drone_sim_{self.host.rpartition(':')[2]}={TOKEN}"
+
+    def connect(self, cookie=None, origin=None, path="/wire"):
+        headers = {"Cookie": self.cookie if cookie is None else cookie}
+        return connect(f"ws://{self.host}{path}", subprotocols=[WIRE], additional_headers=headers, origin=origin)
+
+
+@pytest.fixture(name="served", scope="module")
+def _served():
+    served = Served()
+    yield served
+    served.server.stop()
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/scene/", "/cockpit.js", "/?token=", "/?token=wrong", "/../../etc/passwd", "/wire"]
+)
+def test_without_the_token_nothing_is_served(served, path):
+    status, _, body = served.get(path)
+    assert status == 403 and b"?token=" in body
+    assert served.get(path, Cookie="drone_sim_1=x; =;;")[0] == 403
+
+
+def test_the_token_lets_in_and_leaves_the_address(served):
+    status, answer, _ = served.get(f"/?token={TOKEN}")
+    assert status == 303 and answer.headers["Location"] == "/"
+    cookie = answer.headers["Set-Cookie"]
+    assert cookie.startswith(served.cookie) and "HttpOnly" in cookie and "SameSite=Strict" in cookie
+    for path, word in (("/", b"cockpit.js"), ("/cockpit.js", b"cm-editor"), ("/scene/", b"<html")):
+        status, _, body = served.get(path, Cookie=served.cookie)
+        assert status == 200 and word in body.lower()
+    assert served.get("/nothing.html", Cookie=served.cookie)[0] == 404
+    assert served.get("/__init__.py", Cookie=served.cookie)[0] == 404
+
+
+@pytest.mark.parametrize("path", ["/wire", "/scene"])
+def test_sockets_want_the_token_and_our_origin(served, path):
+    for cookie, origin in (("", None), ("drone_sim=1", None), (None, "http://evil.example"), (None, "null")):
+        with pytest.raises(InvalidStatus, match="403"):
+            served.connect(cookie, origin, path)
+    served.connect(origin=f"http://{served.host}").close()
+
+
+def test_a_browser_that_vanishes_leaves_a_stopped_drone(served):
+    served.sent.clear()
+    with served.connect() as socket:
+        socket.send(json.dumps({"hold": {"vx": 1.5}}))
+        socket.send(json.dumps({"id": 7, "ask": "double", "number": 21}))
+        assert json.loads(socket.recv(timeout=5)) == {"id": 7, "twice": 42}
+        assert served.sent == [Command(vx=1.5)]
+    gone = threading.Event()
+    while len(served.sent) < 2:
+        gone.wait(0.01)
+    assert served.sent[-1] == Command()
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("nonsense", "Expecting value"),
+        ("[1]", "must be a mapping"),
+        ('{"ask": "format"}', "must be one of double, or hold"),
+        ('{"hold": {"vx": "fast"}}', "hold/vx: must be a number"),
+        ('{"hold": {"vx": 1e9}}', "hold/vx: must be a number"),
+        ('{"hold": {"ax": 1}}', "must be a mapping of vx, vy, vz, wz"),
+        ("[" * 100_000, ""),
+    ],
+)
+def test_what_a_browser_says_is_checked(served, text, words):
+    with served.connect() as socket:
+        socket.send(text)
+        answer = json.loads(socket.recv(timeout=5))
+        assert answer["id"] is None and words in answer["error"]
+        socket.send(json.dumps({"id": 1, "ask": "double", "number": 1}))
+        assert json.loads(socket.recv(timeout=5))["twice"] == 2
+
+
+# ---- who flies
+
+
+def test_held_keys_fly_while_they_are_held_and_said():
+    sent, now = [], [0.0]
+    flying = Flying(sent.append, lambda: now[0])
+    ahead, left = Command(vx=1.0), Command(vy=1.0)
+    flying.hold(1, ahead)
+    flying.look()
+    assert sent == [ahead, ahead], "repeated"
+    flying.hold(2, left)
+    flying.hold(1, ahead)
+    assert sent[2:] == [left], "the one that changed last counts, and is not thrown over by a repetition"
+    flying.gone(2)
+    assert sent[-1] == ahead
+    now[0] = 10.0
+    flying.look()
+    assert sent[-1] == Command(), "silence"
+    count = len(sent)
+    flying.look()
+    flying.gone(1)
+    assert len(sent) == count, "nobody flies, and nobody is disturbed"
+
+
+def test_nan_is_no_speed():
+    with pytest.raises(ValueError, match="hold/wz"):
+        read_command({"wz": float("nan")})
+    assert read_command({"vz": -2}) == Command(vz=-2.0)
+
+
+# ---- which files
+
+
+@pytest.fixture(name="shelf")
+def _shelf(tmp_path):
+    package = tmp_path / "package"
+    for folder in ("src/drone_sim/child_scripts", "docs/tutorial"):
+        (package / folder).mkdir(parents=True)
+    (package / "src/drone_sim/child_scripts/pilot.py").write_text("shipped", encoding="utf-8")
+    return Shelf(tmp_path / "mine", package)
+
+
+def test_a_script_of_the_package_becomes_a_copy(shelf, tmp_path):
+    pilot = shelf.find("built-in/pilot.py")
+    own, version = shelf.save(pilot, "changed", shelf.read(pilot)[1])
+    assert own.name == "mine/pilot.py" and (tmp_path / "mine/pilot.py").read_text() == "changed"
+    assert shelf.read(pilot)[0] == "shipped"
+    again, _ = shelf.save(own, "changed again", version)
+    assert again == own and shelf.original(own) == "shipped"
+    assert shelf.save(pilot, "other", "")[0].name == "mine/pilot_2.py", "nothing is lost"
+
+
+def test_what_another_has_changed_is_not_overwritten(shelf, tmp_path):
+    own, version = shelf.save(shelf.find("built-in/pilot.py"), "mine", "")
+    (tmp_path / "mine/pilot.py").write_text("theirs", encoding="utf-8")
+    with pytest.raises(ShelfError, match="changed by somebody else"):
+        shelf.save(own, "mine again", version)
+    assert (tmp_path / "mine/pilot.py").read_text() == "theirs"
+
+
+@pytest.mark.parametrize("name", ["/etc/passwd", "mine/../../x.py", "built-in/../x", "", None, 3, ["a"]])
+def test_only_what_is_listed_is_read(shelf, name):
+    with pytest.raises(ShelfError, match="no such script"):
+        shelf.find(name)
+
+
+def test_scripts_have_limits(shelf, tmp_path):
+    with pytest.raises(ShelfError, match="larger than"):
+        shelf.save(shelf.find("built-in/pilot.py"), "x" * (1 << 21), "")
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "binary.py").write_bytes(b"\xff\xfe")
+    with pytest.raises(ShelfError, match="utf-8"):
+        shelf.read(shelf.find("mine/binary.py"))
+
+
+def test_a_failure_is_read_from_a_line():
+    failure = script_failure("script error: [actuation] /home/a b/x.py:12: NameError: y: z")
+    assert failure == ("actuation", "/home/a b/x.py", 12, "NameError: y: z")
+    assert script_failure("started") is None
+
+
+def test_what_the_master_knows():
+    topics = [
+        ("/drone/view/bodies", "visualization_msgs/MarkerArray"),
+        ("/drone/odom", "nav_msgs/Odometry"),
+        ("/drone/propellers", "std_msgs/Float32MultiArray"),
+        ("/other/odom", "nav_msgs/Odometry"),
+        ("/drone/front/compressed", "sensor_msgs/CompressedImage"),
+    ]
+    assert find(topics) == Found("/drone", ("drone",), ("/drone/front/compressed",))
+    assert find(topics[1:]) == Found()
+
+
+# ---- what is shown
+
+
+class Scene:
+    """Remembers what has been added, as viser would show it."""
+
+    def __init__(self):
+        self.nodes = {}
+        self.added = []
+
+    def __getattr__(self, kind):
+        if not kind.startswith("add_"):
+            raise AttributeError(kind)
+
+        def add(name, *arguments, **options):
+            self.nodes[name] = node = Node(self, name, kind, arguments, options)
+            self.added.append(name)
+            return node
+
+        return add
+
+
+class Node:
+    def __init__(self, scene, name, kind, arguments, options):
+        self.scene, self.name, self.kind, self.arguments = scene, name, kind, arguments
+        self.position, self.wxyz, self.options = options.get("position"), options.get("wxyz"), options
+
+    def remove(self):
+        del self.scene.nodes[self.name]
+
+
+def marker(number, kind=Marker.CUBE, **values):
+    made = Marker(ns="a", id=number, type=kind, **values)
+    made.header.frame_id = "world"
+    made.scale.x = made.scale.y = made.scale.z = 1.0
+    made.color = ColorRGBA(1, 0, 0, 1)
+    return made
+
+
+def test_markers_come_move_and_go():
+    scene = Scene()
+    markers = Markers(scene, "scene", Frames(scene))
+    markers.hear(MarkerArray([marker(0), marker(1)]))
+    markers.show()
+    assert sorted(scene.nodes) == ["/scene/a/0", "/scene/a/1"]
+    moved = marker(0)
+    moved.pose.position.x = 3.0
+    markers.hear(MarkerArray([moved, Marker(ns="a", id=1, action=Marker.DELETE)]))
+    markers.show()
+    assert list(scene.nodes) == ["/scene/a/0"] and scene.nodes["/scene/a/0"].position == (3.0, 0.0, 0.0)
+    assert scene.added.count("/scene/a/0") == 1, "moved, not made anew"
+    hanging = marker(5)
+    hanging.header.frame_id = "nowhere"
+    markers.hear(MarkerArray([hanging]))
+    markers.show()
+    assert list(scene.nodes) == ["/scene/a/0"], "it waits for its frame"
+    markers.hear(MarkerArray([Marker(action=Marker.DELETEALL)]))
+    markers.show()
+    assert not scene.nodes
+
+
+@pytest.mark.parametrize(
+    "kind, added",
+    [
+        (Marker.CUBE, "add_box"),
+        (Marker.SPHERE, "add_icosphere"),
+        (Marker.CYLINDER, "add_cylinder"),
+        (Marker.ARROW, "add_arrows"),
+        (Marker.LINE_STRIP, "add_line_segments"),
+        (Marker.LINE_LIST, "add_line_segments"),
+        (Marker.POINTS, "add_point_cloud"),
+        (Marker.TEXT_VIEW_FACING, "add_label"),
+        (Marker.TRIANGLE_LIST, "add_glb"),
+    ],
+)
+def test_every_kind_of_marker_is_shown(kind, added):
+    points = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)]
+    shape = [] if kind == Marker.ARROW else points
+    node = looks.show(Scene(), "/x", marker(0, kind, points=shape, text="<b>words</b>"))
+    assert node.kind == added and node.wxyz == (1.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("kind", [Marker.LINE_STRIP, Marker.LINE_LIST, Marker.POINTS, Marker.TRIANGLE_LIST, 99])
+def test_markers_of_nothing_are_nothing(kind):
+    assert looks.show(Scene(), "/x", marker(0, kind)) is None
+
+
+def test_a_mesh_that_cannot_be_read_is_told_and_left_out(tmp_path, caplog):
+    file = tmp_path / "broken.stl"
+    file.write_text("solid nothing", encoding="utf-8")
+    scene = Scene()
+    assert looks.show(scene, "/x", marker(0, Marker.MESH_RESOURCE, mesh_resource=f"file://{file}")) is None
+    assert "broken.stl" in caplog.text
+
+
+def test_a_mesh_has_no_metal(tmp_path):
+    file = tmp_path / "box.stl"
+    trimesh.creation.box().export(file)
+    node = looks.show(Scene(), "/x", marker(0, Marker.MESH_RESOURCE, mesh_resource=f"file://{file}"))
+    length = int.from_bytes(node.arguments[0][12:16], "little")
+    tree = json.loads(node.arguments[0][20 : 20 + length])
+    assert [one["pbrMetallicRoughness"]["metallicFactor"] for one in tree["materials"]] == [0.0]
