@@ -143,6 +143,13 @@ def test_the_distance_from_a_path():
     assert judged(round_corner, "path", along=corner, at_most=0.3, covers=0.95).passed
 
 
+def test_a_closed_path_goes_back_to_where_it_begins():
+    home = flown(T, x=4 - 0.4 * T)
+    corner = {"along": [[0, 0, 0], [0, 3, 0], [4, 3, 0], [4, 0, 0]], "at_most": 0.1}
+    assert not judged(home, "path", **corner).passed
+    assert judged(home, "path", **corner, closed=True).passed
+
+
 def test_who_waits_at_the_beginning_of_a_path_has_not_flown_it():
     waiting = judged(flown(T), "path", along=[[0, 0, 0], [4, 0, 0]], closed=True, at_most=0.2, covers=0.9)
     assert not waiting.passed
