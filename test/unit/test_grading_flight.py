@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from drone_sim.files.resources import package_path
 from drone_sim.grading import flight, plan
 from drone_sim.grading.plan import PlanError
 from drone_sim.grading.result import Result
@@ -113,6 +114,13 @@ def test_a_seed_is_spread_evenly(written):
     drawn = np.array([steps.parameters(seed).fleet[0].position for seed in range(1, 201)])
     assert np.abs(drawn.mean(axis=0) - (0, 0, 1)).max() < 0.03
     assert drawn.max(axis=0) == pytest.approx([0.2, 0.2, 1.1], abs=0.01)
+
+
+def test_a_plan_names_the_files_that_it_is_made_of(written, tmp_path):
+    scene = package_path() / "config" / "scenes" / "gates.yaml"
+    (tmp_path / "other.yaml").write_text("script: target\n")
+    steps = written(TALKING + "scene: package://drone_sim/config/scenes/gates.yaml\nconfig: other.yaml", counting="")
+    assert steps.files == [tmp_path / "steps.yaml", scene, tmp_path / "other.yaml"]
 
 
 def test_changes_are_laid_over_the_plan(written):
