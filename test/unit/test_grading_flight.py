@@ -204,6 +204,15 @@ def test_a_script_that_fails_is_named_in_one_line(written, tmp_path, source, err
     assert result.script == str(tmp_path / "mine.py")
 
 
+def test_who_flies(written, tmp_path):
+    of_config = TALKING.replace("script: counting.py", "config: {script: counting.py}")
+    plain, inside = written(of_config.replace("counting.py", "''"), counting=COUNTING), written(of_config)
+    assert flight.grade(inside).flown == pytest.approx(2.05)
+    assert flight.grade(inside).script == str(tmp_path / "counting.py")
+    assert flight.grade(inside, "").digest == flight.grade(plain).digest
+    assert flight.grade(plain, str(tmp_path / "counting.py")).digest == flight.grade(inside).digest
+
+
 def test_a_plan_of_two_vehicles_grades_the_one_that_it_names(written):
     two = """
 duration: 2

@@ -168,7 +168,7 @@ def _beside(folder: Path, config: Mapping[str, Any]) -> dict[str, Any]:
     """Return a plan's own `config` with the files that it names found beside the plan."""
     values = dict(config)
     scene_parameters.find_files_beside(folder, values)
-    for key in ("script", "scene_file"):
+    for key in ("script", "scene_file", "config"):
         if isinstance(values.get(key), str) and Path(values[key]).suffix:
             values[key] = named_in(folder, values[key])
     return values
