@@ -1,0 +1,146 @@
+"""One flight of a plan, flown and judged in this process."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import random
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drone_sim.files import writing
+from drone_sim.grading.plan import Plan
+from drone_sim.grading.result import Result, result_of
+from drone_sim.grading.topics import Topics
+from drone_sim.grading.watching import Witness
+from drone_sim.offline.recording import Recording
+from drone_sim.offline.timeline import first_step
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.load import DEFAULT
+
+EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
+
+
+def grade(
+    plan: Plan,
+    script: str | None = None,
+    seed: int = 0,
+    changes: Mapping[str, Any] | None = None,
+    table: str | Path | None = None,
+) -> Result:
+    """Fly once and return how well: the same to the bit for the same plan, script, seed and changes.
+
+    `script` is as in Plan.script_of, `changes` as in Plan.parameters; `table` is a file to write, as `fly --csv` does.
+    What goes wrong in the flight is in the result's `error`. Raises OSError for a table that cannot be written.
+    """
+    try:
+        flight = Flight(plan, script, seed, changes)
+    except EXPECTED as error:
+        return ungraded(plan, script, seed, changes, _one_line(error))
+    result = flight.grade()
+    if table is not None:
+        write(flight.rows, table)
+    return result
+
+
+def ungraded(plan: Plan, script: str | None, seed: int, changes: Mapping[str, Any] | None, why: str) -> Result:
+    """Return the result of a flight that has not been flown, or of which nothing is left; `why` is one line."""
+    outcomes = tuple(one.missed("nothing was flown") for one in plan.criteria)
+    return result_of(plan.name, plan.script_of(script), seed, changes or {}, outcomes, error=why)
+
+
+class Flight:
+    """A flight that is ready: all is read and built, and no line of a script has run."""
+
+    def __init__(self, plan: Plan, script: str | None = None, seed: int = 0, changes: Mapping[str, Any] | None = None):
+        """Build it; see `grade`. Raises one of EXPECTED."""
+        self._plan, self._seed, self._changes = plan, seed, changes or {}
+        parameters = plan.parameters(seed, None, changes)
+        self._script = plan.script_of(script) or (parameters.script if script is None else "")
+        self._timeline = plan.timeline_of(parameters)
+        self._steps = first_step(plan.duration, parameters.time_step)
+        topics = Topics(plan.topics_of(parameters))
+        backend = topics if topics.wanted else None
+        self._simulation = Simulation(parameters, script=self._script or DEFAULT, backend=backend, started=False)
+        topics.clock = lambda: self._simulation.time
+        try:
+            self._witness = Witness(plan, self._simulation, topics)
+        except BaseException:
+            self._simulation.close()
+            raise
+
+    def grade(self) -> Result:
+        """Fly, once, and return how well."""
+        with _seeded(self._seed):
+            try:
+                failed = _failure(self._fly) or self._failed_scripts()
+            finally:
+                closed = _failure(self._simulation.close)  # cleanup may fail, too
+        plan, wrong, flown = self._plan, failed or closed, self._witness.flown()
+        if flown is None:
+            return ungraded(plan, self._script, self._seed, self._changes, wrong or "nothing was flown")
+        outcomes = tuple(one.judge(flown) for one in plan.criteria)
+        digest = digest_of(flown.rows)
+        return result_of(plan.name, self._script, self._seed, self._changes, outcomes, flown.end, wrong, digest)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The table of what has been flown, (N, 22): see offline.recording.COLUMNS."""
+        return self._witness.rows
+
+    def _fly(self) -> None:
+        self._simulation.load_scripts()
+        self._witness.keep()
+        for step in range(self._steps):
+            self._timeline.apply(step, self._simulation.vehicles)
+            self._simulation.step()
+            self._witness.keep()
+            if self._witness.is_over:
+                return
+
+    def _failed_scripts(self) -> str | None:
+        names = self._simulation.failed_scripts
+        return f"the scripts of {', '.join(names)} failed: the log says why" if names else None
+
+
+def digest_of(rows: np.ndarray) -> str:
+    """Return the SHA-256 of a table's numbers, row by row, as little-endian doubles."""
+    return hashlib.sha256(np.ascontiguousarray(rows, "<f8").tobytes()).hexdigest()
+
+
+def write(rows: np.ndarray, path: str | Path) -> None:
+    """Write a table (N, 22) as `fly --csv` does. Raises OSError."""
+    with writing.replacing(str(path)) as file:
+        recording = Recording(file)
+        for row in rows.tolist():
+            recording.write_row(row)
+
+
+def _failure(action: Callable[[], None]) -> str | None:
+    """Return what went wrong in an action, in one line; None for nothing."""
+    try:
+        action()
+    except EXPECTED as error:
+        return _one_line(error)
+    return None
+
+
+@contextlib.contextmanager
+def _seeded(seed: int) -> Iterator[None]:
+    """Let scripts that draw from Python's and numpy's own generators draw the same in every flight of a seed."""
+    kept, kept_numpy = random.getstate(), np.random.get_state()
+    random.seed(seed)
+    np.random.seed(seed % 2**32)
+    try:
+        yield
+    finally:
+        random.setstate(kept)
+        np.random.set_state(kept_numpy)
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
