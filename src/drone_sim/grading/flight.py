@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-from collections.abc import Mapping
+import random
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +15,11 @@ from drone_sim.files import writing
 from drone_sim.grading.flown import Flown
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
+from drone_sim.grading.topics import Topics
 from drone_sim.grading.watching import Witness
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import first_step
-from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.errors import ScriptError
 
 EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
@@ -36,30 +37,70 @@ def grade(
     `script` is as in Plan.script_of, `changes` as in Plan.parameters; `table` is a file to write, as `fly --csv` does.
     What goes wrong in the flight is in the result's `error`. Raises OSError for a table that cannot be written.
     """
-    changes = changes or {}
-    named = plan.script_of(script)
     try:
-        parameters = plan.parameters(seed, script, changes)
-        simulation = Simulation(parameters, script=named)
+        flight = Flight(plan, script, seed, changes)
     except EXPECTED as error:
-        return ungraded(plan, named, seed, changes, _one_line(error))
-    witness = Witness(plan, simulation)
-    failed = _fly(plan, parameters, simulation, witness)
-    flown = witness.flown()
-    try:
-        simulation.close()
-    except EXPECTED as error:  # in cleanup
-        failed = failed or _one_line(error)
+        return ungraded(plan, script, seed, changes, _one_line(error))
+    result = flight.grade()
     if table is not None:
-        write(flown.rows, table)
-    outcomes = tuple(one.judge(flown) for one in plan.criteria)
-    return result_of(plan.name, named, seed, changes, outcomes, flown.end, failed, digest_of(flown.rows))
+        write(flight.rows, table)
+    return result
 
 
-def ungraded(plan: Plan, script: str, seed: int, changes: Mapping[str, Any], why: str) -> Result:
+def ungraded(plan: Plan, script: str | None, seed: int, changes: Mapping[str, Any] | None, why: str) -> Result:
     """Return the result of a flight that has not been flown, or of which nothing is left; `why` is one line."""
     outcomes = tuple(one.missed("nothing was flown") for one in plan.criteria)
-    return result_of(plan.name, script, seed, changes, outcomes, error=why)
+    return result_of(plan.name, plan.script_of(script), seed, changes or {}, outcomes, error=why)
+
+
+class Flight:
+    """A flight that is ready: all is read and built, and no line of a script has run."""
+
+    def __init__(self, plan: Plan, script: str | None = None, seed: int = 0, changes: Mapping[str, Any] | None = None):
+        """Build it; see `grade`. Raises one of EXPECTED."""
+        self._plan, self._seed, self._changes = plan, seed, changes or {}
+        self._script = plan.script_of(script)
+        parameters = plan.parameters(seed, None, changes)
+        self._timeline = plan.timeline_of(parameters)
+        self._steps = first_step(plan.duration, parameters.time_step)
+        topics = Topics(plan.topics_of(parameters))
+        backend = topics if topics.wanted else None
+        self._simulation = Simulation(parameters, script=self._script, backend=backend, started=False)
+        topics.clock = lambda: self._simulation.time
+        self._witness = Witness(plan, self._simulation, topics)
+
+    def grade(self) -> Result:
+        """Fly, once, and return how well."""
+        with _seeded(self._seed):
+            try:
+                failed = _failure(self._fly) or self._failed_scripts()
+            finally:
+                closed = _failure(self._simulation.close)  # cleanup may fail, too
+        plan, wrong, flown = self._plan, failed or closed, self._witness.flown()
+        if flown is None:
+            return ungraded(plan, self._script, self._seed, self._changes, wrong or "nothing was flown")
+        outcomes = tuple(one.judge(flown) for one in plan.criteria)
+        digest = digest_of(flown.rows)
+        return result_of(plan.name, self._script, self._seed, self._changes, outcomes, flown.end, wrong, digest)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The table of what has been flown, (N, 22): see offline.recording.COLUMNS."""
+        return self._witness.rows
+
+    def _fly(self) -> None:
+        self._simulation.load_scripts()
+        self._witness.keep()
+        for step in range(self._steps):
+            self._timeline.apply(step, self._simulation.vehicles)
+            self._simulation.step()
+            self._witness.keep()
+            if self._witness.is_over:
+                return
+
+    def _failed_scripts(self) -> str | None:
+        names = self._simulation.failed_scripts
+        return f"the scripts of {', '.join(names)} failed: the log says why" if names else None
 
 
 def digest_of(rows: np.ndarray) -> str:
@@ -75,21 +116,26 @@ def write(rows: np.ndarray, path: str | Path) -> None:
             recording.write_row(row)
 
 
-def _fly(plan: Plan, parameters: Parameters, simulation: Simulation, witness: Witness) -> str | None:
-    """Fly to the end; return what went wrong, in one line."""
-    error: str | None = None
+def _failure(action: Callable[[], None]) -> str | None:
+    """Return what went wrong in an action, in one line; None for nothing."""
     try:
-        timeline = plan.timeline_of(parameters)
-        witness.begin()
-        for step in range(first_step(plan.duration, parameters.time_step)):
-            timeline.apply(step, simulation.vehicles)
-            simulation.step()
-            witness.add()
-            if simulation.asked == STOP:
-                break
-    except EXPECTED as failed:
-        error = _one_line(failed)
-    return error
+        action()
+    except EXPECTED as error:
+        return _one_line(error)
+    return None
+
+
+@contextlib.contextmanager
+def _seeded(seed: int) -> Iterator[None]:
+    """Let scripts that draw from Python's and numpy's own generators draw the same in every flight of a seed."""
+    kept, kept_numpy = random.getstate(), np.random.get_state()
+    random.seed(seed)
+    np.random.seed(seed % 2**32)
+    try:
+        yield
+    finally:
+        random.setstate(kept)
+        np.random.set_state(kept_numpy)
 
 
 def _one_line(error: Exception) -> str:
