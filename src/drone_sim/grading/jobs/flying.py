@@ -112,11 +112,11 @@ class FlightProcess:
         if not self._is_alone:
             return
         allowed, memory = self._request["processes"], self._request["memory"]
-        numbers = [int(name) for name in os.listdir("/proc") if name.isdigit()]
+        processes = [int(name) for name in os.listdir("/proc") if name.isdigit()]
         own = _resident(os.getpid())
-        taken = sum(max(0, _resident(number) - own) for number in numbers) / _MIB
-        if len(numbers) > allowed + 3:  # the sandbox's own, this one, the flight's
-            self._lost = f"began more than {allowed} processes"
+        taken = sum(max(0, _resident(one) - own) for one in processes) / _MIB
+        if sum(map(_threads, processes)) > allowed + 2:  # this one, and the flight's own
+            self._lost = f"began more than {allowed} processes and threads"
         elif taken > memory:
             self._lost = f"took more than {memory} MiB of memory"
 
@@ -177,6 +177,13 @@ def _resident(process: int) -> int:
     except OSError:
         return 0
     return sum(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith(("RssAnon", "RssShmem")))
+
+
+def _threads(process: int) -> int:
+    try:
+        return len(os.listdir(f"/proc/{process}/task"))
+    except OSError:
+        return 0
 
 
 def _children() -> list[int]:

@@ -20,6 +20,7 @@ from drone_sim.grading.flight import ungraded
 from drone_sim.grading.jobs import sandbox
 from drone_sim.grading.jobs.job import Job
 from drone_sim.grading.jobs.settings import Limits
+from drone_sim.grading.jobs.warm import READY
 from drone_sim.grading.result import Result
 
 _START = 60.0  # s for the imports, on a busy machine; they take one
@@ -110,17 +111,16 @@ class Warm:
 
     def _ask(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
         """Return what a process replies to a request, and the table. Raises _Died."""
-        process = self._running()
-        assert process.stdin is not None and process.stdout is not None
-        until = time.monotonic() + _START + request["real_time"] + _GRACE
         try:
+            process = self._running()
+            assert process.stdin is not None and process.stdout is not None
+            until = time.monotonic() + request["real_time"] + _GRACE
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
             line, rest = _line(process.stdout.fileno(), until)
             reply = json.loads(line)
             return reply, rest + _bytes(process.stdout.fileno(), reply["table"] - len(rest), until)
         except (OSError, ValueError, KeyError, TypeError) as error:
-            process.kill()
             raise _Died from error
 
     def _running(self) -> subprocess.Popen[bytes]:
@@ -134,6 +134,9 @@ class Warm:
                 self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_grading_", ignore_cleanup_errors=True)
                 temporary = self._folder.name
             self._process = _started(around, temporary)
+            assert self._process.stdout is not None
+            if _line(self._process.stdout.fileno(), time.monotonic() + _START) != (READY, b""):
+                raise _Died
         return self._process
 
 
@@ -162,8 +165,8 @@ def _line(descriptor: int, until: float) -> tuple[bytes, bytes]:
         got += _some(descriptor, until)
         if len(got) > _LONGEST:
             raise OSError("too long a reply")
-    line, _, rest = bytes(got).partition(b"\n")
-    return line, rest
+    end = got.index(b"\n") + 1
+    return bytes(got[:end]), bytes(got[end:])
 
 
 def _bytes(descriptor: int, number: int, until: float) -> bytes:

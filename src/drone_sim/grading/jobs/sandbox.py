@@ -49,7 +49,8 @@ def _wrapped(program: str, files: int) -> list[str]:
     devices = ("--dev-bind", str(_DEVICES), str(_DEVICES)) if _DEVICES.exists() else ()
     return [
         program,
-        *("--unshare-all", "--new-session", "--cap-drop", "ALL"),
+        # The first of its processes cannot be killed or stopped from within, and with it all others end.
+        *("--unshare-all", "--as-pid-1", "--die-with-parent", "--new-session", "--cap-drop", "ALL"),
         *("--ro-bind", "/", "/", "--proc", "/proc", "--dev", "/dev", *devices),
         *("--size", str(files * 2**20), "--tmpfs", TEMPORARY, "--remount-ro", "/dev"),
         "--",

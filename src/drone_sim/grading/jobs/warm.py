@@ -13,6 +13,7 @@ import json
 import os
 import select
 import shutil
+import signal
 import sys
 import tempfile
 from typing import Any, BinaryIO
@@ -23,6 +24,7 @@ from drone_sim.grading.jobs import limits
 from drone_sim.grading.jobs.flying import FlightProcess
 from drone_sim.grading.plan import Plan, PlanError
 
+READY = b"ready\n"  # said once, after the imports
 _IDLE = 120.0  # s
 _MOST_PLANS = 8  # kept in memory
 _BESIDE = ("cv2", "drone_sim.scripting.lua.script", "drone_sim.render.renderer")  # imported where they are needed
@@ -35,8 +37,11 @@ def main() -> None:
     for module in _BESIDE:
         importlib.import_module(module)
     limits.guard()
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # from the first process of a sandbox the kernel keeps it, then
     requests, replies = _own_streams()
     server = Server(is_alone, requests)
+    replies.write(READY)
+    replies.flush()
     while select.select([requests], [], [], _IDLE)[0]:
         line = requests.readline()
         if not line:
