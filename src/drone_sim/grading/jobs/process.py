@@ -54,7 +54,7 @@ class Warm:
         self._limits = limits
         self._sandboxed = sandboxed
         self._process: subprocess.Popen[bytes] | None = None
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._folder: str | None = None
         self._plans: dict[str, plans.Plan] = {}
 
     def fly(self, job: Job, table: bool = False) -> Flight:
@@ -88,7 +88,7 @@ class Warm:
             process.kill()
             process.wait()
         if self._folder is not None:
-            self._folder.cleanup()
+            _remove(self._folder)
             self._folder = None
 
     def _plan(self, path: str) -> plans.Plan:
@@ -119,7 +119,10 @@ class Warm:
             process.stdin.flush()
             line, rest = _line(process.stdout.fileno(), until)
             reply = json.loads(line)
-            return reply, rest + _bytes(process.stdout.fileno(), reply["table"] - len(rest), until)
+            table = rest + _bytes(process.stdout.fileno(), reply["table"] - len(rest), until)
+            if reply["is_last"]:
+                self.close()
+            return reply, table
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise _Died from error
 
@@ -131,8 +134,7 @@ class Warm:
             if self._sandboxed:
                 around = sandbox.command(self._limits.files)
             else:
-                self._folder = tempfile.TemporaryDirectory(prefix="drone_sim_grading_", ignore_cleanup_errors=True)
-                temporary = self._folder.name
+                temporary = self._folder = tempfile.mkdtemp(prefix="drone_sim_grading_")
             self._process = _started(around, temporary)
             assert self._process.stdout is not None
             if _line(self._process.stdout.fileno(), time.monotonic() + _START) != (READY, b""):
@@ -156,6 +158,12 @@ def _started(around: list[str], temporary: str) -> subprocess.Popen[bytes]:
             start_new_session=True,  # the terminal's Ctrl-C is for whoever wants the flights
             env={**passed, **_ONE_THREAD, "PYTHONPATH": path, "TMPDIR": temporary},
         )
+
+
+def _remove(folder: str) -> None:
+    """Remove a folder, however deep it is and whatever rights it has been left with."""
+    for command in (("chmod", "-R", "u+rwX"), ("rm", "-rf")):
+        subprocess.run([*command, "--", folder], stderr=subprocess.DEVNULL, check=False)
 
 
 def _line(descriptor: int, until: float) -> tuple[bytes, bytes]:

@@ -47,10 +47,11 @@ def main() -> None:
         if not line:
             break
         reply, table = server.answer(json.loads(line))
-        replies.write(json.dumps({**reply, "table": len(table)}).encode() + b"\n" + table)
+        is_last = not _cleared(tempfile.gettempdir())  # what cannot be removed here, `process` removes
+        replies.write(json.dumps({**reply, "table": len(table), "is_last": is_last}).encode() + b"\n" + table)
         replies.flush()
-        if not _cleared(tempfile.gettempdir()):
-            break  # what cannot be removed goes with the sandbox, or whoever began this removes it
+        if is_last:
+            break
 
 
 def _own_streams() -> tuple[BinaryIO, BinaryIO]:
