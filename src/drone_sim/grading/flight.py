@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from drone_sim.files import writing
-from drone_sim.grading.flown import Flown
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
 from drone_sim.grading.topics import Topics
