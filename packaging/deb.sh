@@ -39,7 +39,7 @@ rm -rf "$site"/pybullet_{data,envs,examples,utils,robots} "$site"/eglRenderer* "
 find "$site" -name '*.so' -exec strip --strip-unneeded {} +
 find "$stage$own/bin" -type f -delete
 find "$stage" -name __pycache__ -prune -exec rm -rf {} +
-programs=(simulator key_teleop joy_teleop view fly record plot_flight video import_scene doctor)
+programs=(simulator key_teleop joy_teleop view fly record plot_flight video import_scene doctor grade_live)
 sed -i "1s:.*:#!$own/bin/python:" "${programs[@]/#/$stage/usr/lib/drone_sim/}"
 
 mkdir "$stage/DEBIAN"
