@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Sequence
@@ -56,20 +57,22 @@ def _graded(options: argparse.Namespace) -> Result:
     for file in filter(None, (options.csv, options.json, options.junit)):
         writing.check(file)
     result, flown = grade(plan, options.seed, options.node, options.simulator, options.patience)
-    if options.csv and flown is not None:
-        flight.write(flown.rows, options.csv)
-    _write(options, plan, result)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(options.csv or f"{folder}/flight.csv")
+        if flown is not None:
+            flight.write(flown.rows, file)
+        _write(options, plan, result, file if flown is not None else None)
     table.show(plan, [result])
     return result
 
 
-def _write(options: argparse.Namespace, plan: Plan, result: Result) -> None:
+def _write(options: argparse.Namespace, plan: Plan, result: Result, flown: Path | None) -> None:
     if options.json:
         as_json.write(plan, [result], options.json)
     for file in filter(None, (options.junit, options.rostest)):
         junit.write(plan, [result], file)
     if options.html:
-        html.write(plan, [result], lambda _: Path(options.csv) if options.csv else None, options.html)
+        html.write(plan, [result], lambda _: flown, options.html)
 
 
 def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> tuple[Result, Flown | None]:
@@ -127,16 +130,13 @@ class _Live:
             self.hearing.clear()
             self._started = True
             self._simulator.start()
+            ended = self._wait()
+            self._over.set()
+            time.sleep(_LAST)
+            self._simulator.stop()
         except Unfit as error:
             return str(error)
-        error = self._wait()
-        self._over.set()
-        time.sleep(_LAST)
-        try:
-            self._simulator.stop()
-        except Unfit as failed:
-            error = error or str(failed)
-        return error or self._simulator.error
+        return ended or self._simulator.error
 
     def _wait(self) -> str:
         """Wait for the end; return what came before it."""

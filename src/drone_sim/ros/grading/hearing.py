@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ class Hearing:
             _refuse(one.called, one.signals, "a script's signals are heard by no topic; let it publish")
             _refuse(one.called, [other for other in one.others if other not in names], "objects have no topic")
             for other in one.others:
-                self._hear(f"/{other}/odom", Odometry, lambda message, name=other: self._hear_other(name, message))
+                self._hear(f"/{other}/odom", Odometry, partial(self._hear_other, other))
             if one.sees_touches:
                 self._hear(self._contacts(one.called, parameters), MarkerArray, self._hear_contacts)
             if one.sees_states:
@@ -62,7 +63,9 @@ class Hearing:
         for sensor in own.sensors.values():
             if sensor.kind == "contacts":
                 return f"/{self._vehicle}/{sensor.topic}"
-        said = "needs the sensor `contacts`, such as that of config/sensors.yaml, in the plan's config and the simulator's"
+        said = (
+            "needs the sensor `contacts`, such as that of config/sensors.yaml, in the plan's config and the simulator's"
+        )
         raise Unfit(f"criterion {criterion}: {said}")
 
     def _hear(self, topic: str, kind: type, take: Callable[[Any], None]) -> None:
@@ -126,7 +129,7 @@ class Hearing:
             kind, name, _ = rostopic.get_topic_class(topic)
             if kind is not None:
                 del self._topics[called]
-                self._hear(name, kind, lambda message, called=called: self._say(called, message))
+                self._hear(name, kind, partial(self._say, called))
 
     # ---- the flight
 

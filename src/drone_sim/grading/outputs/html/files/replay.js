@@ -4,7 +4,7 @@
 const ARM = 0.13; // m, from the middle to a rotor
 const SMALLEST = 15; // px, of an arm: farther away the drone is drawn larger than it is
 const FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]; // of corners
-const INK = "#1d2733", PATH = "#1f5fa8", HUB = "#ff5a00", FAILED = "#c0392b", NOSE = "#ff5a00";
+const INK = "#1d2733", PATH = "#1f5fa8", HUB = "#ff5a00", FAILED = "#c0392b", NOSE = "#ff8a3c";
 
 class Replay {
   constructor(canvas, scene) {
