@@ -35,7 +35,7 @@ class Job:
     plan: str
     script: str
     seed: int
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: Mapping[str, Any] = field(default_factory=dict, hash=False)
     key: str = ""  # the same for the same contents of all files; see `key_of`
 
 
@@ -113,7 +113,9 @@ def version() -> str:
     """Return a digest of what simulates: this package's files, Python, NumPy, PyBullet and the processor's kind."""
     here = Path(__file__).resolve().parents[2]
     root = package_path()
-    files = sorted([*here.rglob("*.py"), *here.rglob("*.lua"), *(root / "config").rglob("*.yaml"), *root.glob("urdf/*")])
+    files = sorted(
+        [*here.rglob("*.py"), *here.rglob("*.lua"), *(root / "config").rglob("*.yaml"), *root.glob("urdf/*")]
+    )
     digest = hashlib.sha256(
         f"{platform.python_version()} {np.__version__} {pybullet.getAPIVersion()} {platform.machine()}".encode()
     )

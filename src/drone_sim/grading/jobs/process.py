@@ -28,7 +28,20 @@ _GRACE = 10.0  # s beyond what a flight may take
 _LONGEST = 2**23  # bytes of a reply's line
 _TRIES = 2  # of a flight whose warm process has died: it may have been somebody else's doing
 # What the process knows of its surroundings; passwords and tokens are not for scripts.
-_PASSED = ("PATH", "HOME", "LANG", "LC_", "PYTHON", "LD_LIBRARY_PATH", "ROS_", "XDG_", "LIBGL_", "GALLIUM_", "MESA_", "EGL_")
+_PASSED = (
+    "PATH",
+    "HOME",
+    "LANG",
+    "LC_",
+    "PYTHON",
+    "LD_LIBRARY_PATH",
+    "ROS_",
+    "XDG_",
+    "LIBGL_",
+    "GALLIUM_",
+    "MESA_",
+    "EGL_",
+)
 _ONE_THREAD = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
@@ -40,6 +53,10 @@ class Flight:
     result: Result
     table: bytes = b""
     is_lost: bool = False  # a limit or a crash ended it: another time it may end in another way
+
+
+class Stopped(Exception):
+    """Nobody wants the flight any more."""
 
 
 class _Died(Exception):
@@ -56,16 +73,21 @@ class Warm:
         self._process: subprocess.Popen[bytes] | None = None
         self._folder: str | None = None
         self._plans: dict[str, plans.Plan] = {}
+        self._is_stopped = False
 
     def fly(self, job: Job, table: bool = False) -> Flight:
-        """Fly once, whatever the script does. Raises PlanError, and NoSandbox where one is wanted and not there."""
+        """Fly once, whatever the script does. Raises PlanError, Stopped, and NoSandbox where one is wanted and not there."""
         plan = self._plan(job.plan)
         why = ""
+        if self._is_stopped:
+            raise Stopped
         for _ in range(_TRIES):
             try:
                 reply, rows = self._ask(self._request(job, plan.duration, table))
             except _Died:
                 self.close()
+                if self._is_stopped:
+                    raise Stopped from None
                 why = "ended the process that watches its flight"
                 continue
             if reply.get("result") is not None:
@@ -73,6 +95,14 @@ class Warm:
             why = reply.get("lost") or "gave no result"
             break
         return Flight(job, ungraded(plan, job.script, job.seed, job.changes, f"the script {why}"), is_lost=True)
+
+    def stop(self) -> None:
+        """Let `fly` raise Stopped, now and from now on; called by another thread."""
+        self._is_stopped = True
+        process = self._process
+        if process is not None and process.stdin is not None:
+            with contextlib.suppress(OSError):
+                process.stdin.close()  # the pipe whose end is the end of everything
 
     def close(self) -> None:
         """End it, and whatever it flies."""

@@ -37,8 +37,19 @@ class _Results(Checked):
     kept: Annotated[Finite, Within(0, 10000)]  # days
 
 
-class _Cluster(Checked):
-    at_least: Annotated[int, Within(1, 10**6)]  # flights
+class Batches(Checked):
+    """How many flights a worker gets at a time."""
+
+    largest: Annotated[int, Within(1, 1000)]
+    of_a_worker: Annotated[int, Within(1, 1000)]
+
+    def size(self, flights: int, workers: int) -> int:
+        """Return how many, of so many flights."""
+        return max(1, min(self.largest, flights // (workers * self.of_a_worker)))
+
+
+class _Workers(Checked):
+    patience: Annotated[Finite, Within(1, 1e5)]  # s
 
 
 class Settings(Checked):
@@ -46,7 +57,8 @@ class Settings(Checked):
 
     limits: Limits
     results: _Results
-    cluster: _Cluster
+    batches: Batches
+    workers: _Workers
 
 
 def load(overrides: dict[str, Any] | None = None) -> Settings:
