@@ -107,7 +107,7 @@ class _Grading:
 def jobs_of(plan: Plan, scripts: Sequence[str], seeds: int) -> list[Job]:
     """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError."""
     jobs = []
-    for given in dict.fromkeys(plan.script_of(one) for one in (scripts or [None])):
+    for given in dict.fromkeys(plan.script_of(one) for one in (scripts or (None,))):
         found = script_path(given)
         script = found if Path(given).suffix else given
         contents = contents_of(plan, script)

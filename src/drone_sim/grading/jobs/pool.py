@@ -122,7 +122,7 @@ def _connected(address: str, patience: float) -> Iterator[Any]:
     from distributed import Client
 
     try:
-        client = Client(address, timeout=_CONNECTING, set_as_default=False)
+        client = Client(address, timeout=_CONNECTING)
     except (OSError, ValueError, ImportError) as error:
         said = " ".join(str(error).split())
         raise PoolError(f"--scheduler {shown(address)}: no scheduler answers there ({said:.200})") from None
