@@ -52,7 +52,8 @@ class _Grading:
     def run(self) -> int:
         """Fly, and tell."""
         try:
-            self._fly()
+            with self._runner:
+                self._fly()
         except KeyboardInterrupt:
             if self._guardian is not None:
                 self._guardian.stand_down()  # what follows takes its time
