@@ -80,30 +80,43 @@ def write(plan: Plan, results: Sequence[Result], tables: Tables, folder: str | P
     for name in _SHARED:
         shutil.copyfile(_HERE / "files" / name, path / "files" / name)
     writing.write(path / "files" / "scene.js", _assignment("scene", scene_of(plan.parameters().scene)))
-    pages = [_page(number, script, tables, path) for number, script in enumerate(by_script(results), start=1)]
+    draw = _Drawing(plan, tables, path)
+    pages = [draw.page(number, script) for number, script in enumerate(by_script(results), start=1)]
     templates = _templates()
     for page in pages:
         _render(templates, "script.html", path / page.file, plan=plan, page=page)
     _render(templates, "index.html", path / "index.html", plan=plan, pages=pages, criteria=criteria_of(results))
 
 
-def _page(number: int, script: ScriptResults, tables: Tables, folder: Path) -> Page:
-    flights = tuple(
-        _flight(f"{number:02}-{place}", result, tables(result), folder) for place, result in enumerate(script.flights)
-    )
-    slug = re.sub("[^A-Za-z0-9_-]+", "_", Path(script.label).stem)[:_SLUG]
-    return Page(f"scripts/{number:02}-{slug}.html", script, flights)
+class _Drawing:
+    """Writes the figures of the flights."""
 
+    def __init__(self, plan: Plan, tables: Tables, folder: Path):
+        """Take what the flights are of, and where the figures belong."""
+        self._plan, self._tables, self._folder = plan, tables, folder
 
-def _flight(key: str, result: Result, table: Path | None, folder: Path) -> Flight:
-    label = naming.flight_label(result)
-    figures = figures_of(table) if table is not None else Figures({}, "no table of this flight was kept")
-    if not figures.columns:
-        return Flight(key, label, result, "", figures.note)
-    file = f"flights/{key}.js"
-    marks = [{"name": name, "at": one.at} for name, one in naming.named_outcomes(result) if _is_mark(one)]
-    writing.write(folder / file, _assignment(f'flights["{key}"]', {**figures.columns, "marks": marks}))
-    return Flight(key, label, result, file, figures.note)
+    def page(self, number: int, script: ScriptResults) -> Page:
+        """Return a script's page; `number` is from 1."""
+        flights = tuple(self._flight(f"{number:02}-{place}", result) for place, result in enumerate(script.flights))
+        slug = re.sub("[^A-Za-z0-9_-]+", "_", Path(script.label).stem)[:_SLUG]
+        return Page(f"scripts/{number:02}-{slug}.html", script, flights)
+
+    def _flight(self, key: str, result: Result) -> Flight:
+        label, table = naming.flight_label(result), self._tables(result)
+        figures = figures_of(table) if table is not None else Figures({}, "no table of this flight was kept")
+        if not figures.columns:
+            return Flight(key, label, result, "", figures.note)
+        marks = [{"name": name, "at": one.at} for name, one in naming.named_outcomes(result) if _is_mark(one)]
+        content = {**figures.columns, **self._own_scene(result), "marks": marks}
+        file = f"flights/{key}.js"
+        writing.write(self._folder / file, _assignment(f'flights["{key}"]', content))
+        return Flight(key, label, result, file, figures.note)
+
+    def _own_scene(self, result: Result) -> dict[str, Any]:
+        """Return the scene of a flight whose seed has moved objects."""
+        if not (self._plan.spread.objects and result.seed):
+            return {}
+        return {"scene": scene_of(self._plan.parameters(result.seed).scene)}
 
 
 def _is_mark(outcome: Any) -> bool:
