@@ -99,7 +99,7 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     there = Simulator(simulator, patience)
     parameters = there.fit(plan)
     live = _Live(plan, seed, there, parameters)
-    there.wait(live.is_connected, f"{there.name} does not listen, or is silent")
+    there.wait(live.is_connected, f"{there.name} lacks topics of the plan's vehicles: launch it in the plan's scene")
     if node:
         there.wait(lambda: _is_node(node), f"no node {node}")
     error = live.fly()
@@ -145,6 +145,8 @@ class _Live:
             self._simulator.start()
             ended = self._wait()
             self._over.set()
+            if rospy.is_shutdown():
+                return ended
             time.sleep(_LAST)
             self._simulator.stop()
         except Unfit as error:
