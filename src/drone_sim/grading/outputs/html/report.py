@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 import jinja2
 
-from drone_sim.files import writing
 from drone_sim.grading.outputs import by_script as naming
 from drone_sim.grading.outputs.by_script import ScriptResults, by_script, criteria_of
 from drone_sim.grading.outputs.html.figures import Figures, figures_of
@@ -79,7 +78,7 @@ def write(plan: Plan, results: Sequence[Result], tables: Tables, folder: str | P
         (path / name).mkdir(parents=True)
     for name in _SHARED:
         shutil.copyfile(_HERE / "files" / name, path / "files" / name)
-    writing.write(path / "files" / "scene.js", _assignment("scene", scene_of(plan.parameters().scene)))
+    _write(path / "files" / "scene.js", _assignment("scene", scene_of(plan.parameters().scene)))
     draw = _Drawing(plan, tables, path)
     pages = [draw.page(number, script) for number, script in enumerate(by_script(results), start=1)]
     templates = _templates()
@@ -109,7 +108,7 @@ class _Drawing:
         marks = [{"name": name, "at": one.at} for name, one in naming.named_outcomes(result) if _is_mark(one)]
         content = {**figures.columns, **self._own_scene(result), "marks": marks}
         file = f"flights/{key}.js"
-        writing.write(self._folder / file, _assignment(f'flights["{key}"]', content))
+        _write(self._folder / file, _assignment(f'flights["{key}"]', content))
         return Flight(key, label, result, file, figures.note)
 
     def _own_scene(self, result: Result) -> dict[str, Any]:
@@ -141,4 +140,12 @@ def _templates() -> jinja2.Environment:
 
 def _render(templates: jinja2.Environment, name: str, path: Path, **values: Any) -> None:
     text = templates.get_template(f"{name}.j2").render(**values)
-    writing.write(path, text.encode("utf-8", "replace").decode())  # a file's name need not be UTF-8
+    _write(path, text)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file of the report. What is half written is written anew: nobody waits for the disk a thousand times."""
+    try:
+        path.write_bytes(text.encode("utf-8", "replace"))  # a script's name need not be UTF-8
+    except OSError as error:
+        raise OSError(f"{path}: {error.strerror}") from None
