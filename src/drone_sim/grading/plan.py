@@ -87,6 +87,11 @@ class Plan(Checked):
                 if time is not None and time > self.duration:
                     raise _refused((*here, key), f"{time:g}: the flight lasts {self.duration:g} s (duration)")
 
+    def __getstate__(self) -> dict[Any, Any]:
+        """Return what is pickled: not the parameters, which are read anew."""
+        state = super().__getstate__()
+        return {**state, "__pydantic_private__": {"_path": self._path, "_loaded": {}}}
+
     @property
     def path(self) -> Path:
         """The file that it was read from, absolute."""

@@ -53,11 +53,15 @@ def places_of(flown: Flown, part: np.ndarray) -> np.ndarray:
     return places
 
 
-def poses_of(flown: Flown, name: str) -> np.ndarray:
-    """Return the rows (N, 7) of another vehicle or object: position, quaternion xyzw. Raises Missed."""
+def poses_of(flown: Flown, name: str, part: np.ndarray) -> np.ndarray:
+    """Return the poses of another vehicle or object in a part of the flight, (M, 7): see Flown. Raises Missed."""
     if name not in flown.others:
         raise Missed(f"nothing was seen of '{name}'; {near_names(name, flown.others)}")
-    return flown.others[name]
+    poses = flown.others[name][part]
+    gone = np.flatnonzero(~np.isfinite(poses).all(axis=1))
+    if len(gone):
+        raise Missed(f"{name} is gone at {flown.times[part][gone[0]]:.2f} s")
+    return poses
 
 
 def to_polyline(places: np.ndarray, corners: np.ndarray) -> np.ndarray:
