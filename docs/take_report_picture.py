@@ -21,6 +21,7 @@ def main(report: str, picture: str) -> None:
         page.locator("#scrub").evaluate(
             "(slider, time) => { slider.value = time; slider.dispatchEvent(new Event('input')); }", MOMENT
         )
+        page.mouse.move(0, 0)
         page.screenshot(path=picture)
         browser.close()
 

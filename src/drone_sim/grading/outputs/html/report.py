@@ -9,6 +9,7 @@ it is looked at. All text is escaped by the templates, or set as text.
 from __future__ import annotations
 
 import json
+import math
 import re
 import shutil
 from collections.abc import Callable, Sequence
@@ -22,7 +23,7 @@ from drone_sim.grading.outputs.by_script import ScriptResults, by_script, criter
 from drone_sim.grading.outputs.html.figures import Figures, figures_of
 from drone_sim.grading.outputs.html.scene import scene_of
 from drone_sim.grading.plan import Plan
-from drone_sim.grading.result import Result
+from drone_sim.grading.result import Outcome, Result
 
 _HERE = Path(__file__).parent
 _SHARED = ("report.css", "replay.js", "view.js", "plots.js", "page.js", "index.js")
@@ -118,8 +119,8 @@ class _Drawing:
         return {"scene": scene_of(self._plan.parameters(result.seed).scene)}
 
 
-def _is_mark(outcome: Any) -> bool:
-    return not outcome.passed and outcome.at is not None
+def _is_mark(outcome: Outcome) -> bool:
+    return not outcome.passed and outcome.at is not None and math.isfinite(outcome.at)
 
 
 def _assignment(name: str, value: Any) -> str:

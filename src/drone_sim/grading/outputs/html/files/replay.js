@@ -141,7 +141,10 @@ class Replay {
     if (time < mark.at) return;
     pen.fillStyle = FAILED;
     pen.font = "600 12px system-ui, sans-serif";
-    pen.fillText(mark.name, x + 9, y - 7);
+    pen.lineWidth = 3;
+    pen.strokeStyle = "#ffffffd0";
+    pen.strokeText(mark.name, x + 9, y - 9);
+    pen.fillText(mark.name, x + 9, y - 9);
   }
 
   // A cross with rotors, and an arrow where its nose is.
