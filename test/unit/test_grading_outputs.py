@@ -112,7 +112,12 @@ def test_gradescope_gets_the_mean_over_the_flights(plan):
     assert said["score"] == sum(test["score"] for test in said["tests"]) == 2.5
     forward, contact = said["tests"]
     assert (forward["name"], forward["score"], forward["max_score"], forward["status"]) == ("forward", 2, 2, "passed")
-    assert (contact["name"], contact["score"], contact["max_score"], contact["status"]) == ("no_contact", 0.5, 1, "failed")
+    assert (contact["name"], contact["score"], contact["max_score"], contact["status"]) == (
+        "no_contact",
+        0.5,
+        1,
+        "failed",
+    )
     assert "seed 1: FAILED: it rose in 0.5 s (at 1.50 s)" in contact["output"]
     assert said["output_format"] == said["test_output_format"] == said["test_name_format"] == "text"
     assert EVIL in said["output"]

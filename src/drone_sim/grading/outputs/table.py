@@ -106,7 +106,8 @@ def _flight_lines(result: Result, flights: int, width: int, paint: _Paint) -> li
     worst = f", the worst of {flights}" if flights > 1 else ""
     lines = [_cut(f"{by_script([result])[0].label}, {flight_label(result)}{worst}", width)]
     if result.error:
-        lines.append(paint.verdict(_cut(f"error: {result.error}", width), False))
+        wrapped = textwrap.wrap(_clean(f"error: {result.error}"), width)
+        lines += [paint.verdict(line, False) for line in wrapped]
     named = named_outcomes(result)
     widest = min(_SCRIPT, max((len(_clean(name)) for name, _ in named), default=0))
     for name, outcome in named:

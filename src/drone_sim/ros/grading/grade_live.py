@@ -7,6 +7,7 @@ same criteria as `grade`. As a <test> of rostest it writes the result that roste
 from __future__ import annotations
 
 import argparse
+import copy
 import sys
 import tempfile
 import threading
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import rosgraph
 import rospy
+import yaml
 
 from drone_sim.files import writing
 from drone_sim.grading import flight
@@ -24,13 +26,14 @@ from drone_sim.grading.flown import Flown
 from drone_sim.grading.outputs import as_json, html, junit, table
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
-from drone_sim.offline.command_line import FAILED, Parser
+from drone_sim.offline.command_line import FAILED, Parser, status_of
 from drone_sim.ros.grading.hearing import Hearing
 from drone_sim.ros.grading.sending import Sender, entries_of
 from drone_sim.ros.grading.simulator import Simulator, Unfit
 from drone_sim.ros.node.paths import from_shell
 from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.run.parameters import Parameters
+from drone_sim.scene.scene_parameters import find_files_beside
 
 _NAME = "grade_live"
 _XML = "--gtest_output=xml:"  # by which rostest says where it looks for the result
@@ -42,11 +45,23 @@ _PATIENCE = 30.0  # s of real time
 def main() -> int:
     """Grade; return 0 where all is passed, and 1 after the table, or one line for what cannot be graded."""
     options = _parser().parse_args(_arguments(rosgraph.myargv(sys.argv)[1:]))
+    if options.write_config:
+        return status_of(_NAME, lambda: _write_config(options.plan, options.write_config))
     if not init_node(_NAME, anonymous=True, disable_signals=False):
         return FAILED
     results: list[Result] = []
     status = reported(_NAME, lambda: results.append(_graded(options)))
     return status or (0 if results[0].passed else FAILED)
+
+
+def _write_config(file: str, path: str) -> None:
+    """Write what the simulator is to be launched with. Raises ValueError and OSError, in one line."""
+    plan = plans.read(from_shell(file))
+    if isinstance(plan.config, str):
+        raise ValueError(f"{file}: its config is a file already: {plan.config}")
+    config = copy.deepcopy(dict(plan.config))
+    find_files_beside(plan.folder, config)
+    writing.write(path, yaml.safe_dump(config, sort_keys=False))
 
 
 def _graded(options: argparse.Namespace) -> Result:
@@ -84,7 +99,7 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     there = Simulator(simulator, patience)
     parameters = there.fit(plan)
     live = _Live(plan, seed, there, parameters)
-    there.wait(live.is_connected, f"{there.name} does not listen, or is silent")
+    there.wait(live.is_connected, f"{there.name} lacks topics of the plan's vehicles: launch it in the plan's scene")
     if node:
         there.wait(lambda: _is_node(node), f"no node {node}")
     error = live.fly()
@@ -92,8 +107,6 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     flown = live.hearing.flown(plan.duration)
     if flown is None:
         return flight.ungraded(plan, script, seed, {}, error or "nothing was heard of the flight"), None
-    if node and not error and not _is_node(node):
-        error = f"the node {node} has ended before the flight"
     outcomes = tuple(one.judge(flown) for one in plan.criteria)
     digest = flight.digest_of(flown.rows)
     return result_of(plan.name, script, seed, {}, outcomes, flown.end, error or None, digest), flown
@@ -132,6 +145,8 @@ class _Live:
             self._simulator.start()
             ended = self._wait()
             self._over.set()
+            if rospy.is_shutdown():
+                return ended
             time.sleep(_LAST)
             self._simulator.stop()
         except Unfit as error:
@@ -188,6 +203,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--simulator", metavar="NODE", default="drone_sim", help="(default: %(default)s)")
     parser.add_argument(
         "--patience", metavar="S", type=float, default=_PATIENCE, help="real seconds to wait for both (default: 30)"
+    )
+    parser.add_argument(
+        "--write-config", metavar="OUT.yaml", help="write the plan's config, for config:= of drone.launch, and end"
     )
     parser.add_argument("--csv", metavar="OUT.csv", help="write the flight's table, as `fly --csv`")
     parser.add_argument("--json", metavar="OUT.json", help="write everything, for programs")

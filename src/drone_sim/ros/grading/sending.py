@@ -57,7 +57,12 @@ class Sender:
 
 
 def entries_of(timeline: Timeline, wanted: Parameters, there: Parameters) -> list[Entry]:
-    """Return what brings a seed's places and wind about at the beginning, and then the timeline's entries."""
+    """Return what brings a seed's places and wind about at the beginning, and then the timeline's entries.
+
+    Raises Unfit where the seed moves objects.
+    """
+    if wanted.scene != there.scene:
+        raise Unfit("this seed moves objects of the scene, which no topic does; seed 0 moves none")
     first = []
     for own, given in zip(wanted.fleet, there.fleet):
         if (own.position, own.yaw) != (given.position, given.yaw):

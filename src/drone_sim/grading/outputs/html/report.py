@@ -9,6 +9,7 @@ it is looked at. All text is escaped by the templates, or set as text.
 from __future__ import annotations
 
 import json
+import math
 import re
 import shutil
 from collections.abc import Callable, Sequence
@@ -17,13 +18,12 @@ from typing import Any, NamedTuple
 
 import jinja2
 
-from drone_sim.files import writing
 from drone_sim.grading.outputs import by_script as naming
 from drone_sim.grading.outputs.by_script import ScriptResults, by_script, criteria_of
 from drone_sim.grading.outputs.html.figures import Figures, figures_of
 from drone_sim.grading.outputs.html.scene import scene_of
 from drone_sim.grading.plan import Plan
-from drone_sim.grading.result import Result
+from drone_sim.grading.result import Outcome, Result
 
 _HERE = Path(__file__).parent
 _SHARED = ("report.css", "replay.js", "view.js", "plots.js", "page.js", "index.js")
@@ -79,35 +79,48 @@ def write(plan: Plan, results: Sequence[Result], tables: Tables, folder: str | P
         (path / name).mkdir(parents=True)
     for name in _SHARED:
         shutil.copyfile(_HERE / "files" / name, path / "files" / name)
-    writing.write(path / "files" / "scene.js", _assignment("scene", scene_of(plan.parameters().scene)))
-    pages = [_page(number, script, tables, path) for number, script in enumerate(by_script(results), start=1)]
+    _write(path / "files" / "scene.js", _assignment("scene", scene_of(plan.parameters().scene)))
+    draw = _Drawing(plan, tables, path)
+    pages = [draw.page(number, script) for number, script in enumerate(by_script(results), start=1)]
     templates = _templates()
     for page in pages:
         _render(templates, "script.html", path / page.file, plan=plan, page=page)
     _render(templates, "index.html", path / "index.html", plan=plan, pages=pages, criteria=criteria_of(results))
 
 
-def _page(number: int, script: ScriptResults, tables: Tables, folder: Path) -> Page:
-    flights = tuple(
-        _flight(f"{number:02}-{place}", result, tables(result), folder) for place, result in enumerate(script.flights)
-    )
-    slug = re.sub("[^A-Za-z0-9_-]+", "_", Path(script.label).stem)[:_SLUG]
-    return Page(f"scripts/{number:02}-{slug}.html", script, flights)
+class _Drawing:
+    """Writes the figures of the flights."""
+
+    def __init__(self, plan: Plan, tables: Tables, folder: Path):
+        """Take what the flights are of, and where the figures belong."""
+        self._plan, self._tables, self._folder = plan, tables, folder
+
+    def page(self, number: int, script: ScriptResults) -> Page:
+        """Return a script's page; `number` is from 1."""
+        flights = tuple(self._flight(f"{number:02}-{place}", result) for place, result in enumerate(script.flights))
+        slug = re.sub("[^A-Za-z0-9_-]+", "_", Path(script.label).stem)[:_SLUG]
+        return Page(f"scripts/{number:02}-{slug}.html", script, flights)
+
+    def _flight(self, key: str, result: Result) -> Flight:
+        label, table = naming.flight_label(result), self._tables(result)
+        figures = figures_of(table) if table is not None else Figures({}, "no table of this flight was kept")
+        if not figures.columns:
+            return Flight(key, label, result, "", figures.note)
+        marks = [{"name": name, "at": one.at} for name, one in naming.named_outcomes(result) if _is_mark(one)]
+        content = {**figures.columns, **self._own_scene(result), "marks": marks}
+        file = f"flights/{key}.js"
+        _write(self._folder / file, _assignment(f'flights["{key}"]', content))
+        return Flight(key, label, result, file, figures.note)
+
+    def _own_scene(self, result: Result) -> dict[str, Any]:
+        """Return the scene of a flight whose seed has moved objects."""
+        if not (self._plan.spread.objects and result.seed):
+            return {}
+        return {"scene": scene_of(self._plan.parameters(result.seed).scene)}
 
 
-def _flight(key: str, result: Result, table: Path | None, folder: Path) -> Flight:
-    label = naming.flight_label(result)
-    figures = figures_of(table) if table is not None else Figures({}, "no table of this flight was kept")
-    if not figures.columns:
-        return Flight(key, label, result, "", figures.note)
-    file = f"flights/{key}.js"
-    marks = [{"name": name, "at": one.at} for name, one in naming.named_outcomes(result) if _is_mark(one)]
-    writing.write(folder / file, _assignment(f'flights["{key}"]', {**figures.columns, "marks": marks}))
-    return Flight(key, label, result, file, figures.note)
-
-
-def _is_mark(outcome: Any) -> bool:
-    return not outcome.passed and outcome.at is not None
+def _is_mark(outcome: Outcome) -> bool:
+    return not outcome.passed and outcome.at is not None and math.isfinite(outcome.at)
 
 
 def _assignment(name: str, value: Any) -> str:
@@ -128,4 +141,12 @@ def _templates() -> jinja2.Environment:
 
 def _render(templates: jinja2.Environment, name: str, path: Path, **values: Any) -> None:
     text = templates.get_template(f"{name}.j2").render(**values)
-    writing.write(path, text.encode("utf-8", "replace").decode())  # a file's name need not be UTF-8
+    _write(path, text)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file of the report. What is half written is written anew: nobody waits for the disk a thousand times."""
+    try:
+        path.write_bytes(text.encode("utf-8", "replace"))  # a script's name need not be UTF-8
+    except OSError as error:
+        raise OSError(f"{path}: {error.strerror}") from None

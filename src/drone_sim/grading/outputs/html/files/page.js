@@ -2,7 +2,7 @@
 "use strict";
 
 const get = (id) => document.getElementById(id);
-const replay = new Replay(get("canvas"), report.scene);
+const replay = new Replay(get("canvas"));
 const plots = new Plots(get("plots"), (time) => seek(time));
 const clock = { time: 0, end: 0, playing: false, last: 0 };
 

@@ -7,9 +7,8 @@ const FACES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6,
 const INK = "#1d2733", PATH = "#1f5fa8", HUB = "#ff5a00", FAILED = "#c0392b", NOSE = "#ff8a3c";
 
 class Replay {
-  constructor(canvas, scene) {
+  constructor(canvas) {
     this.canvas = canvas;
-    this.scene = scene;
     this.view = new View();
     this.flight = null;
     this.time = 0;
@@ -18,6 +17,7 @@ class Replay {
   // Show a flight from its beginning.
   load(flight) {
     this.flight = flight;
+    this.scene = flight.scene || report.scene;
     this.points = flight.t.map((_, row) => [flight.x[row], flight.y[row], flight.z[row]]);
     const [low, high] = bounds([...this.points, [0, 0, 0].map((_, axis) => (axis === 2 ? 0 : this.points[0][axis]))]);
     this.middle = low.map((value, axis) => (value + high[axis]) / 2);
@@ -141,7 +141,10 @@ class Replay {
     if (time < mark.at) return;
     pen.fillStyle = FAILED;
     pen.font = "600 12px system-ui, sans-serif";
-    pen.fillText(mark.name, x + 9, y - 7);
+    pen.lineWidth = 3;
+    pen.strokeStyle = "#ffffffd0";
+    pen.strokeText(mark.name, x + 9, y - 9);
+    pen.fillText(mark.name, x + 9, y - 9);
   }
 
   // A cross with rotors, and an arrow where its nose is.
