@@ -8,6 +8,7 @@ setup(
         packages=find_packages("src"),
         package_dir={"": "src"},
         package_data={
+            "drone_sim.grading.outputs.html": ["templates/*", "files/*"],
             "drone_sim.ros.cockpit.page": ["*.html", "*.css", "*.js"],
             "drone_sim.scripting.lua": ["*.lua"],
         },

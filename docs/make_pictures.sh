@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots remote weather rviz)
+sections=(diagrams cameras plots remote weather report rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -32,6 +32,15 @@ remote() { "$python" docs/remote/without_ros.py --plot "$pictures/remote_circle.
 weather() {
   "$python" docs/draw_weather.py "$pictures"
   "$python" docs/film_weather.py "$pictures"
+}
+
+# The report of docs/grading.md; needs what ./dev.sh test-web installs.
+report() {
+  local folder
+  folder=$(mktemp -d)
+  "$python" scripts/grade docs/grading/gates.yaml pilot --html "$folder" || true # two of its flights fail
+  "$python" docs/take_report_picture.py "$folder" "$pictures/report.png"
+  rm -r "$folder"
 }
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.

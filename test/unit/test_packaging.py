@@ -18,6 +18,7 @@ KEYS = {
     "av": "python3-av-pip",
     "cbor2": "python3-cbor2-pip",
     "cv2": "python3-opencv",
+    "distributed": "python3-distributed-pip",
     "greenlet": "python3-greenlet-pip",
     "moderngl": "python3-moderngl-pip",
     "pybullet": "python3-pybullet-pip",
