@@ -5,7 +5,9 @@ import pytest
 from flown_signals import first_order, flown, judged, second_order, times
 from pydantic import ValidationError
 
-from drone_sim.grading.flown import Said, Touch
+from drone_sim.files.resources import package_path
+from drone_sim.grading.criteria import KINDS
+from drone_sim.grading.flown import UNITS, Said, Touch
 
 T = times()
 STEP = {"of": "vx", "after": 0.0, "from": 0.0, "to": 1.0}
@@ -143,6 +145,13 @@ def test_the_distance_from_a_path():
     assert judged(round_corner, "path", along=corner, at_most=0.3, covers=0.95).passed
 
 
+def test_a_closed_path_goes_back_to_where_it_begins():
+    home = flown(T, x=4 - 0.4 * T)
+    corner = {"along": [[0, 0, 0], [0, 3, 0], [4, 3, 0], [4, 0, 0]], "at_most": 0.1}
+    assert not judged(home, "path", **corner).passed
+    assert judged(home, "path", **corner, closed=True).passed
+
+
 def test_who_waits_at_the_beginning_of_a_path_has_not_flown_it():
     waiting = judged(flown(T), "path", along=[[0, 0, 0], [4, 0, 0]], closed=True, at_most=0.2, covers=0.9)
     assert not waiting.passed
@@ -272,3 +281,14 @@ def test_a_table_with_what_is_no_number_says_so():
 def test_a_part_without_time_is_refused():
     with pytest.raises(ValidationError, match="until = 2: must be later than after = 3"):
         judged(flown(T), "no_contact", after=3, until=2)
+
+
+def test_the_documentation_has_every_kind_with_its_keys_and_every_column():
+    text = (package_path() / "docs" / "grading.md").read_text()
+    common = {"kind", "name", "points", "after", "until"}
+    for model in KINDS:
+        (kind,) = model.model_fields["kind"].annotation.__args__
+        (row,) = (line for line in text.splitlines() if line.startswith(f"| `{kind}` |"))
+        keys = {field.alias or name for name, field in model.model_fields.items()} - common
+        assert {key for key in keys if f"`{key}`" not in row} == set(), kind
+    assert {column for column in UNITS if f"`{column}`" not in text} - {"propeller2", "propeller3"} == set()

@@ -38,7 +38,9 @@ def sysCall_init():
 def sysCall_sensing():
     if sim.getSimulationTime() > 1:
         sim.setInt32Signal("counted", 3)
-        simROS.publish(self.seen, {"data": 5})
+        message = {"data": 5}
+        simROS.publish(self.seen, message)
+        message["data"] = 6  # which has not been published
         simROS.publish(self.own, {"data": "searching"})
     import random
     sim.setFloatSignal("drawn", random.random())
@@ -141,6 +143,12 @@ def test_who_watches_contacts_changes_no_bit_of_the_crash(written):
     assert seen.outcomes[0].said.startswith("touched Wall, first Wall at ")
     assert seen.outcomes[1].passed
     assert flight.grade(written(CONTACT, wall=50)).outcomes[0].passed
+
+
+def test_a_blow_counts_that_is_over_before_the_step_is(written):
+    """Its arm begins 5 mm inside the wall, which throws it out within one sub-step."""
+    result = flight.grade(written(CONTACT.replace("duration: 4", "duration: 0.2"), wall=0.245))
+    assert said(result)["no_contact"] == "touched Wall, first Wall at 0.05 s; allowed is nothing"
 
 
 TALKING = """

@@ -66,7 +66,11 @@ class Flight:
         backend = topics if topics.wanted else None
         self._simulation = Simulation(parameters, script=self._script, backend=backend, started=False)
         topics.clock = lambda: self._simulation.time
-        self._witness = Witness(plan, self._simulation, topics)
+        try:
+            self._witness = Witness(plan, self._simulation, topics)
+        except BaseException:
+            self._simulation.close()
+            raise
 
     def grade(self) -> Result:
         """Fly, once, and return how well."""

@@ -27,13 +27,14 @@ from drone_sim.files import yaml_files
 from drone_sim.grading.criteria import AnyCriterion
 from drone_sim.grading.spread import Spread, check_objects, spread_out
 from drone_sim.offline import timeline as timelines
+from drone_sim.offline.tables import MAX_ROWS
 from drone_sim.offline.timeline import Timeline, TimelineError
 from drone_sim.run import parameters as parameters_module
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene import scene_parameters
 from drone_sim.wording import near_names, shown
 
-MAX_DURATION = 36_000.0  # s
+MAX_DURATION = 20_000.0  # s
 MAX_SEEDS = 1_000_000
 MAX_CRITERIA = 200
 MAX_ENTRIES = 10_000  # of the timeline
@@ -182,7 +183,7 @@ def read(path: str | Path) -> Plan:
     plan = _checked(values, Path(path))
     try:
         parameters = plan.parameters()
-        _check_names(plan, parameters)
+        _check_with(plan, parameters)
         plan.timeline_of(parameters)
     except TimelineError as error:
         raise PlanError(str(error)) from None
@@ -203,8 +204,11 @@ def _checked(values: dict[str, Any], path: Path) -> Plan:
     return plan
 
 
-def _check_names(plan: Plan, parameters: Parameters) -> None:
-    """Raise ParameterError for a vehicle or an object that is not there."""
+def _check_with(plan: Plan, parameters: Parameters) -> None:
+    """Raise ParameterError for a vehicle or an object that is not there, and for more steps than a table can have."""
+    steps = plan.duration / parameters.time_step
+    if steps > MAX_ROWS:
+        raise _refused(("duration",), f"{plan.duration:g}: makes {steps:.0f} steps; at most {MAX_ROWS} are kept")
     names = [one.name for one in parameters.fleet]
     if plan.vehicle and plan.vehicle not in names:
         raise _refused(("vehicle",), f"{shown(plan.vehicle)}: no such vehicle; {near_names(plan.vehicle, names)}")

@@ -66,8 +66,9 @@ def poses_of(flown: Flown, name: str, part: np.ndarray) -> np.ndarray:
 
 def to_polyline(places: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Return the distances (M,) from places (M, D) to the nearest point of a polyline with corners (K, D), K >= 2."""
-    start, way = corners[:-1], np.diff(corners, axis=0)
-    length = (way**2).sum(axis=1)
-    to = places[:, None, :] - start
-    share = np.clip((to * way).sum(axis=2) / np.where(length > 0, length, 1), 0, 1)
-    return np.sqrt(((to - share[..., None] * way) ** 2).sum(axis=2)).min(axis=1)
+    squares = np.full(len(places), np.inf)
+    for start, way in zip(corners[:-1], np.diff(corners, axis=0)):  # in turn: a flight may have many rows
+        to, length = places - start, float(way @ way)
+        share = np.clip(to @ way / length, 0, 1) if length else np.zeros(len(places))
+        squares = np.minimum(squares, ((to - share[:, None] * way) ** 2).sum(axis=1))
+    return np.sqrt(squares)
