@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import signal
 import sys
@@ -90,14 +91,24 @@ class Runner:
             numbers.limits, numbers.batches, _is_sandboxed(program, options.sandbox), tables, numbers.workers.patience
         )
         self._program = program
+        self._open = contextlib.ExitStack()
+        self._fly: pool.Fly | None = None  # once there is something to fly
 
-    def fly(self, jobs: Sequence[Job]) -> Iterator[tuple[Job, Result]]:
-        """Give each job and its result, as they come; those first that are there already."""
+    def __enter__(self) -> Runner:
+        """Return this."""
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """End what is still flown."""
+        self._open.close()
+
+    def fly(self, jobs: Sequence[Job], quiet: bool = False) -> Iterator[tuple[Job, Result]]:
+        """Give each job and its result, as they come, those first that are there already; `quiet`: without a word."""
         known = self.store.known(jobs, self._orders.tables)
-        if known:
+        if known and not quiet:
             said = "--fresh flies them anew"
             print(f"{self._program}: {len(known)} of {len(jobs)} flights are known ({said})", file=sys.stderr)
-        with tqdm(total=len(jobs), unit=" flights", disable=None, leave=False, smoothing=0.1) as bar:
+        with tqdm(total=len(jobs), unit=" flights", disable=quiet or None, leave=False, smoothing=0.1) as bar:
             waiting = []
             for job in jobs:
                 if job.key in known:
@@ -111,8 +122,12 @@ class Runner:
                 yield flight.job, flight.result
 
     def _flights(self, jobs: Sequence[Job]) -> Iterator[Flight]:
-        if jobs:
-            yield from pool.fly(jobs, self._orders, self._options.jobs, self._options.scheduler)
+        if not jobs:
+            return
+        if self._fly is None:
+            workers = min(self._options.jobs, len(jobs))
+            self._fly = self._open.enter_context(pool.opened(self._orders, workers, self._options.scheduler))
+        yield from self._fly(jobs)
 
 
 def status_of(program: str, action: Callable[[], int], guardian: Guardian | None) -> int:

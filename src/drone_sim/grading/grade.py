@@ -52,7 +52,8 @@ class _Grading:
     def run(self) -> int:
         """Fly, and tell."""
         try:
-            self._fly()
+            with self._runner:
+                self._fly()
         except KeyboardInterrupt:
             if self._guardian is not None:
                 self._guardian.stand_down()  # what follows takes its time
@@ -107,7 +108,7 @@ class _Grading:
 def jobs_of(plan: Plan, scripts: Sequence[str], seeds: int) -> list[Job]:
     """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError."""
     jobs = []
-    for given in dict.fromkeys(plan.script_of(one) for one in (scripts or [None])):
+    for given in dict.fromkeys(plan.script_of(one) for one in (scripts or (None,))):
         found = script_path(given)
         script = found if Path(given).suffix else given
         contents = contents_of(plan, script)

@@ -41,6 +41,7 @@ class FlightProcess:
         self._got = {name: bytearray() for name in _MOST}
         self._lost = ""
         self._status = 0
+        self._deadline = 0.0
         self._used = 0.0  # s of processor time
         ends = {name: os.pipe() for name in _MOST}
         self._process = os.fork()
@@ -74,25 +75,30 @@ class FlightProcess:
             poll.register(descriptor, select.POLLIN)
         poll.register(self._end, select.POLLIN)
         poll.register(lifeline, 0)
-        deadline = time.monotonic() + self._request["real_time"]
+        self._deadline = time.monotonic() + self._request["real_time"]
         while not self._lost:
             ready = dict(poll.poll(1000 * _LOOKS))
             if lifeline in ready:
                 return False
-            has_ended = self._end in ready
-            for descriptor in self._read.keys() & ready.keys():
+            if self._end in ready:
+                break
+            for descriptor in ready:
                 if not self._take(descriptor):
                     poll.unregister(descriptor)
-            if has_ended:
-                break
-            if time.monotonic() > deadline:
-                self._lost = f"did not end within {self._request['real_time']:g} s of real time"
-            elif not ready:
+            self._check_time()
+            if not ready:
                 self._look()
+        self._take_all()
+        return True
+
+    def _take_all(self) -> None:
         for descriptor in self._read:
             while self._take(descriptor):
                 pass
-        return True
+
+    def _check_time(self) -> None:
+        if time.monotonic() > self._deadline:
+            self._lost = f"did not end within {self._request['real_time']:g} s of real time"
 
     def _take(self, descriptor: int) -> bool:
         """Read a block; return whether there was one."""

@@ -10,7 +10,7 @@ import contextlib
 import logging
 import socket
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,55 +40,54 @@ class Orders:
     patience: float = 60.0  # s that a scheduler may be without a worker
 
 
-def fly(jobs: Sequence[Job], orders: Orders, workers: int = 1, scheduler: str = "") -> Iterator[Flight]:
-    """Give the flights as they come, in any order, each job's once; on `workers` threads here, or by a scheduler.
+Fly = Callable[[Sequence[Job]], Iterator[Flight]]
 
-    What is still flown when the generator is closed is ended. Raises PoolError, and what Warm.fly raises.
+
+@contextlib.contextmanager
+def opened(orders: Orders, workers: int = 1, scheduler: str = "") -> Iterator[Fly]:
+    """Give a function that flies: it gives the flights as they come, in any order, each job's once.
+
+    On `workers` threads here, or by the scheduler at an address. At the end what is still flown is ended. Raises
+    PoolError; the function that, too, and what Warm.fly raises.
     """
     if scheduler:
-        return _by_dask(jobs, orders, lambda: _connected(scheduler, orders.patience))
-    if workers == 1 or len(jobs) == 1:
-        return _one_by_one(jobs, orders)
-    return _by_dask(jobs, orders, lambda: _here(min(workers, len(jobs))))
-
-
-def _one_by_one(jobs: Sequence[Job], orders: Orders) -> Iterator[Flight]:
-    warm = Warm(orders.limits, orders.sandboxed)
-    try:
-        for job in jobs:
-            yield warm.fly(job, orders.tables)
-    finally:
-        warm.close()
+        with _connected(scheduler, orders.patience) as client:
+            yield lambda jobs: _by_dask(jobs, orders, client)
+    elif workers == 1:
+        with contextlib.closing(Warm(orders.limits, orders.sandboxed)) as warm:
+            yield lambda jobs: (warm.fly(job, orders.tables) for job in jobs)
+    else:
+        with _here(workers) as client:
+            yield lambda jobs: _by_dask(jobs, orders, client)
 
 
 # ---- with Dask
 
 
-def _by_dask(jobs: Sequence[Job], orders: Orders, connected: Any) -> Iterator[Flight]:
+def _by_dask(jobs: Sequence[Job], orders: Orders, client: Any) -> Iterator[Flight]:
     from distributed import KilledWorker, as_completed  # takes as long to import as five flights
 
-    with connected() as client:
-        workers = sum(one["nthreads"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
-        size = orders.batches.size(len(jobs), workers)
-        batches = {
-            client.submit(fly_batch, batch, orders, pure=False): batch
-            for batch in (jobs[first : first + size] for first in range(0, len(jobs), size))
-        }
-        completed = as_completed(batches, raise_errors=False)
-        for future in completed:
-            batch = batches.pop(future)
-            error = future.exception()
-            if error is None:
-                yield from future.result()
-            elif not isinstance(error, KilledWorker):
-                raise error
-            elif len(batch) == 1:
-                yield _lost(batch[0])
-            else:  # one of them may be to blame: each for itself
-                alone = {client.submit(fly_batch, [job], orders, pure=False): [job] for job in batch}
-                batches.update(alone)
-                completed.update(alone)
-            future.release()
+    workers = sum(one["nthreads"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
+    size = orders.batches.size(len(jobs), max(1, workers))
+    batches = {
+        client.submit(fly_batch, batch, orders, pure=False): batch
+        for batch in (jobs[first : first + size] for first in range(0, len(jobs), size))
+    }
+    completed = as_completed(batches, raise_errors=False)
+    for future in completed:
+        batch = batches.pop(future)
+        error = future.exception()
+        if error is None:
+            yield from future.result()
+        elif not isinstance(error, KilledWorker):
+            raise error
+        elif len(batch) == 1:
+            yield _lost(batch[0])
+        else:  # one of them may be to blame: each for itself
+            alone = {client.submit(fly_batch, [job], orders, pure=False): [job] for job in batch}
+            batches.update(alone)
+            completed.update(alone)
+        future.release()
 
 
 def _lost(job: Job) -> Flight:
@@ -122,7 +121,7 @@ def _connected(address: str, patience: float) -> Iterator[Any]:
     from distributed import Client
 
     try:
-        client = Client(address, timeout=_CONNECTING, set_as_default=False)
+        client = Client(address, timeout=_CONNECTING)
     except (OSError, ValueError, ImportError) as error:
         said = " ".join(str(error).split())
         raise PoolError(f"--scheduler {shown(address)}: no scheduler answers there ({said:.200})") from None

@@ -47,7 +47,7 @@ _ONE_THREAD = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS",
 
 @dataclass(frozen=True)
 class Flight:
-    """A job that was flown: its result, and its table as `fly --csv` writes it, b'' where none was wanted or is left."""
+    """A job that was flown: its result, and its table as `fly --csv` writes it, b'' where there is none."""
 
     job: Job
     result: Result
@@ -64,7 +64,10 @@ class _Died(Exception):
 
 
 class Warm:
-    """A process that has everything imported and forks one for each flight. One thread uses it; it starts when needed."""
+    """A process that has everything imported and forks one for each flight.
+
+    It starts when it is needed. One thread uses it, and closes it.
+    """
 
     def __init__(self, limits: Limits, sandboxed: bool = True):
         """Take what a flight may take, and whether it is flown in the sandbox, which then must be there."""
@@ -76,7 +79,7 @@ class Warm:
         self._is_stopped = False
 
     def fly(self, job: Job, table: bool = False) -> Flight:
-        """Fly once, whatever the script does. Raises PlanError, Stopped, and NoSandbox where one is wanted and not there."""
+        """Fly once, whatever the script does. Raises PlanError, Stopped, and NoSandbox where one is wanted."""
         plan = self._plan(job.plan)
         why = ""
         if self._is_stopped:

@@ -26,7 +26,7 @@ def default_folder() -> Path:
 
 
 class Store:
-    """The results of a plan's flights in a folder, and their tables. Lost flights are not kept: they are flown again."""
+    """The results of a plan's flights in a folder, and their tables. Lost flights are not kept."""
 
     def __init__(self, folder: Path, plan: Plan):
         """Make the folder. Raises OSError."""
