@@ -7,6 +7,7 @@ import pytest
 from graded import EVIL, SCENE, place, read_plan, result, write_table
 
 from drone_sim.grading.outputs import html
+from drone_sim.offline.recording import COLUMNS
 
 
 class Page(HTMLParser):
@@ -87,8 +88,18 @@ def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
         html.check(tmp_path / "no" / "out")
 
 
-def test_a_table_that_cannot_be_read_is_told_of(tmp_path):
-    (tmp_path / "t.csv").write_text("nonsense\n")
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("nonsense\n", "a table of `fly --csv` begins with"),
+        (",".join(COLUMNS) + "\n", "nothing was flown"),
+        (",".join(COLUMNS) + "\n1,2\n", "line 2: is cut off"),
+        (",".join(COLUMNS) + "\n" + ",".join(["nan"] * len(COLUMNS)) + "\n", "line 2: must hold numbers below"),
+    ],
+)
+def test_a_table_that_shows_nothing_is_told_of(tmp_path, text, said):
+    (tmp_path / "t.csv").write_text(text)
     html.write(read_plan(tmp_path), [result()], lambda _: tmp_path / "t.csv", tmp_path / "out")
     (page,) = (tmp_path / "out/scripts").iterdir()
-    assert "a table of `fly --csv` begins with" in page.read_text()
+    assert said in page.read_text()
