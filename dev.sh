@@ -39,7 +39,7 @@ PYBULLET_FILES=267
 # ros-environment is what lets setup.bash set ROS_PACKAGE_PATH, and python3-dev is for compiling PyBullet; on
 # Debian 12 other packages bring the first, and there is a wheel of the second.
 packages() {
-  echo python3-venv python3-dev python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri \
+  echo bubblewrap python3-scipy python3-venv python3-dev python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri \
     catkin ros-environment librostest-dev python3-rospy python3-roslaunch python3-rostest rosbash \
     python3-rosbag python3-rostopic python3-rosnode python3-rosmsg python3-rosservice python3-cv-bridge python3-tf2-ros \
     python3-tf2-msgs rviz python3-diagnostic-updater python3-dynamic-reconfigure python3-geometry-msgs \
@@ -234,7 +234,7 @@ case "$command" in
   pythons) # shellcheck disable=SC2046 # one word each
     install_packages $(packages)
     test_pythons "$@" ;;
-  deb) install_packages python3-jinja2 python3-matplotlib python3-opencv python3-pil python3-tqdm python3-zmq
+  deb) install_packages python3-jinja2 python3-matplotlib python3-opencv python3-pil python3-scipy python3-tqdm python3-zmq
     setup; packaging/deb.sh "$wheels" ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
 esac

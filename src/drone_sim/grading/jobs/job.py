@@ -10,11 +10,11 @@ import platform
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pybullet
 
 from drone_sim.files.resources import package_path
 from drone_sim.grading.plan import Plan
@@ -117,7 +117,7 @@ def version() -> str:
         [*here.rglob("*.py"), *here.rglob("*.lua"), *(root / "config").rglob("*.yaml"), *root.glob("urdf/*")]
     )
     digest = hashlib.sha256(
-        f"{platform.python_version()} {np.__version__} {pybullet.getAPIVersion()} {platform.machine()}".encode()
+        f"{platform.python_version()} {np.__version__} {metadata.version('pybullet')} {platform.machine()}".encode()
     )
     for path in files:
         digest.update(_digest(path).encode())

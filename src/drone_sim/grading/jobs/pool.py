@@ -67,7 +67,7 @@ def opened(orders: Orders, workers: int = 1, scheduler: str = "") -> Iterator[Fl
 def _by_dask(jobs: Sequence[Job], orders: Orders, client: Any) -> Iterator[Flight]:
     from distributed import KilledWorker, as_completed  # takes as long to import as five flights
 
-    workers = sum(one["nthreads"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
+    workers = sum(client.nthreads().values())
     size = orders.batches.size(len(jobs), max(1, workers))
     batches = {
         client.submit(fly_batch, batch, orders, pure=False): batch
