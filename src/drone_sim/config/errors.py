@@ -88,7 +88,7 @@ def _place(model: Any, loc: Location) -> _Place:
 
 def _inside(annotation: Any, part: Key) -> tuple[Any, tuple[str, ...]]:
     bare = _bare(annotation)
-    fields = getattr(bare, "model_fields", {})
+    fields = {one.alias or name: one for name, one in getattr(bare, "model_fields", {}).items()}
     if part in fields:
         return Annotated[fields[part].annotation, fields[part]], tuple(fields)
     arguments = get_args(bare)

@@ -54,6 +54,10 @@ class Recording:
         if not self._keep:
             self.rows.clear()
         self.rows.append(row)
+        self.write_row(row)
+
+    def write_row(self, row: Iterable[float]) -> None:
+        """Write a row to the file alone. Raises TableError where the disk is full."""
         self._write(map(_shortest, row))
 
     def matrix(self, index: int) -> Matrix:

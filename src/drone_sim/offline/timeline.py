@@ -114,15 +114,21 @@ def read(path: str, parameters: Parameters) -> Timeline:
         rows = yaml_files.read(path)
     except yaml_files.YamlError as error:
         raise TimelineError(str(error)) from None
+    return of_rows(rows, parameters, path)
+
+
+def of_rows(rows: Any, parameters: Parameters, path: str, above: Location = ()) -> Timeline:
+    """Return the timeline that stands under the keys `above` in a YAML file; raises TimelineError."""
     if not isinstance(rows, list):
-        raise TimelineError(f"{path}: must be a list of `- {{at: 1.0, twist: ...}}` entries, not {shown(rows)}")
+        key = f"{readable_key(above)}: " if above else ""
+        raise TimelineError(f"{path}: {key}must be a list of `- {{at: 1.0, twist: ...}}` entries, not {shown(rows)}")
     entries: list[Entry] = []
     wrong: list[tuple[Location, str]] = []
     for index, row in enumerate(rows):
         try:
             entries.append(_entry(row, parameters))
         except _WrongKeys as error:
-            wrong += [((index, *location), f"entry {index + 1}: {text}") for location, text in error.found]
+            wrong += [((*above, index, *location), f"entry {index + 1}: {text}") for location, text in error.found]
     if wrong:
         lines = yaml_files.lines(path)
         raise TimelineError(told([(lines.find(location).line, text) for location, text in wrong], path))

@@ -120,6 +120,15 @@ class Parameters(EquipmentParameters):
         """Return the parameters with other `vehicles` given beside the scene file's. Raises ParameterError."""
         return _in_scene({**self._given, "vehicles": entries}, self.scene_file)
 
+    def varied(self, weather: WeatherParameters, fleet: tuple[VehicleParameters, ...]) -> Parameters:
+        """Return the parameters with another weather and another fleet of the same vehicles, for one simulation.
+
+        They are checked already; a scene file that is read anew forgets them.
+        """
+        made = self.model_copy(update={"weather": weather})
+        made._fleet = fleet
+        return made
+
     def check_scene(self, content: dict[str, Any], file: Path) -> None:
         """Raise ParameterError where a scene file with this content could not be loaded."""
         _checked(self._given, str(file), scene_parameters.from_content(content, file.parent))

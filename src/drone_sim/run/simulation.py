@@ -72,6 +72,7 @@ class Simulation:
         self.running = False
         self._backend, self._gui = backend, gui
         self._drawings = drawings if drawings is not None else Drawings(shown=False)
+        self.watch: Callable[[int], None] | None = None  # called like `between` of World.advance, to look and no more
         self._runs = 0
         self._era = 0  # another one whenever what is in the world has become something else
         for one in parameters.fleet:  # a script that is not there needs no world
@@ -297,7 +298,7 @@ class Simulation:
         wrenches = dict(zip(self._bodies, map(Vehicle.wrench, vehicles)))
         if self.scene.carries:
             self.scene.follow()
-        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else None)
+        self.world.advance(wrenches, self._sub_steps, self._between if self._any_between else self.watch)
         for vehicle in vehicles:
             vehicle.body.refresh()
         if self.scene.carries:
@@ -317,6 +318,8 @@ class Simulation:
 
     def _between(self, count: int) -> None:
         """Do what is due after so many sub-steps of the step: instruments look, and forces follow."""
+        if self.watch is not None:
+            self.watch(count)
         if count:
             for vehicle in self._flying:
                 vehicle.after_sub_step(self.steps * self._sub_steps + count)

@@ -1,0 +1,154 @@
+"""A flight plan: a YAML file that says what flies where, what happens, and what counts. See docs/grading.md."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, PrivateAttr, ValidationError
+
+from drone_sim.config.errors import line_of, problems, told
+from drone_sim.config.types import Checked, FileName, Finite, Label, Name, ParameterError, Within, merged, named_in
+from drone_sim.files import yaml_files
+from drone_sim.grading.criteria import AnyCriterion
+from drone_sim.grading.spread import Spread, spread_out
+from drone_sim.offline import timeline as timelines
+from drone_sim.offline.timeline import Timeline, TimelineError
+from drone_sim.run import parameters as parameters_module
+from drone_sim.run.parameters import Parameters
+from drone_sim.scene import scene_parameters
+from drone_sim.wording import near_names, shown
+
+MAX_DURATION = 36_000.0  # s
+MAX_SEEDS = 1_000_000
+MAX_CRITERIA = 200
+MAX_ENTRIES = 10_000  # of the timeline
+
+
+class PlanError(ValueError):
+    """A plan is wrong; one line that names file, line, key, value and what is allowed."""
+
+
+class Plan(Checked):
+    """What a plan's file says, checked; made by `read`. It can be pickled."""
+
+    name: Name
+    title: Label = ""
+    scene: FileName = ""
+    config: Mapping[str, Any] | FileName = Field(default_factory=dict)
+    script: FileName = ""
+    vehicle: Label = ""
+    duration: Annotated[Finite, Within(1e-3, MAX_DURATION)]  # s
+    seeds: Annotated[int, Within(1, MAX_SEEDS)] = 1
+    spread: Spread = Spread()
+    timeline: Annotated[list[Any], Field(max_length=MAX_ENTRIES)] = Field(default_factory=list)
+    criteria: Annotated[list[AnyCriterion], Field(min_length=1, max_length=MAX_CRITERIA)]
+    _path: str = PrivateAttr(default="")
+    _loaded: dict[str, Parameters] = PrivateAttr(default_factory=dict)  # by the changes
+
+    @property
+    def path(self) -> Path:
+        """The file that it was read from, absolute."""
+        return Path(self._path)
+
+    @property
+    def folder(self) -> Path:
+        """Where the files that it names are looked for."""
+        return self.path.parent
+
+    @property
+    def of(self) -> float:
+        """How many points can be had."""
+        return sum(one.points for one in self.criteria)
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that it is made of and names itself: plan, scene, config; what those name is not among them."""
+        named = [self.scene, self.config if isinstance(self.config, str) else ""]
+        return [self.path, *(Path(named_in(self.folder, one)) for one in named if one)]
+
+    def script_of(self, script: str | None) -> str:
+        """Return the script that flies where `script` is asked for: None is the plan's own, '' the built-in one."""
+        if script is not None:
+            return script
+        return str(named_in(self.folder, self.script)) if Path(self.script).suffix else self.script
+
+    def parameters(
+        self, seed: int = 0, script: str | None = None, changes: Mapping[str, Any] | None = None
+    ) -> Parameters:
+        """Return what a flight begins with; `changes` are keys of config/drone.yaml, laid over the plan's.
+
+        Raises ParameterError. What is read from files is read once, and again for other changes alone.
+        """
+        key = json.dumps(changes or {}, sort_keys=True, default=str)
+        if key not in self._loaded:
+            self._loaded[key] = self._load(changes or {})
+        return spread_out(self._loaded[key], self.spread, seed)
+
+    def _load(self, changes: Mapping[str, Any]) -> Parameters:
+        own: dict[str, Any] = {"scene_file": named_in(self.folder, self.scene)} if self.scene else {}
+        if isinstance(self.config, str):
+            own["config"] = str(named_in(self.folder, self.config))
+        else:
+            own = {**_beside(self.folder, self.config), **own}
+        return parameters_module.load(merged(own, changes))
+
+    def vehicle_of(self, parameters: Parameters) -> str:
+        """Return the name of the vehicle that is graded."""
+        return self.vehicle or parameters.fleet[0].name
+
+    def timeline_of(self, parameters: Parameters) -> Timeline:
+        """Return what happens in a flight with these parameters. Raises TimelineError."""
+        return timelines.of_rows(self.timeline, parameters, self._path, ("timeline",))
+
+
+def _beside(folder: Path, config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a plan's own `config` with the files that it names found beside the plan."""
+    values = dict(config)
+    scene_parameters.find_files_beside(folder, values)
+    for key in ("script", "scene_file"):
+        if isinstance(values.get(key), str) and Path(values[key]).suffix:
+            values[key] = named_in(folder, values[key])
+    return values
+
+
+def read(path: str | Path) -> Plan:
+    """Return the plan in a YAML file, with scene, config and timeline checked. Raises PlanError."""
+    try:
+        values = yaml_files.read(path)
+    except yaml_files.YamlError as error:
+        raise PlanError(str(error)) from None
+    if not isinstance(values, dict):
+        raise PlanError(f"{path}: must hold `key: value` lines, of which one is `criteria`, not {shown(values)}")
+    plan = _checked(values, Path(path))
+    try:
+        parameters = plan.parameters()
+        names = [one.name for one in parameters.fleet]
+        _check_vehicle(plan, names)
+        plan.timeline_of(parameters)
+    except TimelineError as error:
+        raise PlanError(str(error)) from None
+    except ParameterError as error:
+        raise PlanError(f"{path}: {error}" if not str(error).startswith(str(path)) else str(error)) from None
+    return plan
+
+
+def _checked(values: dict[str, Any], path: Path) -> Plan:
+    """Return the plan as far as its own keys go. Raises PlanError."""
+    try:
+        plan = Plan.model_validate({"name": path.stem, **values})
+    except ValidationError as error:
+        lines = yaml_files.lines(path)
+        placed = [(line_of(lines, one), one.text.removeprefix("parameter ")) for one in problems(error, Plan)]
+        raise PlanError(told(placed, str(path))) from None
+    plan._path = str(path.resolve())
+    return plan
+
+
+def _check_vehicle(plan: Plan, names: list[str]) -> None:
+    if plan.vehicle and plan.vehicle not in names:
+        line = yaml_files.lines(plan.path).find(("vehicle",)).line
+        said = f"no such vehicle; {near_names(plan.vehicle, names)}"
+        raise PlanError(f"{plan.path}: line {line}: vehicle = {shown(plan.vehicle)}: {said}")

@@ -1,0 +1,69 @@
+"""What one graded flight gives: an outcome for each criterion, with the figure behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one criterion came out."""
+
+    name: str
+    kind: str
+    passed: bool
+    value: float | None  # the figure, in `unit`; None where there is none, as of what never happened
+    unit: str  # '' for a count
+    allowed: str  # what the figure may be, such as 'at most 1.5 s'
+    points: float  # that it gives, of the `of` that can be had
+    of: float
+    at: float | None  # s of simulated time at which it was decided; None where it is no matter of a moment
+    said: str  # one sentence, with the figure
+
+
+@dataclass(frozen=True)
+class Result:
+    """How one flight of a plan came out; to and from JSON without a loss."""
+
+    plan: str
+    script: str  # '' is the built-in one
+    seed: int
+    changes: Mapping[str, Any]  # keys of config/drone.yaml, laid over the plan's
+    passed: bool
+    points: float
+    of: float
+    flown: float  # s of simulated time
+    error: str | None  # one line; None where the flight came to its end
+    outcomes: tuple[Outcome, ...] = field(default=())
+    digest: str = ""  # SHA-256 of the table's numbers, as little-endian doubles; '' where nothing was flown
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as what the module json writes: an infinite or undefined figure is None."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Result:
+        """Return what `to_json` gave. Raises ValueError for anything else."""
+        try:
+            outcomes = tuple(Outcome(**one) for one in values["outcomes"])
+            return cls(**{**{one.name: values[one.name] for one in fields(cls)}, "outcomes": outcomes})
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"no result of a flight: {error}") from None
+
+
+def result_of(
+    plan: str,
+    script: str,
+    seed: int,
+    changes: Mapping[str, Any],
+    outcomes: tuple[Outcome, ...],
+    flown: float = 0.0,
+    error: str | None = None,
+    digest: str = "",
+) -> Result:
+    """Return the result of a flight: passed where every criterion is, and nothing went wrong."""
+    passed = error is None and all(one.passed for one in outcomes)
+    points, of = sum(one.points for one in outcomes), sum(one.of for one in outcomes)
+    return Result(plan, script, seed, dict(changes), passed, points, of, flown, error, outcomes, digest)
