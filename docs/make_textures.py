@@ -1,11 +1,11 @@
-"""Draw the line of tasks/line and the tags of tasks/pad: .venv/bin/python tasks/make_textures.py"""
+"""Draw the line of tasks/line and the tags of tasks/pad: .venv/bin/python docs/make_textures.py"""
 
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-TASKS = Path(__file__).resolve().parent
+TASKS = Path(__file__).resolve().parents[1] / "tasks"
 SHEET, PER_METRE = (8.0, 6.0), 64  # m; px
 WIDTH = 0.08  # m, of the line
 LINE = [(-3, -2), (0, -2), (1.5, -1.5), (2, 0), (1.2, 1.2), (0, 1.2), (-1, 1.6), (-2, 2.2), (-3, 2.2)]  # m
