@@ -1,1 +1,4 @@
-"""Flights that grade themselves: a plan says what happens and what counts, a script flies it, a result says how well."""
+"""Flights that grade themselves: a plan says what happens and what counts, a script flies it, a result says how well.
+
+Knows no ROS. `plan.read` reads a plan, `flight.grade` flies it once and returns a `result.Result`.
+"""

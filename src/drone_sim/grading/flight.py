@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
-from collections.abc import Mapping
+import random
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +15,12 @@ from drone_sim.files import writing
 from drone_sim.grading.flown import Flown
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
+from drone_sim.grading.topics import Topics
 from drone_sim.grading.watching import Witness
 from drone_sim.offline.recording import Recording
-from drone_sim.offline.timeline import first_step
+from drone_sim.offline.timeline import Timeline, first_step
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.errors import ScriptError
 
 EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
@@ -38,18 +40,11 @@ def grade(
     """
     changes = changes or {}
     named = plan.script_of(script)
-    try:
-        parameters = plan.parameters(seed, script, changes)
-        simulation = Simulation(parameters, script=named)
-    except EXPECTED as error:
-        return ungraded(plan, named, seed, changes, _one_line(error))
-    witness = Witness(plan, simulation)
-    failed = _fly(plan, parameters, simulation, witness)
-    flown = witness.flown()
-    try:
-        simulation.close()
-    except EXPECTED as error:  # in cleanup
-        failed = failed or _one_line(error)
+    with _seeded(seed):
+        try:
+            flown, failed = _flown(plan, plan.parameters(seed, None, changes), named)
+        except EXPECTED as error:
+            return ungraded(plan, named, seed, changes, _one_line(error))
     if table is not None:
         write(flown.rows, table)
     outcomes = tuple(one.judge(flown) for one in plan.criteria)
@@ -75,21 +70,58 @@ def write(rows: np.ndarray, path: str | Path) -> None:
             recording.write_row(row)
 
 
-def _fly(plan: Plan, parameters: Parameters, simulation: Simulation, witness: Witness) -> str | None:
-    """Fly to the end; return what went wrong, in one line."""
-    error: str | None = None
+def _flown(plan: Plan, parameters: Parameters, script: str) -> tuple[Flown, str | None]:
+    """Fly; return what there is to judge, and what went wrong, in one line. Raises what comes before the first step."""
+    topics = Topics(plan.topics_of(parameters))
+    timeline = plan.timeline_of(parameters)
+    simulation = Simulation(parameters, script=script, backend=topics if topics.wanted else None)
+    topics.clock = lambda: simulation.time
     try:
-        timeline = plan.timeline_of(parameters)
-        witness.begin()
-        for step in range(first_step(plan.duration, parameters.time_step)):
-            timeline.apply(step, simulation.vehicles)
-            simulation.step()
-            witness.add()
-            if simulation.asked == STOP:
-                break
-    except EXPECTED as failed:
-        error = _one_line(failed)
-    return error
+        witness = Witness(plan, simulation, topics)
+        witness.keep()
+        steps = first_step(plan.duration, parameters.time_step)
+        failed = _failure(lambda: _fly(simulation, timeline, steps, witness))
+        failed = failed or _failed_scripts(simulation)
+        flown = witness.flown()
+    finally:
+        closed = _failure(simulation.close)  # cleanup may fail, too
+    return flown, failed or closed
+
+
+def _fly(simulation: Simulation, timeline: Timeline, steps: int, witness: Witness) -> None:
+    for step in range(steps):
+        timeline.apply(step, simulation.vehicles)
+        simulation.step()
+        witness.keep()
+        if witness.is_over:
+            return
+
+
+def _failure(action: Callable[[], None]) -> str | None:
+    """Return what went wrong in an action, in one line; None for nothing."""
+    try:
+        action()
+    except EXPECTED as error:
+        return _one_line(error)
+    return None
+
+
+def _failed_scripts(simulation: Simulation) -> str | None:
+    names = simulation.failed_scripts
+    return f"the scripts of {', '.join(names)} failed: the log says why" if names else None
+
+
+@contextlib.contextmanager
+def _seeded(seed: int) -> Iterator[None]:
+    """Let scripts that draw from Python's and numpy's own generators draw the same in every flight of a seed."""
+    kept, kept_numpy = random.getstate(), np.random.get_state()
+    random.seed(seed)
+    np.random.seed(seed % 2**32)
+    try:
+        yield
+    finally:
+        random.setstate(kept)
+        np.random.set_state(kept_numpy)
 
 
 def _one_line(error: Exception) -> str:

@@ -16,11 +16,11 @@ class Touch(NamedTuple):
     """The vehicle touched something during the step that ended at `at` (s)."""
 
     at: float
-    what: str  # its name; '' for one that has none
+    what: str  # its name, as the sensor `contacts` has it
 
 
 class Said(NamedTuple):
-    """A signal or a topic had another value from `at` (s) on; None: the signal was cleared."""
+    """A signal, a topic or the flight state had another value from `at` (s) on; None: a signal was cleared."""
 
     at: float
     value: Any
@@ -28,13 +28,18 @@ class Said(NamedTuple):
 
 @dataclass(frozen=True)
 class Flown:
-    """A flight of one vehicle; `rows` (N, 22) as offline.recording.COLUMNS says, N >= 1, times increasing."""
+    """A flight of one vehicle. `rows` (N, 22) are as offline.recording.COLUMNS says, N >= 1, times increasing.
+
+    `is_whole`: it lasted as long as the plan says. The others hold what the criteria ask for; a flight that is only
+    heard of, from a node, may lack some.
+    """
 
     rows: np.ndarray
-    touches: Sequence[Touch] = ()  # in order of time, one for each thing and step
-    states: Sequence[Said] = ()  # what the script says of its flight state, whenever it changes: docs/states.md
-    signals: Mapping[tuple[str, str], Sequence[Said]] = field(default_factory=dict)  # by kind and name, as watched
-    others: Mapping[str, np.ndarray] = field(default_factory=dict)  # rows of other vehicles, by name
+    is_whole: bool = True
+    touches: Sequence[Touch] = ()  # by time; one for each thing and step
+    states: Sequence[Said] = ()  # what the script says of its flight state: docs/states.md
+    said: Mapping[str, Sequence[Said]] = field(default_factory=dict)  # by the names of signals and topics
+    others: Mapping[str, np.ndarray] = field(default_factory=dict)  # (N, 7): position, quaternion xyzw, by name
 
     @cached_property
     def columns(self) -> dict[str, np.ndarray]:
@@ -51,20 +56,13 @@ class Flown:
         """Simulated time of the last row in s."""
         return float(self.rows[-1, 0])
 
-    @cached_property
-    def places(self) -> np.ndarray:
-        """Position of base_link in the world in m, (N, 3)."""
-        return self.rows[:, 1:4]
-
 
 _AS_RECORDED = [name.partition(" ")[0] for name in COLUMNS]
-_TRACK = {"vx": "m/s", "vy": "m/s", "vz": "m/s"}
-UNITS = {
+UNITS = {  # of the columns that a criterion may be `of`
     "t": "s",
     **dict.fromkeys("xyz", "m"),
     **dict.fromkeys(("roll", "pitch", "yaw", "tilt"), "rad"),
-    **_TRACK,
-    **dict.fromkeys(("world_vx", "world_vy", "world_vz", "speed"), "m/s"),
+    **dict.fromkeys(("vx", "vy", "vz", "world_vx", "world_vy", "speed"), "m/s"),
     **dict.fromkeys(("wx", "wy", "wz"), "rad/s"),
     **dict.fromkeys(("command_vx", "command_vy", "command_vz"), "m/s"),
     "command_wz": "rad/s",
@@ -76,20 +74,25 @@ def columns_of(rows: np.ndarray) -> dict[str, np.ndarray]:
     """Return the columns named in UNITS of a table (N, 22).
 
     roll, pitch, yaw (rad) are ROS's, yaw without jumps; tilt is the angle between the body's and the world's z;
-    vx, vy, vz are the velocity in the track frame (at the drone, level, turned by its yaw), as commands are.
+    vx, vy, vz are the velocity in the track frame (at the drone, level, turned by its yaw), as commands are;
+    world_vx and world_vy are those that the table has, as wx, wy and wz are: in the world.
     """
-    found = {name: rows[:, index] for index, name in enumerate(_AS_RECORDED) if name in UNITS}
+    found = {name: rows[:, index] for index, name in enumerate(_AS_RECORDED)}
     x, y, z, w = rows[:, 4:8].T
-    velocity = rows[:, 8:11]
-    r00, r10, r20 = 1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)
-    r01, r21, r22 = 2 * (x * y - z * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
-    found["roll"], found["pitch"] = np.arctan2(r21, r22), np.arcsin(np.clip(-r20, -1, 1))
-    found["yaw"] = np.unwrap(np.arctan2(r10, r00))
-    found["tilt"] = np.arccos(np.clip(r22, -1, 1))
-    turn = np.arctan2(-r01, r00)  # V-REP's gamma, as Track_base has it
-    found["vx"] = np.cos(turn) * velocity[:, 0] + np.sin(turn) * velocity[:, 1]
-    found["vy"] = np.cos(turn) * velocity[:, 1] - np.sin(turn) * velocity[:, 0]
-    found["vz"] = velocity[:, 2]
-    found["world_vx"], found["world_vy"], found["world_vz"] = velocity.T
-    found["speed"] = np.linalg.norm(velocity, axis=1)
-    return found
+    r00, r01 = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w)
+    r10, r20 = 2 * (x * y + z * w), 2 * (x * z - y * w)
+    r21, r22 = 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
+    turn = np.arctan2(-r01, r00)  # V-REP's gamma, by which Track_base is turned
+    east, north, up = rows[:, 8:11].T
+    made = {
+        "roll": np.arctan2(r21, r22),
+        "pitch": np.arcsin(np.clip(-r20, -1, 1)),
+        "yaw": np.unwrap(np.arctan2(r10, r00)),
+        "tilt": np.arccos(np.clip(r22, -1, 1)),
+        "vx": np.cos(turn) * east + np.sin(turn) * north,
+        "vy": np.cos(turn) * north - np.sin(turn) * east,
+        "world_vx": east,
+        "world_vy": north,
+        "speed": np.sqrt(east**2 + north**2 + up**2),
+    }
+    return {name: column for name, column in {**found, **made}.items() if name in UNITS}

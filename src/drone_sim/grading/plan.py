@@ -10,7 +10,19 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, ValidationError
 
 from drone_sim.config.errors import line_of, problems, told
-from drone_sim.config.types import Checked, FileName, Finite, Label, Name, ParameterError, Within, merged, named_in
+from drone_sim.config.types import (
+    Checked,
+    FileName,
+    Finite,
+    Label,
+    Location,
+    Name,
+    ParameterError,
+    Within,
+    merged,
+    named_in,
+    readable_key,
+)
 from drone_sim.files import yaml_files
 from drone_sim.grading.criteria import AnyCriterion
 from drone_sim.grading.spread import Spread, spread_out
@@ -25,6 +37,7 @@ MAX_DURATION = 36_000.0  # s
 MAX_SEEDS = 1_000_000
 MAX_CRITERIA = 200
 MAX_ENTRIES = 10_000  # of the timeline
+_MOST_LOADED = 16  # parameters, each of other changes, that are kept
 
 
 class PlanError(ValueError):
@@ -45,8 +58,23 @@ class Plan(Checked):
     spread: Spread = Spread()
     timeline: Annotated[list[Any], Field(max_length=MAX_ENTRIES)] = Field(default_factory=list)
     criteria: Annotated[list[AnyCriterion], Field(min_length=1, max_length=MAX_CRITERIA)]
+
     _path: str = PrivateAttr(default="")
     _loaded: dict[str, Parameters] = PrivateAttr(default_factory=dict)  # by the changes
+
+    def model_post_init(self, context: Any) -> None:
+        """Check the criteria beside each other."""
+        super().model_post_init(context)
+        taken: set[str] = set()
+        for index, one in enumerate(self.criteria):
+            here = ("criteria", index)
+            if one.called in taken:
+                raise _refused((*here, "name"), f"'{one.called}' comes twice; give each a `name` of its own")
+            taken.add(one.called)
+            for key in ("after", "until"):
+                time = getattr(one, key)
+                if time is not None and time > self.duration:
+                    raise _refused((*here, key), f"{time:g}: the flight lasts {self.duration:g} s (duration)")
 
     @property
     def path(self) -> Path:
@@ -80,11 +108,14 @@ class Plan(Checked):
     ) -> Parameters:
         """Return what a flight begins with; `changes` are keys of config/drone.yaml, laid over the plan's.
 
-        Raises ParameterError. What is read from files is read once, and again for other changes alone.
+        With a `script`, as for `script_of`, it is the one that they name. Raises ParameterError.
         """
-        key = json.dumps(changes or {}, sort_keys=True, default=str)
-        if key not in self._loaded:
-            self._loaded[key] = self._load(changes or {})
+        changes = dict(changes or {}) if script is None else {**(changes or {}), "script": self.script_of(script)}
+        key = json.dumps(changes, sort_keys=True, default=str)
+        if key not in self._loaded:  # files are read once
+            if len(self._loaded) >= _MOST_LOADED:
+                self._loaded.clear()
+            self._loaded[key] = self._load(changes)
         return spread_out(self._loaded[key], self.spread, seed)
 
     def _load(self, changes: Mapping[str, Any]) -> Parameters:
@@ -99,9 +130,19 @@ class Plan(Checked):
         """Return the name of the vehicle that is graded."""
         return self.vehicle or parameters.fleet[0].name
 
+    def topics_of(self, parameters: Parameters) -> dict[str, str]:
+        """Return the full names of the topics that criteria ask for; a relative one is the graded vehicle's."""
+        own = self.vehicle_of(parameters)
+        names = {name for one in self.criteria for name in one.topics}
+        return {name: name if name.startswith("/") else f"/{own}/{name}" for name in sorted(names)}
+
     def timeline_of(self, parameters: Parameters) -> Timeline:
         """Return what happens in a flight with these parameters. Raises TimelineError."""
         return timelines.of_rows(self.timeline, parameters, self._path, ("timeline",))
+
+
+def _refused(location: Location, why: str) -> ParameterError:
+    return ParameterError(f"parameter {readable_key(location)} = {why}", location)
 
 
 def _beside(folder: Path, config: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,46 +2,120 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from drone_sim.grading.flown import Flown, Said, Touch
 from drone_sim.grading.plan import Plan
+from drone_sim.grading.topics import Topics
+from drone_sim.mechanics.frames import position, to_quaternion
 from drone_sim.offline.recording import Recording
 from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.control import STOP
 
 
 class Witness:
-    """Keeps the rows of the graded vehicle, and of others and beside them only what a criterion asks for."""
+    """Keeps the rows of the graded vehicle, and beside them only what a criterion asks for."""
 
-    def __init__(self, plan: Plan, simulation: Simulation):
-        """Take what is asked for, and a simulation before its first step."""
+    def __init__(self, plan: Plan, simulation: Simulation, topics: Topics):
+        """Take what is asked for, a simulation before its first step, and what carries its topics."""
         self._simulation = simulation
-        self._vehicle = plan.vehicle_of(simulation.parameters)
-        self._recording = Recording(vehicle=self._vehicle)
+        self._duration = plan.duration
+        own = plan.vehicle_of(simulation.parameters)
+        self._vehicle = simulation.vehicles[own]
+        self._recording = Recording(vehicle=own)
         self._touches: list[Touch] = []
         self._touching: set[str] = set()  # in the step that is under way
+        self._said: dict[str, list[Said]] = {}
+        self._others: dict[str, list[tuple[float, ...]]] = {}
+        self._each_step: list[Callable[[], None]] = [lambda: self._recording.add(simulation)]
+        self._listen(plan, topics)
+
+    def _listen(self, plan: Plan, topics: Topics) -> None:
         if any(one.sees_touches for one in plan.criteria):
-            simulation.watch = self._look
+            self._simulation.watch = self._look
+            self._each_step.append(self._keep_touches)
+        if any(one.sees_states for one in plan.criteria):
+            self._follow("", lambda: str(self._vehicle.flight_state))
+        for signal in {name for one in plan.criteria for name in one.signals}:
+            self._follow(signal, lambda name=signal: self._signal(name))  # type: ignore[misc]
+        own = self._vehicle.bus.said
+        for topic, full in topics.wanted.items():
+            self._follow(topic, lambda name=full: topics.last.get(name, own.get(name)))  # type: ignore[misc]
+        for other in {name for one in plan.criteria for name in one.others}:
+            self._others[other] = []
+            self._each_step.append(lambda name=other: self._others[name].append(self._pose(name)))  # type: ignore[misc]
 
-    def begin(self) -> None:
-        """Keep the state before the first step."""
-        self._recording.add(self._simulation)
+    def keep(self) -> None:
+        """Keep what there is now: before the first step, and after each. Raises ValueError."""
+        for keep in self._each_step:
+            keep()
 
-    def add(self) -> None:
-        """Keep what a step has brought."""
-        self._recording.add(self._simulation)
+    def flown(self) -> Flown:
+        """Return the flight so far."""
+        rows = np.array(self._recording.rows)
+        return Flown(
+            rows,
+            bool(rows[-1, 0] >= self._duration - 1e-9),
+            tuple(self._touches),
+            tuple(self._said.get("", ())),
+            self._said,
+            {name: np.array(poses[: len(rows)]) for name, poses in self._others.items()},
+        )
+
+    @property
+    def is_over(self) -> bool:
+        """Whether a script has stopped the simulation."""
+        return self._simulation.asked == STOP
+
+    # ---- what is asked for
+
+    def _look(self, count: int) -> None:
+        """See after a sub-step what the vehicle touches: a blow may be over before the step is."""
+        if count:
+            self._touching.update(self._vehicle.touched())
+
+    def _keep_touches(self) -> None:
         if self._touching:
             now = self._simulation.time
             self._touches += [Touch(now, what) for what in sorted(self._touching)]
             self._touching.clear()
 
-    def _look(self, count: int) -> None:
-        """See after a sub-step what the vehicle touches: a blow may be over before the step is."""
-        if count:
-            self._touching.update(self._simulation.vehicles[self._vehicle].touched())
+    def _follow(self, name: str, value: Callable[[], Any]) -> None:
+        """Keep a value whenever it has become another."""
+        kept = self._said[name] = []
 
-    def flown(self) -> Flown:
-        """Return the flight so far."""
-        return Flown(np.array(self._recording.rows), tuple(self._touches))
+        def look() -> None:
+            now, last = value(), kept[-1].value if kept else None
+            if now is not last and not _same(now, last):
+                kept.append(Said(self._simulation.time, now))
+
+        self._each_step.append(look)
+
+    def _signal(self, name: str) -> Any:
+        """Return what a signal of any kind says; None where there is none."""
+        signals = self._simulation.shared.signals
+        for get in (signals.getInt32Signal, signals.getFloatSignal, signals.getStringSignal):
+            value = get(name)
+            if value is not None:
+                return value
+        return None
+
+    def _pose(self, name: str) -> tuple[float, ...]:
+        """Return position (m) and quaternion (xyzw) of a vehicle or object, in the world. Raises ValueError."""
+        vehicle = self._simulation.vehicles.get(name)
+        if vehicle is not None:
+            return (*vehicle.state.position, *vehicle.state.orientation)
+        objects = self._simulation.shared.objects
+        matrix = objects.matrix(objects.handle(name))
+        return (*position(matrix), *to_quaternion(matrix))
+
+
+def _same(first: Any, second: Any) -> bool:
+    """Tell whether two values are equal; those that cannot be compared, such as arrays in messages, are not."""
+    try:
+        return bool(first == second)
+    except Exception:
+        return False

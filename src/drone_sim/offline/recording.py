@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TextIO
+from typing import IO
 
 from drone_sim.mechanics.frames import Matrix, from_quaternion
 from drone_sim.run.simulation import Simulation
@@ -33,7 +33,7 @@ class Recording:
 
     clock = "simulated time"  # what its times are
 
-    def __init__(self, file: TextIO | None = None, keep: bool = True, vehicle: str = ""):
+    def __init__(self, file: IO[str] | None = None, keep: bool = True, vehicle: str = ""):
         """Take the CSV file, if there is to be one, and write its header. Raises TableError.
 
         `vehicle` is the one whose flight it is; by default the first.

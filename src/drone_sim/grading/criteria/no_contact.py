@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from drone_sim.config.types import Label
@@ -13,24 +14,23 @@ from drone_sim.grading.result import Outcome
 
 
 class NoContact(Criterion):
-    """Every sub-step counts, however short the touch."""
+    """Every sub-step counts, however short the touch; `allow` has names, as the sensor `contacts` says them."""
 
     kind: Literal["no_contact"]
-    allow: Annotated[list[Label], Field(max_length=100)] = []  # names of what it may touch
+    allow: Annotated[list[Label], Field(max_length=100)] = Field(default_factory=list)
 
     sees_touches = True
 
     @property
     def allowed(self) -> str:
         """What passes."""
-        return f"only {', '.join(self.allow)}" if self.allow else "no contact"
+        return f"only {', '.join(self.allow)}" if self.allow else "nothing"
 
-    def judge(self, flown: Flown) -> Outcome:
-        """Return how the flight did."""
-        until = flown.end if self.until is None else self.until
-        found = [one for one in flown.touches if self.after < one.at <= until and one.what not in self.allow]
+    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
+        first, last = flown.times[part][[0, -1]]
+        found = [one for one in flown.touches if first <= one.at <= last and one.what not in self.allow]
         if not found:
-            return self.outcome(True, "touched nothing", 0.0, "touches")
-        first = found[0]
-        said = f"touched {first.what or 'something without a name'} at {first.at:.2f} s; it may touch {self.allowed}"
-        return self.outcome(False, said, float(len({one.what for one in found})), "touches", first.at)
+            return self._outcome(True, "touched nothing that it may not", 0.0)
+        what = sorted({one.what for one in found})
+        said = f"touched {', '.join(what)}, first {found[0].what} at {found[0].at:.2f} s; allowed is {self.allowed}"
+        return self._outcome(False, said, float(len(what)), "", found[0].at)

@@ -1,0 +1,109 @@
+"""Landed: the vehicle has flown, and at the end it rests on something, where and as softly as it should."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from drone_sim.config.types import Coordinate, Label
+from drone_sim.grading.criteria.criterion import Bound, Criterion, Missed, figure
+from drone_sim.grading.criteria.places import places_of, poses_of
+from drone_sim.grading.flown import Flown
+from drone_sim.grading.result import Outcome
+from drone_sim.vehicles.flight_state import CRASHED, LANDED
+
+_AT_REST = 0.1  # m/s
+_SETTLING = 0.5  # s; whoever is longer off the ground between two touches flies
+_Where = Annotated[tuple[Coordinate, Coordinate], Field(description="2 numbers, [x, y] in m, or the name of an object")]
+
+
+class Landed(Criterion):
+    """It looks at the end of its part: `until` is by when it has to stand.
+
+    `at` is [x, y] in m, or the name of an object or vehicle; `within` so many metres of it, over ground. `softly` is
+    the largest speed (m/s) in the step before the touch-down; `on` is what it is to stand on.
+    """
+
+    kind: Literal["landed"]
+    at: _Where | Label | None = None
+    within: Bound = 0.3
+    softly: Bound | None = None
+    on: Label = ""
+
+    sees_touches = True
+    sees_states = True
+
+    @property
+    def allowed(self) -> str:
+        """What passes."""
+        wanted = [f"within {figure(self.within, 'm')}"] if self.at is not None else []
+        wanted += [f"at most {figure(self.softly, 'm/s')}"] if self.softly is not None else []
+        wanted += [f"on {self.on}"] if self.on else []
+        return ", ".join(wanted) or "landed"
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """What it asks for."""
+        return (self.at,) if isinstance(self.at, str) else ()
+
+    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
+        end = float(flown.times[part][-1])
+        down = _touch_down(flown, end)
+        speed = float(flown.columns["speed"][np.searchsorted(flown.times, down) - 1])
+        self._check_ground(flown, end)
+        wrong, distance = [], self._distance(flown, part)
+        if distance is not None and distance > self.within:
+            wrong.append(f"{figure(self.within, 'm')} are allowed")
+        if self.softly is not None and speed > self.softly:
+            wrong.append(f"{figure(self.softly, 'm/s')} are allowed")
+        where = "" if distance is None else f" {figure(distance, 'm')} from {self._there}"
+        said = f"landed at {down:.2f} s{where} with {figure(speed, 'm/s')}"
+        value, unit = (speed, "m/s") if distance is None else (distance, "m")
+        return self._outcome(not wrong, "; ".join([said, *wrong]), value, unit, down)
+
+    @property
+    def _there(self) -> str:
+        return self.at if isinstance(self.at, str) else "its place"
+
+    def _distance(self, flown: Flown, part: np.ndarray) -> float | None:
+        """Return how far it stands from where it should, None where that is no matter."""
+        if self.at is None:
+            return None
+        there = poses_of(flown, self.at)[part][-1, :2] if isinstance(self.at, str) else np.array(self.at)
+        return float(np.linalg.norm(places_of(flown, part)[-1, :2] - there))
+
+    def _check_ground(self, flown: Flown, end: float) -> None:
+        if not self.on or not flown.touches:
+            return
+        under = sorted({one.what for one in flown.touches if end - _SETTLING <= one.at <= end})
+        if self.on not in under:
+            raise Missed(f"stands on {' and '.join(under) or 'nothing'}, not on {self.on}")
+
+
+def _touch_down(flown: Flown, end: float) -> float:
+    """Return when (s) the vehicle touched down for the stay in which it is at `end`. Raises Missed."""
+    state = next((str(one.value) for one in reversed(flown.states) if one.at <= end), "")
+    if state == CRASHED:
+        raise Missed("it has crashed, as its script says")
+    if not flown.touches and state == LANDED:  # of a flight that was only heard of
+        return next(one.at for one in reversed(flown.states) if one.at <= end)
+    last = int(np.searchsorted(flown.times, end, "right")) - 1
+    speed = float(flown.columns["speed"][last])
+    stay = _last_stay([one.at for one in flown.touches if one.at <= end + 1e-9])
+    if not stay or end - stay[-1] > _SETTLING:
+        raise Missed(f"is in the air at {end:.2f} s, {figure(float(flown.rows[last, 3]), 'm')} high")
+    if not speed <= _AT_REST:
+        raise Missed(f"still moves with {figure(speed, 'm/s')} at {end:.2f} s; {figure(_AT_REST, 'm/s')} are allowed")
+    if stay[0] - flown.times[0] < _SETTLING:
+        raise Missed("never took off")
+    return stay[0]
+
+
+def _last_stay(touches: list[float]) -> list[float]:
+    """Return the last of these times (s, in order) that have no flight in between."""
+    for index in range(len(touches) - 1, 0, -1):
+        if touches[index] - touches[index - 1] > _SETTLING:
+            return touches[index:]
+    return touches

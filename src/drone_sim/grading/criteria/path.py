@@ -1,0 +1,49 @@
+"""Path: how far the vehicle gets from a polyline, and how much of that it has flown."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from drone_sim.config.types import Fraction, Point
+from drone_sim.grading.criteria.criterion import figure
+from drone_sim.grading.criteria.places import DistanceCriterion, places_of, to_polyline
+from drone_sim.grading.flown import Flown
+from drone_sim.grading.result import Outcome
+
+MAX_CORNERS = 1000
+_SAMPLES = 400  # of the path, at which it is seen whether the vehicle has been there
+
+
+class Path(DistanceCriterion):
+    """`along` are the polyline's corners; `closed`: it goes back to the first.
+
+    `covers` is the share of it that has to be flown: all that the vehicle has been within `at_most` of.
+    """
+
+    kind: Literal["path"]
+    along: Annotated[list[Point], Field(min_length=2, max_length=MAX_CORNERS)]
+    closed: bool = False
+    covers: Fraction = 0.0
+
+    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
+        places, corners = self._along(places_of(flown, part)), self._along(np.array(self.along))
+        if self.closed:
+            corners = np.vstack((corners, corners[:1]))
+        covered = _covered(corners, places, self.at_most) if self.covers else 1.0
+        if covered < self.covers:
+            share, wanted = (figure(100 * one, "%") for one in (covered, self.covers))
+            return self._outcome(False, f"flew {share} of the path; at least {wanted} is wanted")
+        return self._outcome_of(to_polyline(places, corners), flown.times[part], "the path")
+
+
+def _covered(corners: np.ndarray, places: np.ndarray, radius: float) -> float:
+    """Return the share of a polyline (K, D) that is within a radius of one of the places (M, D)."""
+    lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    ways = np.concatenate(([0.0], np.cumsum(lengths)))
+    at = np.linspace(0, ways[-1], _SAMPLES)
+    samples = np.column_stack([np.interp(at, ways, column) for column in corners.T])
+    squares = ((samples[:, None, :] - places) ** 2).sum(axis=2).min(axis=1)
+    return float((squares <= radius**2).mean())

@@ -1,0 +1,102 @@
+"""Reach: the vehicle comes near to places, such as the middles of gates, one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from drone_sim.config.types import Point, Switch
+from drone_sim.grading.criteria.criterion import Bound, Criterion, figure
+from drone_sim.grading.criteria.places import places_of
+from drone_sim.grading.flown import Flown
+from drone_sim.grading.result import Outcome
+
+MAX_PLACES = 200
+_FARTHEST = 2.0  # times as far as its speed says: a vehicle that got farther between two rows was put there
+_ALWAYS = 0.01  # m, that are no jump
+
+
+class Reach(Criterion):
+    """`places` [x, y, z] (m) are to be reached in this order, `within` so many metres, before `until`.
+
+    With `partial` every place that is reached in order gives its share of the points.
+    """
+
+    kind: Literal["reach"]
+    places: Annotated[list[Point], Field(min_length=1, max_length=MAX_PLACES)]
+    within: Bound
+    partial: Switch = False
+
+    is_lasting = False
+
+    @property
+    def allowed(self) -> str:
+        """What passes."""
+        return f"all {len(self.places)} within {figure(self.within, 'm')}"
+
+    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
+        way, here = _way(flown, part), _Here(0, 0.0, 0.0)
+        last: float | None = None
+        for number, place in enumerate(self.places):
+            here = _first_within(way, here, np.array(place), self.within)
+            if here.distance > self.within:
+                return self._short(number, last, here.distance)
+            last = way.time(here)
+        return self._reached(len(self.places), f"reached all {len(self.places)}, the last at {last:.2f} s", last)
+
+    def _short(self, reached: int, last: float | None, nearest: float) -> Outcome:
+        said = (
+            f"reached {reached} of {len(self.places)}; it came to {figure(nearest, 'm')} of place {reached + 1}, "
+            f"{figure(self.within, 'm')} are allowed"
+        )
+        return self._reached(reached, said, last)
+
+    def _reached(self, reached: int, said: str, at: float | None) -> Outcome:
+        outcome = self._outcome(reached == len(self.places), said, float(reached), "places", at)
+        share = self.points * reached / len(self.places)
+        return replace(outcome, points=share) if self.partial else outcome
+
+
+class _Here(NamedTuple):
+    """Where on the way: behind which row, which share of the way to the next, and how far (m) from a place."""
+
+    row: int
+    share: float
+    distance: float
+
+
+class _Way(NamedTuple):
+    """Rows of a flight: times (M,), places (M, 3), and from each the step (M, 3) to the next."""
+
+    times: np.ndarray
+    places: np.ndarray
+    steps: np.ndarray
+
+    def time(self, here: _Here) -> float:
+        following = self.times[min(here.row + 1, len(self.times) - 1)]
+        return float(self.times[here.row] + here.share * (following - self.times[here.row]))
+
+
+def _way(flown: Flown, part: np.ndarray) -> _Way:
+    """Return the way in a part of a flight; where the vehicle was put elsewhere, it stays until it is there."""
+    places, times, speeds = places_of(flown, part), flown.times[part], flown.columns["speed"][part]
+    steps = np.zeros_like(places)
+    steps[:-1] = np.diff(places, axis=0)
+    could = _ALWAYS + _FARTHEST * np.maximum(speeds[:-1], speeds[1:]) * np.diff(times)
+    steps[:-1][np.linalg.norm(steps[:-1], axis=1) > could] = 0
+    return _Way(times, places, steps)
+
+
+def _first_within(way: _Way, here: _Here, place: np.ndarray, radius: float) -> _Here:
+    """Return where the way, from here on, first comes within a radius of a place, or else nearest to it."""
+    to, steps = place - way.places[here.row :], way.steps[here.row :]
+    squares = (steps**2).sum(axis=1)
+    shares = np.clip((to * steps).sum(axis=1) / np.where(squares > 0, squares, 1), 0, 1)
+    shares[0] = max(shares[0], here.share)
+    distances = np.linalg.norm(to - shares[:, None] * steps, axis=1)
+    near = np.flatnonzero(distances <= radius)
+    index = int(near[0]) if len(near) else int(distances.argmin())
+    return _Here(here.row + index, float(shares[index]), float(distances[index]))

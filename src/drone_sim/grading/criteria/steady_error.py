@@ -1,0 +1,42 @@
+"""Steady error: how far the mean of a column is from what it is to be, once it has had its time.
+
+The steady-state error is the limit for t to infinity (Ogata, Modern Control Engineering, 5th ed., section 5-8); of a
+flight that ends it is the mean over its last part.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+
+from drone_sim.config.types import Finite, Within
+from drone_sim.grading.criteria.criterion import Bound, Column, Criterion, Figure, figure, values_of
+from drone_sim.grading.flown import UNITS, Flown
+from drone_sim.grading.result import Outcome
+
+
+class SteadyError(Criterion):
+    """`to` and `at_most` are in the unit of the column; the mean is over the last `over` s of its part."""
+
+    kind: Literal["steady_error"]
+    of: Column
+    to: Figure
+    at_most: Bound
+    over: Annotated[Finite, Within(1e-3, 1e6)] = 1.0
+
+    @property
+    def allowed(self) -> str:
+        """What passes."""
+        return f"at most {figure(self.at_most, UNITS[self.of])}"
+
+    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
+        unit = UNITS[self.of]
+        last = part & (flown.times >= flown.times[part][-1] - self.over - 1e-9)
+        mean = float(values_of(flown, self.of, last).mean())
+        error = abs(mean - self.to)
+        said = (
+            f"{self.of} was {figure(mean, unit)} in the mean, {figure(error, unit)} from {figure(self.to, unit)}; "
+            f"{self.allowed} are allowed"
+        )
+        return self._outcome(error <= self.at_most, said, error, unit)
