@@ -11,7 +11,7 @@ from drone_sim.run import parameters
 
 PARAMETERS = parameters.load()
 
-KINDS = "twist, pose, push, goto, reset, takeoff, land, home, weather, faults"
+KINDS = "twist, pose, push, goto, object, reset, takeoff, land, home, weather, faults"
 
 
 class DroneLog:

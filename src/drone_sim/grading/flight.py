@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 
 from drone_sim.files import writing
-from drone_sim.grading.flown import Flown
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
 from drone_sim.grading.topics import Topics
 from drone_sim.grading.watching import Witness
 from drone_sim.offline.recording import Recording
-from drone_sim.offline.timeline import Timeline, first_step
-from drone_sim.run.parameters import Parameters
+from drone_sim.offline.timeline import first_step
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
 
@@ -38,23 +36,70 @@ def grade(
     `script` is as in Plan.script_of, `changes` as in Plan.parameters; `table` is a file to write, as `fly --csv` does.
     What goes wrong in the flight is in the result's `error`. Raises OSError for a table that cannot be written.
     """
-    changes = changes or {}
-    named = plan.script_of(script)
-    with _seeded(seed):
-        try:
-            flown, failed = _flown(plan, plan.parameters(seed, None, changes), named)
-        except EXPECTED as error:
-            return ungraded(plan, named, seed, changes, _one_line(error))
+    try:
+        flight = Flight(plan, script, seed, changes)
+    except EXPECTED as error:
+        return ungraded(plan, script, seed, changes, _one_line(error))
+    result = flight.grade()
     if table is not None:
-        write(flown.rows, table)
-    outcomes = tuple(one.judge(flown) for one in plan.criteria)
-    return result_of(plan.name, named, seed, changes, outcomes, flown.end, failed, digest_of(flown.rows))
+        write(flight.rows, table)
+    return result
 
 
-def ungraded(plan: Plan, script: str, seed: int, changes: Mapping[str, Any], why: str) -> Result:
+def ungraded(plan: Plan, script: str | None, seed: int, changes: Mapping[str, Any] | None, why: str) -> Result:
     """Return the result of a flight that has not been flown, or of which nothing is left; `why` is one line."""
     outcomes = tuple(one.missed("nothing was flown") for one in plan.criteria)
-    return result_of(plan.name, script, seed, changes, outcomes, error=why)
+    return result_of(plan.name, plan.script_of(script), seed, changes or {}, outcomes, error=why)
+
+
+class Flight:
+    """A flight that is ready: all is read and built, and no line of a script has run."""
+
+    def __init__(self, plan: Plan, script: str | None = None, seed: int = 0, changes: Mapping[str, Any] | None = None):
+        """Build it; see `grade`. Raises one of EXPECTED."""
+        self._plan, self._seed, self._changes = plan, seed, changes or {}
+        self._script = plan.script_of(script)
+        parameters = plan.parameters(seed, None, changes)
+        self._timeline = plan.timeline_of(parameters)
+        self._steps = first_step(plan.duration, parameters.time_step)
+        topics = Topics(plan.topics_of(parameters))
+        backend = topics if topics.wanted else None
+        self._simulation = Simulation(parameters, script=self._script, backend=backend, started=False)
+        topics.clock = lambda: self._simulation.time
+        self._witness = Witness(plan, self._simulation, topics)
+
+    def grade(self) -> Result:
+        """Fly, once, and return how well."""
+        with _seeded(self._seed):
+            try:
+                failed = _failure(self._fly) or self._failed_scripts()
+            finally:
+                closed = _failure(self._simulation.close)  # cleanup may fail, too
+        plan, wrong, flown = self._plan, failed or closed, self._witness.flown()
+        if flown is None:
+            return ungraded(plan, self._script, self._seed, self._changes, wrong or "nothing was flown")
+        outcomes = tuple(one.judge(flown) for one in plan.criteria)
+        digest = digest_of(flown.rows)
+        return result_of(plan.name, self._script, self._seed, self._changes, outcomes, flown.end, wrong, digest)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The table of what has been flown, (N, 22): see offline.recording.COLUMNS."""
+        return self._witness.rows
+
+    def _fly(self) -> None:
+        self._simulation.load_scripts()
+        self._witness.keep()
+        for step in range(self._steps):
+            self._timeline.apply(step, self._simulation.vehicles)
+            self._simulation.step()
+            self._witness.keep()
+            if self._witness.is_over:
+                return
+
+    def _failed_scripts(self) -> str | None:
+        names = self._simulation.failed_scripts
+        return f"the scripts of {', '.join(names)} failed: the log says why" if names else None
 
 
 def digest_of(rows: np.ndarray) -> str:
@@ -70,33 +115,6 @@ def write(rows: np.ndarray, path: str | Path) -> None:
             recording.write_row(row)
 
 
-def _flown(plan: Plan, parameters: Parameters, script: str) -> tuple[Flown, str | None]:
-    """Fly; return what there is to judge, and what went wrong, in one line. Raises what comes before the first step."""
-    topics = Topics(plan.topics_of(parameters))
-    timeline = plan.timeline_of(parameters)
-    simulation = Simulation(parameters, script=script, backend=topics if topics.wanted else None)
-    topics.clock = lambda: simulation.time
-    try:
-        witness = Witness(plan, simulation, topics)
-        witness.keep()
-        steps = first_step(plan.duration, parameters.time_step)
-        failed = _failure(lambda: _fly(simulation, timeline, steps, witness))
-        failed = failed or _failed_scripts(simulation)
-        flown = witness.flown()
-    finally:
-        closed = _failure(simulation.close)  # cleanup may fail, too
-    return flown, failed or closed
-
-
-def _fly(simulation: Simulation, timeline: Timeline, steps: int, witness: Witness) -> None:
-    for step in range(steps):
-        timeline.apply(step, simulation.vehicles)
-        simulation.step()
-        witness.keep()
-        if witness.is_over:
-            return
-
-
 def _failure(action: Callable[[], None]) -> str | None:
     """Return what went wrong in an action, in one line; None for nothing."""
     try:
@@ -104,11 +122,6 @@ def _failure(action: Callable[[], None]) -> str | None:
     except EXPECTED as error:
         return _one_line(error)
     return None
-
-
-def _failed_scripts(simulation: Simulation) -> str | None:
-    names = simulation.failed_scripts
-    return f"the scripts of {', '.join(names)} failed: the log says why" if names else None
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr, ValidationError
+from pydantic import Field, PlainValidator, PrivateAttr, TypeAdapter, ValidationError
 
 from drone_sim.config.errors import line_of, problems, told
 from drone_sim.config.types import (
@@ -25,7 +25,7 @@ from drone_sim.config.types import (
 )
 from drone_sim.files import yaml_files
 from drone_sim.grading.criteria import AnyCriterion
-from drone_sim.grading.spread import Spread, spread_out
+from drone_sim.grading.spread import Spread, check_objects, spread_out
 from drone_sim.offline import timeline as timelines
 from drone_sim.offline.timeline import Timeline, TimelineError
 from drone_sim.run import parameters as parameters_module
@@ -44,13 +44,24 @@ class PlanError(ValueError):
     """A plan is wrong; one line that names file, line, key, value and what is allowed."""
 
 
+def _config(value: Any) -> Any:
+    if isinstance(value, str):
+        return TypeAdapter(FileName).validate_python(value)
+    if not isinstance(value, dict):
+        raise ValueError("must hold keys of config/drone.yaml, or be the name of a file that does")
+    return value
+
+
+_Config = Annotated[Mapping[str, Any] | str, PlainValidator(_config)]
+
+
 class Plan(Checked):
     """What a plan's file says, checked; made by `read`. It can be pickled."""
 
     name: Name
     title: Label = ""
     scene: FileName = ""
-    config: Mapping[str, Any] | FileName = Field(default_factory=dict)
+    config: _Config = Field(default_factory=dict)
     script: FileName = ""
     vehicle: Label = ""
     duration: Annotated[Finite, Within(1e-3, MAX_DURATION)]  # s
@@ -142,7 +153,7 @@ class Plan(Checked):
 
 
 def _refused(location: Location, why: str) -> ParameterError:
-    return ParameterError(f"parameter {readable_key(location)} = {why}", location)
+    return ParameterError(f"{readable_key(location)} = {why}", location)
 
 
 def _beside(folder: Path, config: Mapping[str, Any]) -> dict[str, Any]:
@@ -166,13 +177,12 @@ def read(path: str | Path) -> Plan:
     plan = _checked(values, Path(path))
     try:
         parameters = plan.parameters()
-        names = [one.name for one in parameters.fleet]
-        _check_vehicle(plan, names)
+        _check_names(plan, parameters)
         plan.timeline_of(parameters)
     except TimelineError as error:
         raise PlanError(str(error)) from None
     except ParameterError as error:
-        raise PlanError(f"{path}: {error}" if not str(error).startswith(str(path)) else str(error)) from None
+        raise PlanError(_placed(error, path)) from None
     return plan
 
 
@@ -188,8 +198,21 @@ def _checked(values: dict[str, Any], path: Path) -> Plan:
     return plan
 
 
-def _check_vehicle(plan: Plan, names: list[str]) -> None:
+def _check_names(plan: Plan, parameters: Parameters) -> None:
+    """Raise ParameterError for a vehicle or an object that is not there."""
+    names = [one.name for one in parameters.fleet]
     if plan.vehicle and plan.vehicle not in names:
-        line = yaml_files.lines(plan.path).find(("vehicle",)).line
-        said = f"no such vehicle; {near_names(plan.vehicle, names)}"
-        raise PlanError(f"{plan.path}: line {line}: vehicle = {shown(plan.vehicle)}: {said}")
+        raise _refused(("vehicle",), f"{shown(plan.vehicle)}: no such vehicle; {near_names(plan.vehicle, names)}")
+    check_objects(parameters, plan.spread)
+
+
+def _placed(error: ParameterError, path: str | Path) -> str:
+    """Return what is wrong, with the plan's file and, where the wrong key stands in it, the line."""
+    said = str(error).removeprefix("parameter ")
+    lines = yaml_files.lines(path)
+    for above in ((), ("config",)):  # what stands under `config` is called as in config/drone.yaml
+        location = (*above, *error.location)
+        depth, line = lines.find(location)
+        if error.location and depth == len(location):
+            return f"{path}: line {line}: {'/'.join((*above, said))}"
+    return f"{path}: {said}"

@@ -11,11 +11,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from drone_sim.config.types import Checked, Finite, Within
+from drone_sim.config.types import Checked, Finite, Label, ParameterError, Within
 from drone_sim.run.parameters import Parameters
+from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.vehicles.parameters import VehicleParameters
+from drone_sim.wording import near_names, shown
 
 _Metres = Annotated[Finite, Within(0, 1000)]
+_Width = Annotated[tuple[_Metres, _Metres, _Metres], Field(description="3 numbers, [x, y, z] in m")]
 _Speed = Annotated[Finite, Within(0, 50)]
 _WINDIEST = 100.0  # m/s, as config/drone.yaml allows
 _SEEDS = 2**63
@@ -24,8 +27,9 @@ _SEEDS = 2**63
 class Spread(Checked):
     """Half the width of a uniform distribution about what is given; 0, or left out: as it is given."""
 
-    position: Annotated[tuple[_Metres, _Metres, _Metres], Field(description="3 numbers, [x, y, z] in m")] = (0, 0, 0)
+    position: _Width = (0, 0, 0)
     yaw: Annotated[Finite, Within(0, 3.15)] = 0.0  # rad
+    objects: Annotated[dict[Label, _Width], Field(max_length=1000)] = Field(default_factory=dict)
     wind: Annotated[tuple[_Speed, _Speed, _Speed], Field(description="3 numbers, [x, y, z] in m/s")] = (0, 0, 0)
 
 
@@ -37,7 +41,28 @@ def spread_out(parameters: Parameters, spread: Spread, seed: int) -> Parameters:
     gusts = weather.gusts.model_copy(update={"seed": _seed(seed, "gusts", weather.gusts.seed)})
     wind = np.clip(_about(weather.wind, spread.wind, seed, "wind"), -_WINDIEST, _WINDIEST)
     changed = weather.model_copy(update={"gusts": gusts, "wind": tuple(wind.tolist())})
-    return parameters.varied(changed, tuple(_vehicle(one, spread, seed) for one in parameters.fleet))
+    fleet = tuple(_vehicle(one, spread, seed) for one in parameters.fleet)
+    return parameters.varied(changed, _scene(parameters.scene, spread, seed), fleet)
+
+
+def check_objects(parameters: Parameters, spread: Spread) -> None:
+    """Raise ParameterError for an object that the scene has not."""
+    known = [one.name for one in parameters.scene.objects if one.name]
+    for name in spread.objects:
+        if name not in known:
+            said = f"no such object of the scene; {near_names(name, known)}" if known else "the scene has none"
+            raise ParameterError(f"spread/objects/{shown(name)}: {said}", ("spread", "objects", name))
+
+
+def _scene(scene: SceneParameters, spread: Spread, seed: int) -> SceneParameters:
+    if not spread.objects:
+        return scene
+    objects = []
+    for one in scene.objects:
+        width = spread.objects.get(one.name)
+        place = None if width is None else _about(one.position, width, seed, f"objects/{one.name}").tolist()
+        objects.append(one if place is None else one.model_copy(update={"position": tuple(place)}))
+    return scene.model_copy(update={"objects": objects})
 
 
 def _vehicle(own: VehicleParameters, spread: Spread, seed: int) -> VehicleParameters:

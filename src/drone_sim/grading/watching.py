@@ -11,7 +11,7 @@ from drone_sim.grading.flown import Flown, Said, Touch
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.topics import Topics
 from drone_sim.mechanics.frames import position, to_quaternion
-from drone_sim.offline.recording import Recording
+from drone_sim.offline.recording import COLUMNS, Recording
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import STOP
 
@@ -26,6 +26,7 @@ class Witness:
         own = plan.vehicle_of(simulation.parameters)
         self._vehicle = simulation.vehicles[own]
         self._recording = Recording(vehicle=own)
+        self._contacts, self._body = simulation.world.contacts, self._vehicle.body.number  # asked ten times a step
         self._touches: list[Touch] = []
         self._touching: set[str] = set()  # in the step that is under way
         self._said: dict[str, list[Said]] = {}
@@ -53,9 +54,16 @@ class Witness:
         for keep in self._each_step:
             keep()
 
-    def flown(self) -> Flown:
-        """Return the flight so far."""
-        rows = np.array(self._recording.rows)
+    @property
+    def rows(self) -> np.ndarray:
+        """The rows so far, (N, 22)."""
+        return np.array(self._recording.rows).reshape(-1, len(COLUMNS))
+
+    def flown(self) -> Flown | None:
+        """Return the flight so far; None before there is any."""
+        rows = self.rows
+        if not len(rows):
+            return None
         return Flown(
             rows,
             bool(rows[-1, 0] >= self._duration - 1e-9),
@@ -74,8 +82,9 @@ class Witness:
 
     def _look(self, count: int) -> None:
         """See after a sub-step what the vehicle touches: a blow may be over before the step is."""
-        if count:
-            self._touching.update(self._vehicle.touched())
+        if count and (touches := self._contacts(self._body)):
+            names = self._simulation.shared.names
+            self._touching.update(names.get(one.body, ("", ""))[0] for one in touches)
 
     def _keep_touches(self) -> None:
         if self._touching:

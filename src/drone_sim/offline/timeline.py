@@ -8,6 +8,7 @@
     - {at: 11.0, faults: {propellers: [1, 1, 0, 1]}}                       # and of `faults`; the others stay
     - {at: 12.0, land: {}}                                                 # or takeoff, reset, home: docs/states.md
     - {at: 20.0, goto: {position: [1, 0, 2], rpy: [0, 0, 1.57]}}           # m, rad
+    - {at: 30.0, object: {name: Ball, position: [1, 0, 2], rpy: [0, 0, 0]}} # of the scene; m, rad, world
 
 `at` is in seconds of simulated time, in any order; three numbers that are left out are zeros.
 """
@@ -21,12 +22,13 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from drone_sim.config.errors import told
-from drone_sim.config.types import Finite, Location, Within, numeric, readable_key
+from drone_sim.config.types import Finite, Label, Location, Within, numeric, readable_key
 from drone_sim.files import yaml_files
 from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.frames import Vector, from_rpy, to_quaternion
 from drone_sim.mechanics.state import Pose, Twist
 from drone_sim.offline.changes import CHANGES, Change, read_change
+from drone_sim.offline.moves import ObjectMove
 from drone_sim.run.parameters import Parameters
 from drone_sim.vehicles import checks
 from drone_sim.vehicles.parameters import EquipmentParameters, VehicleParameters
@@ -47,7 +49,7 @@ class Entry(NamedTuple):
     """What happens to a vehicle ('' is the first) at `at` seconds of simulated time."""
 
     at: float
-    action: Twist | Pose | Push | Change | Request
+    action: Twist | Pose | Push | Change | Request | ObjectMove
     vehicle: str = ""
 
     @property
@@ -66,6 +68,8 @@ class Entry(NamedTuple):
             vehicle.push(*self.action)
         elif isinstance(self.action, Request):
             vehicle.ask(*self.action)
+        elif isinstance(self.action, ObjectMove):
+            self.action.apply(vehicle.objects)
         else:
             self.action.apply(vehicle)
 
@@ -175,6 +179,15 @@ class _Pose(_Model):
         return checks.pose(self.position, to_quaternion(from_rpy(_ZERO, self.rpy)), parameters)
 
 
+class _Object(_Model):
+    name: Label
+    position: _Vector
+    rpy: _Vector | None = None
+
+    def checked(self, _parameters: EquipmentParameters) -> ObjectMove:
+        return ObjectMove(self.name, self.position, self.rpy)
+
+
 class _Goto(_Pose):
     def checked(self, parameters: EquipmentParameters) -> Request:  # type: ignore[override]
         return Request("goto", super().checked(parameters))
@@ -200,7 +213,7 @@ class _Push(_Model):
 
 
 _KINDS: dict[str, type[Any]] = {
-    **{"twist": _Twist, "pose": _Pose, "push": _Push, "goto": _Goto},
+    **{"twist": _Twist, "pose": _Pose, "push": _Push, "goto": _Goto, "object": _Object},
     **{topic: _asking(topic) for topic, kind in REQUESTS.items() if kind == EMPTY},
 }
 _ALL_KINDS = (*_KINDS, *CHANGES)
@@ -272,7 +285,7 @@ def _one_line(error: Any, model: type[BaseModel], above: Location) -> str:
     if error["type"] == "extra_forbidden":
         return f"{key}: unknown key; {f'known are {known}' if known else 'it takes none'}"
     if error["type"] == "missing":
-        return f"{key}: missing; it is a number of seconds"
+        return f"{key}: missing{'; it is a number of seconds' if error['loc'][-1] in ('at', 'duration') else ''}"
     if error["type"] == "model_type":
         return f"{key} = {shown(error['input'])}: must be a mapping of {known or 'nothing'}"
     message = error["msg"].replace("Value error, ", "")

@@ -120,12 +120,14 @@ class Parameters(EquipmentParameters):
         """Return the parameters with other `vehicles` given beside the scene file's. Raises ParameterError."""
         return _in_scene({**self._given, "vehicles": entries}, self.scene_file)
 
-    def varied(self, weather: WeatherParameters, fleet: tuple[VehicleParameters, ...]) -> Parameters:
-        """Return the parameters with another weather and another fleet of the same vehicles, for one simulation.
+    def varied(
+        self, weather: WeatherParameters, scene: SceneParameters, fleet: tuple[VehicleParameters, ...]
+    ) -> Parameters:
+        """Return the parameters with other weather and places, of the same objects and vehicles, for one simulation.
 
         They are checked already; a scene file that is read anew forgets them.
         """
-        made = self.model_copy(update={"weather": weather})
+        made = self.model_copy(update={"weather": weather, "scene": scene})
         made._fleet = fleet
         return made
 
@@ -241,7 +243,7 @@ def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str
         parameters = Parameters.model_validate(merged({**given, "scene_file": file}, scene))
     except ValidationError as error:
         found = [one for one in problems(error, Parameters) if _is_given(one, given, scene)]
-        raise ParameterError(_told(found, named, bool(scene))) from None
+        raise ParameterError(_told(found, named, bool(scene)), found[0].location if found else ()) from None
     parameters._given = given
     parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
     return parameters

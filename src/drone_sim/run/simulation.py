@@ -84,7 +84,7 @@ class Simulation:
         self._take(self._built(parameters, world))
         try:
             if started:
-                self._run()
+                self.load_scripts()
         except BaseException:
             try:
                 self.close()
@@ -226,10 +226,10 @@ class Simulation:
         self.stop()
         self._rebuild(self.parameters.in_scene(self.parameters.scene_file if scene_file is None else scene_file))
         memory.give_back()
-        self._run()
+        self.load_scripts()
 
-    def _run(self) -> None:
-        """Load the scripts and run their init."""
+    def load_scripts(self) -> None:
+        """Load the scripts and run their init, of a simulation that was built without. Raises ScriptError."""
         self.running = True
         self._load(self._setting.cast.all())
         self._changed_scripts()

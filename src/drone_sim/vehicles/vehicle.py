@@ -198,10 +198,6 @@ class Vehicle(SharedView):
         sensor = self.objects.matrix(self.objects.handle(camera.object + self.suffix))
         return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
 
-    def touched(self) -> list[str]:
-        """Return what it touched in the last sub-step, by the names that contacts have."""
-        return [one.what for one in self.instruments.carrier.contacts()]
-
     def masses(self) -> dict[str, float]:
         """Return the mass (kg) of each of its shapes, by object name; they are one body."""
         return self.propulsion.masses()

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from drone_sim.config.types import Coordinate, Label
 from drone_sim.grading.criteria.criterion import Bound, Criterion, Missed, figure
@@ -16,7 +16,18 @@ from drone_sim.vehicles.flight_state import CRASHED, LANDED
 
 _AT_REST = 0.1  # m/s
 _SETTLING = 0.5  # s; whoever is longer off the ground between two touches flies
-_Where = Annotated[tuple[Coordinate, Coordinate], Field(description="2 numbers, [x, y] in m, or the name of an object")]
+
+
+def _place(value: Any) -> Any:
+    if isinstance(value, str):
+        return TypeAdapter(Label).validate_python(value)
+    try:
+        return TypeAdapter(tuple[Coordinate, Coordinate]).validate_python(value)
+    except ValidationError:
+        raise ValueError("must be 2 numbers, [x, y] in m, or the name of an object or vehicle") from None
+
+
+_Place = Annotated[tuple[float, float] | str | None, PlainValidator(_place)]
 
 
 class Landed(Criterion):
@@ -27,7 +38,7 @@ class Landed(Criterion):
     """
 
     kind: Literal["landed"]
-    at: _Where | Label | None = None
+    at: _Place = None
     within: Bound = 0.3
     softly: Bound | None = None
     on: Label = ""

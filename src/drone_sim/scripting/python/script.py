@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import copy
+import functools
 import inspect
 import reprlib
 import traceback
@@ -222,6 +223,7 @@ class PythonScript:
         return ([(self._path, 0)] + [place for place in frames if place[0] in self._helpers.files])[-1]
 
 
+@functools.lru_cache(maxsize=32)  # the same few scripts fly again and again
 def _compiled(source: bytes, path: str) -> CodeType:
     return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
 
