@@ -5,7 +5,7 @@ import random
 
 # ruff: noqa: F821 -- `sim` is there when a child script runs
 
-FAR, APART = (0.9, 1.2), (1.2, math.pi)  # m from the origin; rad between the two
+FAR, APART = (0.7, 1.0), (1.2, math.pi)  # m from the origin; rad between the two
 
 
 def sysCall_init():

@@ -12,7 +12,7 @@ from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 
 TAG = 7
 EVERY = 4  # steps from one picture to the next
 FOV = math.radians(60)
-CLIMB, HIGHEST = 0.5, 2.5  # m/s, m
+CLIMB, HIGHEST = 0.5, 3.0  # m/s, m
 APPROACH, FASTEST = 0.5, 0.6  # 1/s, m/s
 OVER, SLOW = 0.08, 0.08  # m, m/s: over the pad, and near to standing
 DESCENT = 0.25  # m/s
