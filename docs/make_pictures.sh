@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots remote weather rviz)
+sections=(diagrams cameras plots remote weather tasks rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -30,6 +30,9 @@ remote() { "$python" docs/remote/without_ros.py --plot "$pictures/remote_circle.
 
 # The flights of docs/weather.md, beside their theory; prints the numbers that the page quotes.
 weather() { "$python" docs/draw_weather.py "$pictures"; }
+
+# The textures of tasks/, and a picture of each task in its folder.
+tasks() { "$python" docs/make_textures.py && "$python" docs/take_task_pictures.py; }
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.
 rviz() { docs/take_rviz_pictures.sh "$pictures"; }

@@ -15,7 +15,7 @@ from drone_sim.grading import tasks
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.run.simulation import Simulation
 
-WIDTH, HEIGHT, FOV = 640, 360, 1.05  # px, px, rad
+WIDTH, HEIGHT, FOV = 480, 270, 1.05  # px, px, rad
 FRAME = 4  # px, white around what a drone's camera sees
 
 
@@ -31,12 +31,12 @@ class View(NamedTuple):
 VIEWS = {
     "hover": View(6, (-1.6, -0.9, 1.3), (0, 0, 0.7)),
     "steps": View(2.0, (-1.0, -1.9, 2.0), (0.9, 0.1, 1.4)),
-    "stability": View(14.3, (-1.4, -1.2, 5.4), (0, 0, 5)),
+    "stability": View(14.3, (8.7, -1.1, 5.3), (10, 0, 4.9)),
     "gates": View(9, (-3.5, -5, 6), (4.2, 3, 0.8)),
     "line": View(9, (-1.5, -4.8, 3.4), (0, 0, 0), "floor"),
-    "pad": View(7, (-1.4, -2.2, 2.6), (0.8, 0, 0.7), "floor"),
+    "pad": View(7, (-2.4, -2.4, 3.2), (0, 0, 0.7), "floor"),
     "chase": View(9, (-2.4, -1.6, 2.6), (2.8, -1.6, 0.9), "front"),
-    "count": View(6, (-3.4, -2.4, 3.4), (0.6, 0.2, 0), "front"),
+    "count": View(6, (-3.9, -2.9, 4.2), (0.2, 0.3, 0), "front"),
     "formation": View(9, (1.6, -3.4, 2.6), (3.6, 0, 0.9)),
 }
 
@@ -57,7 +57,8 @@ def picture(plan, view):
     for step in range(round(view.at / parameters.time_step)):
         timeline.apply(step, simulation.vehicles)
         simulation.step()
-    simulation.drone.blades.show()
+    for vehicle in simulation.vehicles.values():
+        vehicle.propulsion.blades.show()
     intrinsics = Intrinsics(WIDTH, HEIGHT, FOV, 0.02, 100.0)
     drawn = simulation.vision.picture("color", intrinsics, looking(view.eye, view.target)).copy()
     if view.camera:

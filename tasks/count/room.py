@@ -6,7 +6,7 @@ import random
 # ruff: noqa: F821 -- `sim` and `self` are there when a child script runs
 
 PLACES = [(2 * math.pi * number / 11, 2.3 + 0.4 * (number % 2)) for number in range(11)]  # rad, m from the middle
-RADIUS, AWAY = 0.15, -5.0  # m: of a ball; the height of those that are not there
+RADIUS, AWAY = 0.15, (40, 40, -5)  # m: of a ball; where those are that are not there
 RED, OTHERS = [f"Red{number}" for number in range(1, 8)], ["Blue", "Green", "Yellow", "Violet"]
 
 
@@ -19,7 +19,7 @@ def sysCall_init():
         angle, far = places.pop()
         put(name, far * math.cos(angle), far * math.sin(angle), RADIUS)
     for name in RED[self.there :]:
-        put(name, 0, 0, AWAY)
+        put(name, *AWAY)
 
 
 def put(name, x, y, z):

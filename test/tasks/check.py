@@ -13,6 +13,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import broken
+import starts
 
 from drone_sim.grading import flight, tasks
 from drone_sim.grading import plan as plans
@@ -21,24 +22,25 @@ SCRIPTS = Path(__file__).resolve().parent / "scripts"
 NOTHING, HOVERS, BUILT_IN = str(SCRIPTS / "nothing.py"), "tutorial", ""
 SEEDS, MANY_SEEDS = 20, 100
 FLOWN_BY_COMMANDS = ("hover", "steps", "stability")  # the built-in script passes these
+EXTRAS = ("broken", "starts")
 ABOUT_HOVERING = ("steps", "stability")  # and so does the tutorial's controller, which does nothing unasked
 
 
 def main():
     """Fly, print, and return 0 where everything is as promised."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("tasks", nargs="*", help="names of tasks (default: all, and the broken scripts)")
+    parser.add_argument("tasks", nargs="*", help="of a task, or broken, starts (default: all of it)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     options = parser.parse_args()
-    unknown = [name for name in options.tasks if name not in tasks.names()]
+    known = [*tasks.names(), *EXTRAS]
+    unknown = [name for name in options.tasks if name not in known]
     if unknown:
-        parser.error(f"no task {unknown[0]}; there are {', '.join(tasks.names())}")
+        parser.error(f"no task {unknown[0]}; there are {', '.join(known)}")
     wrong = []
     with multiprocessing.get_context("spawn").Pool(options.jobs) as pool, tempfile.TemporaryDirectory() as folder:
-        for name in options.tasks or tasks.names():
-            wrong += check_task(pool, name)
-        if not options.tasks:
-            wrong += check_broken(pool, Path(folder))
+        extras = {"broken": lambda: check_broken(pool, Path(folder)), "starts": lambda: check_starts(pool)}
+        for name in options.tasks or known:
+            wrong += extras[name]() if name in extras else check_task(pool, name)
     for line in wrong:
         print(f"WRONG: {line}")
     print("all as promised" if not wrong else f"{len(wrong)} not as promised")
@@ -70,7 +72,7 @@ def check_broken(pool, folder):
     """Fly scripts that lack something, and see that they fail what they should; return what is not as promised."""
     wrong = []
     for case in broken.cases(folder):
-        results = fly(pool, case.task, case.script, SEEDS)
+        results = fly(pool, case.task, case.script, SEEDS, case.changes)
         failed = {name for one in results for name in failures(one)}
         always = {name for name in failed if all(name in failures(one) for one in results)}
         print(f"{case.task}: {case.what} fails {', '.join(sorted(always)) or 'nothing'}")
@@ -80,18 +82,32 @@ def check_broken(pool, folder):
     return wrong
 
 
+def check_starts(pool):
+    """Displace the drone in many ways; return what is not as the tutorial's law is known to do it.
+
+    Measured for the bare law: 138 of 180 displacements return, depending on the last digits; with the guards, all.
+    """
+    wrong = []
+    for what, changes, least, most in (("bare", broken.BARE, 133, 143), ("built-in", {}, 180, 180)):
+        returned = sum(pool.starmap(starts.returns, [(start, changes) for start in starts.ALL], chunksize=10))
+        print(f"the {what} law returns to rest from {returned} of {len(starts.ALL)} displacements")
+        if not least <= returned <= most:
+            wrong.append(f"the {what} law returns from {returned} displacements, not from {least} to {most}")
+    return wrong
+
+
 # ---- flights
 
 
-def fly(pool, task, script, seeds):
+def fly(pool, task, script, seeds, changes=None):
     """Return a result for each seed."""
-    return pool.starmap(one_flight, [(task, script, seed) for seed in range(seeds)], chunksize=5)
+    return pool.starmap(one_flight, [(task, script, seed, changes) for seed in range(seeds)], chunksize=5)
 
 
-def one_flight(task, script, seed):
+def one_flight(task, script, seed, changes):
     """Return how a flight came out."""
     logging.disable(logging.WARNING)
-    return flight.grade(read(task), script, seed)
+    return flight.grade(read(task), script, seed, changes)
 
 
 def read(task, known={}):  # noqa: B006 -- a process reads a plan once
