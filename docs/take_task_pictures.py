@@ -64,8 +64,8 @@ def picture(plan, view):
     if view.camera:
         small = simulation.vehicles[plan.vehicle_of(parameters)].cameras[view.camera].take()
         rows, columns = small.shape[:2]
-        drawn[-rows - 2 * FRAME :, -columns - 2 * FRAME :] = 255
-        drawn[-rows - FRAME : -FRAME, -columns - FRAME : -FRAME] = small
+        drawn[: rows + 2 * FRAME, : columns + 2 * FRAME] = 255
+        drawn[FRAME : FRAME + rows, FRAME : FRAME + columns] = small
     simulation.close()
     return drawn
 

@@ -42,7 +42,8 @@ def _stages(folder):
         known = min(number, len(LOOPS) - 1)
         source = (STAGES / f"{name}.py").read_text(encoding="utf-8")
         # Its plan would fly it about: the loops alone are tested here.
-        script = _written(folder, name, source.replace("def flight_plan(t):", "def flight_plan(_):\n    return [0] * 6"))
+        source = source.replace("def flight_plan(t):", "def flight_plan(_):\n    return [0] * 6")
+        script = _written(folder, name, source)
         yield Case("stability", f"stage {name}", script, (LOOPS[known],), LOOPS[:known])
 
 

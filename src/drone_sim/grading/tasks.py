@@ -29,10 +29,17 @@ def find(name: str) -> Path:
     given = Path(name)
     if given.suffix.lower() in (".yaml", ".yml"):
         return given
-    if (given / _PLAN).is_file():
+    if name and _is_file(given / _PLAN):
         return given / _PLAN
     known = names()
     if name in known:
         return folder() / name / _PLAN
     said = f"plan {shown(name)}: no file.yaml, and no task of that name"
     raise PlanError(f"{said}; {near_names(name, known)}")
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long a name, a NUL in it
+        return False
