@@ -24,7 +24,7 @@ def sysCall_init():
     tutorial.sysCall_init()
     self.Pangle = 0.6  # twice the tutorial's: it swings less (its stage 4)
     self.camera = sim.getObjectHandle("FloorVision")
-    self.detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50))
+    self.find_tags = finder()
     self.pad = None  # x, y (m, world), once it has been seen
     self.still = 0.0  # s
     self.work = search
@@ -42,11 +42,19 @@ def sysCall_sensing():
         self.thrust = 0
 
 
+def finder():
+    """Return what finds tags in a grey picture: their corners, their numbers, and what is none."""
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    if hasattr(cv2.aruco, "ArucoDetector"):
+        return cv2.aruco.ArucoDetector(dictionary).detectMarkers
+    return lambda grey: cv2.aruco.detectMarkers(grey, dictionary)  # OpenCV 4.6, as Debian 12 has it
+
+
 def look():
     """Return where the pad is (x, y in m, world), None where it is not seen."""
     data, width, height = sim.getVisionSensorCharImage(self.camera)
     picture = np.frombuffer(data, np.uint8).reshape(height, width, 3)[::-1]  # V-REP's begin with the bottom row
-    corners, tags, _ = self.detector.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY))
+    corners, tags, _ = self.find_tags(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY))
     for quad, tag in zip(corners, [] if tags is None else tags.ravel()):
         if tag == TAG:
             return floor_point(*quad.reshape(4, 2).mean(axis=0), width, height)
