@@ -53,9 +53,6 @@ ABSENT: dict[str, str] = {
     ),
     r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
     r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
-    r"simROS\.(?:advertiseService|shutdownServiceServer|serviceServerTreat\w+)": (
-        "a child script offers no services: subscribe to a topic"
-    ),
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
     r"sim\.followPath|sim\.\w*PathTarget\w*": "there is no trajectory generator: set the target in every step",
     r"sim\.(?:sendData|receiveData)": "there is no wireless transmission: use signals or tubes",
