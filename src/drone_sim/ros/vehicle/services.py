@@ -51,7 +51,7 @@ def serve(name: str, kind: str, ask: Ask) -> Callable[[], None]:
     Raises ValueError where the type is not installed, or the name is none, or is this node's already.
     """
     found = _service_class(kind)
-    if not is_legal_name(name):
+    if not is_legal_name(name) or name.endswith("/"):
         raise ValueError(f"'{name:.80}' is no name of a service: letters, digits, _ and / are allowed")
 
     def made(fields: Any) -> genpy.Message:

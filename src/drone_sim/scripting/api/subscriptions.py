@@ -127,7 +127,7 @@ class Subscriptions:
                 receiver.callback(callback, message)
 
     def take(self) -> list[tuple[Callback, Any]]:
-        """Return the messages and ServiceRequests that wait, with whom each is for; of each subscription oldest first."""
+        """Return the messages and requests that wait, and whom each is for; of each subscription the oldest first."""
         waiting: list[tuple[Callback, Any]] = []
         for subscription in self._by_handle.values():  # which no other thread changes
             while subscription.messages:
