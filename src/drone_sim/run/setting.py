@@ -40,6 +40,7 @@ class Setting:
         try:
             self._empty_tree()
             self.scene = Scene(parameters.scene, self.world, self._look, shared.names)
+            shared.nearest = self.scene.nearest
             for one in parameters.fleet:
                 self._put(one)
             self._name_objects()

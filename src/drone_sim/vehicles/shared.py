@@ -12,6 +12,7 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.control import Control
 from drone_sim.scripting.api.custom_values import CustomData
+from drone_sim.scripting.api.distances import MeasureWay, no_way
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
@@ -48,4 +49,5 @@ class Shared:
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
+    nearest: MeasureWay = no_way  # measures between objects
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are

@@ -97,8 +97,9 @@ class Objects:
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
         """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame.
 
-        sim.handleflag_axis may be added to the handle, as V-REP's manual recommends. Without it V-REP gives the Euler
-        angles of the turn in one step, divided by the step: here it is the angular velocity, too.
+        sim.handleflag_axis may be added to the handle, and changes nothing. V-REP takes the means over the last step,
+        and without the flag the Euler angles of the turn in the frame that the object had before it, over the step.
+        Here both are the angular velocity at the end of the step: see "Where this differs" in docs/scripts.md.
         """
         if handle >= AXIS:
             handle = bare(handle)
