@@ -283,6 +283,28 @@ def test_one_that_begins_tilted_and_without_a_script(imported):
     assert "Quadricopter: has no child script" in imported.said
 
 
+def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
+    """A body that lies on its side has a base that stands upright; so does the target that its scripts follow."""
+    root, base, _, *others = quadricopter()
+    upright = (np.cos(0.75), 0, np.sin(0.75), 0)
+    side = shape(
+        0,
+        "Quadricopter",
+        mesh(size=(0.3, 0.02, 0.02)),
+        at=(0, 0, 1),
+        dynamic=True,
+        wrapper=weight(0.12),
+        turned=(np.cos(0.75), 0, -np.sin(0.75), 0),
+    )
+    base = scene_object("DMY", 1, "Quadricopter_base", 0, (0, 0, 0.1), turned=upright)
+    imported(side, base, *others)
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    tree = simulation.shared.objects
+    found, wanted = (tree.matrix(tree.handle(f"Quadricopter_{name}")) for name in ("target", "base"))
+    simulation.close()
+    assert np.allclose(found, wanted, atol=1e-5) and wanted[10] == pytest.approx(1.0, abs=1e-5)
+
+
 # ---- in one step, and what goes wrong
 
 

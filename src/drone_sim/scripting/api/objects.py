@@ -49,9 +49,7 @@ class Objects:
     def setObjectPosition(self, handle: Handle, relativeTo: Handle, position: ThreeNumbers = ()) -> None:
         """Move an object: (handle, relativeTo, position), or (handle, position, relativeTo) as in 4.x."""
         frame, place = _frame_and_values(relativeTo, position, 3)
-        m0, m1, m2, _, m4, m5, m6, _, m8, m9, m10, _ = self._objects.matrix(handle, frame)
-        x, y, z = place
-        self._objects.set_matrix(handle, frame, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
+        self._objects.set_position(handle, frame, place)
 
     def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the Euler angles of an object."""
