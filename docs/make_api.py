@@ -37,7 +37,8 @@ where it is read; but `if simROS2 then` asks for a plugin, and is answered with 
 
 - Positions are in m, angles in rad, forces in N. Orientations are Euler angles (alpha, beta, gamma; R = Rx Ry Rz) or
   quaternions (x, y, z, w), matrices 12 numbers, poses 7. Velocities are in the world frame. A relative name of a topic
-  or parameter stands in the drone's namespace: `pose` is `/drone/pose`.
+  or parameter stands in the drone's namespace: `pose` is `/drone/pose`. Both differ from CoppeliaSim's in part:
+  [scripts.md](scripts.md#where-this-differs).
 - A field of the type uint8[], such as a picture's, arrives as a string, and goes as a string or a table:
   `string.byte(data, 1)` is its first byte.
 - `sim.` and a constant's name, or `sim_` and the name: both have CoppeliaSim's value (simConst.h).

@@ -30,6 +30,10 @@ def sysCall_init():
     self.steps = 0
     self.out = simROS.advertise('/script/steps', 'std_msgs/Float64')
     simROS.subscribe('/script/bump', 'std_msgs/Float64', 'on_bump')
+    simROS.advertiseService('/script/steps', 'std_srvs/SetBool', 'on_asked')
+
+def on_asked(request):
+    return {'success': request.data, 'message': str(self.steps)}
 
 def on_bump(msg):
     self.steps += msg.data
@@ -111,6 +115,17 @@ class Toolbar(unittest.TestCase):
         self.assertEqual(self.call("stop"), "is stopped already")
         self.assertEqual(self.call("start"), "started")
         self.odometry.wait_for(lambda o: o.pose.pose.position.z < 899)
+
+    def test_a_service_that_the_script_offers(self):
+        ask = rospy.ServiceProxy("/script/steps", SetBool)
+        self.assertTrue(float(ask(True).message) <= float(ask(True).message))
+        self.assertFalse(ask(False).success)
+        waiting = threading.Timer(0.1, lambda: self.call("stop"))
+        self.pause(True)
+        waiting.start()
+        with self.assertRaisesRegex(rospy.ServiceException, "the script ended before it answered"):
+            ask(True)
+        waiting.join()
 
     def test_pause_and_single_steps(self):
         self.call("step", expected=False)

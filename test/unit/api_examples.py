@@ -78,6 +78,15 @@ SIM: dict[str, list[Example]] = {
         Example("REFUSED(NAME, BASE)", ["only those can be removed"]),
     ],
     "removeObjects": [Example("NAME({sim.createDummy(0.01, {1, 0, 0}), sim.createDummy(0.02)})", [1])],
+    "removeModel": [
+        Example("NAME(sim.createDummy(0.01))", [1]),
+        Example("REFUSED(NAME, BASE)", ["only those can be removed"]),
+    ],
+    "checkDistance": [
+        Example("NAME(FLOOR, DRONE, 0.5)", [0, near(0, 0, 0, 0, 0, 0, 0), [-1, -1]]),
+        Example("REFUSED(NAME, DRONE, BASE)", ["'Drone' and 'Quadricopter_base' are parts of one rigid body"]),
+    ],
+    "checkCollision": [Example("NAME(DRONE, sim.handle_all)", [0, [-1, -1]])],
     "getObjectUid": [Example("NAME(BASE) == BASE", [True])],
     # ---- where objects are
     "setObjectPosition": [Example("NAME(TARGET, -1, {1,2,3})", []), Example("NAME(TARGET, {4,5,6}, -1)", [])],

@@ -14,6 +14,15 @@ ROS: dict[str, list[Example]] = {
     "imageTransportAdvertise": [Example("NAME('image')", [3])],
     "imageTransportPublish": [Example("NAME(3, '123456', 1, 2, 'camera')", [])],
     "imageTransportShutdownPublisher": [Example("NAME(3)", [])],
+    "advertiseService": [
+        Example("NAME('serve', 'std_srvs/Trigger', 'served')", [4]),
+        Example(
+            "REFUSED(NAME, 'serve', 'std_srvs/Trigger', 'served')",
+            ["this script offers the service /drone/serve already"],
+        ),
+    ],
+    "serviceServerTreatUInt8ArrayAsString": [Example("NAME(4)", [])],
+    "shutdownServiceServer": [Example("NAME(4)", [])],
     "getTime": [Example("NAME()", [0])],
     "sendTransform": [Example("NAME(MESSAGE)", [])],
     "sendTransforms": [Example("NAME({MESSAGE})", [])],

@@ -103,7 +103,7 @@ def _simulation(tmp_path_factory):
 @pytest.fixture(name="modules")
 def _modules(simulation):
     drone = simulation.drone
-    weights = {"masses": drone.masses, "inertias": drone.inertias}
+    weights = {"masses": drone.masses, "inertias": drone.inertias, "nearest": simulation.shared.nearest}
     around = Surroundings(lambda: 0.0, 0.05, PICTURES, planes={"TrackCam": (1.0, 5.0)}, **weights)
     return {
         "sim": make_sim(drone, around),

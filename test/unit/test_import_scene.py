@@ -2,6 +2,7 @@
 
 import logging
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -283,6 +284,28 @@ def test_one_that_begins_tilted_and_without_a_script(imported):
     assert "Quadricopter: has no child script" in imported.said
 
 
+def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
+    """A body that lies on its side has a base that stands upright; so does the target that its scripts follow."""
+    _root, base, _, *others = quadricopter()
+    upright = (np.cos(0.75), 0, np.sin(0.75), 0)
+    side = shape(
+        0,
+        "Quadricopter",
+        mesh(size=(0.3, 0.02, 0.02)),
+        at=(0, 0, 1),
+        dynamic=True,
+        wrapper=weight(0.12),
+        turned=(np.cos(0.75), 0, -np.sin(0.75), 0),
+    )
+    base = scene_object("DMY", 1, "Quadricopter_base", 0, (0, 0, 0.1), turned=upright)
+    imported(side, base, *others)
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
+    tree = simulation.shared.objects
+    found, wanted = (tree.matrix(tree.handle(f"Quadricopter_{name}")) for name in ("target", "base"))
+    simulation.close()
+    assert np.allclose(found, wanted, atol=1e-5) and wanted[10] == pytest.approx(1.0, abs=1e-5)
+
+
 # ---- in one step, and what goes wrong
 
 
@@ -294,6 +317,42 @@ def test_a_file_of_v_reps_is_a_scene(tmp_path, monkeypatch, caplog):
     assert first.scene_file == second.scene_file and first.scene_file.startswith(str(tmp_path / "cache"))
     assert [one.name for one in first.fleet] == ["drone"]
     assert caplog.messages == [caplog.messages[0]] * 2 and "see IMPORT.txt" in caplog.messages[0]
+
+
+ASKS = "require 'scripts/fly'\ndofile('own.lua')\nrequire('../out')\nrequire 'linked'\nrequire 'nothing'\n"
+
+
+@pytest.fixture(name="beside")
+def _beside(tmp_path, monkeypatch):
+    """A folder with a scene, and what its script asks for; others lie around it."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "repo" / "scripts").mkdir(parents=True)
+    for name, content in {
+        "repo/scripts/fly": "require('more')",
+        "repo/more": "x = 1",
+        "repo/own": "",
+        "out": "",
+    }.items():
+        (tmp_path / f"{name}.lua").write_text(content)
+    (tmp_path / "repo" / "linked.lua").symlink_to(tmp_path / "out.lua")
+    (tmp_path / "repo" / "a.ttt").write_bytes(file(*quadricopter(name="own", code=ASKS)))
+    return tmp_path / "repo"
+
+
+def test_files_of_lua_beside_a_scene_are_brought(beside, capsys):
+    out = beside / "out"
+    assert main([str(beside / "a.ttt"), str(out)]) == 0
+    assert (out / "MODULES.txt").read_text().split() == ["scripts/fly.lua", "more.lua"]
+    assert (out / "own.lua").read_text() == ASKS, "the scene's own script"
+    assert sorted(str(one.relative_to(out)) for one in out.rglob("*.lua")) == ["more.lua", "own.lua", "scripts/fly.lua"]
+
+
+def test_they_are_brought_anew_whenever_the_scene_is_asked_for(beside):
+    for content in ("x = 1", "x = 2"):
+        (beside / "more.lua").write_text(content)
+        scene = parameters.load({"scene_file": str(beside / "a.ttt")}).scene_file
+        assert Path(scene).with_name("more.lua").read_text() == content
+        assert Path(scene).with_name("own.lua").read_text() == ASKS
 
 
 def test_a_broken_file_as_a_scene_gets_one_line(tmp_path, monkeypatch):

@@ -4,7 +4,7 @@ import pytest
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_names import NO_SUFFIX, plain, split, suffixed
-from drone_sim.mechanics.object_tree import WORLD, ObjectTree
+from drone_sim.mechanics.object_tree import PARENT, WORLD, ObjectTree
 
 
 def at(x, y, z):
@@ -83,6 +83,26 @@ def test_a_body_that_hangs_on_what_goes_flies_on(objects):
     objects.set_parent(ball, model[0], True)
     objects.remove(model)
     assert frames.position(objects.matrix(ball)) == (1, 2, 3)
+
+
+def test_what_is_put_in_its_own_frame_again_and_again_stays_in_shape(objects):
+    """Rounding errors of its rotation must not grow from one time to the next."""
+    ball = objects.add("ball", None, frames.from_euler((0, 0, 0), (0.3, -0.7, 1.1)))
+    ahead = frames.rotate(objects.matrix(ball), (0.01, 0, 0))
+    for _ in range(200):
+        objects.set_position(ball, ball, (0.01, 0, 0))
+    assert frames.position(objects.matrix(ball)) == pytest.approx([200 * one for one in ahead], abs=1e-9)
+    turn = frames.multiply(objects.matrix(ball), frames.invert(objects.matrix(ball)))
+    assert turn == pytest.approx(at(0, 0, 0), abs=1e-9)
+
+
+def test_a_place_in_another_frame(objects):
+    drone, base, _ = add_model(objects)
+    objects.set_matrix(drone, WORLD, frames.from_euler((1, 0, 0), (0, 0, 1.5)))
+    turn = frames.to_euler(objects.turn(base))
+    objects.set_position(base, PARENT, (0, 2, 0))
+    assert frames.to_euler(objects.turn(base)) == pytest.approx(turn)
+    assert frames.position(objects.matrix(base, drone)) == pytest.approx((0, 2, 0), abs=1e-12)
 
 
 def test_a_part_stays_a_part_whatever_it_hangs_on(objects):

@@ -9,6 +9,7 @@ from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, lookin
 
 from drone_sim.render import context
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.orthographic import Orthographic
 from drone_sim.render.renderer import Renderer, RendererUnavailable
 from drone_sim.shapes.box import Box
 from drone_sim.shapes.cylinder import Cylinder
@@ -66,6 +67,21 @@ def test_an_unreadable_mesh_leaves_the_scene_as_it_was(renderer):
     with pytest.raises(ValueError, match=r"missing\.obj"):
         renderer.set_visuals([Visual("b", Mesh("missing.obj"), RED)])
     np.testing.assert_array_equal(renderer.render(CAMERA, AHEAD, at(4, 0, 1)[None]), before)
+
+
+def test_parallel_rays_show_a_cube_as_large_as_it_is_however_far_it_is(renderer):
+    camera = Orthographic(160, 120, 4.0, 0.1, 20.0)
+    for distance in (2.0, 8.0):
+        cubes, poses = [box("cube", (0.4, 0.4, 0.4))], np.array([at(distance, 0.7, 1.5)])
+        renderer.set_visuals(cubes)
+        rows, columns = np.nonzero(reddish(renderer.render(camera, AHEAD, poses)))
+        # 40 px/m; 0.7 m to the left and 0.5 m up of the middle
+        assert (columns.min(), columns.max() + 1) == (80 - 28 - 8, 80 - 28 + 8)
+        assert (rows.min(), rows.max() + 1) == (60 - 20 - 8, 60 - 20 + 8)
+        depth = renderer.render_depth(camera, AHEAD, poses)
+        assert np.isfinite(depth).sum() == 16 * 16 and depth[40, 52] == pytest.approx(distance - 0.2, abs=1e-5)
+    u, v = (round(one) for one in pixel(CAMERA, (-0.7, -0.5, 7.8)))
+    assert renderer.render_depth(CAMERA, AHEAD, poses)[v, u] == pytest.approx(7.8, abs=1e-3), "in perspective again"
 
 
 def test_depth_is_metric_and_empty_where_nothing_is(renderer):

@@ -39,6 +39,8 @@ objects:
      closed: false}
   - {name: Eye, kind: vision_sensor, parent: Hand, position: [0, 0, 2], rpy: [3.141592653589793, 0, 0],
      width: 32, height: 24}
+  - {name: Plan, kind: vision_sensor, parent: Hand, position: [0, 0, 2], rpy: [3.141592653589793, 0, 0],
+     width: 24, height: 32, size: 1.6}
 """
 
 
@@ -188,6 +190,9 @@ def test_a_vision_sensor_of_the_scene_sees(simulate):
     middle = np.frombuffer(image, np.uint8).reshape(24, 32, 3)[12, 16].astype(int)
     assert middle[0] > middle[1] + 50, "the red finger, 1.5 m below it"
     assert found(simulation, "Eye").picture("depth")[12, 16] == pytest.approx(1.45, abs=0.01)
+    plan = found(simulation, "Plan").picture("depth")
+    assert plan.shape == (32, 24) and plan[16, 12] == pytest.approx(1.45, abs=0.01)
+    assert (abs(plan - 1.45) < 0.01).sum() == 4, "0.1 m at 20 px/m, of the larger side"
 
 
 def test_it_begins_anew_is_saved_and_comes_back_with_a_snapshot(simulate, tmp_path):

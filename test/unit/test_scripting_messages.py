@@ -49,7 +49,7 @@ def test_names_stand_in_the_drones_namespace():
     bus.subscribe("/drone/cmd_vel", "geometry_msgs/Twist", "absolute")
     bus.subscribe("/other/cmd_vel", "geometry_msgs/Twist", "other")
     bus.post("cmd_vel", 1)
-    bus.deliver(lambda callback, message: heard.append((callback, message)))
+    heard += bus.take()
     assert heard == [("relative", 1), ("absolute", 1)]
 
 
@@ -65,7 +65,7 @@ def test_the_same_subscription_once_more_is_the_one_that_is_there():
     assert others == [2, 3, 4]
     bus.shutdownSubscriber(3)
     bus.post("/cmd_vel", 1)
-    bus.deliver(lambda callback, message: heard.append((callback, message)))
+    heard += bus.take()
     assert heard == [("on_twist", 1), ("on_other", 1)]
     bus.shutdownSubscriber(1)
     assert bus.subscribe("/cmd_vel", "geometry_msgs/Twist", "on_twist") == 5
@@ -77,8 +77,7 @@ def test_the_last_messages_are_kept(queue, kept):
     handle = bus.subscribe("x", "std_msgs/Int32", "f", queue)
     for message in range(5):
         bus.post("x", message)
-    bus.deliver(lambda _, message: heard.append(message))
-    bus.deliver(lambda _, message: heard.append(message))
+    heard += [message for _, message in bus.take() + bus.take()]
     assert heard == kept
     bus.shutdownSubscriber(handle)
     with pytest.raises(ValueError, match=f"no subscription has the handle {handle}"):
@@ -116,7 +115,7 @@ def test_a_backend_carries_messages():
     thread = threading.Thread(target=backend.takes["/scan"], args=("message",))
     thread.start()
     thread.join()
-    bus.deliver(lambda callback, message: heard.append((callback, message)))
+    heard += bus.take()
     assert heard == [("on_scan", "message")]
 
     bus.publish(bus.advertise("said", "std_msgs/String", 5, True), {"data": "x"})

@@ -116,7 +116,7 @@ def test_topics_come_back_under_their_handles():
         assert bus.backend.topics == {"/in", "/out"}
         bus.publish(said, {})
         found = []
-        bus.deliver(lambda callback, message, found=found: found.append((callback, message["data"].pop())))
+        found += [(callback, message["data"].pop()) for callback, message in bus.take()]
         assert found == [("f", 1)], "what a callback does to a message, it does to its own"
     assert bus.advertise("/new", "std_msgs/String") == 3
 

@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 from drone_sim.files.resources import read_bytes
+from drone_sim.importing import modules
 from drone_sim.importing.labels import word
 from drone_sim.importing.scene_folder import LIST, SCENE, import_file
 from drone_sim.vrep_files.container import MAX_SIZE
@@ -21,7 +22,7 @@ from drone_sim.vrep_files.errors import VrepFileError
 
 _LOG = logging.getLogger(__name__)
 _LOG.setLevel(logging.INFO)
-_FORM = b"2"  # of what is written: another one, and files are imported anew
+_FORM = b"3"  # of what is written: another one, and files are imported anew
 
 
 def imported_scene(path: Path) -> Path:
@@ -29,6 +30,8 @@ def imported_scene(path: Path) -> Path:
     folder = _folder(path)
     if not (folder / SCENE).is_file():
         _import_into(path, folder)
+    else:
+        modules.renew(path.parent, folder)
     if (folder / LIST).is_file():
         _LOG.warning("%s: imported into %s; not all is as it was there: see %s", path, folder, LIST)
     else:

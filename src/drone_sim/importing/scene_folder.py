@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from drone_sim.importing import modules
 from drone_sim.importing.entries import Entries
 from drone_sim.importing.floors import floor_parts, floor_size
 from drone_sim.importing.folder import Folder
@@ -45,7 +46,10 @@ class Imported(NamedTuple):
 
 def import_file(path: Path, out: Path) -> Imported:
     """Write what is in a file into the folder `out`. Raises VrepFileError and OSError."""
-    return _Import(read_file(path), path.name, Folder(out)).run()
+    work = _Import(read_file(path), path.name, Folder(out))
+    imported = work.run()
+    modules.bring(path.parent, out, work.script_files)
+    return imported
 
 
 class _Import:
@@ -70,6 +74,11 @@ class _Import:
         taken = reserved_names([vehicle.suffix for vehicle in self._vehicles]) | {one.name for one in own}
         ours = self._of_vehicles | {id(one) for one in self._floor}
         Names(taken).give((one for one in self._objects if id(one) not in ours), self._report)
+
+    @property
+    def script_files(self) -> set[str]:
+        """Names of the scripts that it has written, those of Lua."""
+        return {name for name in self._script_files.names if name.endswith(".lua")}
 
     def run(self) -> Imported:
         content: dict[str, Any] = {**self._world()}

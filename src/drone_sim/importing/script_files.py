@@ -23,6 +23,11 @@ class ScriptFiles:
         self._folder = folder
         self._written: dict[tuple[str, str], str] = {}
 
+    @property
+    def names(self) -> list[str]:
+        """Names of the files that it has written."""
+        return list(self._written.values())
+
     def write(self, name: str, script: Script) -> str:
         """Return the name of the file with a script of the object `name`."""
         suffix = ".py" if script.language == "python" else ".lua"

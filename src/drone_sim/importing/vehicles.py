@@ -129,6 +129,7 @@ class ImportedVehicle:
                 f"{self.root.name}: its propellers' scripts are V-REP's own; the built-in law is the same"
             )
         entry["objects"] = {ours: self._object(ours, one) for ours, one in self.objects.items()}
+        entry["objects"].update(self._missing_target())
         cameras = {self._camera_key(one): self._camera(one) for one in self.cameras}
         return {**entry, "cameras": cameras} if cameras else entry
 
@@ -162,6 +163,14 @@ class ImportedVehicle:
         elif ours != DRONE:
             keys.update({"position": [0.0, 0.0, 0.0], **pose_keys(frames.relative(self._above(ours), one.matrix))})
         return keys
+
+    def _missing_target(self) -> dict[str, Any]:
+        """Return the place of the target that the file has not: in the frame that its scripts read, as V-REP's are."""
+        base = self.quadricopter.base
+        if TARGET in self.objects or base is None:
+            return {}
+        matrix = frames.relative(self.root.matrix, base.matrix)
+        return {TARGET: {"position": [0.0, 0.0, 0.0], **pose_keys(matrix)}}
 
     def _above(self, ours: str) -> Matrix:
         """Return the world from what one of our objects hangs on."""

@@ -179,6 +179,18 @@ class ObjectTree:
         for one, local in below:
             one.put(frames.multiply(matrix, local))
 
+    def set_position(self, handle: int, relative_to: int, position: Sequence[float]) -> None:
+        """Put an object at a place (m) relative to another, to its PARENT, or to the WORLD, turned as it is.
+
+        Its rotation is not taken into that frame and back: relative to itself, again and again, its errors would grow
+        threefold each time.
+        """
+        moved = self[handle]
+        reference = None if relative_to == WORLD else moved.parent if relative_to == PARENT else self[relative_to]
+        x, y, z = position if reference is None else frames.transform(reference.below(), position)
+        m0, m1, m2, _, m4, m5, m6, _, m8, m9, m10, _ = moved.matrix()
+        self.set_matrix(handle, WORLD, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
+
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Hang an object on another (WORLD for none): it stays where it is, or keeps its local transform.
 

@@ -20,6 +20,7 @@ from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.calls import Api, Function, contents, explain
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
+from drone_sim.scripting.api.service_servers import ServiceRequest
 from drone_sim.scripting.api.types import Name
 from drone_sim.scripting.errors import ScriptError, UnknownName
 from drone_sim.wording import near_names
@@ -58,8 +59,7 @@ class Client:
     def answer(self, request: Request) -> Task:
         """Carry out a request; raises Refused."""
         self._keep_up()
-        for callback, message in self._messages():
-            yield Call(callback.name if isinstance(callback, ClientFunction) else str(callback), [message])
+        yield from self._hear()
         function = self._function(request.function)
         arguments = [_argument(one) for one in request.arguments]
         while arguments and arguments[-1] is None:
@@ -148,11 +148,15 @@ class Client:
         called: dict[str, Any] = {name: {"func": {}} for name in functions}
         return {**called, **{name: {"const": value} for name, value in constants.items()}}
 
-    def _messages(self) -> list[tuple[Any, Any]]:
-        waiting: list[tuple[Any, Any]] = []
+    def _hear(self) -> Task:
+        """Let the client's functions have the messages and requests that wait for it."""
         self._bus.new_callbacks()
-        self._bus.deliver(lambda callback, message: waiting.append((callback, message)))
-        return waiting
+        for callback, message in self._bus.take():
+            name = callback.name if isinstance(callback, ClientFunction) else str(callback)
+            if not isinstance(message, ServiceRequest):
+                yield Call(name, [message])
+            elif not message.is_abandoned:
+                message.answer((yield Call(name, [message.content])))
 
 
 def _unknown(api: Api, name: str) -> UnknownName:

@@ -20,6 +20,7 @@ from drone_sim.render import context, shaders, sky
 from drone_sim.render.batches import SHADE, Batch, Batches, Programs
 from drone_sim.render.context import RendererUnavailable
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.orthographic import Lens, Orthographic
 from drone_sim.shapes.visual import Visual
 
 __all__ = ["Renderer", "RendererUnavailable"]
@@ -75,11 +76,12 @@ class Renderer:
             self._batches.update(visuals)
 
     def render(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
+        self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
     ) -> np.ndarray:
         """Picture (height, width, 3) uint8 RGB, top row first, written into `out` where given.
 
         camera_pose: world-from-optical (4, 4); poses: world-from-visual (N, 4, 4), in the visuals' order.
+        Where rays are parallel, there is haze in the place of the sky.
         """
         size = (intrinsics.width, intrinsics.height)
         out = _output(out, (size[1], size[0], 3), np.uint8)
@@ -91,14 +93,14 @@ class Renderer:
             self._prepare(intrinsics, camera_pose, poses)
             target.framebuffer.use()
             target.framebuffer.clear(*sky.HAZE, SHADE if self._batches.has_ground else 1.0)
-            self._paint(gl, camera_pose, poses)
+            self._paint(gl, camera_pose, poses, with_sky=isinstance(intrinsics, Intrinsics))
             if self._samples:
                 gl.copy_framebuffer(target.resolved, target.framebuffer)
             target.resolved.read_into(target.rgba, components=4)
         return cv2.cvtColor(target.rgba, cv2.COLOR_RGBA2RGB, dst=out)
 
     def render_depth(
-        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
+        self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
     ) -> np.ndarray:
         """Depth (height, width) float32, metres along the optical z; NaN where nothing is within `far`.
 
@@ -113,6 +115,8 @@ class Renderer:
                 target = gl.framebuffer([gl.renderbuffer(size, 1, dtype="f4")], gl.depth_renderbuffer(size))
                 self._depth_targets[size] = target
             self._prepare(intrinsics, camera_pose, poses)
+            parallel = isinstance(intrinsics, Orthographic)
+            self._programs["depth"]["parallel"] = intrinsics.near, (intrinsics.far - intrinsics.near) * parallel
             target.use()
             target.clear(red=-1.0)
             gl.enable_only(gl.DEPTH_TEST)
@@ -138,7 +142,7 @@ class Renderer:
             raise RuntimeError("a renderer can only be used by the thread that made it")
         return self._gl
 
-    def _prepare(self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray) -> None:
+    def _prepare(self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray) -> None:
         """Send the poses and what depends on the camera alone."""
         origin = camera_pose[:3, 3]
         self._batches.move(origin, poses)
@@ -148,14 +152,15 @@ class Renderer:
         for program in self._programs.values():
             program["clip_from_world"].write(clip_from_world)
 
-    def _paint(self, gl: Any, camera_pose: np.ndarray, poses: np.ndarray) -> None:
+    def _paint(self, gl: Any, camera_pose: np.ndarray, poses: np.ndarray, with_sky: bool) -> None:
         """Solid things, floor, sky, shadows, then what can be seen through, into the bound framebuffer."""
         batches = self._batches
         gl.enable_only(gl.DEPTH_TEST)
         _draw(gl, batches.solids, "surface")
         _draw(gl, batches.floors, "surface")
         gl.disable(gl.CULL_FACE)
-        self._sky.render()
+        if with_sky:
+            self._sky.render()
         height = batches.floor_height(poses)
         if height is not None:
             self._programs["shadow"]["floor_height"] = height - camera_pose[2, 3]

@@ -103,7 +103,8 @@ out vec4 pixel;
 void main() { pixel = vec4(colour, 1.0); }
 """
 
-# Depth along the optical axis is the clip w, which the projection makes equal to the optical z.
+# Depth along the optical axis is the clip w, which a perspective projection makes equal to the optical z. Where rays
+# are parallel it is `parallel.x`, the near plane's, and the buffer's part of `parallel.y`, the way to the far one.
 DEPTH_VERTEX = (
     _INPUTS
     + """
@@ -113,6 +114,9 @@ void main() { gl_Position = clip_from_world * vec4(world_point(), 1.0); }
 
 DEPTH_FRAGMENT = """
 #version 330 core
+uniform vec2 parallel;
 out float depth;
-void main() { depth = 1.0 / gl_FragCoord.w; }
+void main() {
+    depth = parallel.y > 0.0 ? parallel.x + parallel.y * gl_FragCoord.z : 1.0 / gl_FragCoord.w;
+}
 """

@@ -10,7 +10,7 @@ from drone_sim.config.types import ParameterError
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_names import suffixed
 from drone_sim.mechanics.object_tree import ObjectTree
-from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.orthographic import Lens
 from drone_sim.run.cast import Cast, tell
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene import Scene
@@ -40,6 +40,7 @@ class Setting:
         try:
             self._empty_tree()
             self.scene = Scene(parameters.scene, self.world, self._look, shared.names)
+            shared.nearest = self.scene.nearest
             for one in parameters.fleet:
                 self._put(one)
             self._name_objects()
@@ -129,7 +130,7 @@ class Setting:
             said = f"{overlaps} pairs of moving ones touch or overlap, at most {MAX_OVERLAPS} may"
             raise ParameterError(f"scene/objects: {said}")
 
-    def _look(self, kind: str, camera: Intrinsics, pose: Matrix) -> np.ndarray:
+    def _look(self, kind: str, camera: Lens, pose: Matrix) -> np.ndarray:
         """Take a picture for a vision sensor of the scene; see scene.kinds.kind.Look."""
         self._show_blades()
         return self.shared.vision.picture(kind, camera, np.reshape((*pose, 0, 0, 0, 1), (4, 4)))

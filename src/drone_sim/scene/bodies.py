@@ -43,13 +43,13 @@ class LinkBody:
         """Take the world, the number of the body in it, of its link, and that link's frame from the shape's."""
         self._world = world
         self.number = number
-        self._link = link
+        self.link = link
         self._local = local
 
     @property
     def state(self) -> State:
         """Pose and velocity."""
-        link = self._world.joints.link_state(self.number, self._link)
+        link = self._world.joints.link_state(self.number, self.link)
         matrix = frames.multiply(link.matrix, self._local)
         arm = frames.rotate(link.matrix, frames.position(self._local))
         x, y, z = cross(link.angular_velocity, arm)
@@ -60,11 +60,11 @@ class LinkBody:
     @property
     def matrix(self) -> Matrix:
         """World from its frame."""
-        return frames.multiply(self._world.joints.link_state(self.number, self._link).matrix, self._local)
+        return frames.multiply(self._world.joints.link_state(self.number, self.link).matrix, self._local)
 
     def inertia(self) -> Inertia:
         """Return how its mass lies in its frame."""
-        found = self._world.inertia(self.number, self._link)
+        found = self._world.inertia(self.number, self.link)
         return found._replace(frame=frames.multiply(frames.invert(self._local), found.frame))
 
     def move(self, pose: Pose) -> None:

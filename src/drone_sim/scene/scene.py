@@ -14,6 +14,7 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scene import building, chains, order, scene_files
 from drone_sim.scene.bodies import Carried, HeldShape, LinkBody, SceneBody, Shape, bodies_above
+from drone_sim.scene.distances import Distances
 from drone_sim.scene.drive import JointDrive
 from drone_sim.scene.entry import Place
 from drone_sim.scene.kinds.force_sensor import ForceSensor
@@ -51,6 +52,7 @@ class Scene:
             raise ParameterError(str(error)) from None
         self._places, self._bases = built.places, built.chains
         self._around = Around(world, look, self._name_of, self.follow)
+        self.nearest = Distances(self._around, self.floor).nearest
         self.bodies = [self._body(index) for index in sorted(self._places)]  # of the shapes, as the file has them
         self._add_names()
         self._began: dict[int, Matrix] = {}  # where the objects were at the beginning, by entry; empty before

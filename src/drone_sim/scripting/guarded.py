@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from drone_sim.scripting.api.service_servers import Unanswered
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import Script
@@ -43,6 +44,15 @@ class GuardedScript:
         """Call a function of the script with a message."""
         self._attempt(self._script.callback, callback, message)
 
+    def answer(self, callback: Callback, request: Any) -> Any:
+        """Call a function of the script with a request; return what it returns. Raises Unanswered where it fails."""
+        if self.failure is None:
+            try:
+                return self._script.answer(callback, request)
+            except ScriptError as error:
+                self._fail(error)
+        raise Unanswered(f"the script has failed, and is not called any more: {self.failure}")
+
     def check(self, callback: Callback) -> None:
         """Fail where the script has no such function to call back."""
         self._attempt(self._script.check, callback)
@@ -67,8 +77,11 @@ class GuardedScript:
             try:
                 action(*arguments)
             except ScriptError as error:
-                self.failure = error
-                tell_failure(error)
+                self._fail(error)
+
+    def _fail(self, error: ScriptError) -> None:
+        self.failure = error
+        tell_failure(error)
 
 
 def tell_failure(error: ScriptError) -> None:

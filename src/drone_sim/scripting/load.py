@@ -42,6 +42,9 @@ class Script(Protocol):
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message. Raises ScriptError."""
 
+    def answer(self, callback: Callback, request: Any) -> Any:
+        """Call a function of the script with a request; return what it returns. Raises ScriptError."""
+
     def check(self, callback: Callback) -> None:
         """Raise ScriptError where the script has no such function to call back."""
 
@@ -69,6 +72,9 @@ class NoScript:
 
     def callback(self, _callback: Callback, _message: Any) -> None:
         """Do nothing."""
+
+    def answer(self, _callback: Callback, _request: Any) -> Any:
+        """Do nothing, and return nothing."""
 
     def check(self, _callback: Callback) -> None:
         """Do nothing."""

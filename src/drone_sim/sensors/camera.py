@@ -12,6 +12,7 @@ import numpy as np
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.render.context import RendererUnavailable
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.orthographic import Lens, Orthographic
 from drone_sim.render.renderer import Renderer
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.failing import Failure
@@ -59,11 +60,11 @@ class Vision:
         """Take the pictures of another subject from now on."""
         self._subject = subject
 
-    def picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
+    def picture(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
         """Return the picture from `pose` (4, 4), world from optical frame.
 
         `kind` "color": (height, width, 3) uint8 RGB. "depth": (height, width) float32, metres along the
-        optical z, NaN beyond the far plane.
+        optical z, NaN beyond the far plane. Raises ValueError for an orthographic one where there is no OpenGL.
         """
         if self._renderer is None and not self._fallback:
             self._open()
@@ -73,14 +74,16 @@ class Vision:
         self.seconds += time.perf_counter() - began
         return taken
 
-    def _drawn(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
+    def _drawn(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
         if self._renderer is None:
             return self._tiny_picture(kind, intrinsics, pose)
         self._renderer.set_visuals(self._subject.visuals())
         render = self._renderer.render if kind == "color" else self._renderer.render_depth
         return render(intrinsics, pose, self._subject.visual_poses())
 
-    def _tiny_picture(self, kind: str, intrinsics: Intrinsics, pose: np.ndarray) -> np.ndarray:
+    def _tiny_picture(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
+        if isinstance(intrinsics, Orthographic):
+            raise ValueError("an orthographic picture needs OpenGL, and there is no EGL here")
         vertical_fov = 2 * np.arctan(intrinsics.height / 2 / intrinsics.fy)
         color, depth = self._subject.tiny_picture(
             pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far

@@ -107,7 +107,7 @@ class AttachedScript(SharedView):
     def actuation(self) -> None:
         """Hand waiting messages to the script, then let it act."""
         check_callbacks(self.script, self.bus)
-        self.bus.deliver(self.script.callback)
+        self.bus.deliver(self.script)
         self.script.call("actuation")
 
     def close(self) -> None:

@@ -74,6 +74,7 @@ def surroundings(seen: Sequence[Seen], shared: Shared, limit: TimeLimit, turns: 
         control=shared.control,
         data=shared.data,
         tubes=shared.tubes,
+        nearest=lambda *between: shared.nearest(*between),
     )
 
 

@@ -12,6 +12,7 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.control import Control
 from drone_sim.scripting.api.custom_values import CustomData
+from drone_sim.scripting.api.distances import MeasureWay, no_way
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
@@ -49,4 +50,5 @@ class Shared:
     tubes: Tubes = field(default_factory=Tubes)
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
     tunings: int = 0  # grows whenever something is other than it was that may be tuned
+    nearest: MeasureWay = no_way  # measures between objects
     before_pictures: Callable[[], None] = lambda: None  # turns every vehicle's blades to where they are

@@ -325,7 +325,7 @@ class Vehicle(SharedView):
         self.commands.advance()
         for callback in self.bus.new_callbacks():
             self.script.check(callback)
-        self.bus.deliver(self.script.callback)
+        self.bus.deliver(self.script)
         self.script.call("actuation")
 
     def wrench(self) -> Wrench:

@@ -30,6 +30,16 @@ class Met(NamedTuple):
     normal: Vector
 
 
+class Gap(NamedTuple):
+    """What lies nearest to a link: body and link, how far (m, below 0 inside), the point of either, world frame."""
+
+    body: int
+    link: int
+    distance: float
+    own_point: Vector
+    point: Vector
+
+
 class Touch(NamedTuple):
     """One contact of the last sub-step: the other body, where (m), its unit normal, the force (N) that it exerts."""
 
@@ -77,11 +87,16 @@ def rays(client: int, ends: Sequence[tuple[Vector, Vector]], counts: Callable[[i
 
 
 def nearest_points(
-    client: int, probe: int, point: Vector, reach: float, counts: Callable[[int, int], bool]
+    client: int,
+    probe: int,
+    point: Vector,
+    reach: float,
+    counts: Callable[[int, int], bool],
+    inside: bool = False,
 ) -> list[Met]:
     """Return the points that are nearest to a point (m) and within `reach` (m), of every body and link that counts.
 
-    `probe` is a collision shape as good as a point.
+    `probe` is a collision shape as good as a point; `inside`: what it lies inside of counts, too.
     """
     low, high = [one - reach for one in point], [one + reach for one in point]
     around = pybullet.getOverlappingObjects(low, high, physicsClientId=client) or ()
@@ -97,7 +112,24 @@ def nearest_points(
                 collisionShapePositionA=point,
                 physicsClientId=client,
             )
-            found += [Met(body, link, row[6], row[7]) for row in rows if row[8] > 0]
+            found += [Met(body, link, row[6], row[7]) for row in rows if inside or row[8] > 0]
+    return found
+
+
+def gaps(client: int, body: int, link: int, reach: float, counts: Callable[[int, int], bool]) -> list[Gap]:
+    """Return the gap between a body's link and every other that counts and is within `reach` (m).
+
+    Between two meshes that are not convex, PyBullet finds none.
+    """
+    low, high = pybullet.getAABB(body, link, client)
+    around = pybullet.getOverlappingObjects(
+        [one - reach for one in low], [one + reach for one in high], physicsClientId=client
+    )
+    found = []
+    for other in sorted(set(around or ())):
+        if other != (body, link) and counts(*other):
+            rows = pybullet.getClosestPoints(body, other[0], reach, link, other[1], physicsClientId=client)
+            found += [Gap(other[0], other[1], row[8], row[5], row[6]) for row in rows]
     return found
 
 

@@ -54,14 +54,19 @@ class Solidity:
             pybullet.changeDynamics(body, -1, localInertiaDiagonal=moments, physicsClientId=self._client)
         self._moved(body)
 
-    def nearest_points(self, point: Vector, reach: float, counts: Callable[[int, int], bool]) -> list[Met]:
-        """Return the points within `reach` (m) that are nearest to a point (m), of all bodies and links that count."""
+    def nearest_points(
+        self, point: Vector, reach: float, counts: Callable[[int, int], bool], *, measured: bool = False
+    ) -> list[Met]:
+        """Return the points within `reach` (m) that are nearest to a point (m), of all bodies and links that count.
+
+        `measured`: so do what it is inside of, and what nothing meets; a sensor sees neither.
+        """
         if self._probe is None:
             self._probe = pybullet.createCollisionShape(
                 pybullet.GEOM_SPHERE, radius=_PROBE, physicsClientId=self._client
             )
 
         def meets(body: int, link: int) -> bool:
-            return (body, link) not in self._permeable and counts(body, link)
+            return (measured or (body, link) not in self._permeable) and counts(body, link)
 
-        return probing.nearest_points(self._client, self._probe, point, reach, meets)
+        return probing.nearest_points(self._client, self._probe, point, reach, meets, measured)

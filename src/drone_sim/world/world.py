@@ -353,6 +353,10 @@ class World:
         """Return what each of several rays (from, to, m) meets first of the bodies and links that count."""
         return probing.rays(self._client, ends, counts)
 
+    def gaps(self, body: int, link: int, reach: float, counts: Callable[[int, int], bool]) -> list[probing.Gap]:
+        """Return the gaps between a body's link (-1: the root) and those others within `reach` (m) that count."""
+        return probing.gaps(self._client, body, link, reach, counts)
+
     def contacts(self, body: int) -> list[probing.Touch]:
         """Return where others pushed a body in the last sub-step."""
         return probing.contacts(self._client, body)

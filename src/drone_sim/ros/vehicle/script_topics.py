@@ -14,7 +14,7 @@ from sensor_msgs.msg import Image as ImageMessage
 
 from drone_sim.ros.vehicle import services
 from drone_sim.ros.vehicle.filling import fill, message_class
-from drone_sim.scripting.api.backend import Image
+from drone_sim.scripting.api.backend import Ask, Image
 
 
 class RosBackend:
@@ -54,6 +54,10 @@ class RosBackend:
     def call_service(self, name: str, kind: str, request: Any) -> Any:
         """Call a service. Raises ValueError where it does not answer within a second."""
         return services.call(name, kind, request)
+
+    def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:
+        """Offer a service; return what ends that."""
+        return services.serve(name, kind, ask)
 
     def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
         """Call `take` with every message, in rospy's thread; return what ends that."""

@@ -13,13 +13,13 @@ from pydantic import Field
 from drone_sim.config.types import Label, Point
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.orthographic import Lens
 from drone_sim.scene.entry import EntryParameters, Place
 from drone_sim.world import World
 
 __all__ = ["Around", "KindParameters", "Look", "Place"]
 
-Look = Callable[[str, Intrinsics, Matrix], np.ndarray]
+Look = Callable[[str, Lens, Matrix], np.ndarray]
 
 
 @dataclass(frozen=True)

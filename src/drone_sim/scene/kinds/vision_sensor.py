@@ -11,6 +11,7 @@ from drone_sim.config.types import Finite, Length, ParameterError, Within
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.orthographic import Lens, Orthographic
 from drone_sim.scene.kinds.kind import Around, KindParameters, Place
 
 MAX_SIDE = 2048  # px
@@ -20,7 +21,7 @@ _OPTICAL = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # from V-REP's
 class VisionSensorParameters(KindParameters):
     """A camera, by its picture (px) and the angle of its larger side (rad); V-REP's axes: z ahead, y up, x left.
 
-    One with a `size` (m, of the larger side) is orthographic, of which no pictures can be made.
+    One with a `size` (m, of the larger side) is orthographic.
     """
 
     kind: Literal["vision_sensor"]
@@ -56,11 +57,15 @@ class VisionSensor(SceneObject):
 
     def picture(self, kind: str) -> np.ndarray:
         """Return what it sees: "color" or "depth", as sensors.camera.Vision has it. Raises ValueError."""
-        if self.orthographic_size is not None:
-            raise ValueError(f"'{self.name}' is orthographic: pictures are made of perspective vision sensors only")
-        wide = self.angle
-        if self.height > self.width:
-            wide = 2 * math.atan(math.tan(self.angle / 2) * self.width / self.height)
-        camera = Intrinsics(self.width, self.height, wide, self.near, self.far)
         self._around.follow()
-        return self._around.look(kind, camera, frames.multiply(self.matrix(), _OPTICAL))
+        return self._around.look(kind, self._lens(), frames.multiply(self.matrix(), _OPTICAL))
+
+    def _lens(self) -> Lens:
+        larger = max(self.width, self.height)
+        if self.orthographic_size is not None:
+            wide = self.orthographic_size * self.width / larger
+            return Orthographic(self.width, self.height, wide, self.near, self.far)
+        angle = self.angle
+        if self.height > self.width:
+            angle = 2 * math.atan(math.tan(self.angle / 2) * self.width / self.height)
+        return Intrinsics(self.width, self.height, angle, self.near, self.far)

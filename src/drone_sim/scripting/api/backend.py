@@ -34,6 +34,10 @@ class Sender(Protocol):
         """Stop advertising."""
 
 
+# Takes a request, and what makes a response of a script's answer; returns the response. Raises Unanswered.
+Ask = Callable[[Any, Callable[[Any], Any]], Any]
+
+
 class Backend(Protocol):
     """What carries messages to and from others, such as rospy. Topics come resolved: '/drone/front'.
 
@@ -67,6 +71,13 @@ class Backend(Protocol):
 
     def call_service(self, name: str, kind: str, request: Any) -> Any:
         """Call a service; raises ValueError, in one line, where it does not answer or fails."""
+
+    def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:
+        """Offer a service of any installed type; return what ends that.
+
+        Any thread hands a request to `ask`, with what fills the response from the fields that the script gives, and
+        gets the response. Raises ValueError also for a name that is none, or that this process offers already.
+        """
 
     def advertise_image(self, topic: str, queue: int) -> Sender:
         """Advertise a sensor_msgs/Image; its Sender takes Image tuples."""

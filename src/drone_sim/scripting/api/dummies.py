@@ -53,3 +53,10 @@ class Dummies:
                 raise ValueError(f"'{found.name}' is not a dummy that a script has made: only those can be removed")
         self._objects.remove({int(one) for one in handles})
         return 1
+
+    def removeModel(self, handle: Handle, _later: bool = False) -> int:
+        """Take away a dummy that a script has made, with all that hangs on it. Return how many objects are gone."""
+        top = self._objects[handle]
+        going = [one for one in self._objects if self._objects[one] is top or self._objects[one].hangs_on(top)]
+        self.removeObjects(going)
+        return len(going)

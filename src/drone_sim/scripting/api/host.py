@@ -13,6 +13,7 @@ from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.control import Control
 from drone_sim.scripting.api.custom_values import CustomData
+from drone_sim.scripting.api.distances import MeasureWay, no_way
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
@@ -85,3 +86,4 @@ class Surroundings:
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
+    nearest: MeasureWay = no_way

@@ -14,6 +14,7 @@ import numpy as np
 
 from drone_sim.scripting.api.backend import Backend, Image, Sender
 from drone_sim.scripting.api.calls import Function, WrongValue
+from drone_sim.scripting.api.offered_services import OfferedServices
 from drone_sim.scripting.api.publishers import Begin, Kept, Publishers
 from drone_sim.scripting.api.script_values import refuse_if_too_large
 from drone_sim.scripting.api.subscriptions import Subscriptions
@@ -47,6 +48,7 @@ class MessageBus:
         self._subscriptions = Subscriptions()
         # Asked for in every step: without another call in between.
         self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
+        self.take = self._subscriptions.take
         self._publishers = Publishers()
         self.said: dict[str, Any] = {}  # what was last published on own topics, by their full names
         self._last_handle = 0
@@ -66,7 +68,8 @@ class MessageBus:
             "imageTransportPublish",
             "imageTransportShutdownPublisher",
         )
-        return {name: getattr(self, name) for name in names}
+        offering = OfferedServices(self._subscriptions, self._new_handle, self.resolve, lambda: self.backend)
+        return {**{name: getattr(self, name) for name in names}, **offering.functions()}
 
     # ---- what a script calls
 
@@ -93,6 +96,7 @@ class MessageBus:
 
     def shutdownSubscriber(self, handle: Handle) -> None:
         """End a subscription; raises ValueError where there is none of that handle."""
+        self._subscriptions.check(handle)
         self._subscriptions.end(handle)
 
     def advertise(self, topic: Name, kind: Name, queue: int = 1, latch: bool = False, *_ignored: Any) -> int:

@@ -15,6 +15,7 @@ from drone_sim.scripting.api.calls import Api, public_functions
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.custom_data import CustomDataFunctions
 from drone_sim.scripting.api.dialogs import Dialogs
+from drone_sim.scripting.api.distances import Distances
 from drone_sim.scripting.api.drawing import Drawing
 from drone_sim.scripting.api.dummies import Dummies
 from drone_sim.scripting.api.dynamics import Dynamics
@@ -46,6 +47,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         Objects(host),
         Joints(host, ignored),
         ProximitySensors(host),
+        Distances(host.objects, surroundings.nearest),
         Paths(host),
         ObjectKinds(host),
         Dummies(host),

@@ -49,9 +49,7 @@ class Objects:
     def setObjectPosition(self, handle: Handle, relativeTo: Handle, position: ThreeNumbers = ()) -> None:
         """Move an object: (handle, relativeTo, position), or (handle, position, relativeTo) as in 4.x."""
         frame, place = _frame_and_values(relativeTo, position, 3)
-        m0, m1, m2, _, m4, m5, m6, _, m8, m9, m10, _ = self._objects.matrix(handle, frame)
-        x, y, z = place
-        self._objects.set_matrix(handle, frame, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
+        self._objects.set_position(handle, frame, place)
 
     def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the Euler angles of an object."""
@@ -97,8 +95,9 @@ class Objects:
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
         """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame.
 
-        sim.handleflag_axis may be added to the handle, as V-REP's manual recommends. Without it V-REP gives the Euler
-        angles of the turn in one step, divided by the step: here it is the angular velocity, too.
+        sim.handleflag_axis may be added to the handle, and changes nothing. V-REP takes the means over the last step,
+        and without the flag the Euler angles of the turn in the frame that the object had before it, over the step.
+        Here both are the angular velocity at the end of the step: see "Where this differs" in docs/scripts.md.
         """
         if handle >= AXIS:
             handle = bare(handle)

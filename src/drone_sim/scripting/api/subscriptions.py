@@ -1,17 +1,30 @@
-"""What a script is subscribed to, and the messages that wait for it."""
+"""What a script is subscribed to and what it offers, and the messages and requests that wait for it."""
 
 from __future__ import annotations
 
 import copy
+import functools
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
+from drone_sim.scripting.api.service_servers import ServiceRequest, carry_out
 from drone_sim.scripting.api.types import Callback
 
 Begin = Callable[[Callable[[Any], None]], Callable[[], None]]  # takes what takes messages, returns what ends it
 _NONE: list[Callback] = []
+_SERVICE = "service {}"  # instead of a topic, whose full name begins with a slash
+
+
+class Receiver(Protocol):
+    """Who gets messages and requests: a script."""
+
+    def callback(self, callback: Callback, message: Any) -> None:
+        """Call a function with a message."""
+
+    def answer(self, callback: Callback, request: Any) -> Any:
+        """Call a function with a request; return what it returns."""
 
 
 class _Subscription(NamedTuple):
@@ -51,10 +64,26 @@ class Subscriptions:
             self._by_handle[handle] = subscription
         self._new_callbacks.append(callback)
 
+    def add_service(self, handle: int, name: str, kind: str, callback: Callback, most: int, begin: Begin) -> None:
+        """Offer a service of a type, of whose requests at most so many wait."""
+        self.add(handle, _SERVICE.format(name), kind, callback, most, begin)
+
+    def serves(self, name: str) -> bool:
+        """Whether a service of that name is offered."""
+        return self.has(_SERVICE.format(name))
+
     def check(self, handle: int) -> None:
-        """Raise ValueError where no subscription has that handle."""
-        if handle not in self._by_handle:
+        """Raise ValueError where no subscription to a topic has that handle."""
+        if handle not in self._by_handle or self._is_service(handle):
             raise ValueError(f"no subscription has the handle {handle}")
+
+    def check_service(self, handle: int) -> None:
+        """Raise ValueError where no service that is offered has that handle."""
+        if handle not in self._by_handle or not self._is_service(handle):
+            raise ValueError(f"no service that the script offers has the handle {handle}")
+
+    def _is_service(self, handle: int) -> bool:
+        return not self._by_handle[handle].topic.startswith("/")
 
     def end(self, handle: int) -> None:
         """End a subscription; raises ValueError where there is none of that handle."""
@@ -89,14 +118,21 @@ class Subscriptions:
         new, self._new_callbacks = self._new_callbacks, []
         return new
 
-    def deliver(self, call: Callable[[Callback, Any], None]) -> None:
-        """Hand every waiting message to `call(callback, message)`, oldest first."""
+    def deliver(self, receiver: Receiver) -> None:
+        """Hand over every waiting message and request, of each subscription the oldest first."""
+        for callback, message in self.take():
+            if type(message) is ServiceRequest:
+                carry_out(message, functools.partial(receiver.answer, callback))
+            else:
+                receiver.callback(callback, message)
+
+    def take(self) -> list[tuple[Callback, Any]]:
+        """Return the messages and requests that wait, and whom each is for; of each subscription the oldest first."""
         waiting: list[tuple[Callback, Any]] = []
         for subscription in self._by_handle.values():  # which no other thread changes
             while subscription.messages:
                 waiting.append((subscription.callback, subscription.messages.popleft()))
-        for callback, message in waiting:
-            call(callback, message)
+        return waiting
 
     def remember(self) -> Callable[[], None]:
         """Return a function that brings back what is subscribed to now, and the messages that wait."""

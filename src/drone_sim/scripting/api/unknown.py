@@ -48,14 +48,12 @@ ABSENT: dict[str, str] = {
     ),
     r"sim\.setObject(?:Name|Alias)": "names are those of the scene file",
     r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "masses are those of the URDF and the scene file",
-    r"sim\.\w*(?:Collision|Distance|Mill|Mechanism|Collection)\w*": (
-        "there are no collections and no collision or distance objects; a sensor of the kind contacts or range tells"
+    r"sim\.\w*(?:Collision|Distance)\w*": (
+        "there are no collision and distance objects; checkCollision and checkDistance measure between two objects"
     ),
+    r"sim\.\w*(?:Mill|Mechanism|Collection)\w*": "there are no collections and no mills",
     r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
     r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
-    r"simROS\.(?:advertiseService|shutdownServiceServer|serviceServerTreat\w+)": (
-        "a child script offers no services: subscribe to a topic"
-    ),
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
     r"sim\.followPath|sim\.\w*PathTarget\w*": "there is no trajectory generator: set the target in every step",
     r"sim\.(?:sendData|receiveData)": "there is no wireless transmission: use signals or tubes",

@@ -76,10 +76,12 @@ function sandbox.called(name, ...)
   return run(function(...) return hand_back(name, f(...)) end, ...)
 end
 
-function sandbox.called_back(name, message)
+-- Call a function back with a message; `answered`: what it returns is handed over.
+function sandbox.called_back(name, message, answered)
   local f = callbacks[name]
   if f == nil then f = rawget(env, name) end
   if type(f) ~= 'function' then return phases(), MISSING, 0 end
+  if answered then return run(function() return hand_back(name, f(message)) end) end
   return run(f, message)
 end
 

@@ -141,8 +141,15 @@ class LuaScript:
         called = callback.encode() if isinstance(callback, str) else callback
         self._run(name, self._call_back, called, message, near=True)
 
-    def _call_back(self, callback: Any, message: Any) -> Any:
-        return self._lua["called_back"](callback, self._values.to_lua(message))
+    def answer(self, callback: Callback, request: Any) -> Any:
+        """Call the script's function with a request; return its value, a tuple of several. Raises ScriptError."""
+        name = callback if isinstance(callback, str) else "callback"
+        called = callback.encode() if isinstance(callback, str) else callback
+        self._run(name, self._call_back, called, request, True, near=True)
+        return self._values.handed_back()
+
+    def _call_back(self, callback: Any, message: Any, answered: bool = False) -> Any:
+        return self._lua["called_back"](callback, self._values.to_lua(message), answered)
 
     def remember(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now. Raises ScriptError."""

@@ -130,13 +130,17 @@ class PythonScript:
         self.check(name)
         return self._run(name, self._globals[name], *arguments)
 
-    def callback(self, callback: Callback, message: Any) -> None:
-        """Call the script's function (or that of this name) with a message; raises ScriptError."""
+    def callback(self, callback: Callback, message: Any) -> Any:
+        """Call the script's function (or that of this name) with a message, or a request; return its value.
+
+        Raises ScriptError.
+        """
         if callable(callback):
-            self._run(getattr(callback, "__name__", "callback"), callback, message)
-            return
+            return self._run(getattr(callback, "__name__", "callback"), callback, message)
         self.check(callback)
-        self._run(callback, self._globals[callback], message)
+        return self._run(callback, self._globals[callback], message)
+
+    answer = callback
 
     def check(self, callback: Callback) -> None:
         """Raise ScriptError where there is no function to call back."""

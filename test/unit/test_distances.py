@@ -1,0 +1,143 @@
+"""sim.checkDistance and sim.checkCollision: between vehicles, shapes of the scene, the floor, and points."""
+
+import math
+
+import pytest
+
+from drone_sim.mechanics.state import Pose
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.modules import make_sim
+from drone_sim.scripting.api.turns import Turns
+from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.vehicles.child_script import surroundings
+
+SCENE = {
+    "objects": [
+        {"name": "Wall", "shape": "box", "size": [0.2, 4, 4], "position": [3, 0, 2]},
+        {"name": "Ball", "shape": "sphere", "size": [0.2], "position": [0, 3, 1], "mass": 0.5},
+        {"name": "Pole", "shape": "cylinder", "size": [0.1, 2], "position": [-3, 0, 1]},
+        {"name": "Arm", "shape": "box", "size": [1, 0.1, 0.1], "position": [0.5, 0, 0], "parent": "Frame"},
+        {"name": "Frame", "kind": "dummy", "position": [-6, 0, 1]},
+        {"name": "Hinge", "kind": "joint", "type": "revolute", "position": [0, -6, 1]},
+        {"name": "Leaf", "shape": "box", "size": [1, 0.1, 0.1], "mass": 1, "position": [0.5, 0, 0], "parent": "Hinge"},
+        {"shape": "box", "size": [1, 1, 1], "position": [9, 9, 0.5]},
+        {"name": "Near", "kind": "dummy", "position": [9, 9, 1.25]},
+    ]
+}
+STILL = "def sysCall_init(): pass\n"
+
+
+@pytest.fixture(name="simulation", scope="module")
+def _simulation(tmp_path_factory):
+    script = tmp_path_factory.mktemp("still") / "still.py"
+    script.write_text(STILL, encoding="utf-8")
+    fleet = {"drone": {"position": [0, 0, 1]}, "other": {"position": [0, 1, 1]}}
+    simulation = Simulation(parameters.load({"scene": SCENE, "vehicles": fleet, "gravity": 0.0}), script=str(script))
+    yield simulation
+    simulation.close()
+
+
+@pytest.fixture(name="sim")
+def _sim(simulation):
+    drone = simulation.drone
+    drone.move(Pose((0.0, 0.0, 1.0)))
+    return make_sim(drone, surroundings([drone], simulation.shared, TimeLimit(0.0), Turns()))
+
+
+def between(sim, one, other, *threshold):
+    there = sim.handle_all if other == "all" else sim.getObject(other)
+    return sim.checkDistance(sim.getObject(one), there, *threshold)
+
+
+def test_the_shortest_way_between_shapes(sim):
+    result, way, pair = between(sim, "/Wall", "/Pole")
+    assert result == 1 and pair == [sim.getObject("/Wall"), sim.getObject("/Pole")]
+    assert way[6] == pytest.approx(5.8, abs=1e-4)
+    assert (way[0], way[3]) == (pytest.approx(2.9, abs=1e-4), pytest.approx(-2.9, abs=1e-4))
+    assert math.dist(way[:3], way[3:6]) == pytest.approx(way[6], abs=1e-6)
+
+
+def test_nothing_is_nearer_than_the_threshold(sim):
+    assert between(sim, "/Wall", "/Pole", 5.79) == (0, [0.0] * 7, [-1, -1])
+    assert between(sim, "/Wall", "/Pole", 5.81)[0] == 1
+
+
+def test_a_drone_is_one_solid_and_whatever_of_it_is_named(simulation, sim):
+    whole = between(sim, "/Quadcopter", "/Ball")[1]
+    assert whole[6] == pytest.approx(3 - 0.1 - 0.2, abs=0.15)
+    for part in ("/Quadcopter/base", "/Quadcopter/propeller[0]/respondable", "/Quadcopter/propeller[0]"):
+        assert between(sim, part, "/Ball")[1] == whole
+    simulation.drone.move(Pose((0.0, 0.0, 3.0)))
+    assert between(sim, "/Quadcopter", "/Ball")[1][6] > whole[6] + 0.1
+
+
+def test_the_nearest_of_all(simulation, sim):
+    result, way, pair = between(sim, "/Quadcopter", "all")
+    assert result == 1 and pair == [sim.getObject("/Quadcopter"), sim.getObject("/Quadcopter[1]")]
+    simulation.drone.move(Pose((2.0, -5.0, 0.5)))
+    result, way, pair = between(sim, "/Quadcopter", "all")
+    assert pair[1] == sim.getObject("/Floor") and way[5] == pytest.approx(0.0, abs=1e-6) and way[6] < 0.5
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_points(sim, turned):
+    names = ("/Near", "/Wall") if not turned else ("/Wall", "/Near")
+    result, way, _ = between(sim, *names)
+    ends = way[:3], way[3:6]
+    assert result == 1 and ends[turned] == pytest.approx([9, 9, 1.25])
+    assert way[6] == pytest.approx(math.dist((9, 9), (3.1, 2)), abs=1e-3)
+    assert between(sim, "/Near", "/Frame")[1][6] == pytest.approx(math.dist((9, 9, 1.25), (-6, 0, 1)))
+    assert between(sim, "/Near", "/Frame", 3)[0] == 0
+
+
+def test_a_target_is_a_point_wherever_it_hangs(sim):
+    target = sim.getObject("/target")
+    for parent in (sim.getObject("/Quadcopter"), -1):
+        sim.setObjectParent(target, parent, True)
+        sim.setObjectPosition(target, -1, [0, 0, 5])
+        assert 3.5 < between(sim, "/Quadcopter", "/target")[1][6] < 4.1
+
+
+def test_a_point_inside_is_as_far_as_the_surface(simulation, sim):
+    sim.setObjectPosition(sim.getObject("/Near"), -1, [3.08, 0, 2])
+    way = between(sim, "/Near", "/Wall")[1]
+    assert way[6] == pytest.approx(0.02, abs=1e-3) and way[3] == pytest.approx(3.1, abs=1e-3)
+    assert sim.checkCollision(sim.getObject("/Near"), sim.getObject("/Wall"))[0] == 0, "a point collides with nothing"
+    sim.setObjectPosition(sim.getObject("/Near"), -1, [9, 9, 1.25])
+
+
+def test_what_is_carried_is_where_it_was_put(sim):
+    before = between(sim, "/Arm", "/Pole")[1][6]
+    sim.setObjectPosition(sim.getObject("/Frame"), -1, [-6.5, 0, 1])
+    assert between(sim, "/Arm", "/Pole")[1][6] == pytest.approx(before + 0.5, abs=1e-4)
+    sim.setObjectPosition(sim.getObject("/Frame"), -1, [-6, 0, 1])
+
+
+def test_a_shape_that_a_joint_holds(sim):
+    _, way, _ = between(sim, "/Leaf", "/Floor")
+    assert way[6] == pytest.approx(0.95, abs=1e-3) and way[1] == pytest.approx(-6, abs=0.06)
+
+
+def test_collisions(simulation, sim):
+    drone, wall = sim.getObject("/Quadcopter"), sim.getObject("/Wall")
+    assert sim.checkCollision(drone, wall) == sim.checkCollision(drone, sim.handle_all) == (0, [-1, -1])
+    simulation.drone.move(Pose((2.95, 0.0, 2.0)))
+    assert sim.checkCollision(drone, wall) == sim.checkCollision(drone, sim.handle_all) == (1, [drone, wall])
+    assert between(sim, "/Quadcopter", "/Wall")[1][6] == 0.0
+    simulation.drone.move(Pose((9.0, 9.0, 1.0)))
+    assert sim.checkCollision(drone) == (1, [drone, -1]), "what has no name"
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        ("sim.checkCollision(sim.getObject('/Wall'), sim.getObject('/Wall'))", "parts of one rigid body"),
+        ("sim.checkDistance(sim.getObject('/Near'), sim.handle_all)", "'Near' is a point"),
+        ("sim.checkDistance(99999, sim.handle_all)", "no object has the handle 99999"),
+        ("sim.checkDistance(sim.getObject('/Near'), sim.getObject('/Wall'), float('nan'))", "finite numbers"),
+    ],
+)
+def test_what_cannot_be_measured(sim, call, said):
+    with pytest.raises((ValueError, TypeError), match=said):
+        eval(call)
