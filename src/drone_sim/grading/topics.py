@@ -6,6 +6,8 @@ import copy
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from drone_sim.scripting.api.backend import Ask
+
 
 class Topics:
     """A backend (scripting.api.backend) with nobody at its other end."""
@@ -47,6 +49,10 @@ class Topics:
     def delete_parameter(self, name: str) -> None:
         """Forget a parameter."""
         self._parameters.pop(name, None)
+
+    def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:
+        """Do nothing: nobody calls."""
+        return lambda: None
 
     def call_service(self, name: str, kind: str, request: Any) -> Any:
         """Raise ValueError: there is no service."""
