@@ -29,7 +29,7 @@ WIND = 0.07  # m for each m/s
 _EARTH = 9.81  # m/s², the scale's where there is no gravity
 _SHORTEST = 1e-3  # m; what is shorter is not drawn
 _WIDTH, _POINT = 0.009, 0.025  # m, of a line and of a contact
-_CROSS = 0.07  # m, half of a lost propeller's
+_CROSS = 0.045  # m, half a side of a lost propeller's
 _ABOVE, _TEXT_SIZE = 0.47, 0.042  # m: the wind is drawn over the words of `view/state`
 _GREEN, _RED = (0.05, 0.55, 0.15, 1.0), (0.85, 0.08, 0.05, 1.0)
 _TEAL, _PURPLE = (0.0, 0.45, 0.55, 1.0), (0.75, 0.0, 0.6, 1.0)
@@ -111,7 +111,7 @@ def _thrusts(vehicle: Vehicle, felt: _Felt, scale: float) -> Marker | None:
     for link, thrust, share in zip(vehicle.propulsion.rotors.links, felt.thrusts, felt.effectiveness):
         place, axis = np.array(frames.position(link)), np.array((link[2], link[6], link[10]))
         lines = arrow(place, scale * thrust * axis) if abs(scale * thrust) > _SHORTEST else []
-        lines += [] if share else cross(place, frames.rotate(link, (_CROSS, 0, 0)), frames.rotate(link, (0, _CROSS, 0)))
+        lines += [] if share else cross(place, _CROSS)
         points += lines
         colors += [ColorRGBA(*(_GREEN if share == 1 else _RED))] * len(lines)
     if not points:

@@ -26,10 +26,10 @@ def arrow(start: np.ndarray, way: np.ndarray) -> Points:
     return _listed([start, tip, *(point for end in ends for point in (tip, end))])
 
 
-def cross(middle: np.ndarray, along: Sequence[float], across: Sequence[float]) -> Points:
-    """Return two lines through a point, from corner to corner of a parallelogram with these half sides (m)."""
-    one, other = np.add(along, across), np.subtract(along, across)
-    return _listed([middle - one, middle + one, middle - other, middle + other])
+def cross(middle: np.ndarray, half: float) -> Points:
+    """Return the four diagonals of a cube with half a side so long (m): a cross from wherever it is seen."""
+    corners = half * np.array([(1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, 1)])
+    return _listed([point for corner in corners for point in (middle - corner, middle + corner)])
 
 
 def _listed(points: Sequence[np.ndarray]) -> Points:
