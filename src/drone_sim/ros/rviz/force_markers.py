@@ -30,7 +30,7 @@ _EARTH = 9.81  # m/s², the scale's where there is no gravity
 _SHORTEST = 1e-3  # m; what is shorter is not drawn
 _WIDTH, _POINT = 0.009, 0.025  # m, of a line and of a contact
 _CROSS = 0.045  # m, half a side of a lost propeller's
-_ABOVE, _TEXT_SIZE = 0.47, 0.042  # m: the wind is drawn over the words of `view/state`
+_ABOVE, _ASIDE, _TEXT_SIZE = 0.5, 0.16, 0.042  # m: the wind is drawn over the words of `view/state`
 _GREEN, _RED = (0.05, 0.55, 0.15, 1.0), (0.85, 0.08, 0.05, 1.0)
 _TEAL, _PURPLE = (0.0, 0.45, 0.55, 1.0), (0.75, 0.0, 0.6, 1.0)
 
@@ -127,11 +127,11 @@ def _wind(vehicle: Vehicle, wind: Vector | None) -> list[Marker | None]:
     if wind is None:
         return [None, None]
     speed = math.hypot(*wind)
-    x, y, z = way = _times(WIND, wind)
+    x, y, z = _times(-_ASIDE / (speed or 1.0), wind)  # the words are where it comes from
     text = new_marker(Marker.TEXT_VIEW_FACING, _TEAL, (0, 0, _TEXT_SIZE))
     text.text = f"wind {speed:.1f} m/s"
-    text.pose.position = Point(x, y, z + _ABOVE + _TEXT_SIZE)
-    lines = arrow((0.0, 0.0, _ABOVE), way) if WIND * speed > _SHORTEST else []
+    text.pose.position = Point(x, y, z + _ABOVE)
+    lines = arrow((0.0, 0.0, _ABOVE), _times(WIND, wind)) if WIND * speed > _SHORTEST else []
     shaft = beside(vehicle, new_marker(Marker.LINE_LIST, _TEAL, (_WIDTH, 0, 0), lines)) if lines else None
     return [shaft and _named("wind", shaft), _named("wind", beside(vehicle, text))]
 
