@@ -95,7 +95,8 @@ class Warm:
                 why = "ended the process that watches its flight"
                 continue
             if reply.get("result") is not None:
-                return Flight(job, Result.from_json(reply["result"]), rows)
+                result = Result.from_json(reply["result"])
+                return Flight(job, result, rows if result.flown else b"")
             why = reply.get("lost") or "gave no result"
             break
         return Flight(job, ungraded(plan, job.script, job.seed, job.changes, f"the script {why}"), is_lost=True)

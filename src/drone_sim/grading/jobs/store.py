@@ -48,7 +48,9 @@ class Store:
         with open(self._file, encoding="utf-8", errors="replace") as file:
             while line := file.readline(_LONGEST):
                 key, result = _read(line)
-                if result is not None and key in wanted and (not tables or self.table(key) is not None):
+                if result is None or key not in wanted:
+                    continue
+                if not (tables and result.flown) or self.table(key) is not None:
                     found[key] = result
         return found
 
