@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from drone_sim.files.resources import package_path
 from drone_sim.grading import flight, plan
 from drone_sim.grading.plan import PlanError
 from drone_sim.grading.result import Result
@@ -115,6 +116,13 @@ def test_a_seed_is_spread_evenly(written):
     assert drawn.max(axis=0) == pytest.approx([0.2, 0.2, 1.1], abs=0.01)
 
 
+def test_a_plan_names_the_files_that_it_is_made_of(written, tmp_path):
+    scene = package_path() / "config" / "scenes" / "gates.yaml"
+    (tmp_path / "other.yaml").write_text("script: target\n")
+    steps = written(TALKING + "scene: package://drone_sim/config/scenes/gates.yaml\nconfig: other.yaml", counting="")
+    assert steps.files == [tmp_path / "steps.yaml", scene, tmp_path / "other.yaml"]
+
+
 def test_changes_are_laid_over_the_plan(written):
     steps = written()
     lazy = flight.grade(steps, changes={"control": {"Kvcorr": 0.0}})
@@ -196,6 +204,15 @@ def test_a_script_that_fails_is_named_in_one_line(written, tmp_path, source, err
     assert result.script == str(tmp_path / "mine.py")
 
 
+def test_who_flies(written, tmp_path):
+    of_config = TALKING.replace("script: counting.py", "config: {script: counting.py}")
+    plain, inside = written(of_config.replace("counting.py", "''"), counting=COUNTING), written(of_config)
+    assert flight.grade(inside).flown == pytest.approx(2.05)
+    assert flight.grade(inside).script == str(tmp_path / "counting.py")
+    assert flight.grade(inside, "").digest == flight.grade(plain).digest
+    assert flight.grade(plain, str(tmp_path / "counting.py")).digest == flight.grade(inside).digest
+
+
 def test_a_plan_of_two_vehicles_grades_the_one_that_it_names(written):
     two = """
 duration: 2
@@ -207,7 +224,7 @@ criteria:
   - {kind: formation, to: Elsewhere, at_most: 0.01, name: no_object}
 """
     (first, *_) = flight.grade(written(two.replace("Elsewhere", "DronePosition"))).outcomes
-    assert (first.passed, first.said[:6]) == (True, "was at")
+    assert (first.passed, first.said[:6]) == (True, "was up")
     assert "no object named 'Elsewhere'" in flight.grade(written(two)).error
 
 

@@ -24,6 +24,7 @@ from drone_sim.config.types import (
     readable_key,
 )
 from drone_sim.files import yaml_files
+from drone_sim.files.resources import resolve
 from drone_sim.grading.criteria import AnyCriterion
 from drone_sim.grading.spread import Spread, check_objects, spread_out
 from drone_sim.offline import timeline as timelines
@@ -110,9 +111,10 @@ class Plan(Checked):
 
     @property
     def files(self) -> list[Path]:
-        """The files that it is made of and names itself: plan, scene, config; what those name is not among them."""
-        named = [self.scene, self.config if isinstance(self.config, str) else ""]
-        return [self.path, *(Path(named_in(self.folder, one)) for one in named if one)]
+        """The files that it is made of: plan, scene, config. Raises FileNotFoundError for one that has gone."""
+        inside = self.config if isinstance(self.config, dict) else {"scene_file": "", "config": self.config}
+        named = [self.scene or inside.get("scene_file"), inside.get("config")]
+        return [self.path, *(resolve(named_in(self.folder, one)) for one in named if isinstance(one, str) and one)]
 
     def script_of(self, script: str | None) -> str:
         """Return the script that flies where `script` is asked for: None is the plan's own, '' the built-in one."""
@@ -166,7 +168,7 @@ def _beside(folder: Path, config: Mapping[str, Any]) -> dict[str, Any]:
     """Return a plan's own `config` with the files that it names found beside the plan."""
     values = dict(config)
     scene_parameters.find_files_beside(folder, values)
-    for key in ("script", "scene_file"):
+    for key in ("script", "scene_file", "config"):
         if isinstance(values.get(key), str) and Path(values[key]).suffix:
             values[key] = named_in(folder, values[key])
     return values
