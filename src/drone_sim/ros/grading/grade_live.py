@@ -29,7 +29,7 @@ from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
 from drone_sim.offline.command_line import FAILED, Parser, status_of
 from drone_sim.ros.grading.hearing import Hearing
-from drone_sim.ros.grading.sending import Sender, entries_of
+from drone_sim.ros.grading.sending import Sender, entries_of, steps_late
 from drone_sim.ros.grading.simulator import Simulator, Unfit
 from drone_sim.ros.node.paths import from_shell
 from drone_sim.ros.node.starting import init_node, reported
@@ -110,6 +110,9 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     flown = live.hearing.flown(plan.duration)
     if flown is None:
         return flight.ungraded(plan, script, seed, {}, error or "nothing was heard of the flight"), None
+    late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), flown.rows, parameters.time_step)
+    if late:
+        rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
     outcomes = tuple(one.judge(flown) for one in plan.criteria)
     digest = flight.digest_of(flown.rows)
     return result_of(plan.name, script, seed, {}, outcomes, flown.end, error or None, digest), flown
@@ -120,7 +123,7 @@ class _Live:
 
     def __init__(self, plan: Plan, seed: int, simulator: Simulator, parameters: Parameters):
         """Advertise and subscribe. Raises Unfit."""
-        self._simulator, self._duration = simulator, plan.duration
+        self._simulator, self._duration, self._scene = simulator, plan.duration, parameters.scene_file
         self._over = threading.Event()
         self._started = False
         wanted = plan.parameters(seed)
@@ -145,7 +148,7 @@ class _Live:
             time.sleep(_LAST)  # what was sent before is not of this flight
             self.hearing.clear()
             self._started = True
-            self._simulator.start()
+            self._simulator.start(self._scene)
             ended = self._wait()
             self._over.set()
             if rospy.is_shutdown():
