@@ -224,7 +224,7 @@ criteria:
   - {kind: formation, to: Elsewhere, at_most: 0.01, name: no_object}
 """
     (first, *_) = flight.grade(written(two.replace("Elsewhere", "DronePosition"))).outcomes
-    assert (first.passed, first.said[:6]) == (True, "was at")
+    assert (first.passed, first.said[:6]) == (True, "was up")
     assert "no object named 'Elsewhere'" in flight.grade(written(two)).error
 
 
