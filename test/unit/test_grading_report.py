@@ -7,6 +7,7 @@ import pytest
 from graded import EVIL, SCENE, place, read_plan, result, write_table
 
 from drone_sim.grading.outputs import html
+from drone_sim.offline.recording import COLUMNS
 
 
 class Page(HTMLParser):
@@ -33,7 +34,7 @@ def _report(tmp_path_factory):
     results = [
         result("a/my.py", 0, (True, False)),
         result("a/my.py", 1),
-        result("a/<script>alert(1).py", error=EVIL, names=(EVIL, EVIL)),
+        result("a/<img src=x>.py", error=EVIL, names=(EVIL, EVIL)),
     ]
     html.write(plan, results, lambda one: table if one.seed == 0 and not one.error else None, folder / "out")
     return folder / "out"
@@ -51,7 +52,8 @@ def test_every_link_leads_somewhere_in_the_folder(report):
 def test_names_and_errors_are_text(report):
     pages = {report / "index.html": 1, **dict.fromkeys(report.glob("scripts/*.html"), 6)}
     for page, scripts in pages.items():
-        assert Page(page).tags.count("script") == scripts
+        tags = Page(page).tags
+        assert (tags.count("script"), tags.count("img")) == (scripts, 0)
     assert "<script>alert(1)</script>" in Page(report / "index.html").text
 
 
@@ -86,8 +88,26 @@ def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
         html.check(tmp_path / "no" / "out")
 
 
-def test_a_table_that_cannot_be_read_is_told_of(tmp_path):
-    (tmp_path / "t.csv").write_text("nonsense\n")
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("nonsense\n", "a table of `fly --csv` begins with"),
+        (",".join(COLUMNS) + "\n", "nothing was flown"),
+        (",".join(COLUMNS) + "\n1,2\n", "line 2: is cut off"),
+        (",".join(COLUMNS) + "\n" + ",".join(["nan"] * len(COLUMNS)) + "\n", "line 2: must hold numbers below"),
+    ],
+)
+def test_a_table_that_shows_nothing_is_told_of(tmp_path, text, said):
+    (tmp_path / "t.csv").write_text(text)
     html.write(read_plan(tmp_path), [result()], lambda _: tmp_path / "t.csv", tmp_path / "out")
     (page,) = (tmp_path / "out/scripts").iterdir()
-    assert "a table of `fly --csv` begins with" in page.read_text()
+    assert said in page.read_text()
+
+
+def test_a_long_flight_is_thinned(tmp_path):
+    table = write_table(tmp_path / "t.csv", 301)
+    html.write(read_plan(tmp_path), [result()], lambda _: table, tmp_path / "out")
+    (page,), (figures,) = (tmp_path / "out/scripts").iterdir(), (tmp_path / "out/flights").iterdir()
+    assert "one row in 2 is shown" in page.read_text()
+    assert json.loads(figures.read_text().partition(" = ")[2].rstrip(";\n"))["t"][:3] == [0, 0.1, 0.2]
