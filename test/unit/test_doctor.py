@@ -212,12 +212,12 @@ def test_a_check_neither_hangs_nor_raises():
 def test_a_check_leaves_the_timer_of_others_as_it_was():
     rang = []
     before = signal.signal(signal.SIGALRM, lambda *_: rang.append(True))
+    timer = signal.setitimer(signal.ITIMER_REAL, 0.05, 0.02)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.05, 0.02)
         assert lines("nothing", lambda: [], 10.0) == []
         assert signal.getitimer(signal.ITIMER_REAL)[1] == pytest.approx(0.02, abs=0.005)
         while not rang:
             signal.pause()
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_REAL, *timer)

@@ -170,6 +170,12 @@ def test_endless_python_is_stopped(fails, source, phase, line):
     fails("py", source, phase, line, STOPPED)
 
 
+def test_endless_python_is_stopped_though_somebody_switched_the_timer_off(fails):
+    off = "import signal, time\nsignal.setitimer(signal.ITIMER_REAL, 0)\ntime.sleep(0.12)\n"
+    later = "def sysCall_init():\n    time.sleep(0.12)\ndef sysCall_actuation():\n    while True: pass"
+    fails("py", off + later, "actuation", 7, STOPPED)
+
+
 def test_a_callback_that_does_not_exist_is_named(tmp_path):
     for ending in ("py", "lua"):
         path = tmp_path / f"script.{ending}"

@@ -20,6 +20,7 @@ from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import first_step
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.load import DEFAULT
 
 EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
@@ -58,15 +59,19 @@ class Flight:
     def __init__(self, plan: Plan, script: str | None = None, seed: int = 0, changes: Mapping[str, Any] | None = None):
         """Build it; see `grade`. Raises one of EXPECTED."""
         self._plan, self._seed, self._changes = plan, seed, changes or {}
-        self._script = plan.script_of(script)
         parameters = plan.parameters(seed, None, changes)
+        self._script = plan.script_of(script) or (parameters.script if script is None else "")
         self._timeline = plan.timeline_of(parameters)
         self._steps = first_step(plan.duration, parameters.time_step)
         topics = Topics(plan.topics_of(parameters))
         backend = topics if topics.wanted else None
-        self._simulation = Simulation(parameters, script=self._script, backend=backend, started=False)
+        self._simulation = Simulation(parameters, script=self._script or DEFAULT, backend=backend, started=False)
         topics.clock = lambda: self._simulation.time
-        self._witness = Witness(plan, self._simulation, topics)
+        try:
+            self._witness = Witness(plan, self._simulation, topics)
+        except BaseException:
+            self._simulation.close()
+            raise
 
     def grade(self) -> Result:
         """Fly, once, and return how well."""

@@ -24,16 +24,18 @@ from drone_sim.config.types import (
     readable_key,
 )
 from drone_sim.files import yaml_files
+from drone_sim.files.resources import resolve
 from drone_sim.grading.criteria import AnyCriterion
 from drone_sim.grading.spread import Spread, check_objects, spread_out
 from drone_sim.offline import timeline as timelines
+from drone_sim.offline.tables import MAX_ROWS
 from drone_sim.offline.timeline import Timeline, TimelineError
 from drone_sim.run import parameters as parameters_module
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene import scene_parameters
 from drone_sim.wording import near_names, shown
 
-MAX_DURATION = 36_000.0  # s
+MAX_DURATION = 20_000.0  # s
 MAX_SEEDS = 1_000_000
 MAX_CRITERIA = 200
 MAX_ENTRIES = 10_000  # of the timeline
@@ -87,6 +89,11 @@ class Plan(Checked):
                 if time is not None and time > self.duration:
                     raise _refused((*here, key), f"{time:g}: the flight lasts {self.duration:g} s (duration)")
 
+    def __getstate__(self) -> dict[Any, Any]:
+        """Return what is pickled: not the parameters, which are read anew."""
+        state = super().__getstate__()
+        return {**state, "__pydantic_private__": {"_path": self._path, "_loaded": {}}}
+
     @property
     def path(self) -> Path:
         """The file that it was read from, absolute."""
@@ -104,9 +111,10 @@ class Plan(Checked):
 
     @property
     def files(self) -> list[Path]:
-        """The files that it is made of and names itself: plan, scene, config; what those name is not among them."""
-        named = [self.scene, self.config if isinstance(self.config, str) else ""]
-        return [self.path, *(Path(named_in(self.folder, one)) for one in named if one)]
+        """The files that it is made of: plan, scene, config. Raises FileNotFoundError for one that has gone."""
+        inside = self.config if isinstance(self.config, dict) else {"scene_file": "", "config": self.config}
+        named = [self.scene or inside.get("scene_file"), inside.get("config")]
+        return [self.path, *(resolve(named_in(self.folder, one)) for one in named if isinstance(one, str) and one)]
 
     def script_of(self, script: str | None) -> str:
         """Return the script that flies where `script` is asked for: None is the plan's own, '' the built-in one."""
@@ -160,7 +168,7 @@ def _beside(folder: Path, config: Mapping[str, Any]) -> dict[str, Any]:
     """Return a plan's own `config` with the files that it names found beside the plan."""
     values = dict(config)
     scene_parameters.find_files_beside(folder, values)
-    for key in ("script", "scene_file"):
+    for key in ("script", "scene_file", "config"):
         if isinstance(values.get(key), str) and Path(values[key]).suffix:
             values[key] = named_in(folder, values[key])
     return values
@@ -177,7 +185,7 @@ def read(path: str | Path) -> Plan:
     plan = _checked(values, Path(path))
     try:
         parameters = plan.parameters()
-        _check_names(plan, parameters)
+        _check_with(plan, parameters)
         plan.timeline_of(parameters)
     except TimelineError as error:
         raise PlanError(str(error)) from None
@@ -198,8 +206,11 @@ def _checked(values: dict[str, Any], path: Path) -> Plan:
     return plan
 
 
-def _check_names(plan: Plan, parameters: Parameters) -> None:
-    """Raise ParameterError for a vehicle or an object that is not there."""
+def _check_with(plan: Plan, parameters: Parameters) -> None:
+    """Raise ParameterError for a vehicle or an object that is not there, and for more steps than a table can have."""
+    steps = plan.duration / parameters.time_step
+    if steps > MAX_ROWS:
+        raise _refused(("duration",), f"{plan.duration:g}: makes {steps:.0f} steps; at most {MAX_ROWS} are kept")
     names = [one.name for one in parameters.fleet]
     if plan.vehicle and plan.vehicle not in names:
         raise _refused(("vehicle",), f"{shown(plan.vehicle)}: no such vehicle; {near_names(plan.vehicle, names)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,12 +16,17 @@ from drone_sim.offline.recording import COLUMNS, Recording
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import STOP
 
+_NOWHERE = (math.nan,) * 7
+
 
 class Witness:
     """Keeps the rows of the graded vehicle, and beside them only what a criterion asks for."""
 
     def __init__(self, plan: Plan, simulation: Simulation, topics: Topics):
-        """Take what is asked for, a simulation before its first step, and what carries its topics."""
+        """Take what is asked for, a simulation before its first step, and what carries its topics.
+
+        Raises ValueError for a vehicle or object that is not there.
+        """
         self._simulation = simulation
         self._duration = plan.duration
         own = plan.vehicle_of(simulation.parameters)
@@ -40,17 +46,18 @@ class Witness:
             self._each_step.append(self._keep_touches)
         if any(one.sees_states for one in plan.criteria):
             self._follow("", lambda: str(self._vehicle.flight_state))
-        for signal in {name for one in plan.criteria for name in one.signals}:
+        for signal in dict.fromkeys(name for one in plan.criteria for name in one.signals):
             self._follow(signal, lambda name=signal: self._signal(name))  # type: ignore[misc]
         own = self._vehicle.bus.said
         for topic, full in topics.wanted.items():
             self._follow(topic, lambda name=full: topics.last.get(name, own.get(name)))  # type: ignore[misc]
-        for other in {name for one in plan.criteria for name in one.others}:
+        for other in dict.fromkeys(name for one in plan.criteria for name in one.others):
+            self._check(other)
             self._others[other] = []
             self._each_step.append(lambda name=other: self._others[name].append(self._pose(name)))  # type: ignore[misc]
 
     def keep(self) -> None:
-        """Keep what there is now: before the first step, and after each. Raises ValueError."""
+        """Keep what there is now: before the first step, and after each."""
         for keep in self._each_step:
             keep()
 
@@ -70,7 +77,7 @@ class Witness:
             tuple(self._touches),
             tuple(self._said.get("", ())),
             self._said,
-            {name: np.array(poses[: len(rows)]) for name, poses in self._others.items()},
+            {name: np.array(poses) for name, poses in self._others.items()},
         )
 
     @property
@@ -112,12 +119,19 @@ class Witness:
                 return value
         return None
 
+    def _check(self, name: str) -> None:
+        """Raise ValueError where no vehicle and no object has that name."""
+        if name not in self._simulation.vehicles:
+            self._simulation.shared.objects.handle(name)
+
     def _pose(self, name: str) -> tuple[float, ...]:
-        """Return position (m) and quaternion (xyzw) of a vehicle or object, in the world. Raises ValueError."""
+        """Return position (m) and quaternion (xyzw) of a vehicle or object, in the world; NaN once it is gone."""
         vehicle = self._simulation.vehicles.get(name)
         if vehicle is not None:
             return (*vehicle.state.position, *vehicle.state.orientation)
         objects = self._simulation.shared.objects
+        if name not in objects:
+            return _NOWHERE
         matrix = objects.matrix(objects.handle(name))
         return (*position(matrix), *to_quaternion(matrix))
 

@@ -124,14 +124,15 @@ class TimeLimit:
 
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a Python function; raises Stopped where it does not return in time."""
-        self._deadline = monotonic() + self.seconds
+        now = monotonic()
+        self._deadline = now + self.seconds
         self.struck = False
         self._thread = get_ident()
         if self._thread != _MAIN:
             _watch(self)
         elif self.seconds:
             _timer.limit = self
-            if self._deadline < _timer.next:
+            if not now < _timer.next <= self._deadline:  # where it should have gone off, somebody has switched it off
                 _timer.set(self.seconds)
         try:
             try:

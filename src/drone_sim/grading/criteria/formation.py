@@ -29,7 +29,7 @@ class Formation(DistanceCriterion):
         return (self.to,)
 
     def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        poses = poses_of(flown, self.to)[part]
+        poses = poses_of(flown, self.to, part)
         offsets = np.tile(self.offset, (len(poses), 1))
         if self.turns:
             x, y, z, w = poses[:, 3:7].T

@@ -34,14 +34,14 @@ class Landed(Criterion):
     """It looks at the end of its part: `until` is by when it has to stand.
 
     `at` is [x, y] in m, or the name of an object or vehicle; `within` so many metres of it, over ground. `softly` is
-    the largest speed (m/s) in the step before the touch-down; `on` is what it is to stand on.
+    the largest speed (m/s) in the step before the touch-down; `stands_on` is what is to be under it.
     """
 
     kind: Literal["landed"]
     at: _Place = None
     within: Bound = 0.3
     softly: Bound | None = None
-    on: Label = ""
+    stands_on: Label = ""
 
     sees_touches = True
     sees_states = True
@@ -51,7 +51,7 @@ class Landed(Criterion):
         """What passes."""
         wanted = [f"within {figure(self.within, 'm')}"] if self.at is not None else []
         wanted += [f"at most {figure(self.softly, 'm/s')}"] if self.softly is not None else []
-        wanted += [f"on {self.on}"] if self.on else []
+        wanted += [f"on {self.stands_on}"] if self.stands_on else []
         return ", ".join(wanted) or "landed"
 
     @property
@@ -82,15 +82,15 @@ class Landed(Criterion):
         """Return how far it stands from where it should, None where that is no matter."""
         if self.at is None:
             return None
-        there = poses_of(flown, self.at)[part][-1, :2] if isinstance(self.at, str) else np.array(self.at)
+        there = poses_of(flown, self.at, part)[-1, :2] if isinstance(self.at, str) else np.array(self.at)
         return float(np.linalg.norm(places_of(flown, part)[-1, :2] - there))
 
     def _check_ground(self, flown: Flown, end: float) -> None:
-        if not self.on or not flown.touches:
+        if not self.stands_on or not flown.touches:
             return
         under = sorted({one.what for one in flown.touches if end - _SETTLING <= one.at <= end})
-        if self.on not in under:
-            raise Missed(f"stands on {' and '.join(under) or 'nothing'}, not on {self.on}")
+        if self.stands_on not in under:
+            raise Missed(f"stands on {' and '.join(under) or 'nothing'}, not on {self.stands_on}")
 
 
 def _touch_down(flown: Flown, end: float) -> float:

@@ -13,7 +13,7 @@ from drone_sim.wording import near_names
 
 Axes = Literal["xyz", "xy", "xz", "yz", "x", "y", "z"]
 Measure = Literal["largest", "mean", "rms"]
-_WORDS = {"largest": "at most", "mean": "in the mean", "rms": "in the root mean square"}
+_WORDS = {"largest": "up to", "mean": "in the mean", "rms": "in the root mean square"}
 
 
 class DistanceCriterion(Criterion):
@@ -53,17 +53,22 @@ def places_of(flown: Flown, part: np.ndarray) -> np.ndarray:
     return places
 
 
-def poses_of(flown: Flown, name: str) -> np.ndarray:
-    """Return the rows (N, 7) of another vehicle or object: position, quaternion xyzw. Raises Missed."""
+def poses_of(flown: Flown, name: str, part: np.ndarray) -> np.ndarray:
+    """Return the poses of another vehicle or object in a part of the flight, (M, 7): see Flown. Raises Missed."""
     if name not in flown.others:
         raise Missed(f"nothing was seen of '{name}'; {near_names(name, flown.others)}")
-    return flown.others[name]
+    poses = flown.others[name][part]
+    gone = np.flatnonzero(~np.isfinite(poses).all(axis=1))
+    if len(gone):
+        raise Missed(f"{name} is gone at {flown.times[part][gone[0]]:.2f} s")
+    return poses
 
 
 def to_polyline(places: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Return the distances (M,) from places (M, D) to the nearest point of a polyline with corners (K, D), K >= 2."""
-    start, way = corners[:-1], np.diff(corners, axis=0)
-    length = (way**2).sum(axis=1)
-    to = places[:, None, :] - start
-    share = np.clip((to * way).sum(axis=2) / np.where(length > 0, length, 1), 0, 1)
-    return np.sqrt(((to - share[..., None] * way) ** 2).sum(axis=2)).min(axis=1)
+    squares = np.full(len(places), np.inf)
+    for start, way in zip(corners[:-1], np.diff(corners, axis=0)):  # in turn: a flight may have many rows
+        to, length = places - start, float(way @ way)
+        share = np.clip(to @ way / length, 0, 1) if length else np.zeros(len(places))
+        squares = np.minimum(squares, ((to - share[:, None] * way) ** 2).sum(axis=1))
+    return np.sqrt(squares)

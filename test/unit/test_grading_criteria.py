@@ -1,0 +1,294 @@
+import math
+
+import numpy as np
+import pytest
+from flown_signals import first_order, flown, judged, second_order, times
+from pydantic import ValidationError
+
+from drone_sim.files.resources import package_path
+from drone_sim.grading.criteria import KINDS
+from drone_sim.grading.flown import UNITS, Said, Touch
+
+T = times()
+STEP = {"of": "vx", "after": 0.0, "from": 0.0, "to": 1.0}
+
+
+@pytest.mark.parametrize("lag", [0.2, 1.0])
+def test_the_rise_time_of_a_lag_is_ln_9_lags(lag):
+    outcome = judged(flown(T, vx=first_order(T, lag)), "rise_time", **STEP, at_most=2.5)
+    assert outcome.value == pytest.approx(lag * math.log(9), abs=1e-3)
+    assert outcome.passed
+    assert (outcome.points, outcome.of, outcome.unit) == (1.0, 1.0, "s")
+
+
+def test_a_rise_time_is_counted_between_the_rows_and_from_where_the_step_begins():
+    flight = flown(T, vx=-0.5 * first_order(T, 0.5, begins=3.0) + 2.0)
+    outcome = judged(flight, "rise_time", of="vx", after=3.0, to=1.5, at_most=1.0)
+    assert outcome.value == pytest.approx(0.5 * math.log(9), abs=1e-3)
+    assert not outcome.passed
+    assert outcome.said == f"rose in {outcome.value:.4g} s; at most 1 s are allowed"
+    assert outcome.at == pytest.approx(3.0 + 0.5 * math.log(10), abs=1e-3)
+
+
+def test_what_never_rises_says_how_far_it_came():
+    outcome = judged(flown(T, vx=0.8 * first_order(T, 0.1)), "rise_time", **STEP, at_most=9)
+    assert not outcome.passed
+    assert outcome.value is None
+    assert outcome.said == "never rose to 90 % of the step, but to 80 %"
+
+
+@pytest.mark.parametrize("damping", [0.2, 0.5, 0.7])
+def test_the_overshoot_of_a_second_order_system(damping):
+    outcome = judged(flown(T, vx=second_order(T, 4.0, damping)), "overshoot", **STEP, at_most=100)
+    assert outcome.value == pytest.approx(100 * math.exp(-math.pi * damping / math.sqrt(1 - damping**2)), abs=0.02)
+    assert outcome.at == pytest.approx(math.pi / (4.0 * math.sqrt(1 - damping**2)), abs=0.01)
+
+
+def test_a_lag_does_not_overshoot_and_what_does_not_rise_fails():
+    assert judged(flown(T, vx=first_order(T, 0.5)), "overshoot", **STEP, at_most=0).passed
+    nothing = judged(flown(T, vx=0.0 * T), "overshoot", **STEP, at_most=50)
+    assert not nothing.passed
+    assert "came to 0 % of the step" in nothing.said
+
+
+@pytest.mark.parametrize("band", [0.02, 0.05])
+def test_the_settling_time_of_a_lag(band):
+    flight = flown(T, vx=first_order(T, 0.5, begins=2.0))
+    outcome = judged(flight, "settling_time", **{**STEP, "after": 2.0}, at_most=3, band=band)
+    assert outcome.value == pytest.approx(-0.5 * math.log(band), abs=1e-3)
+
+
+def test_the_settling_time_of_a_second_order_system_is_its_last_entry_into_the_band():
+    fine = times(step=1e-4)
+    outside = np.abs(second_order(fine, 4.0, 0.3) - 1) > 0.02
+    last = fine[np.flatnonzero(outside)[-1]]
+    outcome = judged(flown(T, vx=second_order(T, 4.0, 0.3)), "settling_time", **STEP, at_most=5)
+    assert outcome.value == pytest.approx(last, abs=2e-3)
+
+
+def test_what_rings_at_the_end_has_not_settled():
+    outcome = judged(flown(T, vx=1 + 0.1 * np.cos(T * math.pi)), "settling_time", **STEP, at_most=9)
+    assert not outcome.passed
+    assert outcome.said == "did not settle within 2 %: at the end it was 10 % of the step away"
+
+
+def test_the_steady_error_is_that_of_the_mean_over_the_last_second():
+    flight = flown(T, z=np.where(T < 8.99, 5.0, 1.2 + 0.3 * np.sin(2 * math.pi * T)))
+    assert judged(flight, "steady_error", of="z", to=1.0, at_most=0.25).value == pytest.approx(0.2, abs=1e-3)
+    assert not judged(flight, "steady_error", of="z", to=1.0, at_most=0.25, until=8.0).passed
+
+
+def test_a_column_stays_within_bounds_in_its_part_of_the_flight():
+    flight = flown(T, z=T)
+    assert judged(flight, "stays", of="z", at_least=2, at_most=4, after=2, until=4).passed
+    high = judged(flight, "stays", of="z", at_least=2, at_most=4, after=2, until=5)
+    assert (high.passed, high.value, high.at) == (False, 5.0, 5.0)
+    assert high.said == "z was from 2 m to 5 m; at least 2 m and at most 4 m is allowed"
+
+
+def test_the_velocities_are_those_of_the_track_frame():
+    """As commands are: a drone that looks to the left and flies to the left flies ahead."""
+    left = math.sqrt(0.5)
+    flight = flown(T, vy=0 * T + 2.0, qz=left, qw=left)
+    assert judged(flight, "stays", of="vx", at_least=2 - 1e-9, at_most=2 + 1e-9).passed
+    assert judged(flight, "stays", of="world_vy", at_least=2, at_most=2).passed
+    assert judged(flight, "stays", of="yaw", at_least=1.57, at_most=1.58).passed
+
+
+def test_yaw_goes_on_beyond_a_turn():
+    flight = flown(T, qz=np.sin(T / 2), qw=np.cos(T / 2))  # rad/s: 1
+    assert judged(flight, "steady_error", of="yaw", to=9.5, at_most=1e-9, over=1.0).passed
+
+
+def test_attitude_is_the_lean_in_any_direction():
+    half = 0.3 * np.sin(math.pi * T / 10) / 2
+    outcome = judged(flown(T, qx=np.sin(half), qw=np.cos(half)), "attitude", at_most=0.25)
+    assert (outcome.passed, round(outcome.value, 6), outcome.at) == (False, 0.3, 5.0)
+
+
+def test_drift_is_from_where_it_was_or_from_a_place():
+    flight = flown(T, x=3 + 0.1 * T, z=1.0)
+    assert judged(flight, "drift", at_most=0.51, after=5).value == pytest.approx(0.5)
+    there = judged(flight, "drift", **{"from": [3, 0, 0]}, at_most=2, axes="xy", measure="mean")
+    assert there.value == pytest.approx(0.5)
+
+
+# ---- places
+
+
+def test_places_are_reached_between_the_rows_and_in_order():
+    coarse = times(step=0.5)
+    ahead = flown(coarse, x=coarse, vx=1.0, z=1.0)
+    gates = [[1.25, 0, 1], [4.75, 0.1, 1]]
+    passed = judged(ahead, "reach", places=gates, within=0.12)
+    assert (passed.passed, passed.value) == (True, 2.0)
+    assert passed.at == pytest.approx(4.75)
+    backwards = judged(ahead, "reach", places=gates[::-1], within=0.12, partial=True, points=4)
+    assert (backwards.passed, backwards.points) == (False, 2.0)
+    assert backwards.said == "reached 1 of 2; it came to 3.5 m of place 2, 0.12 m are allowed"
+    assert not judged(ahead, "reach", places=gates, within=0.12, until=4.0).passed
+
+
+def test_a_vehicle_that_is_put_elsewhere_has_not_been_in_between():
+    at = times(2.0, 0.05)
+    jumping = flown(at, x=np.where(at < 1, 0.0, 4.0))
+    assert not judged(jumping, "reach", places=[[2, 0, 0]], within=0.5).passed
+    assert judged(jumping, "reach", places=[[4, 0, 0]], within=0.5).passed
+
+
+def test_the_distance_from_a_path():
+    round_corner = flown(T, x=np.minimum(T, 5), y=np.maximum(T - 5, 0) + 0.2)
+    corner = [[0, 0, 0], [5, 0, 0], [5, 5, 0]]
+    assert judged(round_corner, "path", along=corner, at_most=0.2 + 1e-9).value == pytest.approx(0.2)
+    straight = judged(round_corner, "path", along=corner[:2], at_most=1)
+    assert (straight.passed, straight.value, straight.at) == (False, pytest.approx(5.2), 10.0)
+    assert judged(round_corner, "path", along=corner, at_most=0.3, covers=0.95).passed
+
+
+def test_a_closed_path_goes_back_to_where_it_begins():
+    home = flown(T, x=4 - 0.4 * T)
+    corner = {"along": [[0, 0, 0], [0, 3, 0], [4, 3, 0], [4, 0, 0]], "at_most": 0.1}
+    assert not judged(home, "path", **corner).passed
+    assert judged(home, "path", **corner, closed=True).passed
+
+
+def test_who_waits_at_the_beginning_of_a_path_has_not_flown_it():
+    waiting = judged(flown(T), "path", along=[[0, 0, 0], [4, 0, 0]], closed=True, at_most=0.2, covers=0.9)
+    assert not waiting.passed
+    assert waiting.said.startswith("flew 5")  # % of it: that within 0.2 m of the beginning
+    assert waiting.said.endswith("at least 90 % is wanted")
+
+
+def test_formation_turns_with_the_leader_where_it_is_to():
+    left = math.sqrt(0.5)
+    leader = np.column_stack((T, 0 * T, 0 * T, 0 * T, 0 * T, left + 0 * T, left + 0 * T))
+    behind = {"more": {"others": {"lead": leader}}}
+    assert judged(flown(T, x=T - 1, **behind), "formation", to="lead", offset=[-1, 0, 0], at_most=1e-9).passed
+    turned = judged(flown(T, x=T, y=-1, **behind), "formation", to="lead", offset=[-1, 0, 0], turns=True, at_most=1e-9)
+    assert turned.passed
+    assert "no such" not in turned.said
+    assert (
+        "nothing was seen of 'led'; near names are lead"
+        in judged(flown(T, **behind), "formation", to="led", at_most=1).said
+    )
+
+
+# ---- what no table holds
+
+
+def _landing(speed=0.5, until=10.0, x=0.0, first=4.0, **more):
+    """Come down at 4 s and stand."""
+    touches = [Touch(at, "Floor") for at in T if first <= at <= until]
+    return flown(
+        T, x=x, z=np.maximum(2 - speed * T, 0), vz=np.where(T < 4, -speed, 0), more={"touches": touches, **more}
+    )
+
+
+def test_a_landing_has_a_place_and_a_speed():
+    outcome = judged(_landing(x=0.2), "landed", at=[0, 0], within=0.3, softly=0.6, stands_on="Floor")
+    assert (outcome.passed, outcome.at) == (True, 4.0)
+    assert outcome.value == pytest.approx(0.2)
+    assert outcome.said == "landed at 4.00 s 0.2 m from its place with 0.5 m/s"
+    assert not judged(_landing(x=0.4), "landed", at=[0, 0], within=0.3).passed
+    assert "0.4 m/s are allowed" in judged(_landing(), "landed", softly=0.4).said
+    assert judged(_landing(), "landed", stands_on="Pad").said == "stands on Floor, not on Pad"
+
+
+@pytest.mark.parametrize(
+    ("flight", "said"),
+    [
+        (_landing(until=3.0), "is in the air at 10.00 s"),
+        (_landing(first=0.0), "never took off"),
+        (_landing(states=(Said(0, "flying"), Said(5, "crashed"))), "it has crashed, as its script says"),
+        (
+            flown(T, vx=1.0, more={"touches": [Touch(at, "Floor") for at in T[400:]]}),
+            "still moves with 1 m/s at 10.00 s",
+        ),
+    ],
+)
+def test_what_is_no_landing(flight, said):
+    outcome = judged(flight, "landed")
+    assert not outcome.passed
+    assert outcome.said.startswith(said)
+
+
+def test_no_contact_but_with_what_is_allowed():
+    flight = flown(T, more={"touches": [Touch(1.0, "Floor"), Touch(2.5, "Pole"), Touch(2.5, "Tree")]})
+    outcome = judged(flight, "no_contact", allow=["Floor"])
+    assert (outcome.passed, outcome.value, outcome.at) == (False, 2.0, 2.5)
+    assert outcome.said == "touched Pole, Tree, first Pole at 2.50 s; allowed is only Floor"
+    assert judged(flight, "no_contact", after=3).passed
+    assert judged(flight, "no_contact", after=2, until=2.49).passed
+
+
+@pytest.mark.parametrize(
+    ("said", "equals", "tolerance", "passes"),
+    [
+        (3, 3, 0, True),
+        (3, 4, 0, False),
+        (2.9, 3, 0.2, True),
+        ("red", "red", 0, True),
+        (b"red", "red", 0, True),
+        ("red", 3, 9, False),
+        ((1.0, 2.0), [1, 2.05], 0.1, True),
+        ((1.0, 2.0), [1], 9, False),
+        (math.nan, 3, 9, False),
+    ],
+)
+def test_a_signal_is_compared(said, equals, tolerance, passes):
+    flight = flown(T, more={"said": {"count": [Said(1.0, 0), Said(2.0, said)]}})
+    assert judged(flight, "signal", signal="count", equals=equals, tolerance=tolerance).passed == passes
+
+
+def test_a_signal_counts_as_it_was_at_the_end_of_the_part():
+    flight = flown(T, more={"said": {"count": [Said(1.0, 3), Said(6.0, None)]}})
+    assert judged(flight, "signal", signal="count", equals=3, until=5).passed
+    assert judged(flight, "signal", signal="count", equals=3).said == "nothing was said by count until 10.00 s"
+
+
+def test_a_field_of_a_message():
+    message = {"pose": {"position": {"x": 1.5}}}
+    flight = flown(T, more={"said": {"goal": [Said(1.0, message)]}})
+    assert judged(flight, "signal", topic="goal", field="pose.position.x", equals=1.5).passed
+    assert "has no field pose.x" in judged(flight, "signal", topic="goal", field="pose.x", equals=1.5).said
+
+
+# ---- what all have in common
+
+
+def test_a_flight_that_ends_too_early_fails_what_has_to_last():
+    short = flown(times(3.0), is_whole=False, z=1.0)
+    assert judged(short, "stays", of="z", at_most=2, until=2).passed
+    lasting = judged(short, "stays", of="z", at_most=2)
+    assert (lasting.passed, lasting.points) == (False, 0.0)
+    assert lasting.said == "the flight was over at 3.00 s, too early for this"
+    assert judged(short, "stays", of="z", at_most=2, after=4).said.endswith("before this began")
+    assert judged(short, "reach", places=[[0, 0, 1]], within=0.1).passed  # which it did, whatever came after
+
+
+def test_a_table_with_what_is_no_number_says_so():
+    broken = flown(T, z=np.where(T < 5, 1.0, np.nan), x=np.where(T < 7, 1.0, np.inf))
+    for kind, values in (
+        ("stays", {"of": "z", "at_most": 3}),
+        ("steady_error", {"of": "z", "to": 1, "at_most": 3, "over": 5}),
+        ("rise_time", {"of": "z", "to": 3, "at_most": 3}),
+    ):
+        assert judged(broken, kind, **values).said == "z is no finite number at 5.00 s"
+    for kind, values in (("drift", {"at_most": 9}), ("path", {"along": [[0, 0, 0], [1, 0, 0]], "at_most": 9})):
+        assert not judged(broken, kind, **values).passed
+
+
+def test_a_part_without_time_is_refused():
+    with pytest.raises(ValidationError, match="until = 2: must be later than after = 3"):
+        judged(flown(T), "no_contact", after=3, until=2)
+
+
+def test_the_documentation_has_every_kind_with_its_keys_and_every_column():
+    text = (package_path() / "docs" / "grading.md").read_text()
+    common = {"kind", "name", "points", "after", "until"}
+    for model in KINDS:
+        (kind,) = model.model_fields["kind"].annotation.__args__
+        (row,) = (line for line in text.splitlines() if line.startswith(f"| `{kind}` |"))
+        keys = {field.alias or name for name, field in model.model_fields.items()} - common
+        assert {key for key in keys if f"`{key}`" not in row} == set(), kind
+    assert {column for column in UNITS if f"`{column}`" not in text} - {"propeller2", "propeller3"} == set()

@@ -1,0 +1,283 @@
+import json
+import pickle
+from functools import cache
+
+import numpy as np
+import pytest
+
+from drone_sim.files.resources import package_path
+from drone_sim.grading import flight, plan
+from drone_sim.grading.plan import PlanError
+from drone_sim.grading.result import Result
+from drone_sim.grading.spread import Spread
+from drone_sim.offline import fly
+
+STEP = """
+duration: 3
+scene: scene.yaml
+spread: {position: [0.2, 0.2, 0.1], yaw: 0.3, objects: {Ball: [1, 1, 0]}}
+config:
+  weather: {gusts: {deviation: [1, 1, 1]}}
+  sensors: {wind: {kind: wind, rate: 20, noise: {deviation: 1}}}
+timeline:
+  - {at: 0.5, twist: {linear: [1, 0, 0]}}
+  - {at: 1.0, object: {name: Ball, position: [0, 3, 0.5]}}
+criteria:
+  - {kind: rise_time, of: vx, after: 0.5, from: 0, to: 1, at_most: 2}
+"""
+SCENE = """
+drone: {position: [0, 0, 1]}
+objects:
+  - {name: Ball, shape: sphere, size: [0.2], position: [0, 2, 0.5]}
+  - {name: Wall, shape: box, size: [0.2, 8, 8], position: [WALL, 0, 0]}
+"""
+COUNTING = """
+def sysCall_init():
+    self.seen = simROS.advertise("seen", "std_msgs/Int32")
+    self.own = simROS.advertise("state", "std_msgs/String")
+
+def sysCall_sensing():
+    if sim.getSimulationTime() > 1:
+        sim.setInt32Signal("counted", 3)
+        message = {"data": 5}
+        simROS.publish(self.seen, message)
+        message["data"] = 6  # which has not been published
+        simROS.publish(self.own, {"data": "searching"})
+    import random
+    sim.setFloatSignal("drawn", random.random())
+    if sim.getSimulationTime() > 2:
+        sim.stopSimulation()
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    """Return what writes a plan, a scene with a wall so far away (m) and scripts, and reads the plan."""
+
+    def write(text=STEP, wall=50.0, **scripts):
+        (tmp_path / "scene.yaml").write_text(SCENE.replace("WALL", str(wall)))
+        (tmp_path / "steps.yaml").write_text(text)
+        for name, source in scripts.items():
+            (tmp_path / f"{name}.py").write_text(source)
+        return plan.read(tmp_path / "steps.yaml")
+
+    return write
+
+
+def said(result):
+    return {one.name: one.said for one in result.outcomes}
+
+
+def test_a_flight_is_the_same_to_the_bit_whatever_flew_before(written):
+    steps = written()
+    first = [flight.grade(steps, seed=seed) for seed in (0, 1, 2)]
+    again = [flight.grade(pickle.loads(pickle.dumps(steps)), seed=seed) for seed in (2, 1, 0)]
+    assert first == again[::-1]
+    assert len({one.digest for one in first}) == 3
+    assert all(one.passed and one.error is None for one in first)
+
+
+def test_seed_0_is_the_plan_as_it_stands_and_the_table_is_that_of_fly(written, tmp_path):
+    steps = written(STEP.replace("spread:", "spread: {} #"))
+    spread = written()
+    result = flight.grade(spread, table=tmp_path / "graded.csv")
+    assert result == flight.grade(steps)
+    (tmp_path / "commands.yaml").write_text(json.dumps(spread.timeline))
+    (tmp_path / "config.yaml").write_text(json.dumps(dict(spread.config)))
+    files = {"--commands": "commands.yaml", "--config": "config.yaml", "--scene": "scene.yaml", "--csv": "flown.csv"}
+    arguments = [one for option, name in files.items() for one in (option, str(tmp_path / name))]
+    assert fly.main([*arguments, "--duration", "3"]) == 0
+    assert (tmp_path / "graded.csv").read_text() == (tmp_path / "flown.csv").read_text()
+
+
+def test_what_a_seed_draws_depends_on_nothing_else(written):
+    steps = written()
+    start, other = steps.parameters(1), steps.model_copy(update={"spread": Spread(position=(0.2, 0.2, 0.1))})
+    (own,) = start.fleet
+    assert own.position != steps.parameters(0).fleet[0].position
+    assert own.position == other.parameters(1).fleet[0].position
+    assert other.parameters(1).fleet[0].yaw == 0.0
+    assert all(abs(one - middle) <= width for one, middle, width in zip(own.position, (0, 0, 1), (0.2, 0.2, 0.1)))
+    ball, wall = start.scene.objects
+    assert (ball.position[2], wall.position) == (0.5, (50.0, 0.0, 0.0))
+    assert 0 < abs(ball.position[0]) <= 1
+    seeds = {
+        (one.weather.gusts.seed, *(own.sensors["wind"].seed, own.faults.seed))
+        for one in map(steps.parameters, range(3))
+        for own in one.fleet
+    }
+    assert len({seed for three in seeds for seed in three}) == 7  # 0 three times, and two of each
+
+
+def test_a_seed_is_spread_evenly(written):
+    steps = written()
+    drawn = np.array([steps.parameters(seed).fleet[0].position for seed in range(1, 201)])
+    assert np.abs(drawn.mean(axis=0) - (0, 0, 1)).max() < 0.03
+    assert drawn.max(axis=0) == pytest.approx([0.2, 0.2, 1.1], abs=0.01)
+
+
+def test_a_plan_names_the_files_that_it_is_made_of(written, tmp_path):
+    scene = package_path() / "config" / "scenes" / "gates.yaml"
+    (tmp_path / "other.yaml").write_text("script: target\n")
+    steps = written(TALKING + "scene: package://drone_sim/config/scenes/gates.yaml\nconfig: other.yaml", counting="")
+    assert steps.files == [tmp_path / "steps.yaml", scene, tmp_path / "other.yaml"]
+
+
+def test_changes_are_laid_over_the_plan(written):
+    steps = written()
+    lazy = flight.grade(steps, changes={"control": {"Kvcorr": 0.0}})
+    assert (lazy.passed, lazy.changes) == (False, {"control": {"Kvcorr": 0.0}})
+    wrong = flight.grade(steps, changes={"control": {"Kvcor": 1}})
+    assert "control/Kvcor: unknown key; known are Kvcorr" in wrong.error
+    assert said(wrong) == {"rise_time": "nothing was flown"}
+
+
+CONTACT = """
+duration: 4
+scene: scene.yaml
+timeline:
+  - {at: 0, twist: {linear: [1, 0, 0]}}
+criteria:
+  - {kind: no_contact}
+  - {kind: stays, of: x, at_most: 1.4, name: wall}
+"""
+
+
+def test_who_watches_contacts_changes_no_bit_of_the_crash(written):
+    seen = flight.grade(written(CONTACT, wall=1.5))
+    unseen = flight.grade(written(CONTACT.replace("  - {kind: no_contact}\n", ""), wall=1.5))
+    assert seen.digest == unseen.digest
+    assert not seen.outcomes[0].passed
+    assert seen.outcomes[0].said.startswith("touched Wall, first Wall at ")
+    assert seen.outcomes[1].passed
+    assert flight.grade(written(CONTACT, wall=50)).outcomes[0].passed
+
+
+def test_a_blow_counts_that_is_over_before_the_step_is(written):
+    """Its arm begins 5 mm inside the wall, which throws it out within one sub-step."""
+    result = flight.grade(written(CONTACT.replace("duration: 4", "duration: 0.2"), wall=0.245))
+    assert said(result)["no_contact"] == "touched Wall, first Wall at 0.05 s; allowed is nothing"
+
+
+TALKING = """
+duration: 4
+script: counting.py
+criteria:
+  - {kind: signal, signal: counted, equals: 3, until: 2}
+  - {kind: signal, topic: seen, equals: 5, until: 2, name: topic}
+  - {kind: signal, topic: state, equals: searching, until: 2, name: state}
+  - {kind: signal, signal: counter, equals: 3, until: 2, name: mute}
+  - {kind: signal, signal: drawn, equals: 0.5, tolerance: 0.5, until: 1, name: drawn}
+  - {kind: stays, of: z, at_most: 2, name: low}
+"""
+
+
+def test_what_a_script_says_and_that_it_ends_the_flight(written):
+    talking = written(TALKING, counting=COUNTING)
+    result = flight.grade(talking)
+    assert {one.name for one in result.outcomes if one.passed} == {"signal", "topic", "state", "drawn"}
+    assert said(result)["topic"] == "seen was 5 from 1.05 s on; expected is 5"
+    assert said(result)["mute"] == "nothing was said by counter until 2.00 s"
+    assert said(result)["low"] == "the flight was over at 2.05 s, too early for this"
+    assert (result.error, round(result.flown, 9), result.points, result.of) == (None, 2.05, 4.0, 6.0)
+    assert flight.grade(talking) == result  # a script that draws draws the same again
+    assert said(flight.grade(talking, seed=1))["drawn"] != said(result)["drawn"]
+    assert Result.from_json(json.loads(json.dumps(result.to_json()))) == result
+
+
+@pytest.mark.parametrize(
+    ("source", "error", "flown"),
+    [
+        ("def sysCall_init(:", "[load] {}:1: SyntaxError", 0),
+        ("def sysCall_init():\n    sim.getObjectHandel('x')", "[init] {}:2: ", 0),
+        ("def sysCall_sensing():\n    if sim.getSimulationTime() > 1: raise ValueError('a\\nb')",
+         "[sensing] {}:2: ValueError: a b", 1.0),
+        ("def sysCall_sensing(): pass\ndef sysCall_cleanup():\n    1 / 0", "[cleanup] {}:3: ZeroDivisionError", 4.0),
+    ],
+)  # fmt: skip
+def test_a_script_that_fails_is_named_in_one_line(written, tmp_path, source, error, flown):
+    result = flight.grade(written(TALKING, counting=COUNTING, mine=source), str(tmp_path / "mine.py"))
+    assert result.error.startswith(error.format(tmp_path / "mine.py"))
+    assert "\n" not in result.error
+    assert not result.passed
+    assert result.flown == pytest.approx(flown)
+    assert result.script == str(tmp_path / "mine.py")
+
+
+def test_who_flies(written, tmp_path):
+    of_config = TALKING.replace("script: counting.py", "config: {script: counting.py}")
+    plain, inside = written(of_config.replace("counting.py", "''"), counting=COUNTING), written(of_config)
+    assert flight.grade(inside).flown == pytest.approx(2.05)
+    assert flight.grade(inside).script == str(tmp_path / "counting.py")
+    assert flight.grade(inside, "").digest == flight.grade(plain).digest
+    assert flight.grade(plain, str(tmp_path / "counting.py")).digest == flight.grade(inside).digest
+
+
+def test_a_plan_of_two_vehicles_grades_the_one_that_it_names(written):
+    two = """
+duration: 2
+vehicle: wing
+config: {vehicles: {lead: {position: [0, 0, 1]}, wing: {position: [0, 1, 1]}}}
+timeline: [{at: 0, vehicle: lead, twist: {linear: [0.3, 0, 0]}}, {at: 0, vehicle: wing, twist: {linear: [0.3, 0, 0]}}]
+criteria:
+  - {kind: formation, to: lead, offset: [0, 1, 0], at_most: 0.01}
+  - {kind: formation, to: Elsewhere, at_most: 0.01, name: no_object}
+"""
+    (first, *_) = flight.grade(written(two.replace("Elsewhere", "DronePosition"))).outcomes
+    assert (first.passed, first.said[:6]) == (True, "was up")
+    assert "no object named 'Elsewhere'" in flight.grade(written(two)).error
+
+
+def test_a_landing_of_the_built_in_script(written):
+    landing = """
+duration: 8
+timeline: [{at: 0.5, land: {}}]
+criteria:
+  - {kind: landed, at: [0, 0], softly: 1, stands_on: Floor}
+  - {kind: landed, at: DronePosition, until: 1, name: early}
+"""
+    in_time, early = flight.grade(written(landing)).outcomes
+    assert in_time.passed, in_time.said
+    assert early.said.startswith("is in the air at 1.00 s")
+
+
+WRONG = {
+    "": "must hold `key: value` lines, of which one is `criteria`, not None",
+    "duration: 5": "criteria: missing",
+    "duration: 5\ncriteria: []": "line 2: criteria = []: list should have at least 1 item",
+    "duration: 5\ncriteria:\n- {kind: rise_tme}": "line 3: criteria/0/kind = 'rise_tme': must be one of 'rise_time', ",
+    "duration: 5\ncriteria:\n- {kind: stays, of: vxx, at_most: 1}": "line 3: criteria/0/of = 'vxx': no such column of",
+    "duration: 5\ncriteria:\n- {kind: stays, of: vx}": "line 3: criteria/0/at_most: missing; there must be",
+    "duration: 5\ncriteria:\n- {kind: no_contact}\n- {kind: no_contact}": "criteria/1/name = 'no_contact' comes twice",
+    "duration: 5\ncriteria:\n- {kind: no_contact, until: 9}": "line 3: criteria/0/until = 9: the flight lasts 5 s",
+    "duration: 5\ncriteria:\n- {kind: landed, at: [1, 2, 3]}": "criteria/0/at = [1, 2, 3]: must be 2 numbers",
+    "duration: 5\ncriteria:\n- {kind: rise_time, of: vx, from: 1, to: 1, at_most: 1}": "criteria/0/to = 1: is where it",
+}
+BESIDE = {
+    "duratoin: 5": "line 1: duratoin: unknown key; known are duration",
+    "name: a b": "line 1: name = 'a b': must be a letter and then",
+    "scene: nix.yaml": "no such file: ",
+    "vehicle: dron": "line 1: vehicle = 'dron': no such vehicle; near names are drone",
+    "config: {control: {Kzre: 3}}": "line 1: config/control/Kzre: unknown key; known are Kzref",
+    "config: 3": "line 1: config = 3: must hold keys of config/drone.yaml, or be the name of a file",
+    "timeline: [{at: 1, twst: {}}]": "line 1: entry 1: twst: unknown key",
+    "timeline: 3": "line 1: timeline = 3: ",
+    "spread: {objects: {Box: [1, 1, 1]}}": "line 1: spread/objects/'Box': the scene has none",
+    "spread: {position: [1, 1]}": "line 1: spread/position = [1, 1]: must be 3 numbers",
+}
+
+
+@cache
+def _cases():
+    fine = "duration: 5\ncriteria: [{kind: no_contact}]"
+    return {**WRONG, **{f"{line}\n{fine}": text for line, text in BESIDE.items() if "duratoin" not in line},
+            f"duratoin: 5\n{fine}": BESIDE["duratoin: 5"]}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", _cases())
+def test_a_mistake_in_a_plan_is_named_in_one_line(written, text):
+    with pytest.raises(PlanError) as caught:
+        written(text)
+    assert _cases()[text] in str(caught.value)
+    assert "steps.yaml: " in str(caught.value)
+    assert "\n" not in str(caught.value)
