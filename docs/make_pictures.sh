@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots remote weather report rviz)
+sections=(diagrams cameras plots remote weather report tasks rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -39,6 +39,9 @@ report() {
   "$python" docs/take_report_picture.py "$folder" "$pictures/report.png"
   rm -r "$folder"
 }
+
+# The textures of tasks/, and a picture of each task in its folder.
+tasks() { "$python" docs/make_textures.py && "$python" docs/take_task_pictures.py; }
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.
 rviz() { docs/take_rviz_pictures.sh "$pictures"; }

@@ -89,7 +89,7 @@ def cameras():
     simulation = Simulation(parameters.load({"scene_file": "package://drone_sim/config/scenes/gates.yaml"}))
     simulation.drone.receive(Twist(Vector3(0.6, 0, 0)))
     fly(simulation, 1.5)
-    simulation.drone.blades.show()
+    simulation.drone.propulsion.blades.show()
     front, track, depth = (simulation.drone.cameras[name].take() for name in ("front", "track", "depth"))
     simulation.close()
     near = np.uint8(255 / (1 + np.nan_to_num(depth, nan=np.inf) / 2))
@@ -115,7 +115,7 @@ def fly(simulation, seconds):
 
 def take(simulation, camera):
     """Return a camera's picture of now, and end the simulation."""
-    simulation.drone.blades.show()
+    simulation.drone.propulsion.blades.show()
     picture = simulation.drone.cameras[camera].take()
     simulation.close()
     return picture

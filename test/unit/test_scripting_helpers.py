@@ -275,3 +275,14 @@ def test_a_lua_module_is_a_text_file_of_limited_size_in_the_scripts_folder(write
     place = "circle.lua:1" if name == "circle" else "script.lua:2"
     assert said.startswith(f"[load] {tmp_path}/inner/{place}: ")
     assert words in said
+
+
+def test_a_script_anywhere_imports_the_built_in_ones_and_a_file_beside_it_comes_first(write, simulate, printed):
+    user = "import tutorial\nfrom tutorial import *\n"
+    simulation = simulate(write("mine/script.py", user))
+    for _ in range(20):
+        simulation.step()
+    assert simulation.drone.state.position[2] == pytest.approx(0.8, abs=1e-3)
+    write("mine/tutorial.py", "def sysCall_init():\n    print('mine')\n")
+    simulation.start()
+    assert printed() == ["mine"]

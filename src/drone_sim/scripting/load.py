@@ -12,11 +12,11 @@ from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.turns import Turns
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.python.helpers import BUILT_IN
 from drone_sim.scripting.python.script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.wording import near_names
 
-_BUILT_IN = Path(__file__).resolve().parents[1] / "child_scripts"
 DEFAULT = "pilot"
 
 
@@ -88,7 +88,7 @@ def script_path(script: str) -> str:
     """
     name = script or DEFAULT
     if "/" not in name and not Path(name).suffix:
-        known = {path.stem: path for path in _BUILT_IN.glob("*.py") if path.stem != "__init__"}
+        known = {path.stem: path for path in BUILT_IN.glob("*.py") if path.stem != "__init__"}
         if name not in known:
             raise ScriptError("load", name, 0, f"no built-in script of that name; {near_names(name, known)}")
         return str(known[name])

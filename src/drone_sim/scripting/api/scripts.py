@@ -8,6 +8,8 @@ from collections.abc import Collection
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
 from drone_sim.scripting.api.calls import WrongValue
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Host
@@ -150,6 +152,8 @@ def _stored(value: Any, before: Any) -> Any:
         value = _from_text(value)
     elif isinstance(value, list):
         value = list(value)  # the script's own may change
+    elif isinstance(value, np.number):
+        value = value.item()
     if type(value) is float or type(value) is int:
         if not isfinite(value):
             raise WrongValue("a finite number is expected")

@@ -1,7 +1,8 @@
 """Helper modules beside a Python child script, which it imports as any other.
 
 They belong to the script that imports them: read anew with it, seen by no other script, and without __pycache__.
-Python's own modules come before a file of the same name, and a file comes before an installed package.
+Python's own modules come before a file of the same name, and a file comes before an installed package. Last come
+the built-in scripts: `import tutorial` finds the tutorial's controller, wherever a script lies.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any, cast
 from drone_sim.scripting import source_files
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
+BUILT_IN = Path(__file__).resolve().parents[2] / "child_scripts"
 _FIRST = frozenset((*sys.stdlib_module_names, "drone_sim"))
 _numbers = itertools.count(1)
 
@@ -35,7 +37,7 @@ class Helpers:
         self._folder = Path(script).parent
         self.package = f"_script{next(_numbers)}"
         above = ModuleType(self.package)
-        above.__path__ = [str(self._folder)]
+        above.__path__ = [str(self._folder), str(BUILT_IN)]
         sys.modules[self.package] = above  # dataclasses and the like look up the module of a class
         self._compiled = compiled
         self._is_beside: dict[str, bool] = {}
@@ -92,7 +94,8 @@ class Helpers:
         place = self._folder / top
         is_there = place.with_suffix(".py").is_file() or (place / "__init__.py").is_file()
         if top not in _FIRST:
-            return is_there or (place.is_dir() and getattr(PathFinder.find_spec(top), "origin", None) is None)
+            is_known = is_there or place.is_dir() or (BUILT_IN / top).with_suffix(".py").is_file()
+            return is_there or (is_known and getattr(PathFinder.find_spec(top), "origin", None) is None)
         if is_there:
             _LOG.warning("%s: %s is not imported from here: Python's own module comes first", self._folder, top)
         return False

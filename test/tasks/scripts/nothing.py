@@ -1,0 +1,5 @@
+"""Does nothing: the propellers stand."""
+
+
+def sysCall_init():
+    """Find nothing to do."""
