@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | lint | bench [NAME...] |
+# Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | test-web | lint | bench [NAME...] |
 #   fuzz [CASES] | soak [MINUTES] | tasks [TASK...] | pythons [VERSION...] | deb
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
@@ -39,7 +39,7 @@ PYBULLET_FILES=267
 # ros-environment is what lets setup.bash set ROS_PACKAGE_PATH, and python3-dev is for compiling PyBullet; on
 # Debian 12 other packages bring the first, and there is a wheel of the second.
 packages() {
-  echo python3-venv python3-dev python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri \
+  echo bubblewrap python3-scipy python3-venv python3-dev python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri \
     catkin ros-environment librostest-dev python3-rospy python3-roslaunch python3-rostest rosbash \
     python3-rosbag python3-rostopic python3-rosnode python3-rosmsg python3-rosservice python3-cv-bridge python3-tf2-ros \
     python3-tf2-msgs rviz python3-diagnostic-updater python3-dynamic-reconfigure python3-geometry-msgs \
@@ -170,6 +170,9 @@ stay_on_this_machine() {
 
 run_tests() {
   make_venv requirements-dev.txt
+  if ! command -v chromium >/dev/null || ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
+    say "no chromium, or no playwright: the tests in a browser are left out (./dev.sh test-web installs both)"
+  fi
   # Every core tests; of the tests with a master, each with its own, two run at a time.
   PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS=-j2
 }
@@ -218,6 +221,12 @@ case "$command" in
   setup) setup; say "ready: source $root/devel/setup.bash" ;;
   run) stay_on_this_machine; setup; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
+  test-web)
+    install_packages chromium
+    setup
+    make_venv requirements-dev.txt
+    make_venv requirements-web.txt
+    exec .venv/bin/python -m pytest -rs test/web "$@" ;;
   lint) install_packages git; setup; lint ;;
   bench) setup; make_venv requirements-dev.txt; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
@@ -226,7 +235,7 @@ case "$command" in
   pythons) # shellcheck disable=SC2046 # one word each
     install_packages $(packages)
     test_pythons "$@" ;;
-  deb) install_packages python3-matplotlib python3-opencv python3-pil python3-tqdm python3-zmq
+  deb) install_packages python3-jinja2 python3-matplotlib python3-opencv python3-pil python3-scipy python3-tqdm python3-zmq
     setup; packaging/deb.sh "$wheels" ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
 esac

@@ -7,6 +7,9 @@ setup(
     **generate_distutils_setup(
         packages=find_packages("src"),
         package_dir={"": "src"},
-        package_data={"drone_sim.scripting.lua": ["*.lua"]},
+        package_data={
+            "drone_sim.scripting.lua": ["*.lua"],
+            "drone_sim.grading.outputs.html": ["templates/*", "files/*"],
+        },
     )
 )

@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots remote weather tasks rviz)
+sections=(diagrams cameras plots remote weather report tasks rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -30,6 +30,15 @@ remote() { "$python" docs/remote/without_ros.py --plot "$pictures/remote_circle.
 
 # The flights of docs/weather.md, beside their theory; prints the numbers that the page quotes.
 weather() { "$python" docs/draw_weather.py "$pictures"; }
+
+# The report of docs/grading.md; needs what ./dev.sh test-web installs.
+report() {
+  local folder
+  folder=$(mktemp -d)
+  "$python" scripts/grade docs/grading/gates.yaml pilot --html "$folder" || true # two of its flights fail
+  "$python" docs/take_report_picture.py "$folder" "$pictures/report.png"
+  rm -r "$folder"
+}
 
 # The textures of tasks/, and a picture of each task in its folder.
 tasks() { "$python" docs/make_textures.py && "$python" docs/take_task_pictures.py; }

@@ -17,9 +17,9 @@ python=$(/usr/bin/python3 -c 'import sys; print("{}.{}".format(*sys.version_info
 # What Debian has, the package depends on; the environment sees it.
 DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), libegl1, libgl1, libgl1-mesa-dri,
  python3-cv-bridge, python3-diagnostic-updater, python3-dynamic-reconfigure, python3-genpy, python3-geometry-msgs,
- python3-interactive-markers, python3-matplotlib, python3-nav-msgs, python3-numpy, python3-opencv, python3-pil,
- python3-roslaunch, python3-rospy, python3-rosbag, python3-rosmsg, python3-rosnode, python3-rosservice,
- python3-rostopic, python3-sensor-msgs, python3-std-msgs,
+ python3-interactive-markers, python3-jinja2, python3-matplotlib, python3-nav-msgs, python3-numpy, python3-opencv,
+ python3-pil, python3-roslaunch, python3-rospy, python3-rosbag, python3-rosmsg, python3-rosnode, python3-rosservice,
+ python3-scipy, python3-rostopic, python3-sensor-msgs, python3-std-msgs,
  python3-std-srvs, python3-tf2-ros, python3-tqdm, python3-visualization-msgs, python3-yaml, ros-environment,
  python3-tf2-msgs, python3-zmq, rosbash"
 
@@ -39,7 +39,7 @@ rm -rf "$site"/pybullet_{data,envs,examples,utils,robots} "$site"/eglRenderer* "
 find "$site" -name '*.so' -exec strip --strip-unneeded {} +
 find "$stage$own/bin" -type f -delete
 find "$stage" -name __pycache__ -prune -exec rm -rf {} +
-programs=(simulator key_teleop joy_teleop view fly record plot_flight video import_scene doctor)
+programs=(grade sweep simulator key_teleop joy_teleop view fly record plot_flight video import_scene doctor grade_live)
 sed -i "1s:.*:#!$own/bin/python:" "${programs[@]/#/$stage/usr/lib/drone_sim/}"
 
 mkdir "$stage/DEBIAN"
@@ -52,7 +52,7 @@ Section: science
 Priority: optional
 Installed-Size: $(du -sk "$stage/usr" | cut -f1)
 Depends: $DEPENDS
-Recommends: rviz, python3-tk
+Recommends: bubblewrap, rviz, python3-tk
 Description: drone of a V-REP tutorial, without V-REP
  PyBullet underneath, ROS 1 around it: roslaunch drone_sim drone.launch
 CONTROL

@@ -17,6 +17,7 @@ KEYS = {
     "annotated_types": "python3-pydantic-pip",
     "cbor2": "python3-cbor2-pip",
     "cv2": "python3-opencv",
+    "distributed": "python3-distributed-pip",
     "greenlet": "python3-greenlet-pip",
     "moderngl": "python3-moderngl-pip",
     "pybullet": "python3-pybullet-pip",

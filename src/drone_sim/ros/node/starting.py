@@ -86,16 +86,23 @@ def reported(name: str, action: Callable[[], Any]) -> int:
 
 def read_parameters() -> Parameters:
     """Return the node's private parameters. Raises ParameterError, and ScriptError for a script that is not there."""
-    given: dict[str, Any] = rospy.get_param("~", {})
+    parameters = parameters_of(rospy.get_name())
+    script_path(parameters.script)  # a file that is not there ends the node; an error in one that is stops the flight
+    return parameters
+
+
+def parameters_of(name: str, **others: Any) -> Parameters:
+    """Return the private parameters of the simulator that has this name, `others` in place of some.
+
+    Raises ParameterError.
+    """
+    given: dict[str, Any] = rospy.get_param(name, {})
     if not isinstance(given, dict):
-        name = rospy.get_name()
         raise ParameterError(f"parameter {name} = {str(given)[:80]}: must hold parameters, such as {name}/script")
     for key in ("config", "script", "scene_file"):
         if isinstance(given.get(key), str):
             given[key] = from_shell(given[key])
-    parameters = parameters_module.load(given)
-    script_path(parameters.script)  # a file that is not there ends the node; an error in one that is stops the flight
-    return parameters
+    return parameters_module.load({**given, **others})
 
 
 def use_sim_time() -> bool:

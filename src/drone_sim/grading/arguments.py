@@ -1,0 +1,175 @@
+"""What `grade` and `sweep` have in common on the command line, and how they end."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NoReturn
+
+from tqdm import tqdm
+
+from drone_sim.config.types import ParameterError
+from drone_sim.files.resources import package_path
+from drone_sim.grading import plan as plans
+from drone_sim.grading.jobs import pool, sandbox, settings
+from drone_sim.grading.jobs.job import Job
+from drone_sim.grading.jobs.pool import Orders, PoolError
+from drone_sim.grading.jobs.process import Flight
+from drone_sim.grading.jobs.sandbox import NoSandbox
+from drone_sim.grading.jobs.store import Store, default_folder, forget_old
+from drone_sim.grading.plan import Plan, PlanError
+from drone_sim.grading.result import Result
+from drone_sim.offline.command_line import SIGNALLED, Parser
+from drone_sim.run.guardian import Guardian
+from drone_sim.scripting.errors import ScriptError
+from drone_sim.wording import near_names, shown
+
+WRONG = 2  # exit status
+_MOST_JOBS = 1024
+_EXPECTED = (PlanError, ParameterError, ScriptError, PoolError, OSError, ValueError, RuntimeError)
+
+
+class WrongArguments(Parser):
+    """A parser whose exit status for wrong arguments is not that of flights that fail."""
+
+    def error(self, message: str) -> NoReturn:
+        """End the program, with one line on stderr."""
+        self.exit(WRONG, f"{self.prog}: {' '.join(message.split())} (see {self.prog} --help)\n")
+
+
+def add_to(parser: argparse.ArgumentParser) -> None:
+    """Add the plan, and how flights are flown."""
+    parser.add_argument("plan", metavar="PLAN", help="the plan's file.yaml, or a task's name such as hover")
+    cores = len(os.sched_getaffinity(0))
+    parser.add_argument(
+        "--seeds", metavar="N", type=_number(1, plans.MAX_SEEDS), help="seeds 0 to N-1 (default: the plan's)"
+    )
+    parser.add_argument(
+        "--jobs", metavar="N", type=_number(1, _MOST_JOBS), default=cores, help=f"flights at a time ({cores})"
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", default="", help="a Dask scheduler, such as tcp://host:8786")
+    parser.add_argument("--results", metavar="DIR", help=f"where results are kept as they come ({default_folder()})")
+    parser.add_argument("--fresh", action="store_true", help="fly anew what is kept there")
+    parser.add_argument(
+        "--sandbox",
+        choices=("auto", "on", "off"),
+        default="auto",
+        help="bubblewrap around every flight: where it works, or else not at all, or never (auto)",
+    )
+
+
+def find_plan(name: str) -> str:
+    """Return the path of a plan's file, given as a path or as a task's name. Raises PlanError."""
+    if "/" in name or Path(name).suffix or Path(name).is_file():
+        return name
+    tasks = {path.parent.name: path for path in package_path().glob("tasks/*/plan.yaml")}
+    if name not in tasks:
+        raise PlanError(f"{shown(name)}: no such plan: must be a file.yaml, or a task; {near_names(name, tasks)}")
+    return str(tasks[name])
+
+
+class Runner:
+    """Flies jobs as the options say, keeps their results, and takes those that are there already."""
+
+    def __init__(self, program: str, options: argparse.Namespace, plan: Plan, tables: bool = False):
+        """Look for bubblewrap, and make the folder of results. Raises OSError."""
+        numbers = settings.load()
+        self._options = options
+        folder = Path(options.results) if options.results else default_folder()
+        self.store = Store(folder, plan)
+        if not options.results:
+            forget_old(folder, numbers.results.kept)
+        if options.fresh:
+            self.store.forget()
+        self._orders = Orders(
+            numbers.limits, numbers.batches, _is_sandboxed(program, options.sandbox), tables, numbers.workers.patience
+        )
+        self._program = program
+        self._open = contextlib.ExitStack()
+        self._fly: pool.Fly | None = None  # once there is something to fly
+
+    def __enter__(self) -> Runner:
+        """Return this."""
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        """End what is still flown."""
+        self._open.close()
+
+    def fly(self, jobs: Sequence[Job], quiet: bool = False) -> Iterator[tuple[Job, Result]]:
+        """Give each job and its result, as they come, those first that are there already; `quiet`: without a word."""
+        known = self.store.known(jobs, self._orders.tables)
+        if known and not quiet:
+            said = "--fresh flies them anew"
+            print(f"{self._program}: {len(known)} of {len(jobs)} flights are known ({said})", file=sys.stderr)
+        with tqdm(total=len(jobs), unit=" flights", disable=quiet or None, leave=False, smoothing=0.1) as bar:
+            waiting = []
+            for job in jobs:
+                if job.key in known:
+                    bar.update()
+                    yield job, replace(known[job.key], script=job.script)
+                else:
+                    waiting.append(job)
+            for flight in self._flights(waiting):
+                self.store.add(flight)
+                bar.update()
+                yield flight.job, flight.result
+
+    def _flights(self, jobs: Sequence[Job]) -> Iterator[Flight]:
+        if not jobs:
+            return
+        if self._fly is None:
+            workers = min(self._options.jobs, len(jobs))
+            self._fly = self._open.enter_context(pool.opened(self._orders, workers, self._options.scheduler))
+        yield from self._fly(jobs)
+
+
+def status_of(program: str, action: Callable[[], int], guardian: Guardian | None) -> int:
+    """Return an action's exit status: 2 after one line for what cannot be done, 130 after Ctrl-C."""
+    if guardian is not None:
+        guardian.ready(_interrupt)
+    try:
+        return action()
+    except KeyboardInterrupt:
+        return SIGNALLED + (guardian.asked if guardian is not None and guardian.asked else signal.SIGINT)
+    except _EXPECTED as error:
+        print(f"{program}: {' '.join(_said(error).split())}", file=sys.stderr, flush=True)
+        return WRONG
+
+
+def _said(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
+
+
+def _interrupt() -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _is_sandboxed(program: str, wanted: str) -> bool:
+    if wanted == "off":
+        return False
+    try:
+        sandbox.command(1)
+    except NoSandbox as error:
+        if wanted == "on":
+            raise
+        print(f"{program}: Python scripts can change your files: {error}", file=sys.stderr)
+        return False
+    return True
+
+
+def _number(low: int, high: int) -> Callable[[str], int]:
+    def number(text: str) -> int:
+        if not (text.isascii() and text.isdigit() and len(text) < 20 and low <= int(text) <= high):
+            raise argparse.ArgumentTypeError(f"{shown(text)}: must be a whole number from {low} to {high}")
+        return int(text)
+
+    return number

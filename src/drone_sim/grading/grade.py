@@ -1,0 +1,152 @@
+"""`rosrun drone_sim grade`: fly scripts by a plan, each flight in a process of its own, and say how well."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from tqdm import tqdm
+
+from drone_sim.files import writing
+from drone_sim.grading import plan as plans
+from drone_sim.grading.arguments import Runner, WrongArguments, add_to, find_plan, status_of
+from drone_sim.grading.jobs.job import Job, contents_of, key_of
+from drone_sim.grading.outputs import as_json, gradescope, junit, table
+from drone_sim.grading.outputs.by_script import by_script
+from drone_sim.grading.plan import Plan
+from drone_sim.grading.result import Result
+from drone_sim.run.guardian import Guardian
+from drone_sim.scripting.load import script_path
+
+PROGRAM = "grade"
+FAILED = 1
+_WRITERS = {"junit": junit.write, "json": as_json.write, "gradescope": gradescope.write}
+
+
+def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
+    """Grade; return 0 where every flight passes, 1 where one does not, 2 after a line for what cannot be done.
+
+    With a guardian a signal ends it, with what has been flown so far kept, told and written, and 128 + its number.
+    """
+    options = _parser().parse_intermixed_args(arguments)
+    return status_of(PROGRAM, lambda: _Grading(options, guardian).run(), guardian)
+
+
+class _Grading:
+    """One run of the program."""
+
+    def __init__(self, options: argparse.Namespace, guardian: Guardian | None):
+        """Read and check everything. Raises what status_of expects."""
+        self._options = options
+        self._guardian = guardian
+        self._plan = plans.read(find_plan(options.plan))
+        self._jobs = jobs_of(self._plan, options.script, options.seeds or self._plan.seeds)
+        self._scripts = len({job.script for job in self._jobs})
+        _check_outputs(options, self._scripts)
+        self._runner = Runner(PROGRAM, options, self._plan, tables=bool(options.html))
+        self._results: dict[Job, Result] = {}
+
+    def run(self) -> int:
+        """Fly, and tell."""
+        try:
+            with self._runner:
+                self._fly()
+        except KeyboardInterrupt:
+            if self._guardian is not None:
+                self._guardian.stand_down()  # what follows takes its time
+            self._tell()
+            print(
+                f"{PROGRAM}: {len(self._results)} of {len(self._jobs)} flights were flown, and are kept",
+                file=sys.stderr,
+            )
+            raise
+        if self._guardian is not None:
+            self._guardian.stand_down()
+        self._tell()
+        return 0 if all(result.passed for result in self._results.values()) else FAILED
+
+    def _fly(self) -> None:
+        left = Counter(job.script for job in self._jobs)
+        for job, result in self._runner.fly(self._jobs):
+            self._results[job] = result
+            left[job.script] -= 1
+            if not left[job.script] and self._scripts > 1:
+                self._say(job.script)
+
+    def _say(self, script: str) -> None:
+        """Tell how a script has done, as soon as it is known."""
+        (one,) = by_script(result for job, result in self._results.items() if job.script == script)
+        name = Path(script).name or one.label
+        points = f"{one.points:.4g} of {one.of:.4g} points"
+        tqdm.write(f"{name}: {one.passed} of {len(one.flights)} flights passed, {points}", file=sys.stderr)
+
+    def _tell(self) -> None:
+        results = [self._results[job] for job in self._jobs if job in self._results]
+        if not results:
+            return
+        table.show(self._plan, results)
+        for option, write in _WRITERS.items():
+            path = getattr(self._options, option)
+            if path:
+                write(self._plan, results, path)
+        if self._options.html:
+            self._write_html(results)
+
+    def _write_html(self, results: Sequence[Result]) -> None:
+        from drone_sim.grading.outputs import html
+
+        keys = {(job.script, job.seed): job.key for job in self._jobs}
+        html.write(
+            self._plan, results, lambda one: self._runner.store.table(keys[one.script, one.seed]), self._options.html
+        )
+        print(f"wrote {Path(self._options.html) / 'index.html'}")
+
+
+def jobs_of(plan: Plan, scripts: Sequence[str], seeds: int) -> list[Job]:
+    """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError."""
+    jobs = []
+    for given in dict.fromkeys(plan.script_of(one) for one in (scripts or (None,))):
+        found = script_path(given)
+        script = found if Path(given).suffix else given
+        contents = contents_of(plan, script)
+        jobs += [Job(str(plan.path), script, seed, {}, key_of(contents, seed, {})) for seed in range(seeds)]
+    return jobs
+
+
+def _check_outputs(options: argparse.Namespace, scripts: int) -> None:
+    """Raise ValueError or OSError for what cannot be written, before anything is flown."""
+    for option in _WRITERS:
+        if path := getattr(options, option):
+            writing.check(path)
+    if options.gradescope and scripts > 1:
+        raise ValueError(f"--gradescope: is for one script; here are {scripts}")
+    if options.html:
+        from drone_sim.grading.outputs import html
+
+        html.check(options.html)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = WrongArguments(
+        prog=PROGRAM, description="Fly scripts by a plan and grade them; exit status 0 if all pass, 1 if not."
+    )
+    add_to(parser)
+    parser.add_argument(
+        "script",
+        metavar="SCRIPT",
+        nargs="*",
+        default=[],
+        help="child scripts (default: the plan's, or the built-in one)",
+    )
+    parser.add_argument("--junit", metavar="OUT.xml", help="write results as JUnit's XML")
+    parser.add_argument("--json", metavar="OUT.json", help="write all results and figures")
+    parser.add_argument("--gradescope", metavar="results.json", help="write one script's results for Gradescope")
+    parser.add_argument("--html", metavar="DIR", help="write a report with plots and a replay of every flight")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main(guardian=Guardian(PROGRAM)))

@@ -1,0 +1,155 @@
+"""Results in the order in which people ask for them: whose script, how many flights passed, which was the worst."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+
+from drone_sim.grading.result import Outcome, Result
+
+BUILT_IN = "(built-in)"
+
+
+@dataclass(frozen=True)
+class ScriptResults:
+    """All flights of one script, at least one, by seed."""
+
+    script: str  # as the results name it, '' is the built-in one
+    label: str  # its name for people, which no other script of these results has
+    flights: tuple[Result, ...]
+
+    @property
+    def passed(self) -> int:
+        """How many flights passed."""
+        return sum(one.passed for one in self.flights)
+
+    @property
+    def points(self) -> float:
+        """The mean of the flights' points."""
+        return sum(one.points for one in self.flights) / len(self.flights)
+
+    @property
+    def of(self) -> float:
+        """The points that a flight can give."""
+        return max(one.of for one in self.flights)
+
+    @property
+    def worst(self) -> Result:
+        """The flight with the fewest points; of several the first."""
+        return min(self.flights, key=lambda one: (one.points, one.passed))
+
+    @property
+    def flown(self) -> float:
+        """Simulated seconds, of all flights together."""
+        return sum(one.flown for one in self.flights)
+
+    @property
+    def failures(self) -> list[tuple[str, int]]:
+        """Criteria that failed and in how many flights, the most frequent first."""
+        return Counter(name for one in self.flights for name in _failed(one)).most_common()
+
+    @property
+    def errors(self) -> list[str]:
+        """The flights' errors, each once, with the script's name in place of its whole path."""
+        errors = (one.error for one in self.flights if one.error)
+        return list(dict.fromkeys(one.replace(self.script, self.label) if self.script else one for one in errors))
+
+
+def by_script(results: Iterable[Result]) -> list[ScriptResults]:
+    """Return results by script, in the order in which the scripts first come; flights by seed, then as they come."""
+    flights: dict[str, list[Result]] = {}
+    for one in results:
+        flights.setdefault(one.script, []).append(one)
+    labels = _labels(list(flights))
+    return [
+        ScriptResults(script, labels[script], tuple(sorted(some, key=lambda one: one.seed)))
+        for script, some in flights.items()
+    ]
+
+
+def flight_label(result: Result) -> str:
+    """Return what tells a flight from the others of its script: `seed 3`, and what was changed."""
+    changes = ", ".join(f"{key}={value}" for key, value in _flat(result.changes))
+    return f"seed {result.seed}{f', {changes}' if changes else ''}"
+
+
+def named_outcomes(result: Result) -> list[tuple[str, Outcome]]:
+    """Return the outcomes, each with a name that no other has: of two called `reach` the second is `reach (2)`."""
+    seen: Counter[str] = Counter()
+    named = []
+    for one in result.outcomes:
+        seen[one.name] += 1
+        named.append((one.name if seen[one.name] == 1 else f"{one.name} ({seen[one.name]})", one))
+    return named
+
+
+@dataclass(frozen=True)
+class CriterionResults:
+    """One criterion in all flights that it was asked of."""
+
+    name: str
+    kind: str
+    allowed: str
+    of: float
+    passed: int
+    flights: int
+
+
+def criteria_of(results: Iterable[Result]) -> list[CriterionResults]:
+    """Return how often each criterion was passed, in the order of the plan."""
+    found: dict[str, list[Outcome]] = {}
+    for result in results:
+        for name, one in named_outcomes(result):
+            found.setdefault(name, []).append(one)
+    return [
+        CriterionResults(name, some[0].kind, some[0].allowed, some[0].of, sum(one.passed for one in some), len(some))
+        for name, some in found.items()
+    ]
+
+
+def number(value: float) -> str:
+    """Return a figure as people read it: three digits that count, and no more zeros than needed."""
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def points(value: float) -> str:
+    """Return points with two decimals at most."""
+    return f"{value:.2f}".rstrip("0").rstrip(".")
+
+
+def figure(outcome: Outcome) -> str:
+    """Return the figure behind an outcome with its unit, '' where there is none."""
+    return "" if outcome.value is None else f"{number(outcome.value)} {outcome.unit}".rstrip()
+
+
+def told(outcome: Outcome) -> str:
+    """Return how a criterion came out, in a sentence, with the time of a failure."""
+    said = outcome.said or ", ".join(filter(None, (figure(outcome), outcome.allowed)))
+    when = f"{outcome.at:.2f} s" if outcome.at is not None and not outcome.passed else ""
+    return f"{said} (at {when})" if when and when not in said else said
+
+
+def _failed(result: Result) -> list[str]:
+    return [name for name, one in named_outcomes(result) if not one.passed]
+
+
+def _labels(scripts: Sequence[str]) -> dict[str, str]:
+    """Return the shortest ends of the scripts' paths that are different, such as alice/my.py and bob/my.py."""
+    labels = {}
+    for script in scripts:
+        parts = PurePath(script).parts
+        ends = ("/".join(parts[-length:]) for length in range(1, len(parts)))
+        labels[script] = next((end for end in ends if _is_only_one(end, scripts)), script) or BUILT_IN
+    return labels
+
+
+def _is_only_one(end: str, scripts: Iterable[str]) -> bool:
+    return sum(script == end or script.endswith(f"/{end}") for script in scripts) == 1
+
+
+def _flat(changes: object, above: str = "") -> list[tuple[str, object]]:
+    if not isinstance(changes, dict):
+        return [(above, changes)]
+    return [pair for key, value in changes.items() for pair in _flat(value, f"{above}.{key}" if above else str(key))]

@@ -1,0 +1,236 @@
+"""`rosrun drone_sim grade_live PLAN`: the plan on a running simulator, flown by whatever flies there.
+
+It starts the simulation anew, sends the plan's timeline by topics, hears what the vehicle does, and judges that by the
+same criteria as `grade`. As a <test> of rostest it writes the result that rostest reads. See docs/grading.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import os
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import rosgraph
+import rospy
+import yaml
+
+from drone_sim.files import writing
+from drone_sim.grading import flight
+from drone_sim.grading import plan as plans
+from drone_sim.grading.flown import Flown
+from drone_sim.grading.outputs import as_json, gradescope, html, junit, table
+from drone_sim.grading.plan import Plan
+from drone_sim.grading.result import Result, result_of
+from drone_sim.offline.command_line import FAILED, Parser, status_of
+from drone_sim.ros.grading.hearing import Hearing
+from drone_sim.ros.grading.sending import Sender, entries_of, steps_late
+from drone_sim.ros.grading.simulator import Simulator, Unfit
+from drone_sim.ros.node.paths import from_shell
+from drone_sim.ros.node.starting import init_node, reported
+from drone_sim.run.parameters import Parameters
+from drone_sim.scene.scene_parameters import find_files_beside
+
+_NAME = "grade_live"
+_XML = "--gtest_output=xml:"  # by which rostest says where it looks for the result
+_STANDS = 10.0  # s of real time without a step: nothing comes any more
+_LOOK, _LAST = 0.05, 0.3  # s of real time, between two looks; for the last messages to come
+_PATIENCE = 30.0  # s of real time
+
+
+def main() -> int:
+    """Grade; return 0 where all is passed, and 1 after the table, or one line for what cannot be graded."""
+    options = _parser().parse_args(_arguments(rosgraph.myargv(sys.argv)[1:]))
+    if options.write_config:
+        return status_of(_NAME, lambda: _write_config(options.plan, options.write_config))
+    if not init_node(_NAME, anonymous=True, disable_signals=False):
+        return FAILED
+    results: list[Result] = []
+    status = reported(_NAME, lambda: results.append(_graded(options)))
+    return status or (0 if results[0].passed else FAILED)
+
+
+def _write_config(file: str, path: str) -> None:
+    """Write what the simulator is to be launched with. Raises ValueError and OSError, in one line."""
+    plan = plans.read(from_shell(file))
+    if isinstance(plan.config, str):
+        raise ValueError(f"{file}: its config is a file already: {plan.config}")
+    config = copy.deepcopy(dict(plan.config))
+    find_files_beside(plan.folder, config)
+    writing.write(path, yaml.safe_dump(config, sort_keys=False))
+
+
+def _graded(options: argparse.Namespace) -> Result:
+    """Raises ValueError and OSError, in one line."""
+    plan = plans.read(from_shell(options.plan))
+    if options.html:
+        html.check(options.html)
+    for file in filter(None, (options.csv, options.json, options.junit, options.gradescope)):
+        writing.check(file)
+    result, flown = grade(plan, options.seed, options.node, options.simulator, options.patience)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(options.csv or f"{folder}/flight.csv")
+        if flown is not None:
+            flight.write(flown.rows, file)
+        _write(options, plan, result, file if flown is not None else None)
+    table.show(plan, [result])
+    return result
+
+
+def _write(options: argparse.Namespace, plan: Plan, result: Result, flown: Path | None) -> None:
+    if options.json:
+        as_json.write(plan, [result], options.json)
+    if options.gradescope:
+        gradescope.write(plan, [result], options.gradescope)
+    for file in filter(None, (options.junit, options.rostest)):
+        junit.write(plan, [result], file)
+    if options.html:
+        html.write(plan, [result], lambda _: flown, options.html)
+
+
+def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> tuple[Result, Flown | None]:
+    """Fly once, and return the result and the flight.
+
+    `node` is the one that flies, which is waited for, '' where the simulator's script does. Raises Unfit and
+    ParameterError where the plan cannot be graded on this simulator; what goes wrong later is in the result.
+    """
+    there = Simulator(simulator, patience)
+    parameters = there.fit(plan)
+    live = _Live(plan, seed, there, parameters)
+    there.wait(live.is_connected, f"{there.name} lacks topics of the plan's vehicles: launch it in the plan's scene")
+    if node:
+        there.wait(lambda: _is_node(node), f"no node {node}")
+    error = live.fly()
+    script = node or parameters.script
+    flown = live.hearing.flown(plan.duration)
+    if flown is None:
+        return flight.ungraded(plan, script, seed, {}, error or "nothing was heard of the flight"), None
+    late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), flown.rows, parameters.time_step)
+    if late:
+        rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
+    outcomes = tuple(one.judge(flown) for one in plan.criteria)
+    digest = flight.digest_of(flown.rows)
+    return result_of(plan.name, script, seed, {}, outcomes, flown.end, error or None, digest), flown
+
+
+class _Live:
+    """One flight through topics."""
+
+    def __init__(self, plan: Plan, seed: int, simulator: Simulator, parameters: Parameters):
+        """Advertise and subscribe. Raises Unfit."""
+        self._simulator, self._duration, self._scene = simulator, plan.duration, parameters.scene_file
+        self._over = threading.Event()
+        self._started = False
+        wanted = plan.parameters(seed)
+        self._sender = Sender(entries_of(plan.timeline_of(wanted), wanted, parameters), parameters)
+        self.hearing = Hearing(plan, parameters, self._follow)
+
+    def is_connected(self) -> bool:
+        """Whether the simulator hears all that is said, and the other way round."""
+        return self._sender.is_heard and self.hearing.is_connected()
+
+    def _follow(self, now: float) -> None:
+        """Send what is due after a step that ended at this time (s)."""
+        if self._started and not self._over.is_set():
+            self._sender.send(now)
+            if now >= self._duration - 1e-6:
+                self._over.set()
+
+    def fly(self) -> str:
+        """Fly, and return what went wrong, in one line."""
+        try:
+            self._simulator.stop()
+            time.sleep(_LAST)  # what was sent before is not of this flight
+            self.hearing.clear()
+            self._started = True
+            self._simulator.start(self._scene)
+            ended = self._wait()
+            self._over.set()
+            if rospy.is_shutdown():
+                return ended
+            time.sleep(_LAST)
+            self._simulator.stop()
+        except Unfit as error:
+            return str(error)
+        return ended or self._simulator.error
+
+    def _wait(self) -> str:
+        """Wait for the end; return what came before it."""
+        last, since = -1.0, time.monotonic()
+        while not self._over.wait(_LOOK):
+            now = self.hearing.time
+            self.hearing.look_for_topics()
+            if now != last:
+                last, since = now, time.monotonic()
+            if rospy.is_shutdown():
+                return f"ended from outside at {now:.2f} s"
+            if self.hearing.went_back:
+                return "somebody else has started the simulation anew"
+            if self._simulator.state == "stopped" and now > 0:
+                time.sleep(_LAST)  # its reason comes by another topic
+                return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
+            if time.monotonic() - since > _STANDS:
+                return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
+        return ""
+
+
+def _is_node(name: str) -> bool:
+    try:
+        rosgraph.Master(rospy.get_name()).lookupNode(rospy.resolve_name(f"/{name.strip('/')}"))
+    except (rosgraph.MasterError, OSError):
+        return False
+    return True
+
+
+# ---- arguments
+
+
+def _arguments(given: Sequence[str]) -> list[str]:
+    """Return the arguments, those that rostest adds as options of ours."""
+    return [f"--rostest={one.removeprefix(_XML)}" if one.startswith(_XML) else one for one in given if one != "--text"]
+
+
+def _seed(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise argparse.ArgumentTypeError(f"{text:.60}: must be a whole number from 0 on")
+    return int(text)
+
+
+def _from_here(name: str) -> str:
+    """Return a file's name from where the user stands, although roslaunch runs nodes in ~/.ros."""
+    return str(Path(os.environ.get("PWD") or os.getcwd()) / name)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(prog=_NAME, description="Grade what flies on a running simulator by a plan.")
+    parser.add_argument("plan", metavar="PLAN.yaml", help="the plan, as for `grade`")
+    parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="start and wind of this seed (default: 0)")
+    parser.add_argument("--node", metavar="NAME", default="", help="the node that flies: it is waited for")
+    parser.add_argument("--simulator", metavar="NODE", default="drone_sim", help="(default: %(default)s)")
+    parser.add_argument(
+        "--patience", metavar="S", type=float, default=_PATIENCE, help="real seconds to wait for both (default: 30)"
+    )
+    parser.add_argument(
+        "--write-config",
+        type=_from_here,
+        metavar="OUT.yaml",
+        help="write the plan's config, for config:= of drone.launch, and end",
+    )
+    parser.add_argument("--csv", type=_from_here, metavar="OUT.csv", help="write the flight's table, as `fly --csv`")
+    parser.add_argument("--json", type=_from_here, metavar="OUT.json", help="write everything, for programs")
+    parser.add_argument("--junit", type=_from_here, metavar="OUT.xml", help="write JUnit XML")
+    parser.add_argument(
+        "--gradescope", type=_from_here, metavar="results.json", help="write the results for Gradescope"
+    )
+    parser.add_argument("--html", type=_from_here, metavar="DIR", help="write a report for the browser")
+    parser.add_argument("--rostest", metavar="OUT.xml", help=argparse.SUPPRESS)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+"""A plan graded behind topics: a node that flies, a script as without ROS, and what cannot be graded there."""
+
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rosnode
+import rospy
+import rostest
+
+from drone_sim.files.resources import package_path
+from drone_sim.grading import flight
+from drone_sim.grading import plan as plans
+from drone_sim.ros.grading.grade_live import grade
+from drone_sim.ros.grading.simulator import Unfit
+
+PLAN = """
+duration: 4.5
+spread: {position: [0.2, 0.2, 0], yaw: 0.2}
+timeline:
+  - {at: 1, twist: {linear: [1, 0, 0], angular: [0, 0, 0.5]}}
+  - {at: 2, push: {force: [0, 0, 1], duration: 0.2}}
+  - {at: 2.5, weather: {wind: [0, 1, 0], gusts: {deviation: [0.1, 0, 0]}}}
+  - {at: 3, faults: {propellers: [0.9, 1, 1, 1]}}
+  - {at: 4, land: {}}
+criteria:
+  - {kind: rise_time, of: vx, after: 1, from: 0, to: 1, at_most: 0.6}
+  - {kind: stays, of: z, until: 4, at_least: 0.9}
+  - {kind: steady_error, of: vy, to: 0, at_most: 1}
+  - {kind: attitude, at_most: 1}
+"""
+STEP = 0.05  # s
+PATIENCE = 20  # s
+
+
+class GradeLive(unittest.TestCase):
+    """On the simulator of the example, at five times real time."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def read(self, text):
+        path = Path(self.folder.name) / "plan.yaml"
+        path.write_text(text)
+        return plans.read(path)
+
+    def test_1_a_node_flies_the_course_of_the_documentation(self):
+        found, flown = grade(plans.read(package_path() / "docs/grading/course.yaml"), 0, "flyer", "drone_sim", PATIENCE)
+        self.assertTrue(found.passed, found)
+        self.assertEqual((found.script, found.error, len(found.outcomes)), ("flyer", None, 3))
+        self.assertGreater(np.abs(flown.columns["command_vx"]).max(), 0.4)
+        rosnode.kill_nodes(["/flyer"])
+
+    def test_2_the_same_comes_out_as_without_ros(self):
+        plan = self.read(PLAN)
+        offline = Path(self.folder.name) / "offline.csv"
+        wanted = flight.grade(plan, "", 3, None, offline)
+        found, flown = grade(plan, 3, "", "drone_sim", PATIENCE)
+        self.assertEqual((found.error, round(found.flown, 6)), (None, 4.5))
+        self.assertEqual([one.passed for one in found.outcomes], [one.passed for one in wanted.outcomes])
+        self.assertEqual({one.passed for one in found.outcomes}, {True, False})
+        for one, other in zip(found.outcomes, wanted.outcomes):
+            self.assertAlmostEqual(one.value, other.value, delta=0.15, msg=one.name)
+        rows = np.loadtxt(offline, delimiter=",", skiprows=1)
+        self.assertGreater(np.abs(rows[60, 1:4] - rows[0, 1:4]).max(), 1)
+        # A message may come some steps late where the machine is busy.
+        there = np.interp(flown.times, rows[:, 0], rows[:, 1])
+        self.assertLess(np.abs(there - flown.rows[:, 1]).max(), 5 * STEP * 1.3)
+
+    def test_3_what_cannot_be_graded_here_says_why(self):
+        for change, why in (
+            ("config: {control: {Kzref: 3}}", r"control/Kzref = 5.0, the plan's is 3.0; see its config:="),
+            ("scene: room.yaml", r"this seed moves objects of the scene, which no topic does"),
+            ("push", r"entry at 2 s: push.duration = 0.5: a push by topic lasts push/duration = 0.2 s"),
+            ("no_contact", r"criterion no_contact: needs the sensor `contacts`"),
+            ("signal", r"criterion signal: asks for seen: a script's signals are heard by no topic"),
+        ):
+            text = {
+                "push": PLAN.replace("duration: 0.2", "duration: 0.5"),
+                "no_contact": f"{PLAN}  - {{kind: no_contact}}\n",
+                "signal": f"{PLAN}  - {{kind: signal, signal: seen, equals: 1}}\n",
+            }.get(change, f"{PLAN}{change}\n")
+            if change.startswith("scene"):
+                (Path(self.folder.name) / "room.yaml").write_text(
+                    "objects: [{name: Ball, shape: sphere, size: [0.1], position: [3, 3, 1]}]\n"
+                )
+                text = text.replace("yaw: 0.2", "yaw: 0.2, objects: {Ball: [1, 1, 0]}")
+            with self.subTest(change), self.assertRaisesRegex(Unfit, why):
+                grade(self.read(text), 1, "", "drone_sim", PATIENCE)
+
+    def test_3_a_node_that_never_comes_is_not_waited_for_for_ever(self):
+        with self.assertRaisesRegex(Unfit, r"no node student \(waited for 2 s\)"):
+            grade(self.read(PLAN), 0, "student", "drone_sim", 2)
+
+
+if __name__ == "__main__":
+    rospy.init_node("test_grade_live")
+    sys.exit(rostest.rosrun("drone_sim", "grade_live", GradeLive))

@@ -1,0 +1,134 @@
+"""What is made of results for a terminal, for programs, and for CI systems."""
+
+import io
+import json
+import random
+import re
+from xml.etree import ElementTree
+
+import pytest
+from graded import EVIL, PLAN, read_plan, result
+
+from drone_sim.grading.outputs import as_json, gradescope, junit, table
+from drone_sim.grading.outputs.by_script import by_script
+
+
+@pytest.fixture(name="plan", scope="module")
+def _plan(tmp_path_factory):
+    return read_plan(tmp_path_factory.mktemp("plan"))
+
+
+def a_class(scripts=40, seeds=20):
+    chance = random.Random(1)
+    return [
+        result(f"/home/students/{'x' * script}{script}/solution.py", seed, [chance.random() < 0.8 for _ in range(2)])
+        for script in range(scripts)
+        for seed in range(seeds)
+    ]
+
+
+def test_scripts_are_told_apart_by_as_much_of_their_paths_as_it_takes():
+    scripts = ["/a/my.py", "/b/my.py", "/b/other.py", ""]
+    labels = [one.label for one in by_script([result(script) for script in scripts])]
+    assert labels == ["a/my.py", "b/my.py", "other.py", "(built-in)"]
+
+
+def test_a_script_is_as_good_as_the_mean_of_its_flights_and_its_worst_is_named():
+    flights = [result(seed=0), result(seed=2, passed=(False, False)), result(seed=1, passed=(True, False))]
+    (script,) = by_script(flights)
+    assert [one.seed for one in script.flights] == [0, 1, 2]
+    assert (script.passed, script.points, script.of, script.worst.seed) == (1, pytest.approx(5 / 3), 3, 2)
+    assert script.failures == [("no_contact", 2), ("forward", 1)]
+
+
+def test_forty_scripts_fit_into_eighty_columns_a_line_each(plan):
+    lines = table.text(plan, a_class()).splitlines()
+    assert len(lines) == 43
+    assert all(len(line) <= 80 for line in lines)
+    assert "solution.py" in lines[-2]
+    assert re.fullmatch(r"\d+ of 40 scripts passed every flight", lines[-1])
+
+
+def test_a_single_flight_is_told_criterion_by_criterion(plan):
+    text = table.text(plan, [result(passed=(True, False), error="it broke")])
+    assert re.search(r"ok +forward +2/2 +it rose in 0.5 s\n", text)
+    assert re.search(r"FAIL +no_contact +0/1 +it rose in 0.5 s \(at 1.50 s\)\n", text)
+    assert "error: it broke" in text
+    assert "2 of 3 points" in text
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_colours_are_for_terminals_alone(plan, terminal):
+    file = io.StringIO()
+    file.isatty = lambda: terminal
+    table.show(plan, [result()], file)
+    assert ("\033[32m" in file.getvalue()) is terminal
+
+
+def test_no_name_and_no_error_commands_the_terminal(plan):
+    evil = [result(f"{EVIL}{number}.py", error=EVIL, names=(EVIL, EVIL)) for number in (1, 2)]
+    for results in (evil, evil[:1]):
+        assert not re.search("[\x1b\x07\ud800]", table.text(plan, results))
+
+
+def test_json_holds_everything(plan, tmp_path):
+    results = [*a_class(2, 2), result(EVIL, error=EVIL, changes={"control": {"Kzref": float("inf")}})]
+    as_json.write(plan, results, tmp_path / "r.json")
+    said = json.loads((tmp_path / "r.json").read_text(), parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert (said["version"], said["plan"]["name"], len(said["scripts"])) == (1, "steps", 3)
+    assert said["results"][0] == results[0].to_json() | {"outcomes": said["results"][0]["outcomes"]}
+    assert said["results"][0]["outcomes"][0] == results[0].to_json()["outcomes"][0]
+    assert said["results"][-1]["changes"] == {"control": {"Kzref": None}}
+
+
+def test_junit_counts_what_it_says(plan, tmp_path):
+    flights = [result(seed=0), result(seed=1, passed=(True, False)), result("b.py", error="it broke", passed=(False,))]
+    junit.write(plan, flights, tmp_path / "r.xml")
+    root = ElementTree.parse(tmp_path / "r.xml").getroot()
+    assert [(suite.get("name"), suite.get("tests"), suite.get("failures"), suite.get("errors")) for suite in root] == [
+        ("steps: my.py", "6", "1", "0"),
+        ("steps: b.py", "2", "1", "1"),
+    ]
+    failed = [case for case in root.iter("testcase") if case.find("failure") is not None]
+    assert [case.get("name") for case in failed] == ["seed 1: no_contact", "seed 0: forward"]
+    assert failed[0].find("failure").get("message") == failed[0].find("failure").text == "it rose in 0.5 s (at 1.50 s)"
+    cases = [(case.get("classname"), case.get("name")) for case in root.iter("testcase")]
+    assert len(set(cases)) == len(cases)
+
+
+def test_two_criteria_of_one_name_are_two_cases(plan):
+    root = ElementTree.fromstring(junit.text(plan, [result(names=("reach", "reach"))]))
+    assert [case.get("name") for case in root.iter("testcase")][1:] == ["seed 0: reach", "seed 0: reach (2)"]
+
+
+def test_junit_is_xml_whatever_names_and_errors_hold(plan, tmp_path):
+    junit.write(plan, [result(EVIL, error=EVIL, passed=(False, False), names=(EVIL, EVIL))], tmp_path / "r.xml")
+    root = ElementTree.parse(tmp_path / "r.xml").getroot()
+    assert "<script>alert(1)" in root.find(".//error").get("message")
+
+
+def test_gradescope_gets_the_mean_over_the_flights(plan):
+    said = gradescope.content(plan, [result(seed=0), result(seed=1, passed=(True, False), error=EVIL)])
+    assert said["score"] == sum(test["score"] for test in said["tests"]) == 2.5
+    forward, contact = said["tests"]
+    assert (forward["name"], forward["score"], forward["max_score"], forward["status"]) == ("forward", 2, 2, "passed")
+    assert (contact["name"], contact["score"], contact["max_score"], contact["status"]) == (
+        "no_contact",
+        0.5,
+        1,
+        "failed",
+    )
+    assert "seed 1: FAILED: it rose in 0.5 s (at 1.50 s)" in contact["output"]
+    assert said["output_format"] == said["test_output_format"] == said["test_name_format"] == "text"
+    assert EVIL in said["output"]
+
+
+def test_gradescope_grades_one_script(plan, tmp_path):
+    with pytest.raises(ValueError, match=r"is of one script; these results are of 2"):
+        gradescope.write(plan, [result("a.py"), result("b.py")], tmp_path / "r.json")
+    assert not (tmp_path / "r.json").exists()
+
+
+def test_a_plan_without_a_title_goes_by_its_name(tmp_path):
+    plan = read_plan(tmp_path, PLAN.replace("title: Hover & <b>more</b>\n", ""))
+    assert table.text(plan, [result()]).startswith("steps\n")

@@ -1,0 +1,113 @@
+"""The report for the browser, as files; test/web opens it."""
+
+import json
+from html.parser import HTMLParser
+
+import pytest
+from graded import EVIL, SCENE, place, read_plan, result, write_table
+
+from drone_sim.grading.outputs import html
+from drone_sim.offline.recording import COLUMNS
+
+
+class Page(HTMLParser):
+    """What a browser makes of a page."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.tags, self.links, self.text = [], [], ""
+        self.feed(path.read_text())
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.links += [value for key, value in attributes if key in ("href", "src", "data-file") and value]
+
+    def handle_data(self, data):
+        self.text += data
+
+
+@pytest.fixture(name="report", scope="module")
+def _report(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    plan = read_plan(folder, scene=SCENE)
+    table = write_table(folder / "t.csv")
+    results = [
+        result("a/my.py", 0, (True, False)),
+        result("a/my.py", 1),
+        result("a/<img src=x>.py", error=EVIL, names=(EVIL, EVIL)),
+    ]
+    html.write(plan, results, lambda one: table if one.seed == 0 and not one.error else None, folder / "out")
+    return folder / "out"
+
+
+def test_every_link_leads_somewhere_in_the_folder(report):
+    pages = [*report.glob("*.html"), *report.glob("scripts/*.html")]
+    assert len(pages) == 3
+    for page in pages:
+        for link in Page(page).links:
+            file = link.partition("#")[0]
+            assert link.startswith(("data:,", "#")) or (page.parent / file).is_file(), f"{page}: {link}"
+
+
+def test_names_and_errors_are_text(report):
+    pages = {report / "index.html": 1, **dict.fromkeys(report.glob("scripts/*.html"), 6)}
+    for page, scripts in pages.items():
+        tags = Page(page).tags
+        assert (tags.count("script"), tags.count("img")) == (scripts, 0)
+    assert "<script>alert(1)</script>" in Page(report / "index.html").text
+
+
+def test_a_flights_figures_are_those_of_its_table(report):
+    (file,) = report.glob("flights/*.js")
+    name, _, figures = file.read_text().partition(" = ")
+    assert name == 'report.flights["01-0"]'
+    figures = json.loads(figures.rstrip(";\n"))
+    assert figures["marks"] == [{"name": "no_contact", "at": 1.5}]
+    assert (figures["t"][20], *(figures[axis][20] for axis in "xyz")) == pytest.approx((1, *place(1)), abs=1e-4)
+
+
+def test_objects_stand_as_boxes_where_the_scene_has_them(report):
+    scene = json.loads((report / "files/scene.js").read_text().partition(" = ")[2].rstrip(";\n"))
+    gate, pole = scene["boxes"]
+    assert gate["name"] == "<i>Gate</i>"
+    assert gate["corners"][0] == pytest.approx([1.9, -0.5, 0])
+    assert gate["corners"][7] == pytest.approx([2.1, 0.5, 2])
+    assert pole["corners"][7][2] == pytest.approx(2.5)
+
+
+def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
+    plan = read_plan(tmp_path)
+    html.write(plan, [result("a.py"), result("b.py")], lambda _: None, tmp_path / "out")
+    html.write(plan, [result("c.py")], lambda _: None, tmp_path / "out")
+    assert [one.name for one in (tmp_path / "out/scripts").iterdir()] == ["01-c.html"]
+    with pytest.raises(ValueError, match="holds other files"):
+        html.check(tmp_path)
+    with pytest.raises(ValueError, match="is a file"):
+        html.check(tmp_path / "steps.yaml")
+    with pytest.raises(OSError, match="no such folder"):
+        html.check(tmp_path / "no" / "out")
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("nonsense\n", "a table of `fly --csv` begins with"),
+        (",".join(COLUMNS) + "\n", "nothing was flown"),
+        (",".join(COLUMNS) + "\n1,2\n", "line 2: is cut off"),
+        (",".join(COLUMNS) + "\n" + ",".join(["nan"] * len(COLUMNS)) + "\n", "line 2: must hold numbers below"),
+    ],
+)
+def test_a_table_that_shows_nothing_is_told_of(tmp_path, text, said):
+    (tmp_path / "t.csv").write_text(text)
+    html.write(read_plan(tmp_path), [result()], lambda _: tmp_path / "t.csv", tmp_path / "out")
+    (page,) = (tmp_path / "out/scripts").iterdir()
+    assert said in page.read_text()
+
+
+def test_a_long_flight_is_thinned(tmp_path):
+    table = write_table(tmp_path / "t.csv", 301)
+    html.write(read_plan(tmp_path), [result()], lambda _: table, tmp_path / "out")
+    (page,), (figures,) = (tmp_path / "out/scripts").iterdir(), (tmp_path / "out/flights").iterdir()
+    assert "one row in 2 is shown" in page.read_text()
+    assert json.loads(figures.read_text().partition(" = ")[2].rstrip(";\n"))["t"][:3] == [0, 0.1, 0.2]

@@ -1,0 +1,39 @@
+"""A browser for all tests: Debian's chromium, which playwright drives. Without either they are left out."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
+
+
+@pytest.fixture(name="browser", scope="session")
+def _browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="./dev.sh test-web installs playwright")
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("./dev.sh test-web installs chromium")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=chromium)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(name="page")
+def _page(browser):
+    """A page that keeps what goes wrong, and what it asks the network for, in `troubles`."""
+    context = browser.new_context(viewport={"width": 1000, "height": 700})
+    page = context.new_page()
+    page.troubles = []
+    page.on("console", lambda message: page.troubles.append(message.text))
+    page.on("pageerror", lambda error: page.troubles.append(str(error)))
+    page.on("dialog", lambda dialog: (page.troubles.append("a dialog"), dialog.dismiss()))
+    page.on("requestfailed", lambda request: page.troubles.append(f"{request.url} failed"))
+    page.on(
+        "request",
+        lambda request: None if request.url.startswith(("file:", "data:")) else page.troubles.append(request.url),
+    )
+    yield page
+    context.close()

@@ -1,0 +1,122 @@
+"""The report in a browser: opened from a file, played, scrubbed, and seen to show what the table says."""
+
+import io
+
+import numpy as np
+import pytest
+from graded import EVIL, SCENE, place, read_plan, result, write_table
+from PIL import Image
+
+from drone_sim.grading.outputs import html
+
+HUB = (255, 90, 0)  # the drone's middle on the canvas
+NEAR = 2.0  # px
+
+
+@pytest.fixture(name="report", scope="module")
+def _report(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    plan = read_plan(folder, scene=SCENE)
+    table = write_table(folder / "t.csv")
+    results = [
+        result("good.py", 0),
+        result("good.py", 1, (True, False)),
+        result("bad.py", 0, (False, False)),
+        result("evil.py", error=EVIL, names=(EVIL, EVIL), passed=(True, False)),
+    ]
+    html.write(plan, results, lambda one: None if one.error else table, folder / "out")
+    return folder / "out"
+
+
+def open_flight(page, report, script, flight=1):
+    page.goto((report / "index.html").as_uri())
+    page.click(f"text={script}")
+    page.click(f"nav a:nth-of-type({flight})")
+
+
+def drone(page):
+    """Return where the drone's middle is seen on the canvas, from its top left, px."""
+    picture = np.asarray(Image.open(io.BytesIO(page.locator("#canvas").screenshot())).convert("RGB")).astype(int)
+    rows, columns = np.nonzero(np.abs(picture - HUB).max(axis=2) < 8)
+    assert len(rows) > 20
+    return np.array([columns.mean() + 0.5, rows.mean() + 0.5])
+
+
+def expected(page, time, axes):
+    """Return where a top (x, y) or side (x, z) view shows the table's place at a time, px."""
+    canvas = page.locator("#canvas")
+    scale = float(canvas.get_attribute("data-scale"))
+    target = [float(word) for word in canvas.get_attribute("data-target").split()]
+    box = canvas.bounding_box()
+    right, up = (scale * (place(time)[axis] - target[axis]) for axis in axes)
+    return np.array([box["width"] / 2 + right, box["height"] / 2 - up])
+
+
+def scrub(page, time):
+    page.locator("#scrub").evaluate(
+        "(slider, time) => { slider.value = time; slider.dispatchEvent(new Event('input')); }", time
+    )
+
+
+def test_the_replay_shows_the_drone_where_the_table_says(page, report):
+    open_flight(page, report, "good.py")
+    for view, axes in (("top", (0, 1)), ("side", (0, 2))):
+        page.click(f"[data-view={view}]")
+        seen = []
+        for time in (1.025, 3.5):
+            scrub(page, time)
+            seen.append(drone(page))
+            assert np.abs(seen[-1] - expected(page, time, axes)).max() < NEAR, f"{view}, at {time} s"
+        assert np.abs(seen[0] - seen[1]).max() > 30
+    assert page.troubles == []
+
+
+def test_play_goes_on_to_the_end_and_pause_stands_still(page, report):
+    open_flight(page, report, "good.py")
+    shown = page.locator("#time")
+    assert shown.inner_text() == "0.00 / 4.00 s"
+    page.select_option("#speed", "10")
+    page.click("#play")
+    page.wait_for_function("document.getElementById('time').textContent === '4.00 / 4.00 s'")
+    page.wait_for_function("document.getElementById('play').textContent === '▶'")
+    page.select_option("#speed", "0.25")
+    page.click("#play")
+    page.wait_for_function("!document.getElementById('time').textContent.startsWith('0.00')")
+    page.click("#play")
+    before = shown.inner_text()
+    assert 0 < float(before.split()[0]) < 4
+    page.evaluate("new Promise(requestAnimationFrame)")
+    assert shown.inner_text() == before
+    assert page.troubles == []
+
+
+def test_a_failure_is_marked_and_a_click_on_its_time_goes_there(page, report):
+    open_flight(page, report, "good.py", 2)
+    assert page.locator("#marks i").count() == 1
+    assert page.locator("#plots path title").first.text_content() == "no_contact failed at 1.50 s"
+    page.click(".chosen .failed .when")
+    assert page.locator("#time").inner_text().startswith("1.50")
+    assert page.locator("#plots figcaption").first.inner_text().split("\n")[0].startswith("place [m]")
+    assert f"z {place(1.5)[2]:.2f}" in page.locator("#plots figcaption").first.inner_text()
+    assert page.troubles == []
+
+
+def test_names_and_errors_are_text_and_a_flight_without_a_table_says_so(page, report):
+    open_flight(page, report, "evil.py")
+    assert "<script>alert(1)</script>" in page.locator(".chosen .error").inner_text()
+    assert page.locator("#note").inner_text() == "no table of this flight was kept"
+    assert not page.locator("#replay").is_visible()
+    assert page.locator(".chosen .failed").count() == 1
+    assert page.troubles == []
+
+
+def test_a_click_on_a_heading_sorts_the_scripts(page, report):
+    page.goto((report / "index.html").as_uri())
+    names = page.locator("#scripts tbody td:first-child")
+    page.click("th:has-text('points')")
+    assert names.all_inner_texts()[0] == "bad.py"
+    page.click("th:has-text('points')")
+    assert names.all_inner_texts()[-1] == "bad.py"
+    page.click("th:has-text('script')")
+    assert names.all_inner_texts() == ["bad.py", "evil.py", "good.py"]
+    assert page.troubles == []
