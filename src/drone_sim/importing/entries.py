@@ -82,7 +82,9 @@ class Entries:
         of = one.object.of
         assert isinstance(of, Dummy)
         if len(of.path) > 1:
-            return {"kind": "path", "points": [numbers(point) for point in of.path]}
+            turns = [numbers(point[3:]) for point in of.path]
+            points = {"kind": "path", "points": [numbers(point[:3]) for point in of.path]}
+            return {**points, "turns": turns} if all(math.hypot(*turn) > 0.5 for turn in turns) else points
         if of.linked >= 0:
             self._report.add(one.name, "its link to another dummy is not brought")
         return {"kind": "dummy", "size": number(of.size)} if of.size > 0 else {"kind": "dummy"}
