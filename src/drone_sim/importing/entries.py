@@ -82,9 +82,12 @@ class Entries:
         of = one.object.of
         assert isinstance(of, Dummy)
         if len(of.path) > 1:
-            turns = [numbers(point[3:]) for point in of.path]
             points = {"kind": "path", "points": [numbers(point[:3]) for point in of.path]}
-            return {**points, "turns": turns} if all(math.hypot(*turn) > 0.5 for turn in turns) else points
+            lengths = [math.hypot(*point[3:]) for point in of.path]
+            if min(lengths) < _NEAREST:
+                return points
+            turns = [numbers([one / length for one in point[3:]]) for point, length in zip(of.path, lengths)]
+            return {**points, "turns": turns}
         if of.linked >= 0:
             self._report.add(one.name, "its link to another dummy is not brought")
         return {"kind": "dummy", "size": number(of.size)} if of.size > 0 else {"kind": "dummy"}
