@@ -38,7 +38,7 @@ from drone_sim.scene.scene_parameters import find_files_beside
 
 _NAME = "grade_live"
 _XML = "--gtest_output=xml:"  # by which rostest says where it looks for the result
-_STANDS = 10.0  # s of real time without a step: nothing comes any more
+_SILENT, _STANDS = 1.0, 10.0  # s of real time without a step: what is stopped has ended, whatever else waits longer
 _LOOK, _LAST = 0.05, 0.3  # s of real time, between two looks; for the last messages to come
 _PATIENCE = 30.0  # s of real time
 
@@ -167,14 +167,14 @@ class _Live:
             self.hearing.look_for_topics()
             if now != last:
                 last, since = now, time.monotonic()
+            waited = time.monotonic() - since
             if rospy.is_shutdown():
                 return f"ended from outside at {now:.2f} s"
             if self.hearing.went_back:
                 return "somebody else has started the simulation anew"
-            if self._simulator.state == "stopped" and now > 0:
-                time.sleep(_LAST)  # its reason comes by another topic
+            if self._simulator.state == "stopped" and waited > _SILENT:  # it may be told late that it flies
                 return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
-            if time.monotonic() - since > _STANDS:
+            if waited > _STANDS:
                 return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
         return ""
 
