@@ -11,10 +11,11 @@ from launched import launched
 
 SIZE = {"width": 1280, "height": 760}  # px
 PATIENCE = 60_000  # ms, without a GPU
+FLIGHT, SETTLED = 2500, 4000  # ms
 
 
 def main(picture: str) -> None:
-    """Fly through the gates, with a mistake in the script."""
+    """Fly ahead between the gates, and look through the front camera."""
     scene = "scene:=" + str(Path(__file__).resolve().parents[1] / "config/scenes/gates.yaml")
     with launched(scene) as cockpit, sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"))
@@ -22,15 +23,19 @@ def main(picture: str) -> None:
         page.set_default_timeout(PATIENCE)
         page.goto(cockpit.address)
         page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
-        page.select_option("#script", "tutorial/2_elevation.py")
-        page.wait_for_function("document.querySelector('.cm-content').innerText.includes('zref')")
+        page.select_option("#script", "tutorial/6_ros.py")
+        page.wait_for_function("document.querySelector('.cm-content').innerText.includes('on_twist')")
         page.locator(".cm-line", has_text="def sysCall_sensing").click()
         page.keyboard.press("Home")
-        page.keyboard.type("tumble = 1 / 0\n")
-        page.click("#run")
-        page.wait_for_function("document.querySelector('#said').innerText.includes('ZeroDivisionError')")
-        page.click("#script")
-        page.wait_for_timeout(8000)
+        inner = page.frame_locator("#scene")
+        inner.locator("[class*=Notification-closeButton]").click()
+        inner.get_by_role("tab", name="Cameras").click()
+        inner.get_by_label("drone/front").click()
+        page.locator("#command").click()
+        page.keyboard.down("w")
+        page.wait_for_timeout(FLIGHT)
+        page.keyboard.up("w")
+        page.wait_for_timeout(SETTLED)
         page.screenshot(path=picture)
         browser.close()
 
