@@ -228,6 +228,7 @@ class PythonScript:
 
 
 @functools.lru_cache(maxsize=32)  # the same few scripts fly again and again
+@functools.lru_cache(maxsize=16)  # a fork need not do again what has been done before it
 def _compiled(source: bytes, path: str) -> CodeType:
     return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
 
