@@ -39,13 +39,12 @@ def sysCall_init():
     ]
     self.state_publisher = simROS.advertise("state", "std_msgs/String", 1, True)
     tutorial.sysCall_init()
-    read_height()
     x, y, z = sim.getObjectPosition(self.d, -1)
     yaw = sim.getObjectOrientation(self.d, -1)[2]
     self.still = 0.0  # s, that it stands or lies where it should move
     self.goal = None  # x, y, z (m), yaw (rad)
     if sim.getScriptSimulationParameter(sim.handle_self, "start") == LANDED:
-        self.home = (x, y, z + self.takeoff_height, yaw)
+        self.home = (x, y, z + takeoff_height(), yaw)
         rest(LANDED)
     else:
         self.home = (x, y, z, yaw)
@@ -83,15 +82,9 @@ def on_twist(msg):
         refuse("cmd_vel")
 
 
-def on_parameters(msg):
-    """Obey what was tuned in flight."""
-    tutorial.on_parameters(msg)
-    read_height()
-
-
-def read_height():
-    """Know how far up a take-off goes."""
-    self.takeoff_height = sim.getScriptSimulationParameter(sim.handle_self, "takeoff_height")
+def takeoff_height():
+    """Return how far up (m) a take-off goes; it may be tuned in flight."""
+    return sim.getScriptSimulationParameter(sim.handle_self, "takeoff_height")
 
 
 def on_takeoff(_msg):
@@ -99,7 +92,7 @@ def on_takeoff(_msg):
     if self.state in (LANDED, LANDING):
         enter(TAKING_OFF, climb)
         z = sim.getObjectPosition(self.d, -1)[2]
-        self.zref, self.top = z, z + self.takeoff_height
+        self.zref, self.top = z, z + takeoff_height()
     elif self.state == CRASHED:
         refuse("takeoff")
 

@@ -43,7 +43,8 @@ def sysCall_init():
     self.vx = self.vy = self.vz = self.rz = 0  # current twist command
 
     self.twist_subscriber = simROS.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist", 1)
-    self.gains_subscriber = simROS.subscribe("parameter_updates", "dynamic_reconfigure/Config", "on_parameters", 1)
+    # The function itself, not its name: a script that imports this one need not have it.
+    self.gains_subscriber = simROS.subscribe("parameter_updates", "dynamic_reconfigure/Config", on_parameters, 1)
 
 
 def read_gains():

@@ -51,9 +51,10 @@ sandbox.resume = resumed
 
 ---- the script's own thread
 
-local thread, has_ended = nil, false
+local thread = nil
 
-function sandbox.thread_has_ended() return has_ended end
+-- Asked for, and not remembered: the end of its time may strike before anything is written down.
+function sandbox.thread_has_ended() return thread ~= nil and status(thread) == 'dead' end
 
 -- Let the thread, which begins with f, have its turn.
 function sandbox.take_turn(f)
@@ -62,7 +63,6 @@ function sandbox.take_turn(f)
     limit(thread)
   end
   local ok, message = resumed(thread)
-  has_ended = status(thread) == 'dead'
   if not caught(ok, message) then error(message, 0) end
 end
 
