@@ -69,11 +69,6 @@ class Student:
                 raise OSError("no pictures come")
             time.sleep(0.5)
 
-    def end(self) -> None:
-        """End its process."""
-        self._process.kill()
-        self._process.wait()
-
 
 class Simulator:
     """The simulator's host: drone.launch, with a node that looks from near by."""

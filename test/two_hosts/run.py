@@ -23,24 +23,30 @@ _RIGHTS = [] if os.geteuid() == 0 else ["--user", "--map-root-user"]
 _NAMESPACES = ["unshare", *_RIGHTS, "--net", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc"]
 
 TIMEOUT = 0.5  # s, cmd_vel_timeout
-CUT = 10.0  # s
+CUT, LONGEST = 10.0, 3600.0  # s
 
 
 def main() -> int:
     """Go into namespaces of its own, and run there."""
-    parser = argparse.ArgumentParser(prog="./dev.sh two-hosts", description=__doc__)
-    parser.add_argument("--cut", type=float, default=CUT, help="s for which the wire is cut (default: %(default)s)")
+    parser = argparse.ArgumentParser(prog="./dev.sh two-hosts", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--cut", type=_seconds, default=CUT, help="s for which the wire is cut (default: %(default)s)")
     options = parser.parse_args()
     if _INSIDE in os.environ:
-        for asked in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(asked, lambda number, _frame: sys.exit(128 + number))
-        return _run(options.cut)
+        return _run(Path(os.environ[_INSIDE]), options.cut)
     missing = _missing()
     if missing:
         print(f"two-hosts: {missing}")
         return 1
-    os.environ[_INSIDE] = "1"
-    os.execvp(_NAMESPACES[0], [*_NAMESPACES, sys.executable, __file__, *sys.argv[1:]])
+    for asked in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(asked, lambda number, _frame: sys.exit(128 + number))
+    return _inside(sys.argv[1:])
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0 < value <= LONGEST:
+        raise argparse.ArgumentTypeError(f"{text}: must be above 0, and {LONGEST:g} at most")
+    return value
 
 
 def _missing() -> str:
@@ -54,21 +60,30 @@ def _missing() -> str:
     return f"no network namespaces with TUN interfaces can be made here ({said})" if tried.returncode else ""
 
 
-def _run(cut: float) -> int:
+def _inside(arguments: list[str]) -> int:
+    """Run this file in namespaces of its own, out of reach of the terminal's Ctrl-C; with it, all in there ends."""
+    with tempfile.TemporaryDirectory(prefix="drone_sim_two_hosts_", ignore_cleanup_errors=True) as folder:
+        command = [*_NAMESPACES, sys.executable, __file__, *arguments]
+        inside = subprocess.Popen(command, env={**os.environ, _INSIDE: folder}, start_new_session=True)
+        try:
+            return inside.wait()
+        finally:
+            inside.kill()
+
+
+def _run(folder: Path, cut: float) -> int:
     from hosts import Simulator, Student, settle
     from story import told
 
-    with tempfile.TemporaryDirectory(prefix="drone_sim_two_hosts_") as folder:
-        settle(Path(folder))
-        try:
-            student = Student()
-            simulator = Simulator(Path(folder), TIMEOUT)
-            student.begin()
-        except OSError as error:
-            print(f"two-hosts: {error}")
-            return 1
-        wrong = list(told(simulator, student, TIMEOUT, cut))
-        student.end()
+    settle(folder)
+    try:
+        student = Student()
+        simulator = Simulator(folder, TIMEOUT)
+        student.begin()
+    except OSError as error:
+        print(f"two-hosts: {error}")
+        return 1
+    wrong = list(told(simulator, student, TIMEOUT, cut))
     print(*[f"WRONG: {said}" for said in wrong] or ["two-hosts: all as it should be"], sep="\n")
     return 1 if wrong else 0
 
