@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 
 _STEP = 0.05  # s of simulated time
 LOOK = 5.0  # s, for which each network is measured
-AGAIN = 150.0  # s in which all is as before: TCP tries again after as long a silence as it has waited already
+AGAIN = 10.0  # s, and as long as it was cut, after which all is as before: TCP tries again at doubled intervals
 ANSWERS = 2.0  # s that a service may take
 ENDS = 6.0  # s that the launch may take to end: the node 3, and what roslaunch takes beside it
 HOVERS = 0.05  # m/s
@@ -26,7 +26,7 @@ def told(simulator: Simulator, student: Student, timeout: float, cut: float) -> 
     if not good.pictures or not good.round_trip[0]:
         yield "pictures or commands do not get across"
     yield from _cut(simulator, student, timeout, cut)
-    yield from _mend(student)
+    yield from _mend(student, AGAIN + cut)
     for name, delay, loss in (("100 ms of delay each way", 0.1, 0.0), ("1 % of the packets lost", 0.0, 0.01)):
         student.wire.delay, student.wire.loss = delay, loss
         if not _look(student, name).pictures:
@@ -88,19 +88,19 @@ def _asked(name: str, *arguments: bool) -> float:
     return time.monotonic() - began
 
 
-def _mend(student: Student) -> Iterator[str]:
+def _mend(student: Student, limit: float) -> Iterator[str]:
     """Bring the wire back, and see that all is as before, without anybody's help."""
     began = time.time()
     student.wire.cut = False
     pictures = commands = 0.0
     stale = 0
-    while not (pictures and commands) and time.time() - began < AGAIN:
+    while not (pictures and commands) and time.time() - began < limit:
         time.sleep(0.1)
         seen = student.ask()
         pictures, commands = pictures or seen.fresh, commands or seen.echo
         stale += seen.stale
     if not (pictures and commands):
-        yield f"pictures or commands did not come back within {AGAIN:g} s"
+        yield f"pictures or commands did not come back within {limit:g} s"
         return
     pictures, commands = pictures - began, commands - began
     print(f"back: fresh pictures after {pictures:.1f} s, behind {stale} old ones; commands after {commands:.1f} s")
