@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots remote weather report tasks rviz)
+sections=(diagrams cameras plots remote weather report tasks cockpit rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -45,6 +45,9 @@ report() {
 
 # The textures of tasks/, and a picture of each task in its folder.
 tasks() { "$python" docs/make_textures.py && "$python" docs/take_task_pictures.py; }
+
+# The cockpit of docs/cockpit.md; needs what ./dev.sh test-web installs.
+cockpit() { "$python" docs/take_cockpit_picture.py "$pictures/cockpit.png"; }
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.
 rviz() { docs/take_rviz_pictures.sh "$pictures"; }

@@ -21,7 +21,10 @@ from drone_sim.grading import plan as plans
 SCRIPTS = Path(__file__).resolve().parent / "scripts"
 NOTHING, HOVERS, BUILT_IN = str(SCRIPTS / "nothing.py"), "tutorial", ""
 SEEDS, MANY_SEEDS = 20, 100
-FLOWN_BY_COMMANDS = ("hover", "steps", "stability")  # the built-in script passes these
+COMMANDED = {  # what the built-in script passes: plans by task
+    **{name: name for name in ("hover", "steps", "stability")},
+    "gates": str(tasks.folder() / "gates" / "commanded.yaml"),
+}
 EXTRAS = ("broken", "starts")
 ABOUT_HOVERING = ("steps", "stability")  # and so does the tutorial's controller, which does nothing unasked
 
@@ -60,8 +63,8 @@ def check_task(pool, name):
         print(f"{name}: {what} passes {count(results)}")
         print_worst(results)
         wrong += [f"{name}: {what} passes on seed {one.seed}" for one in results if one.passed]
-    if name in FLOWN_BY_COMMANDS:
-        results = fly(pool, name, BUILT_IN, MANY_SEEDS)
+    if name in COMMANDED:
+        results = fly(pool, COMMANDED[name], BUILT_IN, MANY_SEEDS)
         print(f"{name}: the built-in script passes {count(results)}")
         print_worst(results)
         wrong += [f"{name}: the built-in script on seed {one.seed}: {said(one)}" for one in results if not one.passed]
@@ -111,7 +114,7 @@ def one_flight(task, script, seed, changes):
 
 
 def read(task, known={}):  # noqa: B006 -- a process reads a plan once
-    """Return the plan of a task."""
+    """Return the plan of a task, or in a file."""
     if task not in known:
         known[task] = plans.read(tasks.find(task))
     return known[task]

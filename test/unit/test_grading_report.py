@@ -103,3 +103,11 @@ def test_a_table_that_shows_nothing_is_told_of(tmp_path, text, said):
     html.write(read_plan(tmp_path), [result()], lambda _: tmp_path / "t.csv", tmp_path / "out")
     (page,) = (tmp_path / "out/scripts").iterdir()
     assert said in page.read_text()
+
+
+def test_a_long_flight_is_thinned(tmp_path):
+    table = write_table(tmp_path / "t.csv", 301)
+    html.write(read_plan(tmp_path), [result()], lambda _: table, tmp_path / "out")
+    (page,), (figures,) = (tmp_path / "out/scripts").iterdir(), (tmp_path / "out/flights").iterdir()
+    assert "one row in 2 is shown" in page.read_text()
+    assert json.loads(figures.read_text().partition(" = ")[2].rstrip(";\n"))["t"][:3] == [0, 0.1, 0.2]

@@ -11,9 +11,10 @@ from vrep_encoder import chunk, container, file, integers, mesh, numbers, scene_
 from vrep_quadricopter import PROPELLER, quadricopter
 
 from drone_sim.importing.main import main
-from drone_sim.mechanics import urdf
+from drone_sim.mechanics import frames, urdf
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.scene.entry import Place
 
 HOVER = """
 function sysCall_init()
@@ -106,7 +107,8 @@ def test_joints_and_what_hangs_on_them(imported):
 
 def test_a_path_of_4_x_is_a_path(imported):
     corners = [(0, 0, 1), (2, 0, 1), (2, 2, 1)]
-    content = struct.pack("<21d", *(number for corner in corners for number in (*corner, 0, 0, 0, 1)))
+    turns = [(0.0, 0.0, 0.0, 1.0), (0.0, 0.6, 0.0, 0.8), (1.0, 0.0, 0.0, 0.0)]
+    content = struct.pack("<21d", *(number for both in zip(corners, turns) for part in both for number in part))
     blocks = [(b"CONF", b"abc"), (b"PATH", content)]
     data = chunk("Cda", b"".join(chunk("Cdt", text(name) + text(block)) for name, block in blocks) + b"EOO")
     track = scene_object("DMY", 0, "Track", base=data, own=numbers("_y2", "Dy2", 0.01))
@@ -114,9 +116,12 @@ def test_a_path_of_4_x_is_a_path(imported):
         "name": "Track",
         "kind": "path",
         "points": [list(map(float, corner)) for corner in corners],
+        "turns": list(map(list, turns)),
         "position": [0.0, 0.0, 0.0],
     }
-    parameters.load({"scene_file": str(imported.scene)})
+    loaded = parameters.load({"scene_file": str(imported.scene)})
+    path = loaded.scene.objects[0].make(Place(("Track",), "Track", None, frames.IDENTITY), None)
+    assert struct.pack("<21d", *path.table) == content
 
 
 def test_the_floor_the_step_and_gravity(imported):

@@ -40,6 +40,10 @@ class Radio:
         self.heard[topic] = take
         return lambda: self.heard.pop(topic)
 
+    def serve(self, name, kind, ask):
+        self.heard[name] = ask
+        return lambda: self.heard.pop(name)
+
 
 class Stage:
     """A stopped simulation, its server, and clients."""
@@ -387,6 +391,20 @@ def test_messages_are_handed_over_before_an_answer(stage):
     assert client.ask("_*executed*_")["ret"] == [0.0]
     client.call("simROS.shutdownSubscriber", handle)
     assert "/gate" not in stage.radio.heard
+
+
+def test_a_service_of_a_client_is_answered_by_its_function(stage):
+    client, answers = stage.client(), []
+    client.sim("startSimulation")
+    client.call("simROS.advertiseService", "/gate", "std_srvs/Trigger", "on_gate@func")
+    ask = stage.radio.heard["/gate"]
+    thread = threading.Thread(target=lambda: answers.append(ask({"data": 1}, dict)))
+    thread.start()
+    while client.ask("sim.getSimulationTime") != {"func": "on_gate", "args": [{"data": 1}]}:
+        thread.join(0.001)
+    assert client.ask("_*executed*_", {"success": True})["ret"] == [0.0]
+    thread.join(10)
+    assert answers == [{"success": True}]
 
 
 @pytest.mark.parametrize("how", ["stop", "vanish"])

@@ -256,6 +256,14 @@ ONE = "kind: dummy, position: [0, 0, 0]"
             "objects/0/range = inf: input should be a finite",
         ),
         ("{name: A, kind: vision_sensor, near: 2, far: 1}", "parameter objects/0/near = 2: must be less than far = 1"),
+        (
+            "{name: A, kind: path, points: [[0, 0, 0], [1, 0, 0]], turns: [[0, 0, 0, 1]]}",
+            "turns: 1 of them for 2 points",
+        ),
+        (
+            "{name: A, kind: path, points: [[0, 0, 0], [1, 0, 0]], turns: [[0, 0, 0, 1], [0, 0, 0, 9]]}",
+            "must have a length of 1",
+        ),
         ("{name: A, kind: vision_sensor, width: 5000}", "objects/0/width = 5000: input should be less than or equal"),
         ("{name: A, kind: path, points: [[0, 0, 0]]}", "parameter objects/0/points = [[0, 0, 0]]: list should have at"),
         (

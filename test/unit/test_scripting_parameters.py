@@ -1,5 +1,6 @@
 """A script's own parameters, under any name: numbers, truth values, texts and lists of numbers."""
 
+import numpy as np
 import pytest
 from several_drones import Drone, Scene
 
@@ -75,3 +76,11 @@ def test_a_parameter_for_all_scripts_is_one_that_the_own_script_has(caplog):
     assert not caplog.records
     sim.setScriptSimulationParameter(sim.handle_tree, "nobodys", 2)
     assert "nothing reads 'nobodys'" in caplog.text
+
+
+def test_a_number_of_numpys_is_a_number():
+    sim = Drone(Scene(), own=OWN).sim()
+    sim.setScriptSimulationParameter(sim.handle_self, "MyGain", np.float64(2.5))
+    assert type(sim.getScriptSimulationParameter(sim.handle_self, "MyGain")) is float
+    with pytest.raises(TypeError, match="a finite number is expected"):
+        sim.setScriptSimulationParameter(sim.handle_self, "MyGain", np.float64("nan"))

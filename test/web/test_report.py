@@ -32,6 +32,8 @@ def open_flight(page, report, script, flight=1):
     page.goto((report / "index.html").as_uri())
     page.click(f"text={script}")
     page.click(f"nav a:nth-of-type({flight})")
+    key = page.locator(f"nav a:nth-of-type({flight})").get_attribute("data-key")
+    page.wait_for_selector(f"#stage[data-shown='{key}']")
 
 
 def drone(page):

@@ -15,7 +15,6 @@ from typing import NoReturn
 from tqdm import tqdm
 
 from drone_sim.config.types import ParameterError
-from drone_sim.files.resources import package_path
 from drone_sim.grading import plan as plans
 from drone_sim.grading.jobs import pool, sandbox, settings
 from drone_sim.grading.jobs.job import Job
@@ -28,7 +27,7 @@ from drone_sim.grading.result import Result
 from drone_sim.offline.command_line import SIGNALLED, Parser
 from drone_sim.run.guardian import Guardian
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.wording import near_names, shown
+from drone_sim.wording import shown
 
 WRONG = 2  # exit status
 _MOST_JOBS = 1024
@@ -62,16 +61,6 @@ def add_to(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="bubblewrap around every flight: where it works, or else not at all, or never (auto)",
     )
-
-
-def find_plan(name: str) -> str:
-    """Return the path of a plan's file, given as a path or as a task's name. Raises PlanError."""
-    if "/" in name or Path(name).suffix or Path(name).is_file():
-        return name
-    tasks = {path.parent.name: path for path in package_path().glob("tasks/*/plan.yaml")}
-    if name not in tasks:
-        raise PlanError(f"{shown(name)}: no such plan: must be a file.yaml, or a task; {near_names(name, tasks)}")
-    return str(tasks[name])
 
 
 class Runner:

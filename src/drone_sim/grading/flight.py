@@ -21,6 +21,7 @@ from drone_sim.offline.timeline import first_step
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import DEFAULT
+from drone_sim.world import connect_ahead
 
 EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
@@ -45,6 +46,11 @@ def grade(
     if table is not None:
         write(flight.rows, table)
     return result
+
+
+def prepare() -> None:
+    """Do beforehand what the next flight of this process, and the first of each of its forks, needs not do then."""
+    connect_ahead()
 
 
 def ungraded(plan: Plan, script: str | None, seed: int, changes: Mapping[str, Any] | None, why: str) -> Result:

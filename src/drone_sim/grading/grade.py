@@ -12,7 +12,8 @@ from tqdm import tqdm
 
 from drone_sim.files import writing
 from drone_sim.grading import plan as plans
-from drone_sim.grading.arguments import Runner, WrongArguments, add_to, find_plan, status_of
+from drone_sim.grading import tasks
+from drone_sim.grading.arguments import Runner, WrongArguments, add_to, status_of
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.outputs import as_json, gradescope, junit, table
 from drone_sim.grading.outputs.by_script import by_script
@@ -42,7 +43,7 @@ class _Grading:
         """Read and check everything. Raises what status_of expects."""
         self._options = options
         self._guardian = guardian
-        self._plan = plans.read(find_plan(options.plan))
+        self._plan = plans.read(tasks.find(options.plan))
         self._jobs = jobs_of(self._plan, options.script, options.seeds or self._plan.seeds)
         self._scripts = len({job.script for job in self._jobs})
         _check_outputs(options, self._scripts)

@@ -14,7 +14,8 @@ from typing import Any
 from drone_sim.files import writing
 from drone_sim.grading import plan as plans
 from drone_sim.grading import ranges as ranges_module
-from drone_sim.grading.arguments import Runner, WrongArguments, add_to, find_plan, status_of
+from drone_sim.grading import tasks
+from drone_sim.grading.arguments import Runner, WrongArguments, add_to, status_of
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.ranges import Range
 from drone_sim.grading.result import Result
@@ -58,7 +59,7 @@ class _Sweep:
         """Read and check everything. Raises what status_of expects."""
         self._options = options
         self._guardian = guardian
-        self._plan = plans.read(find_plan(options.plan))
+        self._plan = plans.read(tasks.find(options.plan))
         self._script = script_path(self._plan.script_of(options.script))
         self._contents = contents_of(self._plan, self._script)
         self._seeds = options.seeds or self._plan.seeds

@@ -34,8 +34,7 @@ def find(name: str) -> Path:
     known = names()
     if name in known:
         return folder() / name / _PLAN
-    said = f"plan {shown(name)}: no file.yaml, and no task of that name"
-    raise PlanError(f"{said}; {near_names(name, known)}")
+    raise PlanError(f"{shown(name)}: no such plan: must be a file.yaml, or a task; {near_names(name, known)}")
 
 
 def _is_file(path: Path) -> bool:

@@ -82,7 +82,12 @@ class Entries:
         of = one.object.of
         assert isinstance(of, Dummy)
         if len(of.path) > 1:
-            return {"kind": "path", "points": [numbers(point) for point in of.path]}
+            points = {"kind": "path", "points": [numbers(point[:3]) for point in of.path]}
+            lengths = [math.hypot(*point[3:]) for point in of.path]
+            if min(lengths) < _NEAREST:
+                return points
+            turns = [numbers([one / length for one in point[3:]]) for point, length in zip(of.path, lengths)]
+            return {**points, "turns": turns}
         if of.linked >= 0:
             self._report.add(one.name, "its link to another dummy is not brought")
         return {"kind": "dummy", "size": number(of.size)} if of.size > 0 else {"kind": "dummy"}

@@ -23,13 +23,18 @@ class Path(SceneObject):
         local: Matrix,
         points: Sequence[Sequence[float]],
         closed: bool = False,
+        turns: Sequence[Sequence[float]] = (),
     ):
-        """Take at least two points (m); `closed`: the path goes on from the last one to the first."""
+        """Take at least two points (m); `closed`: the path goes on from the last one to the first.
+
+        `turns` are the points' quaternions (x, y, z, w); without any they look along the path.
+        """
         super().__init__(names, alias, parent, local, kind="path")
         self.points: list[Vector] = [(x, y, z) for x, y, z in points]
         self.closed = closed
         if closed and self.points[0] != self.points[-1]:
             self.points.append(self.points[0])
+        self._turns = [*turns, turns[0]][: len(self.points)] if turns else []
         self.position_along = 0.0  # m, of who follows it, as V-REP 3.x keeps it
         pieces = (math.dist(one, other) for one, other in itertools.pairwise(self.points))
         self._ends = list(itertools.accumulate(pieces, initial=0.0))
@@ -42,6 +47,8 @@ class Path(SceneObject):
     @property
     def table(self) -> list[float]:
         """Its points as 4.x keeps them in an object's data PATH: x, y, z and the quaternion x, y, z, w of each."""
+        if self._turns:
+            return [one for point, turn in zip(self.points, self._turns) for one in (*point, *turn)]
         ends = [self.at(min(along, math.nextafter(self.length, 0.0))) for along in self._ends]
         return [one for m, point in zip(ends, self.points) for one in (*point, *frames.to_quaternion(m))]
 

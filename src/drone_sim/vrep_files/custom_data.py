@@ -11,8 +11,10 @@ _POINT = 7 * 8  # bytes: position and quaternion x, y, z, w, as doubles
 _MOST_POINTS = 10_000
 
 
-def read_path(data: bytes | None) -> tuple[tuple[float, float, float], ...]:
-    """Return the points (m) of a path, in its frame, from the blocks of its object; none where it is no path.
+def read_path(data: bytes | None) -> tuple[tuple[float, ...], ...]:
+    """Return the points of a path, in its frame, from the blocks of its object; none where it is no path.
+
+    Each is x, y, z (m) and a quaternion x, y, z, w.
 
     Raises VrepFileError.
     """
@@ -21,7 +23,7 @@ def read_path(data: bytes | None) -> tuple[tuple[float, float, float], ...]:
     if count > _MOST_POINTS:
         raise VrepFileError(f"PATH: {count} points; at most {_MOST_POINTS} are read")
     numbers = finite(unpack(f"<{7 * count}d", content, "PATH"), "PATH")
-    return tuple((numbers[at], numbers[at + 1], numbers[at + 2]) for at in range(0, 7 * count, 7))
+    return tuple(numbers[at : at + 7] for at in range(0, 7 * count, 7))
 
 
 def _block(data: bytes | None, name: bytes) -> bytes:

@@ -68,11 +68,14 @@ class Joint:
 
 @dataclass(frozen=True)
 class Dummy:
-    """A frame; the handle of the dummy that it is linked to, -1 for none; the points (m) of a path of 4.x."""
+    """A frame; the handle of the dummy that it is linked to, -1 for none; the points of a path of 4.x.
+
+    Each is x, y, z (m) and a quaternion x, y, z, w.
+    """
 
     size: float
     linked: int = -1
-    path: tuple[tuple[float, float, float], ...] = ()
+    path: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)

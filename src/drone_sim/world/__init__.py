@@ -17,6 +17,6 @@ def _load_pybullet_quietly() -> None:
 
 _load_pybullet_quietly()
 
-from drone_sim.world.world import World  # noqa: E402
+from drone_sim.world.world import World, connect_ahead  # noqa: E402
 
-__all__ = ["World"]
+__all__ = ["World", "connect_ahead"]

@@ -13,7 +13,7 @@ from drone_sim.wording import near_names
 
 Axes = Literal["xyz", "xy", "xz", "yz", "x", "y", "z"]
 Measure = Literal["largest", "mean", "rms"]
-_WORDS = {"largest": "at most", "mean": "in the mean", "rms": "in the root mean square"}
+_WORDS = {"largest": "up to", "mean": "in the mean", "rms": "in the root mean square"}
 
 
 class DistanceCriterion(Criterion):

@@ -23,7 +23,7 @@ def _of_words(field: str) -> str:
 
 
 class Signal(Criterion):
-    """What `signal` or `topic` last said before `until` is to be `equals`, numbers within `tolerance`.
+    """What `signal` or `topic` last said between `after` and `until` is to be `equals`, numbers within `tolerance`.
 
     A signal may be an integer, a float or a string; of a message `field` counts, such as pose.position.x.
     """

@@ -42,7 +42,8 @@ _PASSED = (
     "MESA_",
     "EGL_",
 )
-_ONE_THREAD = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
+# The same order of sets, and of sums, in every process.
+_THE_SAME = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,8 @@ class Warm:
                 why = "ended the process that watches its flight"
                 continue
             if reply.get("result") is not None:
-                return Flight(job, Result.from_json(reply["result"]), rows)
+                result = Result.from_json(reply["result"])
+                return Flight(job, result, rows if result.flown else b"")
             why = reply.get("lost") or "gave no result"
             break
         return Flight(job, ungraded(plan, job.script, job.seed, job.changes, f"the script {why}"), is_lost=True)
@@ -189,7 +191,7 @@ def _started(around: list[str], temporary: str) -> subprocess.Popen[bytes]:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # the terminal's Ctrl-C is for whoever wants the flights
-            env={**passed, **_ONE_THREAD, "PYTHONPATH": path, "TMPDIR": temporary},
+            env={**passed, **_THE_SAME, "PYTHONPATH": path, "TMPDIR": temporary},
         )
 
 

@@ -34,6 +34,7 @@ class Store:
         named = hashlib.sha256(os.fsencode(plan.path)).hexdigest()[:12]
         self._file = folder / f"{plan.name}-{named}.jsonl"
         self._tables = folder / f"{plan.name}-{named}-tables"
+        self._has_begun = False
 
     def known(self, jobs: Sequence[Job], tables: bool) -> dict[str, Result]:
         """Return the results that are there, by the jobs' keys; if `tables`, only those with a table.
@@ -47,7 +48,9 @@ class Store:
         with open(self._file, encoding="utf-8", errors="replace") as file:
             while line := file.readline(_LONGEST):
                 key, result = _read(line)
-                if result is not None and key in wanted and (not tables or self.table(key) is not None):
+                if result is None or key not in wanted:
+                    continue
+                if not (tables and result.flown) or self.table(key) is not None:
                     found[key] = result
         return found
 
@@ -62,9 +65,11 @@ class Store:
             unfinished.write_bytes(flight.table)
             unfinished.replace(path)
         line = json.dumps({"key": flight.job.key, "result": flight.result.to_json()}) + "\n"
-        # One write at the end of the file: two programs at a time, or one that is killed, mix no lines.
+        before = "" if self._has_begun else "\n"  # half a line may be there
+        self._has_begun = True
+        # One write at the end of the file: two programs at a time mix no lines.
         with open(self._file, "ab", buffering=0) as file:
-            file.write(line.encode())
+            file.write((before + line).encode())
 
     def table(self, key: str) -> Path | None:
         """Return a flight's table, if it is there."""

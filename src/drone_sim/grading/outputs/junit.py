@@ -36,7 +36,7 @@ def text(plan: Plan, results: Sequence[Result]) -> str:
 
 
 def _add_suite(root: Element, plan: Plan, script: ScriptResults) -> Element:
-    suite = SubElement(root, "testsuite", name=_xml(f"{plan.name}: {script.label}"))
+    suite = SubElement(root, "testsuite", name=_xml(f"{plan.name}: {script.label}"), skipped="0")
     for result in script.flights:
         _add_flight(suite, _xml(f"{plan.name}.{script.label.replace('.', '_')}"), result)
     return suite
@@ -58,7 +58,6 @@ def _add_flight(suite: Element, group: str, result: Result) -> None:
 def _count(element: Element, seconds: float) -> None:
     for attribute, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error")):
         element.set(attribute, str(len(list(element.iter(tag)))))
-    element.set("skipped", "0")
     element.set("time", f"{seconds:.3f}")
 
 

@@ -96,8 +96,9 @@ class Cockpit:
         prefix = "" if self._found.namespace.strip("/") == vehicle else f"{vehicle}/"
         self._panel.offer_sights(self._sight.choices(self._view.frames, prefix))
         self._sight.follow(clients.values(), self._view.frames, prefix)
-        self._panel.plots.follow(vehicle)
-        self._panel.plots.show()
+        for one in (self._panel.plots, self._panel.tuning):
+            one.follow(vehicle)
+            one.show()
         self._panel.cameras.show()
 
     def _open(self, namespace: str) -> None:
@@ -110,6 +111,7 @@ class Cockpit:
         self._panel.cameras.rest(not namespace)
         if not namespace:
             self._panel.plots.follow("")
+            self._panel.tuning.follow("")
 
     def _ask_master(self) -> None:
         try:

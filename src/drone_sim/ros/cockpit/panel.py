@@ -10,6 +10,7 @@ from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
 from drone_sim.ros.cockpit.found import Found
 from drone_sim.ros.cockpit.plots import Plots
 from drone_sim.ros.cockpit.simulator import Simulator
+from drone_sim.ros.cockpit.tuning import Tuning
 
 _LINES = 12  # of the log that are shown
 
@@ -35,6 +36,8 @@ class Panel:
             self.cameras = Cameras(gui)
         with tabs.add_tab("Plots"):
             self.plots = Plots(gui)
+        with tabs.add_tab("Tune"):
+            self.tuning = Tuning(gui, self.say)
         with tabs.add_tab("Log"):
             self._log = gui.add_text("Log", "", disabled=True, multiline=True)
             self._diagnosis = gui.add_text("Why", "", disabled=True, multiline=True)

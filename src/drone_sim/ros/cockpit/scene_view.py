@@ -21,7 +21,17 @@ from drone_sim.ros.cockpit.markers import Markers
 from drone_sim.ros.cockpit.pushes import push
 
 _BODIES = "view/bodies"
-_TOPICS = ("scene", "drawing", "view/surroundings", _BODIES, "view/path", "view/height", "view/command", "view/state")
+_TOPICS = (
+    "scene",
+    "drawing",
+    "view/surroundings",
+    _BODIES,
+    "view/path",
+    "view/height",
+    "view/command",
+    "view/forces",
+    "view/state",
+)
 
 
 class SceneView:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import rospy
 from std_srvs.srv import SetBool, Trigger
 
-_FAILURES = (rospy.ServiceException, rospy.ROSException, rospy.exceptions.ROSInternalException, OSError)
+FAILURES = (rospy.ServiceException, rospy.ROSException, rospy.exceptions.ROSInternalException, OSError)
 _ERROR = re.compile(r"\[(\w+)\] (.+?):(\d+): (.*)", re.DOTALL)
 
 
@@ -35,7 +35,7 @@ class Simulator:
         kind = SetBool if request else Trigger
         try:
             answer = rospy.ServiceProxy(f"{self.node}/{service}", kind)(*request)
-        except _FAILURES as error:
+        except FAILURES as error:
             return False, " ".join(str(error).split()) or f"no answer from {self.node}"
         return answer.success, " ".join(answer.message.split())
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import os
 import sys
 import tempfile
 import threading
@@ -23,12 +24,12 @@ from drone_sim.files import writing
 from drone_sim.grading import flight
 from drone_sim.grading import plan as plans
 from drone_sim.grading.flown import Flown
-from drone_sim.grading.outputs import as_json, html, junit, table
+from drone_sim.grading.outputs import as_json, gradescope, html, junit, table
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
 from drone_sim.offline.command_line import FAILED, Parser, status_of
 from drone_sim.ros.grading.hearing import Hearing
-from drone_sim.ros.grading.sending import Sender, entries_of
+from drone_sim.ros.grading.sending import Sender, entries_of, steps_late
 from drone_sim.ros.grading.simulator import Simulator, Unfit
 from drone_sim.ros.node.paths import from_shell
 from drone_sim.ros.node.starting import init_node, reported
@@ -37,7 +38,7 @@ from drone_sim.scene.scene_parameters import find_files_beside
 
 _NAME = "grade_live"
 _XML = "--gtest_output=xml:"  # by which rostest says where it looks for the result
-_STANDS = 10.0  # s of real time without a step: nothing comes any more
+_SILENT, _STANDS = 1.0, 10.0  # s of real time without a step: what is stopped has ended, whatever else waits longer
 _LOOK, _LAST = 0.05, 0.3  # s of real time, between two looks; for the last messages to come
 _PATIENCE = 30.0  # s of real time
 
@@ -69,7 +70,7 @@ def _graded(options: argparse.Namespace) -> Result:
     plan = plans.read(from_shell(options.plan))
     if options.html:
         html.check(options.html)
-    for file in filter(None, (options.csv, options.json, options.junit)):
+    for file in filter(None, (options.csv, options.json, options.junit, options.gradescope)):
         writing.check(file)
     result, flown = grade(plan, options.seed, options.node, options.simulator, options.patience)
     with tempfile.TemporaryDirectory() as folder:
@@ -84,6 +85,8 @@ def _graded(options: argparse.Namespace) -> Result:
 def _write(options: argparse.Namespace, plan: Plan, result: Result, flown: Path | None) -> None:
     if options.json:
         as_json.write(plan, [result], options.json)
+    if options.gradescope:
+        gradescope.write(plan, [result], options.gradescope)
     for file in filter(None, (options.junit, options.rostest)):
         junit.write(plan, [result], file)
     if options.html:
@@ -107,6 +110,9 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     flown = live.hearing.flown(plan.duration)
     if flown is None:
         return flight.ungraded(plan, script, seed, {}, error or "nothing was heard of the flight"), None
+    late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), flown.rows, parameters.time_step)
+    if late:
+        rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
     outcomes = tuple(one.judge(flown) for one in plan.criteria)
     digest = flight.digest_of(flown.rows)
     return result_of(plan.name, script, seed, {}, outcomes, flown.end, error or None, digest), flown
@@ -117,7 +123,7 @@ class _Live:
 
     def __init__(self, plan: Plan, seed: int, simulator: Simulator, parameters: Parameters):
         """Advertise and subscribe. Raises Unfit."""
-        self._simulator, self._duration = simulator, plan.duration
+        self._simulator, self._duration, self._scene = simulator, plan.duration, parameters.scene_file
         self._over = threading.Event()
         self._started = False
         wanted = plan.parameters(seed)
@@ -142,7 +148,7 @@ class _Live:
             time.sleep(_LAST)  # what was sent before is not of this flight
             self.hearing.clear()
             self._started = True
-            self._simulator.start()
+            self._simulator.start(self._scene)
             ended = self._wait()
             self._over.set()
             if rospy.is_shutdown():
@@ -161,14 +167,14 @@ class _Live:
             self.hearing.look_for_topics()
             if now != last:
                 last, since = now, time.monotonic()
+            waited = time.monotonic() - since
             if rospy.is_shutdown():
                 return f"ended from outside at {now:.2f} s"
             if self.hearing.went_back:
                 return "somebody else has started the simulation anew"
-            if self._simulator.state == "stopped" and now > 0:
-                time.sleep(_LAST)  # its reason comes by another topic
+            if self._simulator.state == "stopped" and waited > _SILENT:  # it may be told late that it flies
                 return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
-            if time.monotonic() - since > _STANDS:
+            if waited > _STANDS:
                 return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
         return ""
 
@@ -195,6 +201,11 @@ def _seed(text: str) -> int:
     return int(text)
 
 
+def _from_here(name: str) -> str:
+    """Return a file's name from where the user stands, although roslaunch runs nodes in ~/.ros."""
+    return str(Path(os.environ.get("PWD") or os.getcwd()) / name)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog=_NAME, description="Grade what flies on a running simulator by a plan.")
     parser.add_argument("plan", metavar="PLAN.yaml", help="the plan, as for `grade`")
@@ -205,12 +216,18 @@ def _parser() -> argparse.ArgumentParser:
         "--patience", metavar="S", type=float, default=_PATIENCE, help="real seconds to wait for both (default: 30)"
     )
     parser.add_argument(
-        "--write-config", metavar="OUT.yaml", help="write the plan's config, for config:= of drone.launch, and end"
+        "--write-config",
+        type=_from_here,
+        metavar="OUT.yaml",
+        help="write the plan's config, for config:= of drone.launch, and end",
     )
-    parser.add_argument("--csv", metavar="OUT.csv", help="write the flight's table, as `fly --csv`")
-    parser.add_argument("--json", metavar="OUT.json", help="write everything, for programs")
-    parser.add_argument("--junit", metavar="OUT.xml", help="write JUnit XML")
-    parser.add_argument("--html", metavar="DIR", help="write a report for the browser")
+    parser.add_argument("--csv", type=_from_here, metavar="OUT.csv", help="write the flight's table, as `fly --csv`")
+    parser.add_argument("--json", type=_from_here, metavar="OUT.json", help="write everything, for programs")
+    parser.add_argument("--junit", type=_from_here, metavar="OUT.xml", help="write JUnit XML")
+    parser.add_argument(
+        "--gradescope", type=_from_here, metavar="results.json", help="write the results for Gradescope"
+    )
+    parser.add_argument("--html", type=_from_here, metavar="DIR", help="write a report for the browser")
     parser.add_argument("--rostest", metavar="OUT.xml", help=argparse.SUPPRESS)
     return parser
 

@@ -79,6 +79,7 @@ class Hearing:
         """Forget what has been heard."""
         with self._lock:
             self.went_back = False  # somebody has started the simulation anew
+            self.time = 0.0  # s, the latest stamp of odometry
             self._odometry: list[_Row] = []
             self._propellers: list[_Row] = []
             self._commands: dict[float, _Row] = {}
@@ -86,17 +87,13 @@ class Hearing:
             self._said: dict[str, list[Said]] = {}
             self._others: dict[str, dict[float, _Row]] = {}
 
-    @property
-    def time(self) -> float:
-        """The stamp of the last odometry in s, 0 before the first."""
-        return self._odometry[-1][0] if self._odometry else 0.0
-
     # ---- callbacks
 
     def _hear_odometry(self, message: Odometry) -> None:
         row = _state(message)
         with self._lock:
-            self.went_back = self.went_back or row[0] < self.time
+            self.went_back = self.went_back or 0.0 < row[0] < self.time  # stopped, it is at 0
+            self.time = max(self.time, row[0])
             self._odometry.append(row)
         if row[0]:  # before the first step nothing has been flown
             self._follow(row[0])

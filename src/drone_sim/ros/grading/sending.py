@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
 import rospy
 import yaml
 from diagnostic_msgs.msg import KeyValue
@@ -71,6 +72,23 @@ def entries_of(timeline: Timeline, wanted: Parameters, there: Parameters) -> lis
     if wanted.weather.wind != there.weather.wind:
         first.append(Entry(0.0, Weather({"wind": list(wanted.weather.wind)})))
     return [*first, *timeline.entries]
+
+
+def steps_late(timeline: Timeline, rows: np.ndarray, time_step: float) -> int:
+    """Return by how many steps the latest twist of a vehicle's timeline came into force too late.
+
+    `rows` are the vehicle's table. What is due in the first step cannot be in time, and does not count; nor does what
+    never came into force, as behind a lossy link.
+    """
+    late = 0
+    for entry in timeline.entries:
+        due = first_step(entry.at, time_step)
+        if isinstance(entry.action, Twist) and due:
+            wanted = (*entry.action.linear, entry.action.angular[2])
+            numbers = np.rint(rows[:, 0] / time_step)  # of the steps that end with the rows, from 1
+            in_force = numbers[(np.abs(rows[:, 14:18] - wanted) < _HERE).all(axis=1) & (numbers > due)]
+            late = max(late, int(in_force[0]) - due - 1 if len(in_force) else 0)
+    return late
 
 
 def _messages(entry: Entry, push: float) -> Iterator[tuple[str, Any]]:

@@ -52,25 +52,30 @@ class Simulator:
             time.sleep(_LOOK)
 
     def fit(self, plan: Plan) -> Parameters:
-        """Let it have the plan's scene, and return what it flies with. Raises Unfit where that is not the plan's."""
+        """Return what it will fly with in the plan's scene. Raises Unfit where that is not what the plan says."""
         if not use_sim_time():
             raise Unfit("grading goes by simulated time: start the simulator with use_sim_time:=true")
-        rospy.set_param(f"{self.name}/scene_file", plan.parameters().scene_file)
-        running = parameters_of(self.name)
+        wanted = plan.parameters()
+        running = parameters_of(self.name, scene_file=wanted.scene_file)
         if not running.real_time_factor and plan.timeline:
             raise Unfit("real_time_factor = 0: a timeline by topics comes too late without a pace; 1 to 5 is well")
-        found = [one for one in _differences(plan.parameters().model_dump(), running.model_dump(), ()) if one]
+        found = [one for one in _differences(wanted.model_dump(), running.model_dump(), ()) if one]
         if found:
             more = f", and {len(found) - _MOST} more" if len(found) > _MOST else ""
             told = "; ".join(found[:_MOST])
             raise Unfit(f"the simulator flies with other parameters than the plan: {told}{more}; see its config:=")
         return running
 
-    def start(self) -> None:
-        """Start anew, in the plan's scene. Raises Unfit."""
+    def start(self, scene: str) -> None:
+        """Start anew, in the scene of a file, '' for that of the parameters. Raises Unfit."""
         self.error = ""
-        self._call("stop")
-        self._call("load_scene")
+        key = f"{self.name}/scene_file"
+        before = rospy.get_param(key, "")
+        rospy.set_param(key, scene)
+        try:
+            self._call("load_scene")
+        finally:
+            rospy.set_param(key, before)
 
     def stop(self) -> None:
         """Stop, which runs the script's cleanup. Raises Unfit."""

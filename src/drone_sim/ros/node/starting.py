@@ -91,8 +91,11 @@ def read_parameters() -> Parameters:
     return parameters
 
 
-def parameters_of(name: str) -> Parameters:
-    """Return the private parameters of the simulator that has this name. Raises ParameterError."""
+def parameters_of(name: str, **others: Any) -> Parameters:
+    """Return the private parameters of the simulator that has this name, `others` in place of some.
+
+    Raises ParameterError.
+    """
     given: dict[str, Any] = rospy.get_param(name, {})
     if not isinstance(given, dict):
         raise ParameterError(f"parameter {name} = {str(given)[:80]}: must hold parameters, such as {name}/script")
@@ -100,7 +103,7 @@ def parameters_of(name: str) -> Parameters:
         if isinstance(given.get(key), str):
             names = given[key].split(",") if key == "config" else [given[key]]
             given[key] = ",".join(map(from_shell, names))
-    return parameters_module.load(given)
+    return parameters_module.load({**given, **others})
 
 
 def use_sim_time() -> bool:

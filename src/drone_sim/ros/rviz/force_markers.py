@@ -10,14 +10,14 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
+from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.state import State
-from drone_sim.ros.rviz.line_arrows import arrow, cross
+from drone_sim.ros.rviz.line_arrows import arrow, star
 from drone_sim.ros.rviz.marker_topic import EYES, MarkerTopic, beside, namespace, new_marker
 from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.sensor import Contact
@@ -30,7 +30,7 @@ _EARTH = 9.81  # m/s², the scale's where there is no gravity
 _SHORTEST = 1e-3  # m; what is shorter is not drawn
 _WIDTH, _POINT = 0.009, 0.025  # m, of a line and of a contact
 _CROSS = 0.045  # m, half a side of a lost propeller's
-_ABOVE, _TEXT_SIZE = 0.47, 0.042  # m: the wind is drawn over the words of `view/state`
+_ABOVE, _ASIDE, _TEXT_SIZE = 0.5, 0.16, 0.042  # m: the wind is drawn over the words of `view/state`
 _GREEN, _RED = (0.05, 0.55, 0.15, 1.0), (0.85, 0.08, 0.05, 1.0)
 _TEAL, _PURPLE = (0.0, 0.45, 0.55, 1.0), (0.75, 0.0, 0.6, 1.0)
 
@@ -106,12 +106,12 @@ def metres_per_newton(mass: float, gravity: float) -> float:
 
 def _thrusts(vehicle: Vehicle, felt: _Felt, scale: float) -> Marker | None:
     """Return the arrows of all propellers; red where one is weak, a cross where it is lost."""
-    points: list[Sequence[float]] = []
+    points: list[Vector] = []
     colors: list[ColorRGBA] = []
     for link, thrust, share in zip(vehicle.propulsion.rotors.links, felt.thrusts, felt.effectiveness):
-        place, axis = np.array(frames.position(link)), np.array((link[2], link[6], link[10]))
-        lines = arrow(place, scale * thrust * axis) if abs(scale * thrust) > _SHORTEST else []
-        lines += [] if share else cross(place, _CROSS)
+        place, way = frames.position(link), _times(scale * thrust, (link[2], link[6], link[10]))
+        lines = arrow(place, way) if abs(scale * thrust) > _SHORTEST else []
+        lines += [] if share else star(place, _CROSS)
         points += lines
         colors += [ColorRGBA(*(_GREEN if share == 1 else _RED))] * len(lines)
     if not points:
@@ -127,11 +127,11 @@ def _wind(vehicle: Vehicle, wind: Vector | None) -> list[Marker | None]:
     if wind is None:
         return [None, None]
     speed = math.hypot(*wind)
-    start, way = np.array((0.0, 0.0, _ABOVE)), WIND * np.array(wind)
+    x, y, z = _times(-_ASIDE / (speed or 1.0), wind)  # the words are where it comes from
     text = new_marker(Marker.TEXT_VIEW_FACING, _TEAL, (0, 0, _TEXT_SIZE))
     text.text = f"wind {speed:.1f} m/s"
-    text.pose.position.x, text.pose.position.y, text.pose.position.z = start + way + (0, 0, _TEXT_SIZE)
-    lines = arrow(start, way) if WIND * speed > _SHORTEST else []
+    text.pose.position = Point(x, y, z + _ABOVE)
+    lines = arrow((0.0, 0.0, _ABOVE), _times(WIND, wind)) if WIND * speed > _SHORTEST else []
     shaft = beside(vehicle, new_marker(Marker.LINE_LIST, _TEAL, (_WIDTH, 0, 0), lines)) if lines else None
     return [shaft and _named("wind", shaft), _named("wind", beside(vehicle, text))]
 
@@ -140,15 +140,18 @@ def _contacts(contacts: Sequence[Contact], scale: float) -> list[Marker | None]:
     """Return the points, and arrows for the forces on the vehicle, in the world."""
     if not contacts:
         return [None, None]
-    lines: list[Sequence[float]] = []
+    lines: list[Vector] = []
     for one in contacts:
-        way = scale * np.array(one.force)
-        length = float(np.linalg.norm(way))
+        length = scale * math.hypot(*one.force)
         if length > _SHORTEST:
-            lines += arrow(np.array(one.point), way * min(1.0, LONGEST / length))
+            lines += arrow(one.point, _times(scale * min(1.0, LONGEST / length), one.force))
     points = new_marker(Marker.SPHERE_LIST, _PURPLE, [_POINT] * 3, [one.point for one in contacts])
     forces = new_marker(Marker.LINE_LIST, _PURPLE, (_WIDTH, 0, 0), lines) if lines else None
     return [_named("contacts", points), forces and _named("contacts", forces)]
+
+
+def _times(factor: float, vector: Vector) -> Vector:
+    return factor * vector[0], factor * vector[1], factor * vector[2]
 
 
 def _named(name: str, marker: Marker) -> Marker:

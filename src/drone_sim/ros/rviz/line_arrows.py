@@ -2,36 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+import math
 
-import numpy as np
+from drone_sim.mechanics.frames import Vector, cross
 
 _HEAD = 0.045  # m, how far back its barbs reach
 _SHARE = 0.4  # of a short arrow
 _SPREAD = 0.5  # how far aside they reach, for each metre back
+_CORNERS: tuple[Vector, ...] = ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, 1))
 
-Points = list[Sequence[float]]  # of lines, two by two
 
+def arrow(start: Vector, way: Vector) -> list[Vector]:
+    """Return the lines of an arrow from `start` along `way`, which is not 0 (m), point by point.
 
-def arrow(start: np.ndarray, way: np.ndarray) -> Points:
-    """Return the lines of an arrow from `start` along `way`, which is not 0 (m): its shaft, then four barbs."""
-    length = float(np.linalg.norm(way))
-    ahead, tip = way / length, start + way
-    aside = np.cross(ahead, (1.0, 0.0, 0.0) if abs(ahead[0]) < 0.9 else (0.0, 1.0, 0.0))
-    aside /= np.linalg.norm(aside)
-    other = np.cross(ahead, aside)
+    They are its shaft and four barbs, each of which begins at the tip.
+    """
+    length = math.hypot(*way)
+    x, y, z = ahead = way[0] / length, way[1] / length, way[2] / length
+    across = cross(ahead, (1.0, 0.0, 0.0) if abs(x) < 0.9 else (0.0, 1.0, 0.0))
+    aside = _scaled(across, 1 / math.hypot(*across))
+    tip = _sum(start, way)
     back = min(_HEAD, _SHARE * length)
-    ends = [tip + back * (_SPREAD * one - ahead) for one in (aside, -aside, other, -other)]
-    return _listed([start, tip, *(point for end in ends for point in (tip, end))])
+    neck = _sum(tip, (-back * x, -back * y, -back * z))
+    points = [start, tip]
+    for direction in (aside, cross(ahead, aside)):
+        for reach in (_SPREAD * back, -_SPREAD * back):
+            points += [tip, _sum(neck, _scaled(direction, reach))]
+    return points
 
 
-def cross(middle: np.ndarray, half: float) -> Points:
+def star(middle: Vector, half: float) -> list[Vector]:
     """Return the four diagonals of a cube with half a side so long (m): a cross from wherever it is seen."""
-    corners = half * np.array([(1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, 1)])
-    return _listed([point for corner in corners for point in (middle - corner, middle + corner)])
+    return [_sum(middle, _scaled(corner, reach)) for corner in _CORNERS for reach in (-half, half)]
 
 
-def _listed(points: Sequence[np.ndarray]) -> Points:
-    rows: Any = np.array(points).tolist()
-    return list(rows)
+def _scaled(vector: Vector, factor: float) -> Vector:
+    return vector[0] * factor, vector[1] * factor, vector[2] * factor
+
+
+def _sum(one: Vector, other: Vector) -> Vector:
+    return one[0] + other[0], one[1] + other[1], one[2] + other[2]

@@ -2,25 +2,41 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from drone_sim.config.types import Point, Switch
+from drone_sim.config.types import Finite, ParameterError, Point, Switch
 from drone_sim.mechanics.path import Path
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scene.kinds.kind import Around, KindParameters, Place
 
 MAX_POINTS = 10_000
+Turn = tuple[Finite, Finite, Finite, Finite]
 
 
 class PathParameters(KindParameters):
-    """A path of straight pieces; `points` in its own frame; `closed`: from the last one back to the first."""
+    """A path of straight pieces; `points` in its own frame; `closed`: from the last one back to the first.
+
+    `turns` are quaternions x, y, z, w of the points, for scripts that read them; without any they look along the path.
+    """
 
     kind: Literal["path"]
     points: Annotated[list[Point], Field(min_length=2, max_length=MAX_POINTS)]
     closed: Switch = False
+    turns: Annotated[tuple[Turn, ...], Field(max_length=MAX_POINTS)] = ()
+
+    def model_post_init(self, context: Any) -> None:
+        """Refuse turns that are none, or not one for each point."""
+        super().model_post_init(context)
+        if self.turns and len(self.turns) != len(self.points):
+            raise ParameterError(
+                f"turns: {len(self.turns)} of them for {len(self.points)} points: must be one for each"
+            )
+        if any(abs(math.hypot(*one) - 1.0) > 1e-3 for one in self.turns):
+            raise ParameterError("turns: the numbers x, y, z, w of each must have a length of 1")
 
     def make(self, place: Place, around: Around) -> SceneObject:
         """Return the path."""
-        return Path(*place, self.points, self.closed)
+        return Path(*place, self.points, self.closed, self.turns)

@@ -40,7 +40,8 @@ def figures_of(table: Path) -> Figures:
     every = -(-len(rows) // _MOST)
     thinned = columns_of(rows[::every])
     columns = {name: np.round(thinned[name], _DIGITS).tolist() for name in _COLUMNS}
-    return Figures(columns, f"every {every}th row of the table is shown" if every > 1 else "")
+    first = f" of the first {len(rows)}" if len(rows) == tables.MAX_ROWS else ""
+    return Figures(columns, f"one row in {every}{first} is shown" if every > 1 else "")
 
 
 def _rows(table: Path) -> np.ndarray:

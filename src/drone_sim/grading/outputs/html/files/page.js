@@ -98,7 +98,9 @@ function show(key) {
 
 function load(key) {
   const flight = report.flights[key];
-  if (!flight || !get(key).classList.contains("chosen")) return;
+  if (!get(key).classList.contains("chosen")) return;
+  get("stage").dataset.shown = key;
+  if (!flight) return;
   clock.end = flight.t[flight.t.length - 1];
   get("scrub").max = clock.end;
   get("marks").replaceChildren(...flight.marks.map((mark) => {

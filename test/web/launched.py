@@ -1,0 +1,66 @@
+"""drone.launch with its cockpit, on a ROS master of its own, for tests and pictures; rospy of this process joins it."""
+
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+_ADDRESS = re.compile(r"the cockpit is at (\S+)")
+_PATIENCE = 60  # s
+
+
+class Launched:
+    """The address of the page, and the folder of the editor's scripts."""
+
+    def __init__(self, address, scripts, log):
+        self.address = address
+        self.scripts = scripts
+        self.log = log
+
+
+@contextlib.contextmanager
+def launched(*arguments):
+    """Give a running simulation with a cockpit."""
+    with tempfile.TemporaryDirectory() as folder:
+        port = _free_port()
+        log = Path(folder) / "launch.log"
+        environment = {
+            **os.environ,
+            "ROS_MASTER_URI": f"http://localhost:{port}",
+            "ROS_HOSTNAME": "localhost",
+            "HOME": folder,
+            "PYTHONUNBUFFERED": "1",
+        }
+        command = ["roslaunch", "-p", str(port), "drone_sim", "drone.launch", "rviz:=false", "web:=true"]
+        options = [f"web_port:={_free_port()}", *arguments]
+        with log.open("w") as output:
+            process = subprocess.Popen([*command, *options], env=environment, stdout=output, stderr=subprocess.STDOUT)
+        try:
+            os.environ["ROS_MASTER_URI"] = environment["ROS_MASTER_URI"]
+            yield Launched(_address(process, log), Path(folder) / "drone_sim", log)
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(_PATIENCE)
+
+
+def _address(process, log):
+    began = time.monotonic()
+    while time.monotonic() - began < _PATIENCE and process.poll() is None:
+        found = _ADDRESS.search(log.read_text())
+        if found:
+            return found[1]
+        time.sleep(0.1)
+    print(log.read_text(), file=sys.stderr)
+    raise RuntimeError("the cockpit did not start")
+
+
+def _free_port():
+    with socket.socket() as one:
+        one.bind(("", 0))
+        return one.getsockname()[1]
