@@ -23,7 +23,7 @@ _RIGHTS = [] if os.geteuid() == 0 else ["--user", "--map-root-user"]
 _NAMESPACES = ["unshare", *_RIGHTS, "--net", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc"]
 
 TIMEOUT = 0.5  # s, cmd_vel_timeout
-CUT, LONGEST = 10.0, 3600.0  # s
+CUT, SHORTEST, LONGEST = 10.0, 5.0, 3600.0  # s
 
 
 def main() -> int:
@@ -43,10 +43,12 @@ def main() -> int:
 
 
 def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0 < value <= LONGEST:
-        raise argparse.ArgumentTypeError(f"{text}: must be above 0, and {LONGEST:g} at most")
-    return value
+    try:
+        if SHORTEST <= float(text) <= LONGEST:
+            return float(text)
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"'{text}': must be a number from {SHORTEST:g} to {LONGEST:g}")
 
 
 def _missing() -> str:

@@ -7,6 +7,7 @@ closes, and does not connect again until the master tells it of a publisher. So 
 from __future__ import annotations
 
 import socket
+from collections.abc import Collection
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
@@ -71,7 +72,7 @@ class LostPeers:
             # What that node hears of this one is broken, too, which this one does not know yet.
             self._announce({one.topic for one in self._before if not one.publishes})
 
-    def _announce(self, topics: Any) -> None:
+    def _announce(self, topics: Collection[str]) -> None:
         """Have the master tell those who listen that this node publishes."""
         for topic, kind in get_topic_manager().get_publications():
             if topic in topics:
