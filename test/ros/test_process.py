@@ -37,7 +37,7 @@ sys.exit(node.main(guardian))
 """
 HOLDS_THE_LOCK, LETS_GO_OF_IT = "sum(range(10**13))", "time.sleep(1000)"
 
-# Another node, which a new master introduces to the simulator.
+# Another node, which a new master introduces to the simulator; then its connections break, as a network breaks them.
 CLIENT = """
 import rospy
 from geometry_msgs.msg import Twist
@@ -45,10 +45,15 @@ from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 rospy.init_node("client")
 heights = []
-rospy.Subscriber("/drone/odom", Odometry, lambda o: heights.append(o.pose.pose.position.z))
+odometry = rospy.Subscriber("/drone/odom", Odometry, lambda o: heights.append(o.pose.pose.position.z))
+commands = rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1, latch=True)
+while len(heights) < 400 or not commands.get_num_connections():  # 4 s; every 2 s the simulator looks who is there
+    rospy.rostime.wallsleep(0.05)
+for connection in (*odometry.impl.connections, *commands.impl.connections):
+    connection.close()
 climb = Twist()
 climb.linear.z = 1.0
-rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1, latch=True).publish(climb)
+commands.publish(climb)
 while not heights or heights[-1] < 2.0:
     rospy.rostime.wallsleep(0.05)
 print(rospy.ServiceProxy("/drone_sim/stop", Trigger)().message, rospy.get_param("/drone_sim"))

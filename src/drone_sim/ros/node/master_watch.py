@@ -1,4 +1,7 @@
-"""Say it, once each way, when the ROS master goes and when it comes back; be found by a new one, too."""
+"""Say it, once each way, when the ROS master goes and when it comes back; be found by a new one, too.
+
+And by nodes that have been cut off: see lost_peers.py.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,9 @@ from typing import Any
 import rosgraph
 import rospy
 import rospy.core
-from rospy.impl.registration import (
-    RegManager,
-    get_registration_listeners,
-    get_service_manager,
-    get_topic_manager,
-)
+from rospy.impl.registration import get_service_manager, get_topic_manager
+
+from drone_sim.ros.node.lost_peers import LostPeers, subscribers_connector
 
 _PERIOD = 2.0  # s
 _USE_SIM_TIME = "/use_sim_time"
@@ -35,6 +35,7 @@ class MasterWatch(threading.Thread):
         self._parameters: dict[str, Any] = {}
         self._names = parameters
         self._pid = self._ask()
+        self._lost_peers = LostPeers(self._master)
 
     def run(self) -> None:
         """Watch until the node shuts down."""
@@ -50,6 +51,9 @@ class MasterWatch(threading.Thread):
                 self._pid = pid
                 rospy.logwarn("a new ROS master is there: registered again, with the parameters as they were")
             lost = pid is None
+            if not lost:
+                with contextlib.suppress(OSError, rosgraph.MasterException):  # it has gone meanwhile
+                    self._lost_peers.find()
 
     def _ask(self) -> int | None:
         """Return the master's process number, None where it does not answer; remember what it knows of this node."""
@@ -72,7 +76,7 @@ class MasterWatch(threading.Thread):
         rospy has no function for that. This is what it does itself when a node starts before its master.
         """
         uri = rospy.core.get_node_uri()
-        connector = next(one for one in get_registration_listeners().listeners if isinstance(one, RegManager))
+        connector = subscribers_connector()
         try:
             for name, value in self._parameters.items():
                 if not self._master.hasParam(name):
