@@ -19,7 +19,7 @@ import tempfile
 from typing import Any, BinaryIO
 
 from drone_sim.grading import plan as plans
-from drone_sim.grading.flight import grade
+from drone_sim.grading.flight import grade, prepare
 from drone_sim.grading.jobs import limits
 from drone_sim.grading.jobs.flying import FlightProcess
 from drone_sim.grading.plan import Plan, PlanError
@@ -105,6 +105,7 @@ class Server:
             plan = plans.read(path)
             with contextlib.suppress(Exception):
                 grade(plan.model_copy(update={"duration": 0.1}), "pilot")  # what this reads and compiles, forks have
+            prepare()
             self._plans[path] = _version(plan), plan
             gc.collect()
             gc.freeze()  # a fork that counts references copies fewer pages
