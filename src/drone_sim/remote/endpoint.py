@@ -73,7 +73,7 @@ class Endpoint:
         if not _readable(self._socket):
             return None
         *envelope, payload = self._socket.recv_multipart(zmq.NOBLOCK, copy=False)
-        return Incoming(tuple(one.bytes for one in envelope), payload.get(zmq.SRCFD), payload.bytes)
+        return Incoming(tuple(one.bytes for one in envelope), int(payload.get(zmq.SRCFD)), payload.bytes)
 
     def send(self, envelope: tuple[bytes, ...], payload: bytes) -> None:
         """Answer; what nobody waits for any more goes nowhere."""
