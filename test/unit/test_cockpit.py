@@ -3,6 +3,7 @@
 import http.client
 import json
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -85,6 +86,12 @@ def test_the_token_lets_in_and_leaves_the_address(served):
         assert status == 200 and word in body.lower()
     assert served.get("/nothing.html", Cookie=served.cookie)[0] == 404
     assert served.get("/__init__.py", Cookie=served.cookie)[0] == 404
+
+
+def test_the_page_that_is_served_is_the_one_in_the_source():
+    source = Path(__file__).parents[2] / "web" / "src"
+    for name in ("index.html", "cockpit.css"):  # the script is built of it: web/package.json
+        assert Page().find(f"/{name}")[1] == (source / name).read_bytes(), "cd web && npm ci && npm run build"
 
 
 @pytest.mark.parametrize("path", ["/wire", "/scene"])
