@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import rosgraph
@@ -27,6 +26,7 @@ from drone_sim.ros.cockpit.hearing import Hearing
 from drone_sim.ros.cockpit.page import Page
 from drone_sim.ros.cockpit.panel import Panel
 from drone_sim.ros.cockpit.scene_view import SceneView
+from drone_sim.ros.cockpit.settings import Settings, read
 from drone_sim.ros.cockpit.shelf import Shelf
 from drone_sim.ros.cockpit.sight import Sight
 from drone_sim.ros.cockpit.simulator import Simulator
@@ -43,9 +43,9 @@ _ASKING = 2.0  # s between two questions to the master
 class Cockpit:
     """One page for one simulation. While no browser is open, it listens to nothing."""
 
-    def __init__(self) -> None:
+    def __init__(self, settings: Settings):
         """Serve; init_node must have been called. Raises AddressError where nothing can listen."""
-        self._simulator = Simulator(rospy.get_param("~simulator", "drone_sim"))
+        self._simulator = Simulator(settings.simulator)
         self._found = Found()
         self._view: SceneView | None = None
         self._hearing: Hearing | None = None
@@ -53,11 +53,11 @@ class Cockpit:
         self._commanding = Commanding()
         self._sight = Sight()
         flying = Flying(self._commanding.send)
-        shelf = Shelf(Path(rospy.get_param("~scripts", "~/drone_sim")).expanduser())
+        shelf = Shelf(settings.scripts)
         self._wire = Wire(flying, Editing(shelf, self._simulator).answers)
         token = secrets.token_urlsafe(16)
         gate = Gate(token, Page(), self._wire.serve)
-        host, port = free_place(rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080))
+        host, port = free_place(settings.address, settings.port)
         with gate.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
             self._server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -137,16 +137,17 @@ def _scenes() -> list[Path]:
 
 def main() -> int:
     """Serve until the node ends; return the exit status."""
+    # There may be several. Its time is the person's, who looks on while /clock stands still.
+    if not init_node(_NAME, anonymous=True, disable_rostime=True):
+        return 1
     return reported(_NAME, _serve)
 
 
-def _serve() -> Any:
-    if not init_node(_NAME):
-        return 1
-    cockpit = Cockpit()
-    elsewhere = f" (on other machines: {cockpit.address_elsewhere} )" if cockpit.address_elsewhere else ""
+def _serve() -> None:
+    cockpit = Cockpit(read(rospy.get_param("~", {})))
+    elsewhere = f" and, on other machines, at {cockpit.address_elsewhere}" if cockpit.address_elsewhere else ""
     rospy.loginfo(f"the cockpit is at {cockpit.address}{elsewhere}")
-    return cockpit.run()
+    cockpit.run()
 
 
 if __name__ == "__main__":
