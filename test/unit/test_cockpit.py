@@ -10,6 +10,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 pytest.importorskip("viser")
 
+import rospy
 import trimesh
 import viser
 from geometry_msgs.msg import Point
@@ -18,7 +19,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit import looks
+from drone_sim.ros.cockpit import looks, settings
+from drone_sim.ros.cockpit.cockpit import Cockpit
 from drone_sim.ros.cockpit.flying import Flying, read_command
 from drone_sim.ros.cockpit.found import Found, find
 from drone_sim.ros.cockpit.frames import Frames
@@ -332,3 +334,24 @@ def test_a_mesh_has_no_metal(tmp_path):
     length = int.from_bytes(node.arguments[0][12:16], "little")
     tree = json.loads(node.arguments[0][20 : 20 + length])
     assert [one["pbrMetallicRoughness"]["metallicFactor"] for one in tree["materials"]] == [0.0]
+
+
+def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
+    """Whoever ends and starts a launch anew keeps the page, and what stands in the editor."""
+
+    def refuse(*_):
+        raise ConnectionRefusedError(111, "Connection refused")
+
+    shown = Cockpit(settings.read({"port": 0, "scripts": str(tmp_path)}))
+    monkeypatch.setattr(
+        rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
+    )
+    monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
+    shown._ask_master()
+    assert shown._found.namespace == "/drone"
+    for gone in ("get_param", "get_published_topics"):  # it may go between the two
+        monkeypatch.setattr(rospy, gone, refuse)
+        shown._ask_master()
+        assert shown._found == Found()
+        assert shown._panel._state.value == "no simulation"
+    shown._server.stop()

@@ -11,7 +11,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import rosgraph
 import rospy
 import viser
 
@@ -29,7 +28,7 @@ from drone_sim.ros.cockpit.scene_view import SceneView
 from drone_sim.ros.cockpit.settings import Settings, read
 from drone_sim.ros.cockpit.shelf import Shelf
 from drone_sim.ros.cockpit.sight import Sight
-from drone_sim.ros.cockpit.simulator import Simulator
+from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.node.starting import init_node, reported
 
@@ -117,12 +116,13 @@ class Cockpit:
     def _ask_master(self) -> None:
         try:
             self._found = find(rospy.get_published_topics())
-        except (OSError, rosgraph.MasterException):
-            self._found = Found()
+            scene = str(self._simulator.parameter("scene_file", ""))
+        except FAILURES:  # another master may come
+            self._found, scene = Found(), ""
         if not self._found.namespace:
             self._panel.show_state("no simulation")
         scenes = tuple(f"package://drone_sim/config/scenes/{one.name}" for one in _scenes())
-        self._panel.offer(self._found, ("", *scenes), str(self._simulator.parameter("scene_file", "")))
+        self._panel.offer(self._found, ("", *scenes), scene)
 
 
 def _sky() -> np.ndarray:

@@ -9,7 +9,7 @@ from drone_sim.ros.cockpit.cameras import Cameras
 from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
 from drone_sim.ros.cockpit.found import Found
 from drone_sim.ros.cockpit.plots import Plots
-from drone_sim.ros.cockpit.simulator import Simulator
+from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.tuning import Tuning
 
 _LINES = 12  # of the log that are shown
@@ -77,7 +77,11 @@ class Panel:
     def _load(self, event: Any) -> None:
         if event.client is None:  # the server itself has set it
             return
-        self._simulator.set_parameter("scene_file", event.target.value)
+        try:
+            self._simulator.set_parameter("scene_file", event.target.value)
+        except FAILURES as error:
+            self.say(f"load_scene: failed: {' '.join(str(error).split())}")
+            return
         self._call("load_scene")
 
     # ---- what is said
