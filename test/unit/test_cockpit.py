@@ -13,8 +13,8 @@ pytest.importorskip("viser")
 import rospy
 import trimesh
 import viser
+from browser_scene import Scene, marker
 from geometry_msgs.msg import Point
-from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -233,42 +233,6 @@ def test_what_the_master_knows():
 
 
 # ---- what is shown
-
-
-class Scene:
-    """Remembers what has been added, as viser would show it."""
-
-    def __init__(self):
-        self.nodes = {}
-        self.added = []
-
-    def __getattr__(self, kind):
-        if not kind.startswith("add_"):
-            raise AttributeError(kind)
-
-        def add(name, *arguments, **options):
-            self.nodes[name] = node = Node(self, name, kind, arguments, options)
-            self.added.append(name)
-            return node
-
-        return add
-
-
-class Node:
-    def __init__(self, scene, name, kind, arguments, options):
-        self.scene, self.name, self.kind, self.arguments = scene, name, kind, arguments
-        self.position, self.wxyz, self.options = options.get("position"), options.get("wxyz"), options
-
-    def remove(self):
-        del self.scene.nodes[self.name]
-
-
-def marker(number, kind=Marker.CUBE, **values):
-    made = Marker(ns="a", id=number, type=kind, **values)
-    made.header.frame_id = "world"
-    made.scale.x = made.scale.y = made.scale.z = 1.0
-    made.color = ColorRGBA(1, 0, 0, 1)
-    return made
 
 
 def test_markers_come_move_and_go():

@@ -26,7 +26,15 @@ function told(message) {
   }
 }
 
+// viser paints everything, shadows too, with whatever the browser has.
+function paintsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const names = gl?.getExtension("WEBGL_debug_renderer_info");
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "");
+}
+
 async function opened() {
+  if (paintsInSoftware()) wire.ask("spare").catch(tell);
   const flown = await editor.list();
   if (!editor.script) await editor.open(flown);
   show({ said: "" });
@@ -53,6 +61,9 @@ at("toggle").onclick = () => {
 window.addEventListener("keydown", (event) => {
   if (event.key === "Enter" && event.ctrlKey) editor.run().catch(tell);
 });
+const letGo = (event) => event.key === "Escape" && wire.ask("let go").catch(tell);
+window.addEventListener("keydown", letGo);
+at("scene").addEventListener("load", () => at("scene").contentWindow.addEventListener("keydown", letGo));
 window.addEventListener("beforeunload", (event) => editor.dirty && event.preventDefault());
 flying.listenTo(window);
 at("scene").addEventListener("load", () => flying.listenTo(at("scene").contentWindow));

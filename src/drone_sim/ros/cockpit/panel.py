@@ -6,6 +6,7 @@ from typing import Any
 
 from drone_sim.ros.cockpit import sight
 from drone_sim.ros.cockpit.cameras import Cameras
+from drone_sim.ros.cockpit.choice import Choice
 from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
 from drone_sim.ros.cockpit.found import Found
 from drone_sim.ros.cockpit.plots import Plots
@@ -18,11 +19,12 @@ _LINES = 12  # of the log that are shown
 class Panel:
     """Buttons that call the simulation's services, and what it says."""
 
-    def __init__(self, gui: Any, simulator: Simulator, commanding: Commanding, eyes: sight.Sight):
+    def __init__(self, gui: Any, simulator: Simulator, commanding: Commanding, eyes: sight.Sight, choice: Choice):
         """Draw it."""
         self._gui = gui
         self._simulator = simulator
         self._commanding = commanding
+        self._choice = choice
         self._lines: list[str] = []
         gui.set_panel_label("drone_sim")
         self._state = gui.add_text("State", "no simulation", disabled=True)
@@ -63,6 +65,9 @@ class Panel:
         self._look.on_update(lambda event: setattr(eyes, "choice", event.target.value))
         self.axes = gui.add_checkbox("Frames", False)
         self.handles = gui.add_checkbox("Handles", True)
+        self._objects = gui.add_dropdown("Drag", ("",))
+        self._objects.on_update(lambda event: setattr(self._choice, "name", event.target.value))
+        self.shadows = gui.add_checkbox("Shadows", True)
         self.strength = gui.add_slider("Push by a click, N", min=0.1, max=3.0, step=0.1, initial_value=0.5)
 
     def _stand(self, what: str) -> None:
@@ -109,6 +114,16 @@ class Panel:
         """Offer where to look from."""
         if tuple(self._look.options) != choices:
             self._look.options = choices
+
+    def offer_objects(self, names: tuple[str, ...]) -> None:
+        """Offer the objects of the scene, and show the one that is chosen."""
+        choices = ("", *names)
+        if self._choice.name not in choices:
+            self._choice.name = ""
+        if tuple(self._objects.options) != choices:
+            self._objects.options = choices
+        if self._objects.value != self._choice.name:
+            self._objects.value = self._choice.name
 
     def offer(self, found: Found, scenes: tuple[str, ...], scene: str) -> None:
         """Offer vehicles, cameras and scenes that there are."""

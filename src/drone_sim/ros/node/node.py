@@ -74,7 +74,8 @@ class Node:
             self._inbox.sleep_by(self._outside.wait, self._outside.wake)
         self._topics = FleetTopics(self.simulation, self._inbox)
         self._services = Services(self.player, self._inbox, self._topics.follow)
-        self._handles = Handles(self.simulation, self._inbox), ObjectHandles(self.simulation, self._inbox)
+        self._handles = Handles(self.simulation, self._inbox)
+        self._object_handles = ObjectHandles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
         diagnosis = Diagnosis(self.player, self._pacer, self._topics.command_logs, self._time.simulated)
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
@@ -196,8 +197,8 @@ class Node:
 
     def _show_to_eyes(self) -> None:
         self._topics.publish_command(self._time.stamp)
-        for handles in self._handles:
-            handles.update()
+        self._handles.update()
+        self._object_handles.update()
         self._view.update()
         if self._parameters.gui:
             track = self.simulation.drone.track
