@@ -25,6 +25,7 @@ from viser import _messages as said
 from websockets.asyncio.client import ClientConnection, connect
 
 AT_ONCE = 4
+DAY, NIGHT, BETWEEN = 90.0, 10.0, 8.0  # s; between two visits at most
 LONGEST = 30.0  # s of a visit
 DEAF = 60.0  # s; the node gives up somebody who takes nothing after 40
 PATIENCE = 30.0  # s until the scene is there
@@ -202,11 +203,11 @@ async def visit(door: Door, role: str, dice: random.Random) -> float:
     return waited
 
 
-async def visit_again_and_again(door: Door, number: int, dice: random.Random, diary: Path) -> None:
-    """Come and go."""
-    while True:
+async def visit_again_and_again(door: Door, end: float, dice: random.Random, diary: Path) -> None:
+    """Come and go until a time."""
+    while time.monotonic() < end:
         role, waited, trouble = dice.choice(sorted(ROLES)), 0.0, ""
-        await asyncio.sleep(dice.uniform(0.0, 5.0 + 3.0 * number))
+        await asyncio.sleep(dice.uniform(0.0, BETWEEN))
         try:
             waited = await visit(door, role, dice)
         except Exception as error:  # also what the node should not do
@@ -216,11 +217,14 @@ async def visit_again_and_again(door: Door, number: int, dice: random.Random, di
 
 
 async def main() -> None:
-    """Be several browsers."""
+    """Be several browsers by day, and none in the short nights."""
     address, seed, folder = sys.argv[1], int(sys.argv[2]), Path(sys.argv[3])
     door, diary = Door(address), folder / "browsers.jsonl"
     dices = [random.Random(f"browser {seed} {number}") for number in range(AT_ONCE)]
-    await asyncio.gather(*(visit_again_and_again(door, *one, diary) for one in enumerate(dices)))
+    while True:
+        end = time.monotonic() + DAY
+        await asyncio.gather(*(visit_again_and_again(door, end, dice, diary) for dice in dices))
+        await asyncio.sleep(NIGHT)
 
 
 if __name__ == "__main__":

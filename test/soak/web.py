@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`./dev.sh soak-web [MINUTES] [--seed N] [roslaunch args]`: drone.launch with its cockpit, and browsers that come and go.
+"""`./dev.sh soak-web [MINUTES] [--seed N] [roslaunch args]`: the cockpit, and browsers that come and go.
 
 Chromium now and then, where it is installed, and several clients that speak as the page does: they fly, watch a
 camera, press buttons and write scripts; some vanish while they hold a key, some take nothing of what they are sent.
