@@ -125,16 +125,17 @@ class Browser:
     async def stay(self, seconds: float) -> None:
         """Take what comes, without looking at it."""
         with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._ignore(), seconds)
-
-    async def _ignore(self) -> None:
-        async for _ in self.scene:
-            pass
+            await asyncio.wait_for(asyncio.gather(_ignore(self.scene), _ignore(self.wire)), seconds)
 
     def vanish(self) -> None:
         """Be gone without a word, as a browser that is killed."""
         for one in (self.scene, self.wire):
             one.transport.abort()
+
+
+async def _ignore(connection: ClientConnection) -> None:
+    async for _ in connection:
+        pass
 
 
 async def watch(browser: Browser) -> None:

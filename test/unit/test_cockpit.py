@@ -10,8 +10,6 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 pytest.importorskip("viser")
 
-import cv2
-import numpy as np
 import trimesh
 import viser
 from geometry_msgs.msg import Point, TransformStamped
@@ -21,7 +19,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit import cameras, looks
+from drone_sim.ros.cockpit import looks
 from drone_sim.ros.cockpit.flying import Flying, read_command
 from drone_sim.ros.cockpit.found import Found, find
 from drone_sim.ros.cockpit.frames import Frames
@@ -354,14 +352,6 @@ def test_lines_of_another_colour_are_made_anew():
         markers.hear(MarkerArray([message]))
         markers.show()
     assert scene.added == ["/scene/a/0"] * 2
-
-
-def test_a_picture_is_shown_as_it_came():
-    jpeg, png = (
-        cv2.imencode(".jpg", np.zeros((2, 2, 3)))[1].tobytes(),
-        cv2.imencode(".png", np.zeros((2, 2)))[1].tobytes(),
-    )
-    assert [cameras.format_of(one) for one in (jpeg, png, b"", b"\0" * 12 + png)] == ["jpeg", "png", None, None]
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import threading
 from typing import Any
 
+import cv2
 import numpy as np
 import rospy
 from sensor_msgs.msg import CompressedImage
 
 _BUFFER = 1 << 22  # bytes
-_KINDS = {"jpeg": b"\xff\xd8\xff", "png": b"\x89PNG\r\n\x1a\n"}  # how their files begin
 
 
 class Cameras:
@@ -78,18 +78,13 @@ class _Camera:
         with self._lock:
             message, self._message = self._message, None
         if message is not None:
-            kind = format_of(message.data)
-            if kind is not None:  # as it came: the setter of viser's `image` would compress it anew
-                self._image._format, self._image._data = kind, message.data
+            picture = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
+            if picture is not None:
+                self._image.image = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
 
     def close(self) -> None:
         self.listen(False)
         self._image.remove()
-
-
-def format_of(data: bytes) -> str | None:
-    """Return what a browser calls this format of pictures, None for one that it does not know."""
-    return next((kind for kind, begin in _KINDS.items() if data.startswith(begin)), None)
 
 
 def _label(topic: str) -> str:

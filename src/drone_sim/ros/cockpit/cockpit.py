@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rosgraph
@@ -26,12 +26,14 @@ from drone_sim.ros.cockpit.gate import Gate
 from drone_sim.ros.cockpit.hearing import Hearing
 from drone_sim.ros.cockpit.page import Page
 from drone_sim.ros.cockpit.panel import Panel
-from drone_sim.ros.cockpit.scene_view import SceneView
 from drone_sim.ros.cockpit.shelf import Shelf
 from drone_sim.ros.cockpit.sight import Sight
 from drone_sim.ros.cockpit.simulator import Simulator
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.node.starting import init_node, reported
+
+if TYPE_CHECKING:
+    from drone_sim.ros.cockpit.scene_view import SceneView
 
 _NAME = "cockpit"
 _WIDTH = 270  # pixels of the panel
@@ -72,6 +74,8 @@ class Cockpit:
 
     def run(self) -> None:
         """Show what is new, again and again."""
+        import drone_sim.ros.cockpit.scene_view  # noqa: F401 # with trimesh: a page that is asked for first comes at once
+
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._look(began)
@@ -107,6 +111,8 @@ class Cockpit:
         for one in (self._view, self._hearing):
             if one is not None:
                 one.close()
+        from drone_sim.ros.cockpit.scene_view import SceneView
+
         self._view = SceneView(self._server.scene, namespace) if namespace else None
         self._hearing = Hearing(self._simulator.node, self._panel, self._wire) if namespace else None
         self._panel.cameras.rest(not namespace)
