@@ -31,6 +31,7 @@ DEAF = 60.0  # s; the node gives up somebody who takes nothing after 40
 PATIENCE = 30.0  # s until the scene is there
 PING = 100.0  # s; who is deaf does not hear the answers to its own, either
 TEXTS = ("# a line\n", "1 / 0\n", "")
+SCENES = ("", *(f"package://drone_sim/config/scenes/{name}.yaml" for name in ("gates", "room")))
 BUTTONS = ("start", "stop", "restart", "pause", "go on", "step", "snapshot", "restore")
 
 
@@ -161,6 +162,7 @@ async def press(browser: Browser) -> None:
     for _ in range(browser.dice.randrange(1, 8)):
         await browser.set(browser.dice.choice(labels), browser.dice.choice(BUTTONS))
         await browser.stay(browser.dice.uniform(0.0, 2.0))
+    await browser.set("Scene", browser.dice.choice(SCENES))
     await browser.set("Run", "restart")
     await browser.set("Frames", browser.dice.random() < 0.3)
 
