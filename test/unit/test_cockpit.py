@@ -14,7 +14,8 @@ import rospy
 import trimesh
 import viser
 from browser_scene import Scene, marker
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, TransformStamped
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
@@ -235,6 +236,9 @@ def test_what_the_master_knows():
 # ---- what is shown
 
 
+LINE = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)]
+
+
 def test_markers_come_move_and_go():
     scene = Scene()
     markers = Markers(scene, "scene", Frames(scene))
@@ -255,6 +259,65 @@ def test_markers_come_move_and_go():
     markers.hear(MarkerArray([Marker(action=Marker.DELETEALL)]))
     markers.show()
     assert not scene.nodes
+
+
+@pytest.mark.parametrize(
+    "before, after, seen",
+    [
+        ({"type": Marker.TEXT_VIEW_FACING, "text": "one"}, {"text": "three"}, lambda node: node.text == "three"),
+        ({"type": Marker.LINE_STRIP, "points": LINE[:2]}, {"points": LINE}, lambda node: len(node.points) == 2),
+        ({"type": Marker.LINE_LIST, "points": LINE[:2]}, {"points": LINE[1:]}, lambda node: node.points[0][0][0] == 1),
+    ],
+)
+def test_words_and_lines_change_in_place(before, after, seen):
+    scene = Scene()
+    markers = Markers(scene, "scene", Frames(scene))
+    for number, values in enumerate((before, {**before, **after})):
+        message = Marker(ns="a", **values)
+        message.header.frame_id, message.pose.position.x = "world", number
+        markers.hear(MarkerArray([message]))
+        markers.show()
+    (node,) = scene.nodes.values()
+    assert scene.added == ["/scene/a/0"] and seen(node) and node.position[0] == 1.0
+    markers.hear(MarkerArray([Marker(ns="a", type=before["type"], header=message.header)]))
+    markers.show()
+    assert len(scene.nodes) == (before["type"] == Marker.TEXT_VIEW_FACING), "lines of no points are nothing"
+
+
+def transform(parent, child, x=0.0):
+    made = TransformStamped(child_frame_id=child)
+    made.header.frame_id, made.transform.translation.x, made.transform.rotation.w = parent, x, 1.0
+    return made
+
+
+def test_a_frame_waits_for_its_parents():
+    scene = Scene()
+    frames = Frames(scene)
+    loop = [transform("a", "b"), transform("b", "a"), transform("c", "c")]
+    for message, shown in (
+        ([transform("propeller", "blades"), *loop], []),
+        ([transform("body", "propeller", 0.1)], []),
+        ([transform("world", "body")], ["/body", "/body/propeller", "/body/propeller/blades"]),
+    ):
+        frames.hear(TFMessage(message))
+        frames.show()
+        assert sorted(scene.nodes) == [f"/frames{name}" for name in shown]
+    frames.hear(TFMessage([transform("world", "body", 2.0)]))
+    frames.show()
+    assert scene.nodes["/frames/body"].position == (2.0, 0.0, 0.0) and len(scene.added) == 3
+    frames.forget()
+    assert not scene.nodes
+
+
+def test_lines_of_another_colour_are_made_anew():
+    scene = Scene()
+    markers = Markers(scene, "scene", Frames(scene))
+    painted = marker(0, Marker.LINE_STRIP, points=LINE)
+    painted.color = ColorRGBA(0, 1, 0, 1)
+    for message in (marker(0, Marker.LINE_STRIP, points=LINE[:2]), painted):
+        markers.hear(MarkerArray([message]))
+        markers.show()
+    assert scene.added == ["/scene/a/0"] * 2
 
 
 @pytest.mark.parametrize(

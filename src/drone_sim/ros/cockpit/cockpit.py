@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rospy
@@ -26,7 +27,6 @@ from drone_sim.ros.cockpit.gate import Gate
 from drone_sim.ros.cockpit.hearing import Hearing
 from drone_sim.ros.cockpit.page import Page
 from drone_sim.ros.cockpit.panel import Panel
-from drone_sim.ros.cockpit.scene_view import SceneView
 from drone_sim.ros.cockpit.settings import Settings, read
 from drone_sim.ros.cockpit.shelf import Shelf
 from drone_sim.ros.cockpit.sight import Sight
@@ -34,6 +34,9 @@ from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.sunlight import Sunlight
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.node.starting import init_node, reported
+
+if TYPE_CHECKING:
+    from drone_sim.ros.cockpit.scene_view import SceneView
 
 _NAME = "cockpit"
 _WIDTH = 270  # pixels of the panel
@@ -76,6 +79,8 @@ class Cockpit:
 
     def run(self) -> None:
         """Show what is new, again and again."""
+        import drone_sim.ros.cockpit.scene_view  # noqa: F401 # with trimesh: a page that is asked for first comes at once
+
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._look(began)
@@ -114,6 +119,8 @@ class Cockpit:
         for one in (self._view, self._hearing):
             if one is not None:
                 one.close()
+        from drone_sim.ros.cockpit.scene_view import SceneView
+
         self._view = SceneView(self._server.scene, namespace, self._sun, self._choice) if namespace else None
         self._hearing = Hearing(self._simulator.node, self._panel, self._wire) if namespace else None
         self._panel.cameras.rest(not namespace)

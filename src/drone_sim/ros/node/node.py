@@ -22,11 +22,12 @@ from drone_sim.mechanics.frames import position, to_euler
 from drone_sim.remote import outside
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.ending import Ending
+from drone_sim.ros.node.given import read_parameters, use_sim_time
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.launch_arguments import check_launch_arguments
 from drone_sim.ros.node.master_watch import MasterWatch
 from drone_sim.ros.node.services import Services
-from drone_sim.ros.node.starting import init_node, read_parameters, reported, use_sim_time
+from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.ros.node.step_time import StepTime
 from drone_sim.ros.rviz.handles import Handles
 from drone_sim.ros.rviz.object_handles import ObjectHandles
