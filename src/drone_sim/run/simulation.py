@@ -217,6 +217,10 @@ class Simulation:
         self._changed_vehicles()
         tell(errors)
 
+    def set_pace(self, factor: Any) -> None:
+        """Have whoever plays it play at another real-time factor, through every start. Raises ParameterError."""
+        self.parameters = self.parameters.at_pace(factor)
+
     # ---- start and stop
 
     def start(self, scene_file: str | None = None) -> None:
