@@ -28,6 +28,7 @@ from drone_sim.ros.node.master_watch import MasterWatch
 from drone_sim.ros.node.services import Services
 from drone_sim.ros.node.starting import init_node, read_parameters, reported, use_sim_time
 from drone_sim.ros.node.step_time import StepTime
+from drone_sim.ros.node.windows import WindowTopics
 from drone_sim.ros.rviz.handles import Handles
 from drone_sim.ros.rviz.rviz_view import RvizView
 from drone_sim.ros.vehicle.fleet_topics import FleetTopics
@@ -75,6 +76,7 @@ class Node:
         self._topics = FleetTopics(self.simulation, self._inbox)
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
+        self._windows = WindowTopics(self.simulation, self._inbox)
         self._handles = Handles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
         diagnosis = Diagnosis(self.player, self._pacer, self._topics.command_logs, self._time.simulated)
@@ -207,6 +209,7 @@ class Node:
         self._topics.publish_command(self._time.stamp)
         self._handles.update()
         self._view.update()
+        self._windows.update(self._time.stamp)
         if self._parameters.gui:
             track = self.simulation.drone.track
             self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
