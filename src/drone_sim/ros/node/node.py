@@ -30,6 +30,7 @@ from drone_sim.ros.node.starting import init_node, read_parameters, reported, us
 from drone_sim.ros.node.step_time import StepTime
 from drone_sim.ros.node.windows import WindowTopics
 from drone_sim.ros.rviz.handles import Handles
+from drone_sim.ros.rviz.object_handles import ObjectHandles
 from drone_sim.ros.rviz.rviz_view import RvizView
 from drone_sim.ros.vehicle.fleet_topics import FleetTopics
 from drone_sim.ros.vehicle.script_topics import RosBackend
@@ -77,7 +78,7 @@ class Node:
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._windows = WindowTopics(self.simulation, self._inbox)
-        self._handles = Handles(self.simulation, self._inbox)
+        self._handles = Handles(self.simulation, self._inbox), ObjectHandles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
         diagnosis = Diagnosis(self.player, self._pacer, self._topics.command_logs, self._time.simulated)
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
@@ -207,7 +208,8 @@ class Node:
 
     def _show_to_eyes(self) -> None:
         self._topics.publish_command(self._time.stamp)
-        self._handles.update()
+        for handles in self._handles:
+            handles.update()
         self._view.update()
         self._windows.update(self._time.stamp)
         if self._parameters.gui:
