@@ -91,7 +91,7 @@ class Cameras:
             except ValueError as error:
                 rospy.logwarn_throttle(10, f"{topic} is not shown: {error}")
                 continue
-            self._wire.show_picture(topic, " ".join(filter(None, (label(topic), caption))), picture)
+            self._wire.show_picture({"picture": topic, "name": label(topic), "note": caption}, picture)
 
     def rest(self, resting: bool) -> None:
         """Listen to nobody while no browser is open, and to those that were switched on again afterwards."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from cv_bridge import CvBridge, CvBridgeError
@@ -37,7 +39,8 @@ def _depths(depths: np.ndarray) -> tuple[bytes, str]:
     if not there.any():
         return _encoded(np.zeros((*depths.shape, 3), np.uint8)), "nothing within its range"
     near, far = float(depths[there].min()), float(depths[there].max())
-    scaled = np.where(there, (depths - near) * (255 / max(far - near, 1e-6)), 0).astype(np.uint8)
+    share = np.log(np.where(there, depths, near) / near) / max(math.log(far / near), 1e-6)  # as eyes see distances
+    scaled = (255 * share).astype(np.uint8)
     colored = cv2.applyColorMap(scaled, _COLORS)
     colored[~there] = 0
     return _encoded(colored), f"{near:.2f} m (blue) to {far:.2f} m (red)"

@@ -28,6 +28,10 @@ class Wire:
         self._numbers = itertools.count()
         self._out: dict[int, tuple[asyncio.AbstractEventLoop, Outbox]] = {}
 
+    def answer_also(self, answers: Mapping[str, Answer]) -> None:
+        """Answer other questions, too."""
+        self._answers = {**self._answers, **answers}
+
     async def serve(self, connection: ServerConnection) -> None:
         """Talk with one browser until it goes."""
         browser = next(self._numbers)
@@ -53,10 +57,13 @@ class Wire:
         """Whether any browser has shown the last picture of that name; any thread may call."""
         return any(box.wants(name) for _, box in list(self._out.values()))
 
-    def show_picture(self, name: str, caption: str, jpeg: bytes) -> None:
-        """Send a picture to all browsers that have shown the last one of that name; any thread may call."""
-        picture = json.dumps({"picture": name, "caption": caption}).encode() + b"\n" + jpeg
-        self._leave(lambda box: box.put_picture(name, picture))
+    def show_picture(self, said: Mapping[str, str], content: bytes) -> None:
+        """Send a picture to all browsers that have shown the last one of its name; any thread may call.
+
+        `said` has its name as `picture`, and what else the page is to know of it; `content` is a JPEG or PNG.
+        """
+        picture = json.dumps(said).encode() + b"\n" + content
+        self._leave(lambda box: box.put_picture(said["picture"], picture))
 
     def close_picture(self, name: str) -> None:
         """Send no more of that name; any thread may call."""
