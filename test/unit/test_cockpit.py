@@ -23,7 +23,7 @@ from websockets.sync.client import connect
 from drone_sim.ros.cockpit import looks, settings
 from drone_sim.ros.cockpit.cockpit import Cockpit
 from drone_sim.ros.cockpit.flying import Flying, read_command
-from drone_sim.ros.cockpit.found import Found, find
+from drone_sim.ros.cockpit.found import Found, Source, find
 from drone_sim.ros.cockpit.frames import Frames
 from drone_sim.ros.cockpit.gate import WIRE, Gate
 from drone_sim.ros.cockpit.markers import Markers
@@ -229,7 +229,7 @@ def test_what_the_master_knows():
         ("/other/odom", "nav_msgs/Odometry"),
         ("/drone/front/compressed", "sensor_msgs/CompressedImage"),
     ]
-    assert find(topics) == Found("/drone", ("drone",), ("/drone/front/compressed",))
+    assert find(topics) == Found("/drone", ("drone",), (Source("/drone/front", "/drone/front/compressed"),))
     assert find(topics[1:]) == Found()
 
 

@@ -1,6 +1,7 @@
-// The page around the scene: held keys, and the script in an editor. Everything else is viser's, in the frame.
+// The page around the scene: held keys, the script in an editor, and what floats over the scene. The rest is viser's.
 import { Editor } from "./editor.js";
 import { Flying } from "./flying.js";
+import { Windows } from "./windows.js";
 import { Wire } from "./wire.js";
 
 const at = (id) => document.getElementById(id);
@@ -19,6 +20,8 @@ function show({ saved, said, bad = false, scripts, script }) {
 }
 
 function told(message) {
+  if (message.windows) windows.show(message.windows);
+  if (message.pictures) windows.showPictures(message.pictures);
   if (message.failure) {
     const { file, line, said, phase } = message.failure;
     show({ said: `${phase}, line ${line}: ${said}`, bad: true });
@@ -35,13 +38,15 @@ function paintsInSoftware() {
 
 async function opened() {
   if (paintsInSoftware()) wire.ask("spare").catch(tell);
+  told(await wire.ask("windows"));
   const flown = await editor.list();
   if (!editor.script) await editor.open(flown);
   show({ said: "" });
 }
 
 const tell = (error) => show({ said: error.message, bad: true });
-const wire = new Wire(told, () => opened().catch(tell), () => show({ said: "the cockpit's node does not answer", bad: true }));
+const wire = new Wire(told, (data) => windows.picture(data), () => opened().catch(tell), () => show({ said: "the cockpit's node does not answer", bad: true }));
+const windows = new Windows(at("windows"), wire);
 const editor = new Editor(at("text"), (...question) => wire.ask(...question), show);
 const flying = new Flying(
   (command) => wire.hold(command),

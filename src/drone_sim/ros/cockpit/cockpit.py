@@ -32,6 +32,7 @@ from drone_sim.ros.cockpit.shelf import Shelf
 from drone_sim.ros.cockpit.sight import Sight
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.sunlight import Sunlight
+from drone_sim.ros.cockpit.windows import Windows
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.node.starting import init_node, reported
 
@@ -74,7 +75,11 @@ class Cockpit:
         panel.dock_right()
         panel.set_width(_WIDTH)
         self.address, self.address_elsewhere = urls(host, self._server.get_port(), token)
-        self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight, self._choice)
+        self._panel = Panel(
+            self._server.gui, self._simulator, self._commanding, self._sight, self._choice, self._wire
+        )
+        self._windows = Windows(self._simulator.node, self._panel.cameras, self._wire)
+        self._wire.answer_also(self._windows.answers)
         threading.Thread(target=flying.watch, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
 
     def run(self) -> None:
@@ -124,6 +129,7 @@ class Cockpit:
         self._view = SceneView(self._server.scene, namespace, self._sun, self._choice) if namespace else None
         self._hearing = Hearing(self._simulator.node, self._panel, self._wire) if namespace else None
         self._panel.cameras.rest(not namespace)
+        self._windows.listen(bool(namespace))
         if not namespace:
             self._panel.plots.follow("")
             self._panel.tuning.follow("")
