@@ -23,6 +23,7 @@ from drone_sim.ros.cockpit.flying import Flying
 from drone_sim.ros.cockpit.found import Found, find
 from drone_sim.ros.cockpit.gate import Gate
 from drone_sim.ros.cockpit.hearing import Hearing
+from drone_sim.ros.cockpit.lessons import Lessons
 from drone_sim.ros.cockpit.page import Page
 from drone_sim.ros.cockpit.panel import Panel
 from drone_sim.ros.cockpit.scene_view import SceneView
@@ -53,9 +54,10 @@ class Cockpit:
         self._sight = Sight()
         flying = Flying(self._commanding.send)
         shelf = Shelf(Path(rospy.get_param("~scripts", "~/drone_sim")).expanduser())
-        self._wire = Wire(flying, Editing(shelf, self._simulator).answers)
+        lessons = Lessons()
+        self._wire = Wire(flying, Editing(shelf, lessons, self._simulator).answers)
         token = secrets.token_urlsafe(16)
-        gate = Gate(token, Page(), self._wire.serve)
+        gate = Gate(token, Page(beside=lessons.picture), self._wire.serve)
         host, port = rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080)
         with gate.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
             self._server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
