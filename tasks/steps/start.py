@@ -1,6 +1,5 @@
 """To begin with: the tutorial's controller, which obeys what `on_twist` keeps; that is not much yet."""
 
-import tutorial
 from tutorial import sysCall_actuation, sysCall_cleanup, sysCall_init, sysCall_sensing  # noqa: F401 -- as they are
 
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
