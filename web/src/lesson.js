@@ -1,6 +1,9 @@
 // The text beside the script: a section of the tutorial, or a task. What it says of a scene, Run flies in.
 import { render } from "./markdown.js";
 
+// The tutorial is written for a terminal: what does the same here.
+const HERE = "Here, Run is its roslaunch; a click on the drone pushes it, its arrows put it elsewhere, the keys below are its commands.";
+
 export class Lesson {
   // `parts` are elements: choice, before, after, fold, body, start, flies, text.
   constructor(parts, ask, open) {
@@ -41,7 +44,8 @@ export class Lesson {
     const { text, folder, script, flies } = await this.ask("lesson", { lesson: name });
     if (name !== this.name) return; // another one has been chosen meanwhile
     this.script = script;
-    this.parts.flies.textContent = flies ? `Run flies ${flies}.` : "";
+    const isTask = this.all[this.place]?.task;
+    this.parts.flies.textContent = [flies && `Run flies ${flies}.`, isTask ? "" : HERE].filter(Boolean).join(" ");
     this.folded(false);
     const knows = (to) => to.script || this.all.some((one) => one.lesson === to.lesson);
     render(this.parts.text, text, folder, knows, (to) => (to.script ? this.open(to.script) : this.go(to.lesson)));

@@ -90,7 +90,8 @@ class Lessons:
 
 def _parted(text: str) -> Iterator[tuple[str, str]]:
     """Yield title and text of each section; what looks like a heading in a block of code is none."""
-    title, lines, in_code = "", [], False
+    title, in_code = "", False
+    lines: list[str] = []
     for line in text.splitlines():
         in_code ^= bool(_FENCE.match(line))
         heading = None if in_code else _HEADING.match(line)

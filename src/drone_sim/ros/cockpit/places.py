@@ -37,7 +37,7 @@ class Places:
         wanted = _scene(lesson)
         if wanted:
             self._before = self._before if is_brought else now
-            return self._load(wanted, now, f"started {self.told(lesson)}" if lesson else "")
+            return self._load(wanted, now, f"started in {_name(lesson, wanted)}")
         if is_brought:
             said = "started in the scene of the launch" if self._before in ("", "none") else f"back in {self._before}"
             return self._load(self._before, now, said)
@@ -58,6 +58,10 @@ class Places:
 def plan_of(lesson: Lesson) -> Plan:
     """Return the plan of a task. Raises PlanError."""
     return plans.read(tasks.find(lesson.task))
+
+
+def _name(lesson: Lesson | None, file: str) -> str:
+    return f"the scene of the task {lesson.task}" if lesson and lesson.task else file.rpartition("/")[2]
 
 
 def _scene(lesson: Lesson | None) -> str:

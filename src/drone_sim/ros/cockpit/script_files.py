@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 from drone_sim.files import writing
@@ -46,6 +47,14 @@ def write(name: str, path: Path, text: str) -> str:
     return version_of(path)
 
 
+def copy(name: str, path: Path, to: Path) -> None:
+    """Copy a file, whatever it holds. Raises ShelfError."""
+    try:
+        shutil.copyfile(path, to)
+    except (OSError, shutil.Error) as error:
+        raise ShelfError(f"{name}: {_told(error) if isinstance(error, OSError) else error}") from None
+
+
 def version_of(path: Path) -> str:
     """Return what changes whenever the file does, '' where it is not there."""
     try:
@@ -73,5 +82,5 @@ def _has_windows_line_ends(path: Path) -> bool:
 
 
 def _told(error: OSError) -> str:
-    """Return what went wrong, for a user: errno's words, or our own."""
-    return os.strerror(error.errno) if error.errno else str(error)
+    """Return what went wrong, for a user: errno's words with the file, or our own."""
+    return f"{error.filename}: {os.strerror(error.errno)}" if error.errno and error.filename else str(error)

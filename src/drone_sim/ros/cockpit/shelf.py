@@ -123,22 +123,21 @@ class Shelf:
     def keep_both(self, name: Any, text: str, mine: bool) -> tuple[Book, str, str]:
         """End a conflict about a script of the user's: `text`, or what the file holds, goes into another file.
 
-        The file itself holds the `text` in the end where it is `mine`. Return the script, its version, and the name of
-        the other script, '' where nothing was left to keep. Raises ShelfError.
+        The file itself holds the `text` in the end where that is `mine`, or where there was no file. Return the script,
+        its version, and the name of the other script, '' where there is none. Raises ShelfError.
         """
         file_name = str(name).removeprefix(f"{OWN}/")
         book = self._own(file_name if file_name in scripts_in(self.folder) else _checked(file_name))
         self._check_place(book)
         with self._writing:
-            theirs = self.read(book)[0] if book.path.exists() else None
-            other = ""
-            if theirs is not None and theirs != text:
-                second = self._copy_of(book)
-                script_files.write(second.name, second.path, theirs if mine else text)
-                other = second.name
-            if mine or theirs is None:
-                return book, script_files.write(book.name, book.path, text), other
-            return book, script_files.version_of(book.path), other
+            if not book.path.exists():
+                return book, script_files.write(book.name, book.path, text), ""
+            second = self._copy_of(book)
+            if mine:
+                script_files.copy(second.name, book.path, second.path)
+                return book, script_files.write(book.name, book.path, text), second.name
+            script_files.write(second.name, second.path, text)
+            return book, script_files.version_of(book.path), second.name
 
     def original(self, book: Book) -> str:
         """Return what a script was before the first change, to go back to. Raises ShelfError."""
