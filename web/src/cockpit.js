@@ -7,7 +7,7 @@ import { Wire } from "./wire.js";
 
 const at = (id) => document.getElementById(id);
 
-function show({ saved, said, bad = false, lists, script, question }) {
+function show({ saved, said, bad = false, lists, script, of, question }) {
   if (saved !== undefined) {
     at("saved").textContent = saved;
     at("saved").classList.toggle("bad", bad);
@@ -17,10 +17,8 @@ function show({ saved, said, bad = false, lists, script, question }) {
     at("said").classList.toggle("bad", bad);
   }
   if (lists) offer(lists);
-  if (script) {
-    at("script").value = script;
-    lesson.has(script);
-  }
+  if (script) at("script").value = script;
+  if (of !== undefined) lesson.has(script, of);
   if (question !== undefined) ask(question);
 }
 
@@ -71,7 +69,7 @@ const wire = new Wire(
   },
   () => {
     isLost = true;
-    show({ said: "the cockpit's node does not answer; what you write is kept here until it does", bad: true });
+    show({ said: "the cockpit's node does not answer; what you write is kept here until it does. Started anew, it has a new address.", bad: true });
   },
 );
 const scripts = new Scripts(at("text"), wire, { show }, (name) => lesson.go(name));

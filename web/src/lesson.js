@@ -12,6 +12,7 @@ export class Lesson {
     this.open = open; // a script
     this.all = []; // { lesson, title, task, script } in the order of reading
     this.name = "";
+    this.opened = { script: "", lesson: "" };
     parts.choice.onchange = () => this.go(parts.choice.value);
     parts.before.onclick = () => this.turn(-1);
     parts.after.onclick = () => this.turn(1);
@@ -43,7 +44,7 @@ export class Lesson {
     if (!name) return this.folded(true);
     const { text, folder, script, flies } = await this.ask("lesson", { lesson: name });
     if (name !== this.name) return; // another one has been chosen meanwhile
-    this.script = script;
+    this.script = this.opened.lesson === name ? this.opened.script : script; // there may be several
     const isTask = this.all[this.place]?.task;
     this.parts.flies.textContent = [flies && `Run flies ${flies}.`, isTask ? "" : HERE].filter(Boolean).join(" ");
     this.folded(false);
@@ -71,9 +72,10 @@ export class Lesson {
     return this.all.findIndex((one) => one.lesson === this.name);
   }
 
-  // Lets the button open the script of this text, unless it is there.
-  has(script) {
-    this.opened = script;
+  // Hears which script is in the editor, and to which text it belongs: no button is needed for that.
+  has(script, lesson) {
+    this.opened = { script, lesson };
+    if (lesson && lesson === this.name) this.script = script;
     this.aim();
   }
 
@@ -81,7 +83,7 @@ export class Lesson {
     const { before, after, start } = this.parts;
     before.disabled = this.place <= 0;
     after.disabled = this.place + 1 >= this.all.length;
-    start.hidden = !this.name || !this.script || this.script === this.opened;
+    start.hidden = !this.name || !this.script || this.opened.lesson === this.name;
     start.textContent = `Open ${this.script}`;
   }
 

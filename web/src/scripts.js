@@ -65,7 +65,7 @@ export class Scripts {
     });
     this.know(answer);
     this.conflict = this.dirty = false;
-    this.page.show({ saved: "", script, question: null });
+    this.page.show({ saved: "", script, of: answer.lesson, question: null });
     this.editor.show(script, answer.text);
     if (draft && draft.text !== answer.text) this.resume(draft, gone);
     else this.drafts.drop(script);
@@ -128,7 +128,7 @@ export class Scripts {
     this.dirty = this.editor.text !== text; // more has been written meanwhile
     if (this.dirty) this.drafts.put(this.is.script, { text: this.editor.text, version: this.is.version });
     if (before !== this.is.script) this.editor.rename(this.is.script);
-    this.page.show({ saved: `saved as ${this.is.script}`, script: this.is.script });
+    this.page.show({ saved: `saved as ${this.is.script}`, script: this.is.script, of: answer.lesson });
     if (before !== this.is.script) return this.list();
   }
 
@@ -198,7 +198,7 @@ export class Scripts {
     const again = ["Write it again", keep(true)];
     const others = gone ? ["Let it go", () => this.letGo()] : ["The other's", keep(false)];
     const choices = why && !gone ? [again] : [gone ? again : ["Mine", keep(true)], others];
-    this.page.show({ saved: "not saved", bad: true, question: { said, choices } });
+    this.page.show({ saved: "not saved", said: "", bad: true, question: { said, choices } });
   }
 
   async keep(mine) {
