@@ -56,12 +56,29 @@ class Node:
         self.parameters[name] = value
 
 
+class Happenings:
+    """Remembers whose timeline was sent."""
+
+    def __init__(self):
+        self.prepared = self.begun = None
+
+    def prepare(self, plan):
+        self.prepared, self.begun = plan, False
+
+    def begin(self):
+        self.begun = True
+
+    def end(self):
+        self.prepared = None
+
+
 class Asked:
     """What a browser asks."""
 
     def __init__(self, shelf):
         self.node = Node()
-        self.answers = Editing(shelf, LESSONS, self.node).answers
+        self.happenings = Happenings()
+        self.answers = Editing(shelf, LESSONS, self.node, self.happenings).answers
 
     def __call__(self, ask, **message):
         return self.answers[ask](message)
@@ -283,7 +300,7 @@ def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_p
     assert node.parameters["scene_file"] == "mine.yaml"
     node.asked.clear()
     assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"
-    assert node.asked == ["restart"]
+    assert node.asked == ["restart"] and ask.happenings.prepared is None
 
 
 def test_a_scene_that_the_user_has_chosen_meanwhile_stays(ask):

@@ -23,6 +23,7 @@ from drone_sim.ros.cockpit.editing import Editing
 from drone_sim.ros.cockpit.flying import Flying
 from drone_sim.ros.cockpit.found import Found, find
 from drone_sim.ros.cockpit.gate import Gate
+from drone_sim.ros.cockpit.happenings import Happenings
 from drone_sim.ros.cockpit.hearing import Hearing
 from drone_sim.ros.cockpit.lessons import Lessons
 from drone_sim.ros.cockpit.page import Page
@@ -56,7 +57,8 @@ class Cockpit:
         flying = Flying(self._commanding.send)
         shelf = Shelf(Path(rospy.get_param("~scripts", "~/drone_sim")).expanduser())
         lessons = Lessons()
-        self._wire = Wire(flying, Editing(shelf, lessons, self._simulator).answers)
+        editing = Editing(shelf, lessons, self._simulator, Happenings(self._simulator.node))
+        self._wire = Wire(flying, editing.answers)
         token = secrets.token_urlsafe(16)
         gate = Gate(token, Page(beside=lessons.picture), self._wire.serve)
         host, port = free_place(rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080))

@@ -7,8 +7,9 @@ from typing import Any
 
 import rosgraph
 
+from drone_sim.ros.cockpit.happenings import Happenings
 from drone_sim.ros.cockpit.lessons import Lesson, Lessons
-from drone_sim.ros.cockpit.places import Places
+from drone_sim.ros.cockpit.places import Places, plan_of
 from drone_sim.ros.cockpit.script_files import ShelfError
 from drone_sim.ros.cockpit.shelf import OWN, Book, Shelf
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator, script_failure
@@ -20,12 +21,13 @@ _Message = Mapping[str, Any]
 class Editing:
     """The answers, by what is asked."""
 
-    def __init__(self, shelf: Shelf, lessons: Lessons, simulator: Simulator):
-        """Take where scripts and texts are, and what flies them."""
+    def __init__(self, shelf: Shelf, lessons: Lessons, simulator: Simulator, happenings: Happenings):
+        """Take where scripts and texts are, what flies them, and what lets happen what a task says."""
         self._shelf = shelf
         self._lessons = lessons
         self._simulator = simulator
         self._places = Places(simulator)
+        self._happenings = happenings
 
     @property
     def answers(self) -> dict[str, Answer]:
@@ -128,8 +130,11 @@ class Editing:
         path = str(book.path)
         if not path.isprintable():
             raise ShelfError(f"{book.name!r}: ROS cannot pass on such a name; save it as another one")
+        lesson = self._find_lesson(message)
+        self._happenings.prepare(plan_of(lesson) if lesson and lesson.task else None)
         self._simulator.set_parameter("script", path)
-        done, said = self._places.fly(self._find_lesson(message))
+        done, said = self._places.fly(lesson)
+        self._happenings.begin() if done else self._happenings.end()
         failure = None if done else script_failure(said)
         return {"done": done, "said": said, "line": failure.line if failure and failure.file == path else 0}
 
