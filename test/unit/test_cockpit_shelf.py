@@ -1,5 +1,6 @@
 """The cockpit's scripts and texts without a browser: what may be read and written, and where a script flies."""
 
+import json
 import os
 from pathlib import Path
 
@@ -183,6 +184,15 @@ def test_a_file_that_is_no_script_gets_one_line(ask, own, make, words):
     assert "mine/odd.py" in str(error.value) and "\n" not in str(error.value)
 
 
+def test_a_name_that_is_no_utf8_is_opened_but_not_flown(ask, own):
+    own.mkdir()
+    Path(os.fsdecode(os.fsencode(own) + b"/\xff.py")).write_text("text")
+    name = ask("scripts")["groups"][-1]["scripts"][0]
+    assert json.loads(json.dumps(ask("open", script=name)))["text"] == "text" and ask("look", script=name)["version"]
+    with pytest.raises(ShelfError, match="save it as another one"):
+        ask("run", script=name, lesson="")
+
+
 def test_lines_end_as_they_did(shelf, own):
     own.mkdir()
     (own / "dos.py").write_bytes(b"a\r\nb\r\n")
@@ -296,7 +306,9 @@ def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_p
     }
     ask("run", script="tutorial/4_pitch.py", lesson="stage-4-pitch")
     assert node.parameters["scene_file"] == str(package_path() / "config/scenes/empty.yaml")
-    assert ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust")["said"] == "back in mine.yaml"
+    assert ask("lesson", lesson="stage-1-constant-thrust")["flies"] == "back in mine.yaml"
+    said = ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust")["said"]
+    assert said == "started back in mine.yaml"
     assert node.parameters["scene_file"] == "mine.yaml"
     node.asked.clear()
     assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"

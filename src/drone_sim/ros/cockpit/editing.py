@@ -135,6 +135,8 @@ class Editing:
         self._simulator.set_parameter("script", path)
         done, said = self._places.fly(lesson)
         self._happenings.begin() if done else self._happenings.end()
+        if said.endswith("unavailable"):  # rospy's word for a service of nobody
+            said = f"no simulation answers: {said}"
         failure = None if done else script_failure(said)
         return {"done": done, "said": said, "line": failure.line if failure and failure.file == path else 0}
 

@@ -25,23 +25,33 @@ class Places:
         """Return where a lesson is flown, in one line; '' for where the user is. Raises ValueError, OSError."""
         if lesson.task:
             return task_scenes.told(plan_of(lesson))
-        return f"in {lesson.scene.rpartition('/')[2]}, as the tutorial's command says" if lesson.scene else ""
+        if lesson.scene:
+            return f"in {lesson.scene.rpartition('/')[2]}, as the tutorial's command says"
+        return self._back() if self._is_brought(self._now()) else ""
 
     def fly(self, lesson: Lesson | None) -> tuple[bool, str]:
         """Start the simulation anew where a lesson is flown; return whether that was done, and one line.
 
         Raises ValueError and OSError, in one line.
         """
-        now = str(self._simulator.parameter(_KEY, ""))
-        is_brought = bool(self._brought) and now == self._brought
+        now = self._now()
+        is_brought = self._is_brought(now)
         wanted = _scene(lesson)
         if wanted:
             self._before = self._before if is_brought else now
             return self._load(wanted, now, f"started in {_name(lesson, wanted)}")
         if is_brought:
-            said = "started in the scene of the launch" if self._before in ("", "none") else f"back in {self._before}"
-            return self._load(self._before, now, said)
+            return self._load(self._before, now, f"started {self._back()}")
         return self._simulator.call("restart")
+
+    def _now(self) -> str:
+        return str(self._simulator.parameter(_KEY, ""))
+
+    def _is_brought(self, scene: str) -> bool:
+        return bool(self._brought) and scene == self._brought
+
+    def _back(self) -> str:
+        return f"back in {'the scene of the launch' if self._before in ('', 'none') else self._before}"
 
     def _load(self, file: str, now: str, said: str) -> tuple[bool, str]:
         _, cleanup = self._simulator.call("stop")  # an error in the cleanup of what flew must not hinder what comes
