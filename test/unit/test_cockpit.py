@@ -28,7 +28,6 @@ from drone_sim.ros.cockpit.frames import Frames
 from drone_sim.ros.cockpit.gate import WIRE, Gate
 from drone_sim.ros.cockpit.markers import Markers
 from drone_sim.ros.cockpit.page import Page
-from drone_sim.ros.cockpit.shelf import Shelf, ShelfError
 from drone_sim.ros.cockpit.simulator import script_failure
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.tools.commands import Command
@@ -93,7 +92,7 @@ def test_the_token_lets_in_and_leaves_the_address(served):
 
 def test_the_page_that_is_served_is_the_one_in_the_source():
     source = Path(__file__).parents[2] / "web" / "src"
-    for name in ("index.html", "cockpit.css"):  # the script is built of it: web/package.json
+    for name in ("index.html", "cockpit.css", "script.css"):  # the script is built of it: web/package.json
         assert Page().find(f"/{name}")[1] == (source / name).read_bytes(), "cd web && npm ci && npm run build"
 
 
@@ -167,52 +166,6 @@ def test_nan_is_no_speed():
     with pytest.raises(ValueError, match="hold/wz"):
         read_command({"wz": float("nan")})
     assert read_command({"vz": -2}) == Command(vz=-2.0)
-
-
-# ---- which files
-
-
-@pytest.fixture(name="shelf")
-def _shelf(tmp_path):
-    package = tmp_path / "package"
-    for folder in ("src/drone_sim/child_scripts", "docs/tutorial"):
-        (package / folder).mkdir(parents=True)
-    (package / "src/drone_sim/child_scripts/pilot.py").write_text("shipped", encoding="utf-8")
-    return Shelf(tmp_path / "mine", package)
-
-
-def test_a_script_of_the_package_becomes_a_copy(shelf, tmp_path):
-    pilot = shelf.find("built-in/pilot.py")
-    own, version = shelf.save(pilot, "changed", shelf.read(pilot)[1])
-    assert own.name == "mine/pilot.py" and (tmp_path / "mine/pilot.py").read_text() == "changed"
-    assert shelf.read(pilot)[0] == "shipped"
-    again, _ = shelf.save(own, "changed again", version)
-    assert again == own and shelf.original(own) == "shipped"
-    assert shelf.save(pilot, "other", "")[0].name == "mine/pilot_2.py", "nothing is lost"
-
-
-def test_what_another_has_changed_is_not_overwritten(shelf, tmp_path):
-    own, version = shelf.save(shelf.find("built-in/pilot.py"), "mine", "")
-    (tmp_path / "mine/pilot.py").write_text("theirs", encoding="utf-8")
-    with pytest.raises(ShelfError, match="changed by somebody else"):
-        shelf.save(own, "mine again", version)
-    assert (tmp_path / "mine/pilot.py").read_text() == "theirs"
-
-
-@pytest.mark.parametrize("name", ["/etc/passwd", "mine/../../x.py", "built-in/../x", "", None, 3, ["a"]])
-def test_only_what_is_listed_is_read(shelf, name):
-    with pytest.raises(ShelfError, match="no such script"):
-        shelf.find(name)
-
-
-def test_scripts_have_limits(shelf, tmp_path):
-    with pytest.raises(ShelfError, match="larger than"):
-        shelf.save(shelf.find("built-in/pilot.py"), "x" * (1 << 21), "")
-    folder = tmp_path / "mine"
-    folder.mkdir()
-    (folder / "binary.py").write_bytes(b"\xff\xfe")
-    with pytest.raises(ShelfError, match="utf-8"):
-        shelf.read(shelf.find("mine/binary.py"))
 
 
 def test_a_failure_is_read_from_a_line():

@@ -24,7 +24,9 @@ from drone_sim.ros.cockpit.editing import Editing
 from drone_sim.ros.cockpit.flying import Flying
 from drone_sim.ros.cockpit.found import Found, find
 from drone_sim.ros.cockpit.gate import Gate
+from drone_sim.ros.cockpit.happenings import Happenings
 from drone_sim.ros.cockpit.hearing import Hearing
+from drone_sim.ros.cockpit.lessons import Lessons
 from drone_sim.ros.cockpit.page import Page
 from drone_sim.ros.cockpit.panel import Panel
 from drone_sim.ros.cockpit.settings import Settings, read
@@ -59,11 +61,11 @@ class Cockpit:
         self._commanding = Commanding()
         self._sight, self._choice = Sight(), Choice()
         flying = Flying(self._commanding.send)
-        shelf = Shelf(settings.scripts)
-        answers = {**Editing(shelf, self._simulator).answers, "let go": self._let_go, "spare": self._spare}
-        self._wire = Wire(flying, answers)
+        shelf, lessons = Shelf(settings.scripts), Lessons()
+        editing = Editing(shelf, lessons, self._simulator, Happenings(self._simulator.node))
+        self._wire = Wire(flying, {**editing.answers, "let go": self._let_go, "spare": self._spare})
         token = secrets.token_urlsafe(16)
-        gate = Gate(token, Page(), self._wire.serve)
+        gate = Gate(token, Page(beside=lessons.picture), self._wire.serve)
         host, port = free_place(settings.address, settings.port)
         with gate.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
             self._server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
