@@ -15,6 +15,7 @@ import trimesh
 import viser
 from browser_scene import Scene, marker
 from geometry_msgs.msg import Point, TransformStamped
+from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
