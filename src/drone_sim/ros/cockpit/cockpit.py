@@ -77,9 +77,7 @@ class Cockpit:
         panel.dock_right()
         panel.set_width(_WIDTH)
         self.address, self.address_elsewhere = urls(host, self._server.get_port(), token)
-        self._panel = Panel(
-            self._server.gui, self._simulator, self._commanding, self._sight, self._choice, self._wire
-        )
+        self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight, self._choice, self._wire)
         self._windows = Windows(self._simulator.node, self._panel.cameras, self._wire)
         self._wire.answer_also(self._windows.answers)
         threading.Thread(target=flying.watch, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
