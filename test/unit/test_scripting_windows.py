@@ -20,7 +20,8 @@ def sysCall_init():
     self.results = []
 
 def sysCall_actuation():
-    self.results.append((sim.getDialogResult(self.asked), sim.getDialogResult(self.input), sim.getDialogInput(self.input)))
+    asked, answered = sim.getDialogResult(self.asked), sim.getDialogResult(self.input)
+    self.results.append((asked, answered, sim.getDialogInput(self.input)))
     sim.auxiliaryConsolePrint(self.console, f'step {len(self.results)}\\n')
     sim.setStringSignal('results', repr(self.results[-1]))
     if sim.getInt32Signal('close'):
