@@ -30,14 +30,19 @@ function told(message) {
 }
 
 async function opened() {
-  told(await wire.ask("windows"));
+  wire.ask("windows").then(told, () => {});
   const flown = await editor.list();
   if (!editor.script) await editor.open(flown);
   show({ said: "" });
 }
 
+function closed() {
+  windows.clear();
+  show({ said: "the cockpit's node does not answer", bad: true });
+}
+
 const tell = (error) => show({ said: error.message, bad: true });
-const wire = new Wire(told, (data) => windows.picture(data), () => opened().catch(tell), () => show({ said: "the cockpit's node does not answer", bad: true }));
+const wire = new Wire(told, (data) => windows.picture(data), () => opened().catch(tell), closed);
 const windows = new Windows(at("windows"), wire);
 const editor = new Editor(at("text"), (...question) => wire.ask(...question), show);
 const flying = new Flying(
