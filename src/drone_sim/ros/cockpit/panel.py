@@ -6,11 +6,12 @@ from typing import Any
 
 from drone_sim.ros.cockpit import sight
 from drone_sim.ros.cockpit.cameras import Cameras
+from drone_sim.ros.cockpit.choice import Choice
 from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
 from drone_sim.ros.cockpit.found import Found
 from drone_sim.ros.cockpit.pace import Pace
 from drone_sim.ros.cockpit.plots import Plots
-from drone_sim.ros.cockpit.simulator import Simulator
+from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.tuning import Tuning
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.cockpit.words import Words
@@ -21,11 +22,20 @@ _LINES = 50  # of the log that are shown
 class Panel:
     """Buttons that call the simulation's services, and what it says."""
 
-    def __init__(self, gui: Any, simulator: Simulator, commanding: Commanding, eyes: sight.Sight, wire: Wire):
+    def __init__(
+        self,
+        gui: Any,
+        simulator: Simulator,
+        commanding: Commanding,
+        eyes: sight.Sight,
+        choice: Choice,
+        wire: Wire,
+    ):
         """Draw it; `wire` takes pictures to the browsers."""
         self._gui = gui
         self._simulator = simulator
         self._commanding = commanding
+        self._choice = choice
         self._lines: list[str] = []
         gui.set_panel_label("drone_sim")
         self._state = gui.add_text("State", "no simulation", disabled=True)
@@ -42,7 +52,7 @@ class Panel:
         with tabs.add_tab("Tune"):
             self.tuning = Tuning(gui, self.say)
         with tabs.add_tab("Log"):
-            self._diagnosis = Words(gui, "Why it does not fly")
+            self._diagnosis = Words(gui, "Diagnosis")
             self._log = Words(gui, "Log")
 
     def _toolbar(self) -> None:
@@ -67,6 +77,9 @@ class Panel:
         self._look.on_update(lambda event: setattr(eyes, "choice", event.target.value))
         self.axes = gui.add_checkbox("Frames", False)
         self.handles = gui.add_checkbox("Handles", True)
+        self._objects = gui.add_dropdown("Drag", ("",))
+        self._objects.on_update(lambda event: setattr(self._choice, "name", event.target.value))
+        self.shadows = gui.add_checkbox("Shadows", True)
         self.strength = gui.add_slider("Push by a click, N", min=0.1, max=3.0, step=0.1, initial_value=0.5)
 
     def _stand(self, what: str) -> None:
@@ -81,7 +94,11 @@ class Panel:
     def _load(self, event: Any) -> None:
         if event.client is None:  # the server itself has set it
             return
-        self._simulator.set_parameter("scene_file", event.target.value)
+        try:
+            self._simulator.set_parameter("scene_file", event.target.value)
+        except FAILURES as error:
+            self.say(f"load_scene: failed: {' '.join(str(error).split())}")
+            return
         self._call("load_scene")
 
     # ---- what is said
@@ -108,6 +125,16 @@ class Panel:
         """Offer where to look from."""
         if tuple(self._look.options) != choices:
             self._look.options = choices
+
+    def offer_objects(self, names: tuple[str, ...]) -> None:
+        """Offer the objects of the scene, and show the one that is chosen."""
+        choices = ("", *names)
+        if self._choice.name not in choices:
+            self._choice.name = ""
+        if tuple(self._objects.options) != choices:
+            self._objects.options = choices
+        if self._objects.value != self._choice.name:
+            self._objects.value = self._choice.name
 
     def offer(self, found: Found, scenes: tuple[str, ...], scene: str) -> None:
         """Offer vehicles, cameras and scenes that there are."""

@@ -15,7 +15,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from drone_sim.grading.plan import Plan
-from drone_sim.ros.node.starting import parameters_of, use_sim_time
+from drone_sim.ros.node.given import parameters_of, use_sim_time
 from drone_sim.run.parameters import Parameters
 from drone_sim.wording import shown
 

@@ -22,11 +22,12 @@ from drone_sim.mechanics.frames import position, to_euler
 from drone_sim.remote import outside
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.ending import Ending
+from drone_sim.ros.node.given import read_parameters, use_sim_time
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.launch_arguments import check_launch_arguments
 from drone_sim.ros.node.master_watch import MasterWatch
 from drone_sim.ros.node.services import Services
-from drone_sim.ros.node.starting import init_node, read_parameters, reported, use_sim_time
+from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.ros.node.step_time import StepTime
 from drone_sim.ros.node.windows import WindowTopics
 from drone_sim.ros.rviz.handles import Handles
@@ -78,7 +79,8 @@ class Node:
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._windows = WindowTopics(self.simulation, self._inbox)
-        self._handles = Handles(self.simulation, self._inbox), ObjectHandles(self.simulation, self._inbox)
+        self._handles = Handles(self.simulation, self._inbox)
+        self._object_handles = ObjectHandles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
         diagnosis = Diagnosis(self.player, self._pacer, self._topics.command_logs, self._time.simulated)
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
@@ -208,8 +210,8 @@ class Node:
 
     def _show_to_eyes(self) -> None:
         self._topics.publish_command(self._time.stamp)
-        for handles in self._handles:
-            handles.update()
+        self._handles.update()
+        self._object_handles.update()
         self._view.update()
         self._windows.update(self._time.stamp)
         if self._parameters.gui:
