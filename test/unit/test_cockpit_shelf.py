@@ -2,6 +2,7 @@
 
 import json
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ import rospy
 from drone_sim.files.resources import package_path
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit import task_scenes
+from drone_sim.ros.cockpit import grader, task_scenes
 from drone_sim.ros.cockpit.editing import Editing
 from drone_sim.ros.cockpit.lessons import Lessons
 from drone_sim.ros.cockpit.script_files import LARGEST, ShelfError
@@ -330,6 +331,30 @@ def test_a_script_that_fails_in_a_tasks_scene_is_shown_at_its_line_and_one_that_
     ask.node.fails = {"load_scene": "gates.yaml: no such file"}
     assert ask("run", script="tasks/gates.py", lesson="tasks/gates")["said"] == "gates.yaml: no such file"
     assert ask.node.parameters["scene_file"] == "mine.yaml"
+
+
+def test_a_script_is_graded_in_a_process_of_its_own(ask):
+    begun = ask("grade", script="tasks/hover.py", lesson="tasks/hover")
+    with pytest.raises(ShelfError, match="another script is being graded"):
+        ask("grade", script="tasks/hover.py", lesson="tasks/hover")
+    while not (result := ask("graded", number=begun["number"])):
+        time.sleep(0.02)
+    assert (result["error"], result["points"], result["of"]) == ("", 3.0, 6.0)
+    assert [(one["name"], one["passed"]) for one in result["rows"]][:2] == [("place", False), ("height", True)]
+    for message, words in (({"lesson": "stage-3-yaw"}, "needs a task"), ({"lesson": None}, "needs a task")):
+        with pytest.raises(ShelfError, match=words):
+            ask("grade", script="tasks/hover.py", **message)
+    with pytest.raises(ShelfError, match="graded since"):
+        ask("graded", number=-1)
+
+
+def test_a_grading_that_does_not_end_is_ended(monkeypatch, tmp_path):
+    monkeypatch.setattr(grader, "_MOST", 0.0)
+    one = grader.Grader()
+    number = one.start("hover", tmp_path / "x.py")
+    while not (result := one.result(number)):
+        time.sleep(0.01)
+    assert result == {"error": "it took more than 0 s"}
 
 
 def test_a_master_that_has_gone_is_one_line(ask, monkeypatch):

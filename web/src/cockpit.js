@@ -55,9 +55,11 @@ const lesson = new Lesson(
   {
     choice: at("lesson"), before: at("before"), after: at("after"), fold: at("fold"),
     body: at("lesson-body"), start: at("start"), flies: at("flies"), text: at("lesson-text"),
+    grade: at("grade"), graded: at("graded"),
   },
   (...question) => wire.ask(...question),
   open,
+  () => scripts.save(),
 );
 let isLost = false;
 const wire = new Wire(
