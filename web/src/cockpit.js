@@ -102,7 +102,11 @@ at("toggle").onclick = () => {
   at("toggle").setAttribute("aria-expanded", String(!wide));
 };
 window.addEventListener("keydown", (event) => {
-  if (event.key === "Enter" && (event.ctrlKey || event.metaKey) && !event.defaultPrevented) run();
+  if (event.defaultPrevented || !(event.ctrlKey || event.metaKey)) return;
+  if (event.key === "Enter") run();
+  if (event.key !== "s") return;
+  event.preventDefault(); // the browser would save the page
+  scripts.save().catch(tell);
 });
 window.addEventListener("beforeunload", (event) => scripts.drafts.isSafe(scripts.is.script) || event.preventDefault());
 split(at("beside"), "--editor", "x", 300, () => window.innerWidth - 320, (event) => window.innerWidth - event.clientX);
