@@ -5,7 +5,7 @@ import { classHighlighter, highlightCode } from "@lezer/highlight";
 import { pythonLanguage } from "@codemirror/lang-python";
 
 const FORMULA = /\$\$([\s\S]+?)\$\$|\$(?!\s)((?:[^$\\`]|\\.)+?)(?<!\s)\$(?!\d)/y; // $$on a line of its own$$, $in a line$
-const STAGE = /^\/docs\/tutorial\/([^/]+\.(?:py|lua))$/;
+const STAGE = /^\/docs\/tutorial\/([0-9][^/]*\.(?:py|lua))$/;
 const BUILT_IN = /^\/src\/drone_sim\/child_scripts\/([^/]+\.(?:py|lua))$/;
 const PICTURE = /^\/(?:docs\/pictures|tasks\/\w+)\/\w+\.png$/;
 
