@@ -96,7 +96,9 @@ at("as-form").onsubmit = (event) => {
   event.preventDefault();
   scripts.saveAs(at("name").value.trim()).then(() => (at("as-form").hidden = true)).catch(tell);
 };
-at("name").onkeydown = (event) => event.key === "Escape" && (at("as-form").hidden = true);
+at("name").onkeydown = (event) => {
+  if (event.key === "Escape") at("as-form").hidden = true;
+};
 at("toggle").onclick = () => {
   const wide = document.body.classList.toggle("wide");
   at("toggle").setAttribute("aria-expanded", String(!wide));
