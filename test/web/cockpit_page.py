@@ -31,3 +31,16 @@ def wait_until(page, condition, seconds=30):
     while not condition():
         assert time.monotonic() < until, "it did not come to pass"
         page.wait_for_timeout(50)
+
+
+def ready(page):
+    """Wait until the editor has its script, and the scene a canvas."""
+    page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
+    page.frame_locator("#scene").locator("canvas").first.wait_for()
+
+
+def switch_camera(page, name="drone/front"):
+    """Switch a camera on, or off."""
+    scene = page.frame_locator("#scene")
+    scene.get_by_role("tab", name="Cameras").click()
+    scene.get_by_label(name).click()

@@ -1,8 +1,10 @@
-// The page around the scene: held keys, and the script in an editor with its text. Everything else is viser's, in the frame.
+// The page around the scene: held keys, the script in an editor with its text, and what floats over the scene. The rest
+// is viser's, in the frame.
 import { Flying } from "./flying.js";
 import { Lesson } from "./lesson.js";
 import { Scripts } from "./scripts.js";
 import { split } from "./split.js";
+import { Windows } from "./windows.js";
 import { Wire } from "./wire.js";
 
 const at = (id) => document.getElementById(id);
@@ -47,7 +49,20 @@ function ask(question) {
 }
 
 const tell = (error) => show({ said: error.message, bad: true });
-const told = (message) => message.failure && scripts.fail(message.failure);
+
+function told(message) {
+  if (message.windows) windows.show(message.windows);
+  if (message.pictures) windows.showPictures(message.pictures);
+  if (message.failure) scripts.fail(message.failure);
+}
+
+// viser paints everything, shadows too, with whatever the browser has.
+function paintsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const names = gl?.getExtension("WEBGL_debug_renderer_info");
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "");
+}
+
 const run = () => scripts.run(lesson.name).catch(tell);
 const open = (script) => scripts.open(script).catch(tell);
 
@@ -64,9 +79,12 @@ const lesson = new Lesson(
 let isLost = false;
 const wire = new Wire(
   told,
+  (data) => windows.picture(data),
   () => {
     if (isLost) show({ said: "" });
     isLost = false;
+    if (paintsInSoftware()) wire.ask("spare").catch(tell);
+    wire.ask("windows").then(told).catch(tell);
     scripts.connected().catch(tell);
   },
   () => {
@@ -74,6 +92,7 @@ const wire = new Wire(
     show({ said: "the cockpit's node does not answer; what you write is kept here until it does. Started anew, it has a new address.", bad: true });
   },
 );
+const windows = new Windows(at("windows"), wire);
 const scripts = new Scripts(at("text"), wire, { show }, (name) => lesson.go(name));
 scripts.onRun = run;
 const flying = new Flying(
@@ -110,6 +129,9 @@ window.addEventListener("keydown", (event) => {
   event.preventDefault(); // the browser would save the page
   scripts.save().catch(tell);
 });
+const letGo = (event) => event.key === "Escape" && wire.ask("let go").catch(tell);
+window.addEventListener("keydown", letGo);
+at("scene").addEventListener("load", () => at("scene").contentWindow.addEventListener("keydown", letGo));
 window.addEventListener("beforeunload", (event) => scripts.drafts.isSafe(scripts.is.script) || event.preventDefault());
 split(at("beside"), "--editor", "x", 300, () => window.innerWidth - 320, (event) => window.innerWidth - event.clientX);
 const above = () => at("lesson-body").getBoundingClientRect().top;
