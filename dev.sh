@@ -28,6 +28,8 @@ ros=$(sourced_ros)
 python=/usr/bin/python3
 if [ -x "$ros/bin/python3" ]; then python=$ros/bin/python3; fi
 
+: "${HOME:=$(getent passwd "$(id -u)" | cut -d: -f6)}" # which cron leaves out
+export HOME
 venv=$root/.venv
 venv_options=--system-site-packages
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim
@@ -133,7 +135,16 @@ build() {
   echo "$wanted" >build/.made-from
 }
 
+# ROS itself would end with a traceback.
+check_home() {
+  local folder
+  for folder in "$cache" "${ROS_HOME:-$HOME/.ros}"; do
+    { mkdir -p "$folder" && [ -w "$folder" ]; } 2>/dev/null || fail "cannot write to $folder: set HOME to a folder of yours"
+  done
+}
+
 setup() {
+  check_home
   # shellcheck disable=SC2046 # one word each
   install_packages $(packages)
   grep -qw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"

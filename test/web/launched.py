@@ -43,7 +43,7 @@ def launched(*arguments):
             process = subprocess.Popen([*command, *options], env=environment, stdout=output, stderr=subprocess.STDOUT)
         try:
             os.environ["ROS_MASTER_URI"] = environment["ROS_MASTER_URI"]
-            yield Launched(_address(process, log), Path(folder) / "drone_sim", log)
+            yield Launched(_address(process, log), Path(folder) / "drone_scripts", log)
         finally:
             process.send_signal(signal.SIGINT)
             process.wait(_PATIENCE)
