@@ -1,6 +1,6 @@
-"""Films the cockpit, in chromium: docs/film_cockpit.py OUT.webp. A script is edited; the drone is dragged, and flown by keys.
+"""Films the cockpit, in chromium: docs/film_cockpit.py OUT.webp. A script is edited and flown, the drone is dragged.
 
-The simulation goes slower than real time, so that a browser without a GPU draws every step of it. Two minutes or three.
+The simulation goes slower than real time, so that a browser without a GPU draws every step of it. Three minutes.
 """
 
 import shutil
