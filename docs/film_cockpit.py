@@ -108,7 +108,7 @@ class Film:
         """Write all pictures."""
         times = [round(1000 * STEP)] * (len(self.pictures) - 1) + [STANDS]
         first, *others = self.pictures
-        first.save(path, save_all=True, append_images=others, duration=times, loop=0, quality=QUALITY, method=6)
+        first.save(path, save_all=True, append_images=others, duration=times, loop=0, quality=QUALITY, method=4)
         print(f"{path}: {len(self.pictures)} pictures, {path.stat().st_size / 1000:.0f} kB")
 
 
@@ -129,7 +129,8 @@ def edit(film):
     line = film.page.locator(".cm-line", has_text=OLD)
     film.take(6)
     film.click(line)
-    keyboard.press("Home")
+    keyboard.press("End")
+    keyboard.press("Home")  # to the first letter, from wherever behind it
     for _ in range(line.inner_text().strip().index(OLD)):
         keyboard.press("ArrowRight")
     for _ in range(len(OLD)):
