@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import io
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
 from geometry_msgs.msg import Pose
@@ -15,7 +15,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 from drone_sim.ros.cockpit import looks
 from drone_sim.ros.cockpit.frames import Frames
 
-_HIDDEN = {"sky"}  # namespaces that the browser has in another way
 _Key = tuple[str, int]
 
 
@@ -33,12 +32,25 @@ class _Shown(NamedTuple):
 class Markers:
     """The markers of one topic. Messages are taken in any thread, and shown in the one that calls `show`."""
 
-    def __init__(self, scene: Any, topic: str, frames: Frames, on_new: Callable[[Marker, Any], None] = lambda *_: None):
-        """Begin with nothing; `on_new` is called with every marker that is made anew, and its handle."""
+    def __init__(
+        self,
+        scene: Any,
+        topic: str,
+        frames: Frames,
+        on_new: Callable[[Marker, Any], None] = lambda *_: None,
+        *,
+        hidden: Collection[str] = (),
+        casts: bool = False,
+    ):
+        """Begin with nothing; `on_new` is called with every marker that is made anew, and its handle.
+
+        `hidden` are namespaces that the browser has in another way; `casts`: the markers throw shadows.
+        """
         self._scene = scene
         self._name = topic.replace("/", "_")
         self._frames = frames
         self._on_new = on_new
+        self._hidden, self._casts = hidden, casts
         self._wanted: dict[_Key, Marker] = {}
         self._lock = threading.Lock()
         self._changed = False
@@ -53,7 +65,7 @@ class Markers:
                     self._wanted.clear()
                 elif marker.action == Marker.DELETE:
                     self._wanted.pop(key, None)
-                elif marker.ns not in _HIDDEN:
+                elif marker.ns not in self._hidden:
                     self._wanted[key] = marker
             self._changed = True
 
@@ -87,7 +99,7 @@ class Markers:
         name = f"{parent}/{self._name}/{namespace}/{marker.id}"
         if before is not None and before.handle is not None and before.handle.name != name:
             self._remove(key)
-        handle = looks.show(self._scene, name, marker)
+        handle = looks.show(self._scene, name, marker, self._casts)
         if handle is None:
             self._remove(key)
         else:
