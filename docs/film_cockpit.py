@@ -3,6 +3,7 @@
 The simulation goes slower than real time, so that a browser without a GPU draws every step of it. Three minutes.
 """
 
+import math
 import shutil
 import sys
 import time
@@ -28,7 +29,9 @@ PATIENCE = 60_000  # ms
 STANDS = 1500  # ms, the last picture
 QUALITY = 55  # of WebP
 SCRIPT, OLD, NEW = "tutorial/6_ros.py", "sim.getObjectPosition(self.d, -1)[2]", "1.4"  # m: climb to that
-BLUE = (32, 128, 255)  # of the handle's arrow upwards
+EYE, AIM, TIP = (-1.6, 0.0, 0.7), (0.4, 0.0, 0.0), (0.0, 0.0, 0.2)  # m, from the drone: who looks, at what; its arrow
+HALF_ANGLE = math.radians(75 / 2)  # of the picture's height
+PULL = 0.35  # m
 POINTER = [(0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12)]  # px
 HELD = """([key, on]) => document.querySelectorAll("kbd").forEach((one) => {
   if (one.textContent.trim() === key) one.style.cssText = on ? "background: #e8590c; color: #fff" : "";
@@ -45,7 +48,7 @@ def main(path: str) -> None:
         page.goto(cockpit.address)
         ready(page)
         film = Film(page)
-        for act in (open_script, edit, run, drag, switch_camera, fly):
+        for act in (open_script, edit, run, widen, drag, switch_camera, fly):
             act(film)
         browser.close()
     film.save(Path(path))
@@ -113,10 +116,13 @@ class Film:
 
 
 def open_script(film):
-    """Have the script in the editor, and nothing before the scene, when the film begins."""
+    """Have the script in the editor, and nothing before it or the scene, when the film begins."""
     page = film.page
     page.select_option("#script", SCRIPT)
     page.wait_for_function("text => document.querySelector('.cm-content').innerText.includes(text)", arg=OLD)
+    page.wait_for_timeout(2000)
+    if page.locator("#lesson-body").is_visible():
+        page.locator("#fold").click()
     for note in film.scene.locator("[class*=Notification-closeButton]").all():
         note.click()
     while not film.steps:
@@ -127,6 +133,7 @@ def edit(film):
     """Change the height that is held."""
     keyboard = film.page.keyboard
     line = film.page.locator(".cm-line", has_text=OLD)
+    line.scroll_into_view_if_needed()
     film.take(6)
     film.click(line)
     keyboard.press("End")
@@ -148,33 +155,32 @@ def run(film):
     film.take(35, fly=True)
 
 
+def widen(film):
+    """Fold the editor away."""
+    film.click(film.page.locator("#toggle"), count=12)
+    film.take(3, fly=True)
+
+
 def drag(film):
-    """Pull the drone up by its arrow, and sideways by nothing: it flies on."""
-    arrow = tip(film)
-    if arrow is None:
-        print("the handle's arrow is not seen: nothing is dragged")
-        return
-    film.move(arrow, 8, fly=True)
-    arrow = tip(film)
-    film.at = np.array(arrow)
-    film.page.mouse.move(*arrow)
+    """Pull the drone up by the arrow of its handle."""
+    film.move(seen(film, TIP), 12, fly=True)
+    film.page.mouse.move(*(film.at + 1))  # the arrow takes notice
+    film.take(2, fly=True)
     film.page.mouse.down()
-    film.move(film.at - (0, 90), 14, fly=True)
+    film.move(seen(film, np.add(TIP, (0, 0, PULL))), 16, fly=True)
     film.page.mouse.up()
-    film.take(16, fly=True)
+    film.take(12, fly=True)
 
 
-def tip(film):
-    """Return where the blue arrow of the drone's handle is in the page, None where it is not seen."""
-    box = film.page.locator("#scene").bounding_box()
-    colors = np.asarray(film.look(), dtype=int)
-    y, x = np.nonzero(np.abs(colors - BLUE).max(axis=2) < 30)
-    inside = (x > box["x"]) & (x < box["x"] + box["width"] / 2) & (y > box["y"] + box["height"] / 4)
-    if inside.sum() < 10:
-        return None
-    x, y = x[inside], y[inside]
-    top = y < y.min() + 8
-    return float(x[top].mean()), float(y[top].mean())
+def seen(film, point):
+    """Return where a point (m, from the drone) is in the page, for who looks from behind."""
+    box = film.scene.locator("canvas").first.bounding_box()
+    ahead = np.subtract(AIM, EYE) / np.linalg.norm(np.subtract(AIM, EYE))
+    right = np.cross(ahead, (0, 0, 1)) / np.linalg.norm(np.cross(ahead, (0, 0, 1)))
+    ray = np.subtract(point, EYE)
+    place = np.array((ray @ right, ray @ np.cross(ahead, right))) / (ray @ ahead)
+    middle = np.array((box["x"] + box["width"] / 2, box["y"] + box["height"] / 2))
+    return middle + place * box["height"] / 2 / math.tan(HALF_ANGLE)
 
 
 def switch_camera(film):
