@@ -120,7 +120,8 @@ class Browser:
 
     async def _hear(self, number: int) -> dict[str, Any]:
         while True:
-            answer = json.loads(await self.wire.recv())
+            message = await self.wire.recv()
+            answer = json.loads(message) if isinstance(message, str) else {}  # or a picture
             if answer.get("id") == number:
                 return dict(answer)
 
