@@ -180,6 +180,14 @@ stay_on_this_machine() {
   export ROS_MASTER_URI=$default ROS_HOSTNAME=localhost
 }
 
+# Without a display there is no rviz, and a newcomer would see a log and nothing else.
+hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
+  case "$DISPLAY $*" in
+    " "*web:=*) ;;
+    " "*) say "no display, so no rviz: ./dev.sh run web:=true shows the simulation in a browser" ;;
+  esac
+}
+
 run_tests() {
   make_venv requirements-dev.txt
   if ! command -v chromium >/dev/null || ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
@@ -231,7 +239,7 @@ command=${1:-help}
 shift || true
 case "$command" in
   setup) setup; say "ready: source $root/devel/setup.bash" ;;
-  run) stay_on_this_machine; setup; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
+  run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   test-web)
     install_packages chromium

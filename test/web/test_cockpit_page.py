@@ -62,6 +62,9 @@ def test_buttons_fields_and_pictures(cockpit, opened):
     wait_until(opened, lambda: scene.locator("input[disabled]").first.input_value() == "flying")
     scene.get_by_role("tab", name="Cameras").click()
     scene.get_by_label("drone/front").click()
+    opened.keyboard.down("w")  # the focus is on a switch, into which nobody writes
+    wait_until(opened, lambda: cockpit.drone.command[0] == 1.0)
+    opened.keyboard.up("w")
     wait_until(opened, lambda: scene.locator("img").evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
     scene.get_by_role("tab", name="Tune").click()
     field = scene.get_by_label("Kzref", exact=True)
