@@ -5,6 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from cockpit_page import WAIT, Drone, wait_until
+from launched import launched
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 
@@ -36,4 +38,30 @@ def _page(browser):
         lambda request: None if request.url.startswith(("file:", "data:")) else page.troubles.append(request.url),
     )
     yield page
+    context.close()
+
+
+@pytest.fixture(name="cockpit", scope="session")
+def _cockpit(browser):
+    """One running simulation for all tests of the page; each leaves it as it has found it."""
+    rospy = pytest.importorskip("rospy", reason="needs ROS")
+    with launched() as cockpit:
+        rospy.init_node("test_cockpit", anonymous=True, disable_signals=True)
+        cockpit.drone = Drone()
+        yield cockpit
+
+
+@pytest.fixture(name="opened")
+def _opened(cockpit, browser):
+    """The cockpit's page in a browser of its own, with the flown script in the editor."""
+    context = browser.new_context(viewport={"width": 1000, "height": 500})
+    page = context.new_page()
+    page.set_default_timeout(WAIT)
+    page.troubles = []
+    page.on("pageerror", lambda error: page.troubles.append(str(error)))
+    page.goto(cockpit.address)
+    page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
+    wait_until(page, lambda: cockpit.drone.place is not None)
+    yield page
+    assert page.troubles == []
     context.close()

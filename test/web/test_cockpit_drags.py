@@ -8,8 +8,8 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
+from cockpit_page import wait_until
 from std_srvs.srv import Trigger
-from test_cockpit_page import _cockpit, _opened, wait_until  # noqa: F401 fixtures
 from visualization_msgs.msg import InteractiveMarkerFeedback, MarkerArray
 
 SCENE = """

@@ -7,58 +7,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from geometry_msgs.msg import TwistStamped
-from launched import launched
-from nav_msgs.msg import Odometry
-
-WAIT = 30_000  # ms; a browser without a GPU is slow
-
-
-class Drone:
-    """What the node says of it."""
-
-    def __init__(self):
-        self.place = self.command = None
-        rospy.Subscriber("/drone/odom", Odometry, self._on_odometry, queue_size=1)
-        rospy.Subscriber("/drone/command", TwistStamped, self._on_command, queue_size=1)
-
-    def _on_odometry(self, message):
-        at = message.pose.pose.position
-        self.place = at.x, at.y, at.z
-
-    def _on_command(self, message):
-        self.command = message.twist.linear.x, message.twist.linear.z, message.twist.angular.z
-
-
-def wait_until(page, condition, seconds=30):
-    """Wait, and let the browser go on."""
-    until = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < until, "it did not come to pass"
-        page.wait_for_timeout(50)
-
-
-@pytest.fixture(name="cockpit", scope="module")
-def _cockpit(browser):
-    with launched() as cockpit:
-        rospy.init_node("test_cockpit", anonymous=True, disable_signals=True)
-        cockpit.drone = Drone()
-        yield cockpit
-
-
-@pytest.fixture(name="opened")
-def _opened(cockpit, browser):
-    context = browser.new_context(viewport={"width": 1000, "height": 500})
-    page = context.new_page()
-    page.set_default_timeout(WAIT)
-    page.troubles = []
-    page.on("pageerror", lambda error: page.troubles.append(str(error)))
-    page.goto(cockpit.address)
-    page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
-    wait_until(page, lambda: cockpit.drone.place is not None)
-    yield page
-    assert page.troubles == []
-    context.close()
+from cockpit_page import wait_until
 
 
 def test_a_key_that_is_held_flies_and_one_that_is_released_stops(cockpit, opened):
