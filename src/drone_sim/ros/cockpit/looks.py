@@ -192,7 +192,7 @@ def _linear(rgba: np.ndarray) -> np.ndarray:
     clipped = np.clip(rgba, 0, 1)
     rgb = clipped[..., :3]
     clipped[..., :3] = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)  # IEC 61966-2-1
-    return np.uint8(np.round(clipped * 255))
+    return np.asarray(np.round(clipped * 255), dtype=np.uint8)
 
 
 def _points(marker: Marker) -> np.ndarray:
