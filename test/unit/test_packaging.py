@@ -8,6 +8,7 @@ from xml.etree import ElementTree as Xml
 import yaml
 
 from drone_sim.files.resources import package_path
+from drone_sim.ros.cockpit.shelf import Shelf
 
 ROOT = package_path()
 SOURCE = ROOT / "src"
@@ -76,3 +77,11 @@ def test_every_file_of_the_package_is_installed():
     }
     there = {path for path in SOURCE.rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc")}
     assert there and there == named
+
+
+def test_every_script_that_the_editor_offers_is_installed(tmp_path):
+    listed = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    folders = {ROOT / one for names in re.findall(r"install\(DIRECTORY ([\w/ ]+)", listed) for one in names.split()}
+    folders.add(SOURCE / "drone_sim")  # by catkin_python_setup
+    offered = [book.path for book in Shelf(tmp_path).books()]
+    assert [path for path in offered if not folders & set(path.parents)] == [] != offered

@@ -352,6 +352,7 @@ class Simulation:
             raise ValueError(
                 "the snapshot is of an earlier run: start, stop, and a vehicle that comes or goes, forget it"
             )
+        self.scene.grip.let_go_of_all()
         self.world.restore(snapshot.world)
         self.steps = snapshot.steps
         for recall in snapshot.recall:

@@ -17,6 +17,7 @@ from drone_sim.scene.bodies import Carried, HeldShape, LinkBody, SceneBody, Shap
 from drone_sim.scene.distances import Distances
 from drone_sim.scene.drive import JointDrive
 from drone_sim.scene.entry import Place
+from drone_sim.scene.grip import Grip
 from drone_sim.scene.kinds.force_sensor import ForceSensor
 from drone_sim.scene.kinds.kind import Around, KindParameters, Look
 from drone_sim.scene.object_parameters import ObjectParameters
@@ -57,6 +58,7 @@ class Scene:
         self._add_names()
         self._began: dict[int, Matrix] = {}  # where the objects were at the beginning, by entry; empty before
         self._tree = ObjectTree()
+        self.grip = Grip(world, self.things, floor.size)
         self._forget_objects()
 
     def _body(self, index: int) -> SceneBody | LinkBody:
@@ -71,12 +73,16 @@ class Scene:
         for index, (number, link) in self._places.items():
             name = self._entries[index].name
             if link == -1 or number not in self._names:
-                self._names[number] = (name or f"objects/{index}", name)
+                self._names[number] = (self._called(index), name)
 
     def _name_of(self, body: int, link: int) -> str:
         """Return what scripts call a body's link (-1: its root), ''  for what they do not know."""
         name = self._link_names.get((body, link))
         return self._names.get(body, ("", ""))[1] if name is None else name
+
+    def _called(self, index: int) -> str:
+        """Return what a person calls an entry."""
+        return self._entries[index].name or f"objects/{index}"
 
     # ---- the tree
 
@@ -86,7 +92,7 @@ class Scene:
         Raises ParameterError, with its place, for a name that is taken, or a parent that is not there.
         """
         self._forget_objects()
-        self._tree = objects
+        self._tree = self.grip.tree = objects
         for index in order.parents_first(self._entries):
             if self._entries[index].name:
                 self._objects[index] = self._add(objects, index)
@@ -97,6 +103,7 @@ class Scene:
         self.follow()
 
     def _forget_objects(self) -> None:
+        self.grip.let_go_of_all()
         for one in getattr(self, "_objects", {}).values():
             if isinstance(one, Shape):
                 one.release()
@@ -212,10 +219,26 @@ class Scene:
         """Return the bodies of the shapes, by entry of the scene file."""
         return dict(zip(sorted(self._places), self.bodies))
 
+    def things(self) -> dict[str, SceneObject]:
+        """Return what one can see and move, by name; a shape without one is called objects/ and its number."""
+        seen = {one.name: one for one in self._objects.values() if one.kind in ("shape", "dummy", "path")}
+        for index in self._places.keys() - self._objects.keys():
+            name = self._called(index)
+            seen.setdefault(name, SceneObject((name,), name, None, IDENTITY, self._body(index)))
+        return seen
+
     def visuals(self) -> tuple[list[Visual], np.ndarray]:
         """Return how the objects look, the floor aside, and the poses world from visual, (N, 4, 4)."""
-        numbers = list(dict.fromkeys(self._places[index][0] for index in sorted(self._places)))
+        numbers = self._numbers()
         return self._world.visuals(numbers), self._world.visual_poses(numbers)
+
+    def visual_names(self) -> list[str]:
+        """Return whose each of the visuals is, as `things` calls it."""
+        names = {place: self._called(index) for index, place in self._places.items()}
+        return [names.get(place, "") for place in self._world.visual_places(self._numbers())]
+
+    def _numbers(self) -> list[int]:
+        return list(dict.fromkeys(self._places[index][0] for index in sorted(self._places)))
 
 
 def _warn(entries: Sequence[object], reasons: Mapping[int, str]) -> None:

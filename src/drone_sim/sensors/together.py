@@ -14,6 +14,7 @@ RESERVED_TOPICS = (
     *("set_wind", "weather", "faults", "takeoff", "land", "reset", "home", "goto", "state"),
     *("parameter_descriptions", "parameter_updates"),
     *("command", "scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
+    *("objects/update", "objects/update_full", "objects/feedback"),
     *(f"view/{what}" for what in ("surroundings", "bodies", "path", "height", "command", "forces", "state")),
 )
 

@@ -29,12 +29,14 @@ def push(force: Sequence[float], torque: Sequence[float], parameters: EquipmentP
     return Push((force[0], force[1], force[2]), (torque[0], torque[1], torque[2]), limits.duration)
 
 
-def pose(position: Sequence[float], orientation: Sequence[float], parameters: EquipmentParameters) -> Pose:
+def pose(
+    position: Sequence[float], orientation: Sequence[float], parameters: EquipmentParameters, lowest: float = 0.0
+) -> Pose:
     """Return the pose (m, quaternion made exactly unit); raises Refused where nothing could stand."""
     limit = parameters.position_limit
-    for axis, value, lowest in zip("xyz", position, (-limit, -limit, 0.0)):
-        if not lowest <= value <= limit:
-            raise Refused(f"position.{axis} = {value}: must lie within {lowest} and {limit} m")
+    for axis, value, least in zip("xyz", position, (-limit, -limit, lowest)):
+        if not least <= value <= limit:
+            raise Refused(f"position.{axis} = {value}: must lie within {least} and {limit} m")
     length = math.sqrt(sum(value * value for value in orientation))
     if not 0.99 < length < 1.01:
         raise Refused(f"orientation {tuple(orientation)}: must be a unit quaternion, its length is {length:.3g}")

@@ -98,6 +98,10 @@ class Pictures:
         """Return all that can be drawn of these bodies."""
         return [part.visual for body in bodies for part in self._of(body)]
 
+    def places(self, bodies: Iterable[int]) -> list[tuple[int, int]]:
+        """Return body and link (-1: the root) of each of their visuals."""
+        return [(body, part.link) for body in bodies for part in self._of(body)]
+
     def poses(self, root_from_inertial: Mapping[int, Pose]) -> np.ndarray:
         """Return the poses world from visual, (N, 4, 4), of bodies given with the inverse of their inertial frame."""
         poses: list[np.ndarray] = [np.empty((0, 4, 4))]

@@ -43,6 +43,8 @@ class Solidity:
 
     def freeze(self, body: int, still: bool) -> None:
         """Take a body's mass away and stop it, or give the mass back."""
+        if still and body in self._frozen:
+            return
         if still:
             mass, _, moments = pybullet.getDynamicsInfo(body, -1, self._client)[:3]
             self._frozen[body] = mass, moments

@@ -376,6 +376,10 @@ class World:
         """Return what can be drawn of these bodies, or of all, in the order of `visual_poses`."""
         return self._pictures.visuals(self._inertial_frames if bodies is None else bodies)
 
+    def visual_places(self, bodies: Sequence[int]) -> list[tuple[int, int]]:
+        """Return body and link (-1: the root) of each of the `visuals` of these bodies."""
+        return self._pictures.places(bodies)
+
     def visual_poses(self, bodies: Sequence[int] | None = None) -> np.ndarray:
         """Return the poses world from visual, (N, 4, 4), of these bodies, or of all."""
         if bodies is not None:

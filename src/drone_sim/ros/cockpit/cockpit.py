@@ -17,6 +17,7 @@ import rospy
 import viser
 
 from drone_sim.files.resources import package_path
+from drone_sim.ros.cockpit.address import free_place, urls
 from drone_sim.ros.cockpit.commanding import Commanding
 from drone_sim.ros.cockpit.editing import Editing
 from drone_sim.ros.cockpit.flying import Flying
@@ -43,7 +44,7 @@ class Cockpit:
     """One page for one simulation. While no browser is open, it listens to nothing."""
 
     def __init__(self) -> None:
-        """Serve; init_node must have been called. Raises OSError where no port is free."""
+        """Serve; init_node must have been called. Raises AddressError where nothing can listen."""
         self._simulator = Simulator(rospy.get_param("~simulator", "drone_sim"))
         self._found = Found()
         self._view: SceneView | None = None
@@ -56,7 +57,7 @@ class Cockpit:
         self._wire = Wire(flying, Editing(shelf, self._simulator).answers)
         token = secrets.token_urlsafe(16)
         gate = Gate(token, Page(), self._wire.serve)
-        host, port = rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080)
+        host, port = free_place(rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080))
         with gate.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
             self._server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -65,7 +66,7 @@ class Cockpit:
         panel = self._server.gui.main_panel
         panel.dock_right()
         panel.set_width(_WIDTH)
-        self.address = f"http://{host}:{self._server.get_port()}/?token={token}"
+        self.address, self.address_elsewhere = urls(host, self._server.get_port(), token)
         self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight)
         threading.Thread(target=flying.watch, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
 
@@ -143,7 +144,8 @@ def _serve() -> Any:
     if not init_node(_NAME):
         return 1
     cockpit = Cockpit()
-    rospy.loginfo(f"the cockpit is at {cockpit.address}")
+    elsewhere = f" (on other machines: {cockpit.address_elsewhere} )" if cockpit.address_elsewhere else ""
+    rospy.loginfo(f"the cockpit is at {cockpit.address}{elsewhere}")
     return cockpit.run()
 
 

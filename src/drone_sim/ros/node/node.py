@@ -29,6 +29,7 @@ from drone_sim.ros.node.services import Services
 from drone_sim.ros.node.starting import init_node, read_parameters, reported, use_sim_time
 from drone_sim.ros.node.step_time import StepTime
 from drone_sim.ros.rviz.handles import Handles
+from drone_sim.ros.rviz.object_handles import ObjectHandles
 from drone_sim.ros.rviz.rviz_view import RvizView
 from drone_sim.ros.vehicle.fleet_topics import FleetTopics
 from drone_sim.ros.vehicle.script_topics import RosBackend
@@ -73,7 +74,7 @@ class Node:
             self._inbox.sleep_by(self._outside.wait, self._outside.wake)
         self._topics = FleetTopics(self.simulation, self._inbox)
         self._services = Services(self.player, self._inbox, self._topics.follow)
-        self._handles = Handles(self.simulation, self._inbox)
+        self._handles = Handles(self.simulation, self._inbox), ObjectHandles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
         diagnosis = Diagnosis(self.player, self._pacer, self._topics.command_logs, self._time.simulated)
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
@@ -195,7 +196,8 @@ class Node:
 
     def _show_to_eyes(self) -> None:
         self._topics.publish_command(self._time.stamp)
-        self._handles.update()
+        for handles in self._handles:
+            handles.update()
         self._view.update()
         if self._parameters.gui:
             track = self.simulation.drone.track

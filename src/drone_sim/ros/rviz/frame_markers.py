@@ -22,10 +22,10 @@ _MOST = 2000  # points of a line
 def markers_of(objects: Iterable[SceneObject]) -> Iterator[Marker]:
     """Yield a marker for each dummy and each path among some objects, in the frame `world`."""
     for one in objects:
-        if isinstance(one, Dummy):
-            yield _ball(one)
-        elif isinstance(one, Path):
-            yield _line(one)
+        if isinstance(one, (Dummy, Path)):
+            marker = _ball(one) if isinstance(one, Dummy) else _line(one)
+            marker.ns = one.name
+            yield marker
 
 
 def _ball(dummy: Dummy) -> Marker:

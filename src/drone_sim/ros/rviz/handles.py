@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import rospy
-from geometry_msgs.msg import Point, Pose, Quaternion
-from interactive_markers.interactive_marker_server import InteractiveMarkerServer
-from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback, Marker
+from geometry_msgs.msg import Point
+from visualization_msgs.msg import InteractiveMarkerFeedback, Marker
 
-from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Matrix
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.rviz.held import Held
+from drone_sim.ros.rviz.marker_server import MarkerServer, level, new_handle, pose_message
 from drone_sim.ros.rviz.marker_topic import namespace
 from drone_sim.ros.vehicle.inputs import checked_pose
-from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles import checks
 from drone_sim.vehicles.quadricopter_objects import DRONE, TARGET
 
 _PERIOD = 0.19  # s of real time, between two updates: five a second are enough for handles
-_UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # a control acts along, about, or across its x axis: turned to z
 
 
 class _Handle(NamedTuple):
@@ -43,7 +38,7 @@ class Handles:
         self._inbox = inbox
         self._held = Held()
         self._throttle = Throttle(_PERIOD)
-        self._server = _Server(f"{namespace(simulation)}/markers")
+        self._server = MarkerServer(f"{namespace(simulation)}/markers")
         self._looks = {True: _ball(), False: _ring()}
         self._shown: dict[str, _Handle] = {}
         self._show(self._wanted())
@@ -51,15 +46,13 @@ class Handles:
 
     def update(self) -> None:
         """Let the handles follow what they stand for, unless they are being dragged."""
-        if not self._server.update_pub.get_num_connections() or not self._throttle.passes():
+        if not self._server.watched or not self._throttle.passes():
             return
         self._show(self._wanted())
         objects = self._simulation.drone.objects
         for name in self._shown.keys() - self._held.names():
             matrix = objects.matrix(objects.handle(self._shown[name].object))
-            yaw = frames.to_euler(matrix)[2]
-            level = frames.from_euler(frames.position(matrix), (0, 0, yaw))
-            self._server.setPose(name, _pose(level))
+            self._server.setPose(name, pose_message(level(matrix)))
         self._server.applyChanges()
 
     def _wanted(self) -> dict[str, _Handle]:
@@ -75,21 +68,15 @@ class Handles:
 
     def _show(self, wanted: dict[str, _Handle]) -> None:
         for name in wanted.keys() - self._shown.keys():
-            self._server.insert(_handle(name, self._looks[wanted[name].is_target]), self._on_feedback)
+            self._server.insert(new_handle(name, [self._looks[wanted[name].is_target]]), self._on_feedback)
         for name in self._shown.keys() - wanted.keys():
             self._server.erase(name)
         self._shown = wanted
 
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        name, client = feedback.marker_name, feedback.client_id
-        if feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN:
-            self._held.take(name, client)
-        elif feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
-            self._held.let_go(name, client)
-        else:
-            self._held.keep(name, client)
+        self._held.hear(feedback)
         if feedback.event_type == InteractiveMarkerFeedback.POSE_UPDATE:
-            self._move(name, feedback)
+            self._move(feedback.marker_name, feedback)
 
     def _move(self, name: str, feedback: InteractiveMarkerFeedback) -> None:
         handle = self._shown.get(name)
@@ -101,18 +88,6 @@ class Handles:
         except checks.Refused:
             return  # dragged below the floor, or to the horizon: it stays where it was
         self._inbox.put(lambda: vehicle.move_target(pose) if handle.is_target else vehicle.move(pose))
-
-
-class _Server(InteractiveMarkerServer):
-    """Its timer may still publish while rospy closes the topic, as the node ends; there is nobody left to tell."""
-
-    def publish(self, update: Any) -> None:
-        """Publish, or not any more."""
-        try:
-            super().publish(update)
-        except rospy.ROSException:
-            if not rospy.is_shutdown():
-                raise
 
 
 def _ball() -> Marker:
@@ -133,22 +108,3 @@ def _ring() -> Marker:
         ring.points += [i, o, next_o, i, next_o, next_i]
     ring.colors = [ring.color] * len(ring.points)  # lights it from everywhere
     return ring
-
-
-def _handle(name: str, look: Marker) -> InteractiveMarker:
-    """Return a handle that slides level when its body is dragged, and has an arrow up and a ring to turn it."""
-    handle = InteractiveMarker(name=name, scale=0.5)
-    handle.header.frame_id = WORLD_FRAME
-    slide = InteractiveMarkerControl(name="slide", orientation=_UPRIGHT, always_visible=True)
-    slide.interaction_mode = InteractiveMarkerControl.MOVE_PLANE
-    slide.markers.append(look)
-    lift = InteractiveMarkerControl(name="lift", orientation=_UPRIGHT)
-    lift.interaction_mode = InteractiveMarkerControl.MOVE_AXIS
-    turn = InteractiveMarkerControl(name="turn", orientation=_UPRIGHT)
-    turn.interaction_mode = InteractiveMarkerControl.ROTATE_AXIS
-    handle.controls = [slide, lift, turn]
-    return handle
-
-
-def _pose(matrix: Matrix) -> Pose:
-    return Pose(Point(*frames.position(matrix)), Quaternion(*frames.to_quaternion(matrix)))

@@ -6,6 +6,8 @@ import threading
 import time
 from collections.abc import Callable
 
+from visualization_msgs.msg import InteractiveMarkerFeedback
+
 PATIENCE = 1.0  # s; while a handle is held, rviz says so every 0.25 s
 
 
@@ -20,6 +22,16 @@ class Held:
         self._clock = clock
         self._lock = threading.Lock()
         self._heard: dict[tuple[str, str], float] = {}  # by handle and client, s
+
+    def hear(self, feedback: InteractiveMarkerFeedback) -> None:
+        """Take what a client tells of a handle."""
+        name, client = feedback.marker_name, feedback.client_id
+        if feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN:
+            self.take(name, client)
+        elif feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
+            self.let_go(name, client)
+        else:
+            self.keep(name, client)
 
     def take(self, name: str, client: str) -> None:
         """Say that a client has taken a handle."""

@@ -34,7 +34,7 @@ _FROM_ITS_FILE = (0.0, 0.0, 0.0, 0.0)  # the color by which rviz keeps a mesh's 
 
 
 class SceneMarkers:
-    """Shows the objects of the scene as they stand. The floor is not among them."""
+    """Shows the objects of the scene as they stand, each in a namespace of its name. The floor is not among them."""
 
     def __init__(self, simulation: Simulation, files: RvizMeshes):
         """Advertise where all that flies has its topics: see marker_topic.namespace."""
@@ -56,8 +56,11 @@ class SceneMarkers:
             return
         self._shown, self._frames = (visuals, poses), copy.deepcopy(bodiless)
         markers = [Marker(action=Marker.DELETEALL)]
-        for visual, pose in zip(visuals, poses):
-            markers += markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
+        for name, visual, pose in zip(self._simulation.scene.visual_names(), visuals, poses):
+            made = markers_of(visual, tuple(pose[:3].ravel().tolist()), self._files)
+            for marker in made:
+                marker.ns = name
+            markers += made
         markers += bodiless
         for marker in markers:
             marker.frame_locked = True
@@ -73,10 +76,10 @@ def markers_of(visual: Visual, matrix: frames.Matrix, files: RvizMeshes) -> Sequ
             return [marker]
         except (ValueError, OSError) as error:
             rospy.logwarn_throttle(5, f"rviz gets an object without texture: {error}")
-    return [_marker_of(one, matrix, visual.rgba) for one in visual.shape.for_rviz()]
+    return [marker_of(one, matrix, visual.rgba) for one in visual.shape.for_rviz()]
 
 
-def _marker_of(primitive: Primitive, matrix: frames.Matrix, rgba: Rgba) -> Marker:
+def marker_of(primitive: Primitive, matrix: frames.Matrix, rgba: Rgba) -> Marker:
     """Return a primitive of a shape that stands at `matrix`, world from shape."""
     place = frames.multiply(matrix, primitive.local)
     marker = _marker(_KINDS[primitive.kind], place, primitive.scale, rgba)

@@ -151,11 +151,11 @@ def _sender(message: Any) -> str:
     return str(header.get("callerid", "?"))
 
 
-def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters) -> Pose:
-    """Return a pose that came in a frame; raises Refused."""
+def checked_pose(frame: str, message: PoseMessage, parameters: EquipmentParameters, lowest: float = 0.0) -> Pose:
+    """Return a pose that came in a frame, at `lowest` or above (m); raises Refused."""
     _check_frame(frame)
     turn = message.orientation
-    return checks.pose(_numbers(message.position), (turn.x, turn.y, turn.z, turn.w), parameters)
+    return checks.pose(_numbers(message.position), (turn.x, turn.y, turn.z, turn.w), parameters, lowest)
 
 
 def _check_frame(frame: str) -> None:

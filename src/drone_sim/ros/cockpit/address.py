@@ -1,0 +1,90 @@
+"""Where the cockpit listens: what a user asked for, checked before viser tries it, and what to type into a browser."""
+
+from __future__ import annotations
+
+import errno
+import socket
+from typing import Any
+
+_HIGHEST = 65535
+_TRIES = 100  # ports, from the one that was asked for
+_EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # listening at all addresses: the one for this machine itself
+_FAR = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # kept for examples: nobody's
+
+
+class AddressError(ValueError):
+    """Nothing can listen where the user asked for; one line."""
+
+
+def free_place(address: Any, port: Any) -> tuple[str, int]:
+    """Return a numeric address of this machine, and the first free port from the given one on; 0 is any port.
+
+    Raises AddressError.
+    """
+    if not isinstance(port, int) or isinstance(port, bool) or not 0 <= port <= _HIGHEST:
+        raise AddressError(f"port = {str(port)[:80]}: must be a whole number from 0 to {_HIGHEST}, such as 8080")
+    family, host = _resolved(address)
+    last = min(port + _TRIES - 1, _HIGHEST)
+    for one in range(port, last + 1):
+        if _is_free(family, host, one):
+            return host, one
+    raise AddressError(f"port = {port}: neither this one nor any other up to {last} is free at {host}")
+
+
+def _resolved(address: Any) -> tuple[socket.AddressFamily, str]:
+    """Return the family and the numeric form of an address, of IPv4 where it has one. Raises AddressError."""
+    wrong = AddressError(
+        f"address = {str(address)[:80]!r}: is none of this machine's; 127.0.0.1 is for this machine alone, "
+        "0.0.0.0 lets others in"
+    )
+    if not isinstance(address, str) or not address:
+        raise wrong
+    try:
+        found = socket.getaddrinfo(address, None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError):
+        raise wrong from None
+    family, _, _, _, place = min(found, key=lambda one: one[0] != socket.AF_INET)
+    try:
+        _is_free(family, str(place[0]), 0)
+    except OSError:
+        raise wrong from None
+    return family, str(place[0])
+
+
+def _is_free(family: socket.AddressFamily, host: str, port: int) -> bool:
+    """Tell whether a server can listen there. Raises AddressError for a port that is not for this user, OSError."""
+    with socket.socket(family, socket.SOCK_STREAM) as one:
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as servers do: one that has just ended is gone
+        try:
+            one.bind((host, port))
+            one.listen()
+        except PermissionError:
+            raise AddressError(f"port = {port}: is for root alone; those from 1024 on are for everybody") from None
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
+            return False
+    return True
+
+
+def urls(host: str, port: int, token: str) -> tuple[str, str]:
+    """Return what opens the cockpit in a browser on this machine, and on others, '' where they cannot reach it."""
+    here = _EVERYWHERE.get(host, host)
+    there = _outside(host) if host in _EVERYWHERE else ""
+    url, far = (f"http://{_bracketed(one)}:{port}/?token={token}" for one in (here, there))
+    return url, far if there else ""
+
+
+def _outside(host: str) -> str:
+    """Return the address by which others reach this machine; its name, where there is no way to any other."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as one:
+            one.connect((_FAR[family], 9))  # which sends nothing: it only chooses the way
+            return str(one.getsockname()[0])
+    except OSError:
+        return socket.gethostname()
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,62 @@
+"""Handles that slide level, rise and turn, as rviz knows them: interactive markers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import Point, Pose, Quaternion
+from interactive_markers.interactive_marker_server import InteractiveMarkerServer
+from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, Marker
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import Matrix
+from drone_sim.ros.vehicle.messages import WORLD_FRAME
+
+_UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # a control acts along, about, or across its x axis: turned to z
+
+
+class MarkerServer(InteractiveMarkerServer):
+    """Its timer may still publish while rospy closes the topic, as the node ends; there is nobody left to tell."""
+
+    @property
+    def watched(self) -> bool:
+        """Whether somebody listens."""
+        return bool(self.update_pub.get_num_connections())
+
+    def publish(self, update: Any) -> None:
+        """Publish, or not any more."""
+        try:
+            super().publish(update)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():
+                raise
+
+
+def new_handle(name: str, looks: Sequence[Marker], scale: float = 0.5, arrows: bool = True) -> InteractiveMarker:
+    """Return a handle that slides level when its looks are dragged; with `arrows`, of `scale` m, it rises and turns."""
+    handle = InteractiveMarker(name=name, scale=scale)
+    handle.header.frame_id = WORLD_FRAME
+    handle.pose.orientation.w = 1.0
+    slide = InteractiveMarkerControl(name="slide", orientation=_UPRIGHT, always_visible=True)
+    slide.interaction_mode = InteractiveMarkerControl.MOVE_PLANE
+    slide.markers = list(looks)
+    handle.controls = [slide]
+    if arrows:
+        lift = InteractiveMarkerControl(name="lift", orientation=_UPRIGHT)
+        lift.interaction_mode = InteractiveMarkerControl.MOVE_AXIS
+        turn = InteractiveMarkerControl(name="turn", orientation=_UPRIGHT)
+        turn.interaction_mode = InteractiveMarkerControl.ROTATE_AXIS
+        handle.controls += [lift, turn]
+    return handle
+
+
+def level(matrix: Matrix) -> Matrix:
+    """Return where a handle stands for what is at `matrix`: turned about the vertical as it is, and upright."""
+    return frames.from_rpy(frames.position(matrix), (0, 0, frames.to_rpy(matrix)[2]))
+
+
+def pose_message(matrix: Matrix) -> Pose:
+    """Return a pose in the world as ROS says it."""
+    return Pose(Point(*frames.position(matrix)), Quaternion(*frames.to_quaternion(matrix)))
