@@ -21,7 +21,7 @@ from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
 # Nothing but sky is behind the drone then.
-EYE, AIM, FOV = np.array((0.9, -2.6, 0.3)), np.array((0.9, 0.0, 1.0)), 0.8  # m, m, rad
+EYE, AIM, FOV = np.array((1.5, -4.0, 0.1)), np.array((1.5, 0.0, 1.0)), 0.8  # m, m, rad
 STEP = 0.05  # s
 SEARCHED = 12  # px each way
 
