@@ -292,6 +292,31 @@ class Toolbar(unittest.TestCase):
             self.wait_until(lambda *, sent=message, name=name, where=where: self.dragged(feedback, sent, name) == where)
         self.assertEqual(self.place_of("DronePosition"), (1.0, 2.0, 3.0), "the drone does not take it along")
 
+    def test_an_object_is_dragged_and_falls_when_it_is_let_go(self):
+        ball = "{name: Ball, shape: sphere, size: [0.1], position: [1, 0, 0.1], mass: 1}"
+        self.scene.write_text(f"objects: [{ball}, {{shape: box, size: [1, 1, 1], position: [3, 0, 0.5]}}]")
+        rospy.set_param("~scene_file", str(self.scene))
+        self.call("load_scene")
+        handles = Listener("/drone/objects/update", InteractiveMarkerUpdate)
+        handles.wait_for(lambda m: {"Ball", "objects/1"} <= {one.name for one in m.markers}, after=0)
+        feedback = connected(rospy.Publisher("/drone/objects/feedback", InteractiveMarkerFeedback, queue_size=10))
+
+        def drag(*where):
+            for kind in (InteractiveMarkerFeedback.MOUSE_DOWN, InteractiveMarkerFeedback.POSE_UPDATE):
+                message = InteractiveMarkerFeedback(client_id="test", marker_name="Ball", event_type=kind)
+                message.pose.position.x, message.pose.position.y, message.pose.position.z = where
+                message.pose.orientation.w = 1.0
+                feedback.publish(message)
+            return self.place_of("Ball")
+
+        self.wait_until(lambda: drag(1.0, 1.0, 2.0) == (1.0, 1.0, 2.0))
+        fallen = self.simulation.steps + 20
+        self.wait_until(lambda: self.simulation.steps > fallen or drag(1.0, 1.0, 2.0) is None)
+        self.assertEqual(drag(1e9, 1.0, 2.0), (1.0, 1.0, 2.0), "it does not fall while it is held")
+        self.log.wait_for(lambda m: "'Ball' cannot be dragged there: position.x = 1000000000.0: must" in m.msg, after=0)
+        feedback.publish(InteractiveMarkerFeedback(client_id="test", marker_name="Ball", event_type=5))  # MOUSE_UP
+        self.wait_until(lambda: self.place_of("Ball")[2] < 0.2)
+
     def dragged(self, feedback, message, name):
         feedback.publish(message)
         return self.place_of(name)

@@ -150,7 +150,7 @@ def send_commands(dice: random.Random, _folder: Path, _diary: Diary) -> None:
     """Publish commands, good ones and nonsense, far more often than there are steps."""
     kinds: dict[str, Any] = {"cmd_vel": Twist, "set_pose": PoseStamped, "target_pose": PoseStamped}
     kinds.update({"initialpose": PoseWithCovarianceStamped, "push": WrenchStamped})
-    kinds["markers/feedback"] = InteractiveMarkerFeedback
+    kinds["markers/feedback"] = kinds["objects/feedback"] = InteractiveMarkerFeedback
     publishers = {topic: rospy.Publisher(f"/drone/{topic}", kind, queue_size=10) for topic, kind in kinds.items()}
     while True:
         topic = dice.choice(["cmd_vel"] * 20 + sorted(kinds))
@@ -198,6 +198,7 @@ TOPICS: tuple[tuple[str, Any], ...] = (
     ("scene", MarkerArray),
     ("drawing", MarkerArray),
     ("markers/update", InteractiveMarkerUpdate),
+    ("objects/update", InteractiveMarkerUpdate),
 )
 
 

@@ -54,7 +54,7 @@ def open_page(cockpit, browser, init="", **options):
     page.troubles = []
     page.on("pageerror", lambda error: page.troubles.append(str(error)))
     page.goto(cockpit.address)
-    page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
+    ready(page)
     wait_until(page, lambda: cockpit.drone.place is not None)
     yield page
     assert page.troubles == []
@@ -97,3 +97,16 @@ class Panel:
         """Choose something of a list."""
         self.field(field).click()
         self.scene.get_by_role("option", name=choice, exact=True).click()
+
+
+def ready(page):
+    """Wait until the editor has its script, and the scene a canvas."""
+    page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
+    page.frame_locator("#scene").locator("canvas").first.wait_for()
+
+
+def switch_camera(page, name="drone/front"):
+    """Switch a camera on, or off."""
+    scene = page.frame_locator("#scene")
+    scene.get_by_role("tab", name="Cameras").click()
+    scene.get_by_label(name).click()

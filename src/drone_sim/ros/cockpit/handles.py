@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from geometry_msgs.msg import Point, Pose, Quaternion
@@ -13,55 +14,120 @@ from visualization_msgs.msg import (
     InteractiveMarkerUpdate,
 )
 
+from drone_sim.mechanics import frames
 from drone_sim.ros.cockpit.frames import ROOT
 
-_SCALE = 0.25  # m
+LARGE = {"scale": 0.25}  # m
+ANYWHERE = {"scale": 90.0, "fixed": True}  # pixels, near or far
+_STILL = 0.25  # s, after which the simulation is told once more that a handle is held
+_KINDS = {
+    "start": InteractiveMarkerFeedback.MOUSE_DOWN,
+    "update": InteractiveMarkerFeedback.POSE_UPDATE,
+    "end": InteractiveMarkerFeedback.MOUSE_UP,
+}
+_UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # wxyz
+
+
+class _Control:
+    """Arrows and planes along the axes, and a ring about the vertical, which turns by itself."""
+
+    def __init__(self, scene: Any, name: str, visible: bool, size: Mapping[str, Any]):
+        look = {"depth_test": False, **size}
+        self.arrows = scene.add_transform_controls(name, disable_rotations=True, visible=visible, **look)
+        alone = {"active_axes": (True, True, False), "disable_axes": True, "disable_sliders": True}
+        self.ring = scene.add_transform_controls(f"{name}/turn", **alone, **look)
+
+    def put(self, pose: Pose) -> None:
+        at, turn = pose.position, pose.orientation
+        place, wxyz = (at.x, at.y, at.z), (turn.w, turn.x, turn.y, turn.z)
+        for control, name, value in (
+            (self.arrows, "position", place),
+            (self.arrows, "wxyz", wxyz),
+            (self.ring, "wxyz", _UPRIGHT),
+        ):
+            if tuple(getattr(control, name)) != value:
+                setattr(control, name, value)
+
+    @property
+    def pose(self) -> Pose:
+        (w, x, y, z), (rw, rx, ry, rz) = (map(float, one.wxyz) for one in (self.arrows, self.ring))
+        turn = frames.multiply_quaternions((x, y, z, w), (rx, ry, rz, rw))
+        return Pose(Point(*map(float, self.arrows.position)), Quaternion(*turn))
+
+    def remove(self) -> None:
+        self.ring.remove()
+        self.arrows.remove()
 
 
 class Handles:
-    """One control for each interactive marker. Messages are taken in any thread; `show` is called in one."""
+    """One control for each interactive marker of a server. Messages are taken in any thread, and shown in one."""
 
-    def __init__(self, scene: Any, publish: Callable[[InteractiveMarkerFeedback], None]):
-        """Take what hears about drags: the topic `markers/feedback`."""
-        self._scene = scene
+    def __init__(
+        self,
+        scene: Any,
+        publish: Callable[[InteractiveMarkerFeedback], None],
+        folder: str = "handles",
+        is_offered: Callable[[str], bool] = lambda _: True,
+        size: Mapping[str, Any] = LARGE,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        """Take what hears about drags, the topic `…/feedback`, and which of the markers have a control."""
+        self._scene, self._folder, self._size = scene, folder, size
         self._publish = publish
+        self._is_offered = is_offered
+        self._clock = clock
         self._lock = threading.Lock()
-        self._wanted: dict[str, Pose] = {}
-        self._shown: dict[str, Any] = {}
-        self._held: set[str] = set()
+        self._known: dict[str, Pose] = {}
+        self._shown: dict[str, _Control] = {}
+        self._held: dict[str, tuple[int, float]] = {}  # by whom, and when that was said last
         self._visible = True
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All markers there are, with a control or without."""
+        with self._lock:
+            return tuple(sorted(self._known))
+
+    @property
+    def held(self) -> bool:
+        """Whether somebody drags one."""
+        return bool(self._held)
 
     def hear_all(self, message: InteractiveMarkerInit) -> None:
         """Take all that there are."""
         with self._lock:
-            self._wanted = {one.name: one.pose for one in message.markers}
+            self._known = {one.name: one.pose for one in message.markers}
 
     def hear(self, message: InteractiveMarkerUpdate) -> None:
         """Take what has come, gone or moved."""
         with self._lock:
-            for one in (*message.markers, *message.poses):
-                if one in message.markers or one.name in self._wanted:
-                    self._wanted[one.name] = one.pose
+            self._known.update({one.name: one.pose for one in message.markers})
+            self._known.update({one.name: one.pose for one in message.poses if one.name in self._known})
             for name in message.erases:
-                self._wanted.pop(name, None)
+                self._known.pop(name, None)
 
-    def show(self) -> None:
-        """Put the handles where they are, but for those that somebody drags."""
+    def show(self, browsers: Collection[int] = ()) -> None:
+        """Put the handles where they are, but for those that somebody in one of the open browsers drags."""
         with self._lock:
-            wanted = dict(self._wanted)
+            wanted = {name: pose for name, pose in self._known.items() if self._is_offered(name)}
+            held = dict(self._held)
         for name in self._shown.keys() - wanted.keys():
+            self._let_go(name)
             self._shown.pop(name).remove()
+        for name, (browser, said) in held.items():
+            if browser not in browsers:
+                self._let_go(name)
+            elif self._clock() - said > _STILL:
+                self._tell(name, browser, InteractiveMarkerFeedback.KEEP_ALIVE)
         for name, pose in wanted.items():
             control = self._shown.get(name) or self._make(name)
-            place = (pose.position.x, pose.position.y, pose.position.z)
-            if name not in self._held and tuple(control.position) != place:
-                control.position = place
+            if name not in self._held:
+                control.put(pose)
 
     def forget(self) -> None:
         """Have none."""
         with self._lock:
-            self._wanted = {}
-        self._held.clear()
+            self._known = {}
         self.show()
 
     def show_all(self, visible: bool) -> None:
@@ -70,29 +136,37 @@ class Handles:
             return
         self._visible = visible
         for control in self._shown.values():
-            control.visible = visible
+            control.arrows.visible = visible
 
-    def _make(self, name: str) -> Any:
-        control = self._scene.add_transform_controls(
-            f"/handles/{name.replace('/', '_')}", scale=_SCALE, disable_rotations=True, visible=self._visible
-        )
-        self._shown[name] = control
-        control.on_drag_start(lambda event: self._on_drag(name, event, InteractiveMarkerFeedback.MOUSE_DOWN))
-        control.on_update(lambda event: self._on_drag(name, event, InteractiveMarkerFeedback.POSE_UPDATE))
-        control.on_drag_end(lambda event: self._on_drag(name, event, InteractiveMarkerFeedback.MOUSE_UP))
+    def _make(self, name: str) -> _Control:
+        path = f"/{self._folder}/{name.replace('/', '_')}"
+        control = self._shown[name] = _Control(self._scene, path, self._visible, self._size)
+
+        async def drag(event: Any) -> None:  # so, and not in a thread, the events keep their order
+            self._tell(name, event.client_id, _KINDS[event.phase])
+
+        control.arrows.on_update(drag)
+        control.ring.on_update(drag)
         return control
 
-    def _on_drag(self, name: str, event: Any, kind: int) -> None:
-        if kind == InteractiveMarkerFeedback.MOUSE_UP:
-            self._held.discard(name)
-        else:
-            self._held.add(name)
-        with self._lock:
-            known = self._wanted.get(name)
-        if known is None:
+    def _let_go(self, name: str) -> None:
+        """Tell for a browser that has gone, or has lost its handle."""
+        if name in self._held:
+            self._tell(name, self._held[name][0], InteractiveMarkerFeedback.MOUSE_UP)
+
+    def _tell(self, name: str, browser: int, kind: int) -> None:
+        control = self._shown.get(name)
+        if control is None:
             return
-        feedback = InteractiveMarkerFeedback(client_id=f"cockpit/{event.client_id}", marker_name=name, event_type=kind)
+        pose = control.pose
+        with self._lock:
+            if kind == InteractiveMarkerFeedback.MOUSE_UP:
+                self._held.pop(name, None)
+            else:
+                self._held[name] = browser, self._clock()
+            if name in self._known:
+                self._known[name] = pose  # until the simulation says where it is
+        feedback = InteractiveMarkerFeedback(client_id=f"cockpit/{browser}", marker_name=name, event_type=kind)
         feedback.header.frame_id = ROOT
-        turn = known.orientation
-        feedback.pose = Pose(Point(*map(float, event.target.position)), Quaternion(turn.x, turn.y, turn.z, turn.w))
+        feedback.pose = pose
         self._publish(feedback)

@@ -22,10 +22,31 @@ _LARGEST = 64 << 20  # bytes of a mesh file
 _UNLIT = "KHR_materials_unlit"
 
 
-def show(scene: Any, name: str, marker: Marker) -> Any:
-    """Put a marker into viser's scene under a name, where its pose says; return its handle, None for nothing to see."""
+def show(scene: Any, name: str, marker: Marker, casts: bool = False) -> Any:
+    """Put a marker into viser's scene under a name, where its pose says; return its handle, None for nothing to see.
+
+    `casts`: it throws a shadow, if it is solid.
+    """
+    if marker.type in _SOLID:
+        is_solid = marker.color.a >= 1 or marker.mesh_use_embedded_materials
+        return _SOLID[marker.type](scene, name, marker, cast_shadow=casts and is_solid, receive_shadow=False)
     make = _MAKERS.get(marker.type)
     return make(scene, name, marker) if make else None
+
+
+def change(handle: Any, marker: Marker) -> bool:
+    """Give what `show` returned other points or other words; tell whether that is possible for a marker of its kind.
+
+    A browser does so at once, where it would make something new in several steps.
+    """
+    if marker.type == Marker.TEXT_VIEW_FACING:
+        handle.text = marker.text
+        return True
+    ends = _ENDS[marker.type](marker) if marker.type in _ENDS else None
+    if ends is None:
+        return False
+    handle.points = ends
+    return True
 
 
 def place(marker: Marker) -> dict[str, tuple[float, ...]]:
@@ -39,22 +60,23 @@ def _rgb(color: Any) -> tuple[float, float, float]:
     return color.r, color.g, color.b
 
 
-def _box(scene: Any, name: str, marker: Marker) -> Any:
-    size = marker.scale.x, marker.scale.y, marker.scale.z
-    return scene.add_box(name, dimensions=size, color=_rgb(marker.color), opacity=_opacity(marker), **place(marker))
-
-
-def _sphere(scene: Any, name: str, marker: Marker) -> Any:
+def _box(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
     size = marker.scale.x, marker.scale.y, marker.scale.z
     look = {"color": _rgb(marker.color), "opacity": _opacity(marker)}
-    return scene.add_icosphere(name, radius=0.5, scale=size, **look, **place(marker))
+    return scene.add_box(name, dimensions=size, **look, **shade, **place(marker))
 
 
-def _cylinder(scene: Any, name: str, marker: Marker) -> Any:
+def _sphere(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
+    size = marker.scale.x, marker.scale.y, marker.scale.z
+    look = {"color": _rgb(marker.color), "opacity": _opacity(marker)}
+    return scene.add_icosphere(name, radius=0.5, scale=size, **look, **shade, **place(marker))
+
+
+def _cylinder(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
     # viser's stands along z, too; rviz's may be an ellipse
     size = marker.scale.x, marker.scale.y, marker.scale.z
     look = {"color": _rgb(marker.color), "opacity": _opacity(marker)}
-    return scene.add_cylinder(name, radius=0.5, height=1.0, scale=size, **look, **place(marker))
+    return scene.add_cylinder(name, radius=0.5, height=1.0, scale=size, **look, **shade, **place(marker))
 
 
 def _opacity(marker: Marker) -> float | None:
@@ -73,17 +95,22 @@ def _arrow(scene: Any, name: str, marker: Marker) -> Any:
     return scene.add_arrows(name, points=ends[None], colors=_rgb(marker.color), **look, **place(marker))
 
 
-def _line_strip(scene: Any, name: str, marker: Marker) -> Any:
+def _strip_ends(marker: Marker) -> np.ndarray | None:
+    """Return the ends of lines from each point to the next, (n, 2, 3), None where there are none."""
     points = _points(marker)
-    return _lines(scene, name, marker, np.stack((points[:-1], points[1:]), axis=1)) if len(points) > 1 else None
+    return np.stack((points[:-1], points[1:]), axis=1) if len(points) > 1 else None
 
 
-def _line_list(scene: Any, name: str, marker: Marker) -> Any:
+def _list_ends(marker: Marker) -> np.ndarray | None:
+    """Return the ends of lines between points two by two, (n, 2, 3), None where there are none."""
     points = _points(marker)
-    return _lines(scene, name, marker, points[: len(points) // 2 * 2].reshape(-1, 2, 3)) if len(points) > 1 else None
+    return points[: len(points) // 2 * 2].reshape(-1, 2, 3) if len(points) > 1 else None
 
 
-def _lines(scene: Any, name: str, marker: Marker, ends: np.ndarray) -> Any:
+def _lines(scene: Any, name: str, marker: Marker) -> Any:
+    ends = _ENDS[marker.type](marker)
+    if ends is None:
+        return None
     return scene.add_line_segments(name, points=ends, colors=_rgb(marker.color), line_width=_PIXELS, **place(marker))
 
 
@@ -101,7 +128,7 @@ def _text(scene: Any, name: str, marker: Marker) -> Any:
     return scene.add_label(name, marker.text, anchor="bottom-center", **place(marker))
 
 
-def _triangles(scene: Any, name: str, marker: Marker) -> Any:
+def _triangles(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
     corners = _points(marker) * (marker.scale.x, marker.scale.y, marker.scale.z)
     corners = corners[: len(corners) // 3 * 3]
     if not len(corners):
@@ -111,14 +138,14 @@ def _triangles(scene: Any, name: str, marker: Marker) -> Any:
     mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
     mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=np.uint8(np.clip(rgba, 0, 1) * 255))
     glb = as_glb(mesh, is_lit=True, is_clear=bool((rgba[:, 3] < 1).any()))
-    return scene.add_glb(name, glb, cast_shadow=False, receive_shadow=False, **place(marker))
+    return scene.add_glb(name, glb, **shade, **place(marker))
 
 
-def _mesh(scene: Any, name: str, marker: Marker) -> Any:
+def _mesh(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
     color = None if marker.mesh_use_embedded_materials else (*_rgb(marker.color), marker.color.a)
     glb = _glb(marker.mesh_resource, color)
     size = marker.scale.x, marker.scale.y, marker.scale.z
-    return scene.add_glb(name, glb, scale=size, **place(marker)) if glb else None
+    return scene.add_glb(name, glb, scale=size, **shade, **place(marker)) if glb else None
 
 
 @lru_cache(maxsize=64)
@@ -184,17 +211,20 @@ def _points(marker: Marker) -> np.ndarray:
     return np.array([(one.x, one.y, one.z) for one in marker.points], dtype=float).reshape(-1, 3)
 
 
+_ENDS = {Marker.LINE_STRIP: _strip_ends, Marker.LINE_LIST: _list_ends}
 _MAKERS = {
     Marker.ARROW: _arrow,
-    Marker.CUBE: _box,
-    Marker.SPHERE: _sphere,
-    Marker.CYLINDER: _cylinder,
-    Marker.LINE_STRIP: _line_strip,
-    Marker.LINE_LIST: _line_list,
+    Marker.LINE_STRIP: _lines,
+    Marker.LINE_LIST: _lines,
     Marker.CUBE_LIST: _point_cloud,
     Marker.SPHERE_LIST: _point_cloud,
     Marker.POINTS: _point_cloud,
     Marker.TEXT_VIEW_FACING: _text,
+}
+_SOLID = {
+    Marker.CUBE: _box,
+    Marker.SPHERE: _sphere,
+    Marker.CYLINDER: _cylinder,
     Marker.TRIANGLE_LIST: _triangles,
     Marker.MESH_RESOURCE: _mesh,
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import io
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
 from geometry_msgs.msg import Pose
@@ -15,25 +15,42 @@ from visualization_msgs.msg import Marker, MarkerArray
 from drone_sim.ros.cockpit import looks
 from drone_sim.ros.cockpit.frames import Frames
 
-_HIDDEN = {"sky"}  # namespaces that the browser has in another way
 _Key = tuple[str, int]
+
+
+class _Look(NamedTuple):
+    kind: bytes
+    form: bytes  # points and words, which may change in place
 
 
 class _Shown(NamedTuple):
     handle: Any  # None where there is nothing to see
-    look: bytes
+    look: _Look
     marker: Marker
 
 
 class Markers:
     """The markers of one topic. Messages are taken in any thread, and shown in the one that calls `show`."""
 
-    def __init__(self, scene: Any, topic: str, frames: Frames, on_new: Callable[[Marker, Any], None] = lambda *_: None):
-        """Begin with nothing; `on_new` is called with every marker that is made anew, and its handle."""
+    def __init__(
+        self,
+        scene: Any,
+        topic: str,
+        frames: Frames,
+        on_new: Callable[[Marker, Any], None] = lambda *_: None,
+        *,
+        hidden: Collection[str] = (),
+        casts: bool = False,
+    ):
+        """Begin with nothing; `on_new` is called with every marker that is made anew, and its handle.
+
+        `hidden` are namespaces that the browser has in another way; `casts`: the markers throw shadows.
+        """
         self._scene = scene
         self._name = topic.replace("/", "_")
         self._frames = frames
         self._on_new = on_new
+        self._hidden, self._casts = hidden, casts
         self._wanted: dict[_Key, Marker] = {}
         self._lock = threading.Lock()
         self._changed = False
@@ -48,7 +65,7 @@ class Markers:
                     self._wanted.clear()
                 elif marker.action == Marker.DELETE:
                     self._wanted.pop(key, None)
-                elif marker.ns not in _HIDDEN:
+                elif marker.ns not in self._hidden:
                     self._wanted[key] = marker
             self._changed = True
 
@@ -72,11 +89,8 @@ class Markers:
 
     def _put(self, key: _Key, marker: Marker) -> None:
         before, look = self._shown.get(key), _look(marker)
-        if before is not None and before.look == look:
-            if before.handle is not None and before.marker.pose != marker.pose:
-                place = looks.place(marker)
-                before.handle.position, before.handle.wxyz = place["position"], place["wxyz"]
-            self._shown[key] = before._replace(marker=marker)
+        if before is not None and self._change(before, look, marker):
+            self._shown[key] = before._replace(look=look, marker=marker)
             return
         parent = self._frames.name(marker.header.frame_id)
         if parent is None:
@@ -85,12 +99,25 @@ class Markers:
         name = f"{parent}/{self._name}/{namespace}/{marker.id}"
         if before is not None and before.handle is not None and before.handle.name != name:
             self._remove(key)
-        handle = looks.show(self._scene, name, marker)
+        handle = looks.show(self._scene, name, marker, self._casts)
         if handle is None:
             self._remove(key)
         else:
             self._on_new(marker, handle)
         self._shown[key] = _Shown(handle, look, marker)
+
+    @staticmethod
+    def _change(before: _Shown, look: _Look, marker: Marker) -> bool:
+        """Show a marker by what is there already; tell whether that was possible."""
+        same = before.look == look
+        if before.handle is None or before.look.kind != look.kind:
+            return same
+        if not (same or looks.change(before.handle, marker)):
+            return False
+        if before.marker.pose != marker.pose:
+            place = looks.place(marker)
+            before.handle.position, before.handle.wxyz = place["position"], place["wxyz"]
+        return True
 
     def _remove(self, key: _Key) -> None:
         gone = self._shown.pop(key, None)
@@ -98,10 +125,15 @@ class Markers:
             gone.handle.remove()
 
 
-def _look(marker: Marker) -> bytes:
+def _look(marker: Marker) -> _Look:
     """Return what differs between two markers that look different; their poses, times and ids do not."""
     bare = copy.copy(marker)
-    bare.header, bare.pose = Header(frame_id=marker.header.frame_id), Pose()
+    bare.header, bare.pose, bare.points, bare.text = Header(frame_id=marker.header.frame_id), Pose(), [], ""
+    form = Marker(points=marker.points, text=marker.text)
+    return _Look(_bytes(bare), _bytes(form))
+
+
+def _bytes(marker: Marker) -> bytes:
     data = io.BytesIO()
-    bare.serialize(data)
+    marker.serialize(data)
     return data.getvalue()

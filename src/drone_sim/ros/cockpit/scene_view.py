@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import rospy
@@ -15,56 +16,58 @@ from visualization_msgs.msg import (
     MarkerArray,
 )
 
+from drone_sim.ros.cockpit.choice import Choice
 from drone_sim.ros.cockpit.frames import Frames
-from drone_sim.ros.cockpit.handles import Handles
+from drone_sim.ros.cockpit.handles import ANYWHERE, Handles
 from drone_sim.ros.cockpit.markers import Markers
 from drone_sim.ros.cockpit.pushes import push
+from drone_sim.ros.cockpit.sunlight import Sunlight
 
-_BODIES = "view/bodies"
-_TOPICS = (
-    "scene",
-    "drawing",
-    "view/surroundings",
-    _BODIES,
-    "view/path",
-    "view/height",
-    "view/command",
-    "view/forces",
-    "view/state",
-)
+_SCENE, _BODIES, _AROUND = "scene", "view/bodies", "view/surroundings"
+_OTHERS = ("drawing", "view/path", "view/height", "view/command", "view/forces", "view/state")
 
 
 class SceneView:
     """Everything at one namespace, that of the only drone or of the node."""
 
-    def __init__(self, scene: Any, namespace: str):
-        """Listen; the node must be initialised."""
+    def __init__(self, scene: Any, namespace: str, sun: Sunlight, choice: Choice):
+        """Listen; the node must be initialised. What is clicked on is chosen."""
         self.namespace = namespace
         self.frames = Frames(scene)
         self.strength = 0.5  # N, of a click on a vehicle
+        self._choice, self._sun = choice, sun
         self._pushers: dict[str, rospy.Publisher] = {}
         self._markers = {
-            name: Markers(scene, name, self.frames, self._make_pushable if name == _BODIES else lambda *_: None)
-            for name in _TOPICS
+            _SCENE: Markers(scene, _SCENE, self.frames, self._make_choosable, casts=True),
+            _BODIES: Markers(scene, _BODIES, self.frames, self._make_pushable, casts=True),
+            _AROUND: Markers(scene, _AROUND, self.frames, sun.shine_on, hidden=("sky",)),
+            **{name: Markers(scene, name, self.frames) for name in _OTHERS},
         }
-        feedback = rospy.Publisher(f"{namespace}/markers/feedback", InteractiveMarkerFeedback, queue_size=10)
-        self.handles = Handles(scene, feedback.publish)
+        drags = [
+            rospy.Publisher(f"{namespace}/{name}/feedback", InteractiveMarkerFeedback, queue_size=10)
+            for name in ("markers", "objects")
+        ]
+        self.handles = Handles(scene, drags[0].publish)
+        self.objects = Handles(scene, drags[1].publish, "objects", lambda name: name == choice.name, ANYWHERE)
         heard = [
             *((f"{namespace}/{name}", MarkerArray, one.hear) for name, one in self._markers.items()),
             ("/tf", TFMessage, self.frames.hear),
             ("/tf_static", TFMessage, self.frames.hear),
             (f"{namespace}/markers/update_full", InteractiveMarkerInit, self.handles.hear_all),
             (f"{namespace}/markers/update", InteractiveMarkerUpdate, self.handles.hear),
+            (f"{namespace}/objects/update_full", InteractiveMarkerInit, self.objects.hear_all),
+            (f"{namespace}/objects/update", InteractiveMarkerUpdate, self.objects.hear),
         ]
-        self._listening = [feedback, *(rospy.Subscriber(*one, queue_size=20) for one in heard)]
+        self._listening = [*drags, *(rospy.Subscriber(*one, queue_size=20) for one in heard)]
 
-    def show(self) -> None:
-        """Put into the scene what is new."""
+    def show(self, browsers: Collection[int]) -> None:
+        """Put into the scene what is new, for the browsers that are open."""
         self.frames.show()
         grown, self.frames.new = self.frames.new, False
         for markers in self._markers.values():
             markers.show(frames_changed=grown)
-        self.handles.show()
+        for handles in (self.handles, self.objects):
+            handles.show(browsers)
 
     def close(self) -> None:
         """Listen no more, and show nothing."""
@@ -73,7 +76,14 @@ class SceneView:
         for markers in self._markers.values():
             markers.forget()
         self.handles.forget()
+        self.objects.forget()
+        self._sun.forget()
         self.frames.forget()
+
+    def _make_choosable(self, marker: Marker, handle: Any) -> None:
+        """Let a click on an object, whose name is the marker's namespace, choose it."""
+        if hasattr(handle, "on_click"):  # lines have none
+            handle.on_click(lambda _: self._choice.toggle(marker.ns))
 
     def _make_pushable(self, marker: Marker, handle: Any) -> None:
         """Let a click on a part of a vehicle, whose name is the marker's namespace, push it."""

@@ -36,7 +36,7 @@ class VehicleTopics:
         self._sensors = {
             name: SensorOutput(vehicle.parameters, sensor) for name, sensor in vehicle.instruments.by_name.items()
         }
-        self._tuning = TuningServer(vehicle, inbox)
+        self._tuning = TuningServer(vehicle.name, vehicle.tuning, inbox)
         set_description(vehicle.parameters)
 
     @property
@@ -59,7 +59,7 @@ class VehicleTopics:
 
     def show_tuning(self) -> None:
         """Say what holds now of what may be tuned, where that is news."""
-        self._tuning.follow(self.vehicle)
+        self._tuning.follow(self.vehicle.tuning)
 
     def close(self) -> None:
         """Hear and publish no more."""
