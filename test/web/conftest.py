@@ -56,7 +56,8 @@ def _cockpit(browser):
 
 @pytest.fixture(name="opened")
 def _opened(cockpit, browser):
-    """The cockpit's page in a browser of its own."""
+    """The cockpit's page in a browser of its own, while the pilot flies."""
+    cockpit.start_afresh()
     with open_page(cockpit, browser) as page:
         yield page
 
@@ -64,5 +65,6 @@ def _opened(cockpit, browser):
 @pytest.fixture(name="panel", scope="module")
 def _panel(cockpit, browser):
     """The panel of a page that the tests of a file share; each leaves it as it has found it."""
+    cockpit.start_afresh()
     with open_page(cockpit, browser) as page:
         yield Panel(page)

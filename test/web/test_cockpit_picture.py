@@ -141,6 +141,7 @@ def fly_alike(steps):
 
 def test_a_key_held_for_2_s_flies_as_the_same_commands_without_ros_and_the_page_shows_it(cockpit, panel, picture):
     page, drone = panel.page, cockpit.drone
+    wait_until(page, lambda: abs(drone.velocity.z) < 0.01 and drone.place[2] > 0.5)
     cockpit.call("pause", True)
     wait_until(page, lambda: is_where_odometry_says(cockpit, picture))
     before = drone.place
