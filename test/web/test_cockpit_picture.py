@@ -48,6 +48,7 @@ class Picture:
 
     def __init__(self, panel):
         self.page = panel.page
+        self.page.click("#toggle")  # without the editor, the scene is wide
         panel.show("View")
         panel.choose("Look", "free")
         panel.scene.get_by_role("checkbox", name="Handles").click()
@@ -89,6 +90,7 @@ class Picture:
     def misplaced(self, pose):
         """Return how far the drone is seen from where it should be, px each way; nan where it is not seen."""
         expected, seen = self.expected(pose), self.seen()
+        assert expected.sum() > 100, "the drone is out of sight"
         scores = {
             (right, down): (np.roll(expected, (down, right), (0, 1)) & seen).sum() / expected.sum()
             for right in range(-SEARCHED, SEARCHED + 1)
