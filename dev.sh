@@ -193,8 +193,8 @@ run_tests() {
   if ! command -v chromium >/dev/null || ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
     say "no chromium, or no playwright: the tests in a browser are left out (./dev.sh test-web installs both)"
   fi
-  # Every core tests; of the tests with a master, each with its own, two run at a time.
-  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS=-j2
+  # Every core tests; tests with a master, each with its own, wait a third of their time: one more of them than cores.
+  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$(($(nproc) + 1))"
 }
 
 # A python of that version which can make an environment. pyenv's are found where it has put them: its shims on the
