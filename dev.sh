@@ -180,13 +180,21 @@ stay_on_this_machine() {
   export ROS_MASTER_URI=$default ROS_HOSTNAME=localhost
 }
 
+# Without a display there is no rviz, and a newcomer would see a log and nothing else.
+hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
+  case "$DISPLAY $*" in
+    " "*web:=*) ;;
+    " "*) say "no display, so no rviz: ./dev.sh run web:=true shows the simulation in a browser" ;;
+  esac
+}
+
 run_tests() {
   make_venv requirements-dev.txt
   if ! command -v chromium >/dev/null || ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
     say "no chromium, or no playwright: the tests in a browser are left out (./dev.sh test-web installs both)"
   fi
-  # Every core tests; of the tests with a master, each with its own, two run at a time.
-  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS=-j2
+  # Every core tests; tests with a master, each with its own, wait a third of their time: one more of them than cores.
+  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$(($(nproc) + 1))"
 }
 
 # A python of that version which can make an environment. pyenv's are found where it has put them: its shims on the
@@ -231,7 +239,7 @@ command=${1:-help}
 shift || true
 case "$command" in
   setup) setup; say "ready: source $root/devel/setup.bash" ;;
-  run) stay_on_this_machine; setup; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
+  run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   test-web)
     install_packages chromium

@@ -30,6 +30,7 @@ LONGEST = 30.0  # s of a visit
 DEAF = 60.0  # s; the node gives up somebody who takes nothing after 40
 PATIENCE = 30.0  # s until the scene is there
 PING = 100.0  # s; who is deaf does not hear the answers to its own, either
+MINE = "mine/soak.py"
 TEXTS = ("# a line\n", "1 / 0\n", "")
 SCENES = ("", *(f"package://drone_sim/config/scenes/{name}.yaml" for name in ("gates", "room")))
 BUTTONS = ("start", "stop", "restart", "pause", "go on", "step", "snapshot", "restore")
@@ -119,14 +120,15 @@ class Browser:
 
     async def _hear(self, number: int) -> dict[str, Any]:
         while True:
-            answer = json.loads(await self.wire.recv())
+            message = await self.wire.recv()
+            answer = json.loads(message) if isinstance(message, str) else {}  # or a picture
             if answer.get("id") == number:
                 return dict(answer)
 
     async def stay(self, seconds: float) -> None:
         """Take what comes, without looking at it."""
         with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(asyncio.gather(_ignore(self.scene), _ignore(self.wire)), seconds)
+            await asyncio.wait_for(asyncio.gather(_ignore(self.scene), _show(self.wire)), seconds)
 
     def vanish(self) -> None:
         """Be gone without a word, as a browser that is killed."""
@@ -137,6 +139,14 @@ class Browser:
 async def _ignore(connection: ClientConnection) -> None:
     async for _ in connection:
         pass
+
+
+async def _show(wire: ClientConnection) -> None:
+    """Say of every picture that it has been shown, or there would be no other."""
+    async for message in wire:
+        if isinstance(message, bytes):
+            name = json.loads(message.partition(b"\n")[0])["picture"]
+            await wire.send(json.dumps({"shown": name}))
 
 
 async def watch(browser: Browser) -> None:
@@ -168,15 +178,16 @@ async def press(browser: Browser) -> None:
 
 
 async def write(browser: Browser) -> None:
-    """Write scripts, good ones and bad, and fly them."""
+    """Write a script, well or badly, and fly it; fly others."""
+    groups = (await browser.ask("scripts"))["groups"]
+    if MINE not in [name for group in groups for name in group["scripts"]]:
+        await browser.ask("save_as", name=MINE.partition("/")[2], text="")
     for _ in range(browser.dice.randrange(1, 6)):
-        names = [one for one in (await browser.ask("scripts"))["scripts"] if not one.startswith("mine/own")]
-        opened = await browser.ask("open", script=browser.dice.choice(names))
-        text = browser.dice.choice(TEXTS) + opened["text"][:20_000]
-        mine = {"script": opened["script"], "version": opened["version"], "text": text}
-        if opened["script"].startswith("mine/"):  # or there would be a copy more each time
-            await browser.ask("save", **mine)
-        await browser.ask("run", script=opened["script"])
+        shipped = await browser.ask("open", script=browser.dice.choice(browser.dice.choice(groups[:2])["scripts"]))
+        mine = await browser.ask("open", script=MINE)
+        text = browser.dice.choice(TEXTS) + shipped["text"]
+        await browser.ask("save", script=MINE, version=mine["version"], text=text)
+        await browser.ask("run", script=browser.dice.choice([MINE, shipped["script"]]))
     await browser.ask("run", script="built-in/pilot.py")
 
 

@@ -29,6 +29,7 @@ from drone_sim.ros.cockpit.frames import Frames
 from drone_sim.ros.cockpit.gate import WIRE, Gate
 from drone_sim.ros.cockpit.markers import Markers
 from drone_sim.ros.cockpit.page import Page
+from drone_sim.ros.cockpit.serving import Serving
 from drone_sim.ros.cockpit.simulator import script_failure
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.tools.commands import Command
@@ -317,13 +318,34 @@ def test_a_mesh_has_no_metal(tmp_path):
     assert [one["pbrMetallicRoughness"]["metallicFactor"] for one in tree["materials"]] == [0.0]
 
 
+def test_a_page_that_is_opened_early_is_answered_when_all_is_there(tmp_path):
+    serving = Serving(settings.read({"port": 0, "scripts": str(tmp_path)}))
+    host, token = serving.address.removeprefix("http://").split("/?token=")
+    cookie = {"Cookie": f"drone_sim_{host.rpartition(':')[2]}={token}"}
+
+    async def wire(connection):
+        await connection.send(f"heard {await connection.recv()}")
+
+    with connect(f"ws://{host}/wire", subprotocols=[WIRE], additional_headers=cookie) as early:
+        early.send("this")
+        with pytest.raises(TimeoutError):
+            early.recv(timeout=0.1)
+        serving.begin(wire, lambda path: ("image/png", path.encode()))
+        assert early.recv(timeout=5) == "heard this"
+    connection = http.client.HTTPConnection(host, timeout=5)
+    connection.request("GET", "/a.png", headers=cookie)
+    assert connection.getresponse().read() == b"/a.png"
+    serving.server.stop()
+
+
 def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
     """Whoever ends and starts a launch anew keeps the page, and what stands in the editor."""
 
     def refuse(*_):
         raise ConnectionRefusedError(111, "Connection refused")
 
-    shown = Cockpit(settings.read({"port": 0, "scripts": str(tmp_path)}))
+    given = settings.read({"port": 0, "scripts": str(tmp_path)})
+    shown = Cockpit(given, Serving(given))
     monkeypatch.setattr(
         rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
     )

@@ -23,6 +23,21 @@ class Launched:
         self.scripts = scripts
         self.log = log
 
+    def call(self, service, *request):
+        """Call a service of the simulation; return what it says."""
+        import rospy
+        from std_srvs.srv import SetBool, Trigger
+
+        return rospy.ServiceProxy(f"/drone_sim/{service}", SetBool if request else Trigger)(*request).message
+
+    def start_afresh(self):
+        """Fly the pilot from the start, as after the launch."""
+        import rospy
+
+        rospy.set_param("/drone_sim/script", "pilot")
+        self.call("pause", False)
+        self.call("restart")
+
 
 @contextlib.contextmanager
 def launched(*arguments):

@@ -22,7 +22,7 @@ export class Flying {
 
   // Keys count in the page and in the scene, but not where somebody writes, reads or moves a bar.
   listenTo(window) {
-    const writes = (target) => target.closest?.("input, textarea, select, article, [contenteditable], [role=separator]");
+    const writes = (target) => target.closest?.("input:not([type=checkbox], [type=radio]), textarea, select, article, [contenteditable], [role=separator]");
     window.addEventListener("keydown", (event) => {
       if (event.key === "Shift") this.fast = true;
       if (!(event.code in KEYS) || writes(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;

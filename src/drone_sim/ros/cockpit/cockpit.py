@@ -1,49 +1,39 @@
-"""`rosrun drone_sim cockpit`: the simulation in a browser, from a node that only knows its topics and services."""
+"""The simulation in a browser, from a node that only knows its topics and services."""
 
 from __future__ import annotations
 
-import contextlib
-import io
-import secrets
-import sys
 import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import rospy
-import viser
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.cockpit.address import free_place, urls
 from drone_sim.ros.cockpit.choice import Choice
 from drone_sim.ros.cockpit.commanding import Commanding
 from drone_sim.ros.cockpit.editing import Editing
 from drone_sim.ros.cockpit.flying import Flying
 from drone_sim.ros.cockpit.found import Found, find
-from drone_sim.ros.cockpit.gate import Gate
 from drone_sim.ros.cockpit.happenings import Happenings
 from drone_sim.ros.cockpit.hearing import Hearing
 from drone_sim.ros.cockpit.lessons import Lessons
-from drone_sim.ros.cockpit.page import Page
 from drone_sim.ros.cockpit.panel import Panel
-from drone_sim.ros.cockpit.settings import Settings, read
+from drone_sim.ros.cockpit.scene_view import SceneView
+from drone_sim.ros.cockpit.serving import Serving
+from drone_sim.ros.cockpit.settings import Settings
 from drone_sim.ros.cockpit.shelf import Shelf
 from drone_sim.ros.cockpit.sight import Sight
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.sunlight import Sunlight
 from drone_sim.ros.cockpit.windows import Windows
 from drone_sim.ros.cockpit.wire import Wire
-from drone_sim.ros.node.starting import init_node, reported
 
-if TYPE_CHECKING:
-    from drone_sim.ros.cockpit.scene_view import SceneView
-
-_NAME = "cockpit"
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
+_NO_SCENE = "none"  # as the launch file says it
 _PERIOD = 0.05  # s between two looks: 20 a second
 _ASKING = 2.0  # s between two questions to the master
 
@@ -51,8 +41,8 @@ _ASKING = 2.0  # s between two questions to the master
 class Cockpit:
     """One page for one simulation. While no browser is open, it listens to nothing."""
 
-    def __init__(self, settings: Settings):
-        """Serve; init_node must have been called. Raises AddressError where nothing can listen."""
+    def __init__(self, settings: Settings, serving: Serving):
+        """Fill what is served."""
         self._simulator = Simulator(settings.simulator)
         self._found = Found()
         self._view: SceneView | None = None
@@ -64,11 +54,7 @@ class Cockpit:
         shelf, lessons = Shelf(settings.scripts), Lessons()
         editing = Editing(shelf, lessons, self._simulator, Happenings(self._simulator.node))
         self._wire = Wire(flying, {**editing.answers, "let go": self._let_go, "spare": self._spare})
-        token = secrets.token_urlsafe(16)
-        gate = Gate(token, Page(beside=lessons.picture), self._wire.serve)
-        host, port = free_place(settings.address, settings.port)
-        with gate.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
-            self._server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
+        self._server = serving.server
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._server.scene.set_up_direction("+z")
         self._server.scene.set_background_image(_sky())
@@ -76,16 +62,14 @@ class Cockpit:
         panel = self._server.gui.main_panel
         panel.dock_right()
         panel.set_width(_WIDTH)
-        self.address, self.address_elsewhere = urls(host, self._server.get_port(), token)
         self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight, self._choice, self._wire)
         self._windows = Windows(self._simulator.node, self._panel.cameras, self._wire)
         self._wire.answer_also(self._windows.answers)
+        serving.begin(self._wire.serve, lessons.picture)
         threading.Thread(target=flying.watch, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
 
     def run(self) -> None:
         """Show what is new, again and again."""
-        import drone_sim.ros.cockpit.scene_view  # noqa: F401 # with trimesh: a page that is asked for first comes at once
-
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._look(began)
@@ -124,8 +108,6 @@ class Cockpit:
         for one in (self._view, self._hearing):
             if one is not None:
                 one.close()
-        from drone_sim.ros.cockpit.scene_view import SceneView
-
         self._view = SceneView(self._server.scene, namespace, self._sun, self._choice) if namespace else None
         self._hearing = Hearing(self._simulator.node, self._panel, self._wire) if namespace else None
         self._panel.cameras.rest(not namespace)
@@ -146,13 +128,13 @@ class Cockpit:
     def _ask_master(self) -> None:
         try:
             self._found = find(rospy.get_published_topics())
-            scene = str(self._simulator.parameter("scene_file", ""))
+            scene = str(self._simulator.parameter("scene_file", "") or _NO_SCENE)
         except FAILURES:  # another master may come
             self._found, scene = Found(), ""
         if not self._found.namespace:
             self._panel.show_state("no simulation")
         scenes = tuple(f"package://drone_sim/config/scenes/{one.name}" for one in _scenes())
-        self._panel.offer(self._found, ("", *scenes), scene)
+        self._panel.offer(self._found, (_NO_SCENE, *scenes), scene)
 
 
 def _sky() -> np.ndarray:
@@ -163,22 +145,3 @@ def _sky() -> np.ndarray:
 
 def _scenes() -> list[Path]:
     return sorted((package_path() / "config" / "scenes").glob("*.yaml"))
-
-
-def main() -> int:
-    """Serve until the node ends; return the exit status."""
-    # There may be several. Its time is the person's, who looks on while /clock stands still.
-    if not init_node(_NAME, anonymous=True, disable_rostime=True):
-        return 1
-    return reported(_NAME, _serve)
-
-
-def _serve() -> None:
-    cockpit = Cockpit(read(rospy.get_param("~", {})))
-    elsewhere = f" and, on other machines, at {cockpit.address_elsewhere}" if cockpit.address_elsewhere else ""
-    rospy.loginfo(f"the cockpit is at {cockpit.address}{elsewhere}")
-    cockpit.run()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -62,15 +62,24 @@ class CommandMarkers:
         """Advertise."""
         self._simulation = simulation
         self._topic = MarkerTopic(f"{namespace(simulation)}/view/command", EYES)
-        self._shown: list[tuple[Twist, frames.Matrix, State]] = []
+        self._shown: list[_Told | None] = []
 
     def update(self) -> None:
         """Publish commands and places where they have changed, if anybody listens."""
         vehicles = self._simulation.vehicles.values()
-        seen = [(vehicle.command, vehicle.track, vehicle.state) for vehicle in vehicles]
+        seen = [_told(vehicle) for vehicle in vehicles]
         if seen != self._shown and self._topic.due():
             self._shown = seen
             self._topic.show([marker for vehicle in vehicles for marker in _commanded(vehicle)])
+
+
+_Told = tuple[Twist, frames.Matrix, State]
+
+
+def _told(vehicle: Vehicle) -> _Told | None:
+    """Return what its arrows are made of, None where it has none."""
+    command = vehicle.command
+    return (command, vehicle.track, vehicle.state) if any((*command.linear, command.angular[2])) else None
 
 
 class StateText:
