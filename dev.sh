@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | test-web | lint | bench [NAME...] |
-#   fuzz [CASES] | soak [MINUTES] | two-hosts [--cut SECONDS] | tasks [TASK...] | pythons [VERSION...] | deb
+#   fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | tasks [TASK...] | pythons [VERSION...] | deb
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
 # build/ and devel/. What is there already is left alone, so a second run takes seconds. Where another ROS 1 has
@@ -28,6 +28,8 @@ ros=$(sourced_ros)
 python=/usr/bin/python3
 if [ -x "$ros/bin/python3" ]; then python=$ros/bin/python3; fi
 
+: "${HOME:=$(getent passwd "$(id -u)" | cut -d: -f6)}" # which cron leaves out
+export HOME
 venv=$root/.venv
 venv_options=--system-site-packages
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim
@@ -133,7 +135,16 @@ build() {
   echo "$wanted" >build/.made-from
 }
 
+# ROS itself would end with a traceback.
+check_home() {
+  local folder
+  for folder in "$cache" "${ROS_HOME:-$HOME/.ros}"; do
+    { mkdir -p "$folder" && [ -w "$folder" ]; } 2>/dev/null || fail "cannot write to $folder: set HOME to a folder of yours"
+  done
+}
+
 setup() {
+  check_home
   # shellcheck disable=SC2046 # one word each
   install_packages $(packages)
   grep -qw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
@@ -169,13 +180,21 @@ stay_on_this_machine() {
   export ROS_MASTER_URI=$default ROS_HOSTNAME=localhost
 }
 
+# Without a display there is no rviz, and a newcomer would see a log and nothing else.
+hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
+  case "$DISPLAY $*" in
+    " "*web:=*) ;;
+    " "*) say "no display, so no rviz: ./dev.sh run web:=true shows the simulation in a browser" ;;
+  esac
+}
+
 run_tests() {
   make_venv requirements-dev.txt
   if ! command -v chromium >/dev/null || ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
     say "no chromium, or no playwright: the tests in a browser are left out (./dev.sh test-web installs both)"
   fi
-  # Every core tests; of the tests with a master, each with its own, two run at a time.
-  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS=-j2
+  # Every core tests; tests with a master, each with its own, wait a third of their time: one more of them than cores.
+  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$(($(nproc) + 1))"
 }
 
 # A python of that version which can make an environment. pyenv's are found where it has put them: its shims on the
@@ -220,7 +239,7 @@ command=${1:-help}
 shift || true
 case "$command" in
   setup) setup; say "ready: source $root/devel/setup.bash" ;;
-  run) stay_on_this_machine; setup; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
+  run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   test-web)
     install_packages chromium
@@ -232,6 +251,7 @@ case "$command" in
   bench) setup; make_venv requirements-dev.txt; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
+  soak-web) setup; exec .venv/bin/python test/soak/web.py "$@" ;;
   two-hosts) setup; exec .venv/bin/python test/two_hosts/run.py "$@" ;;
   tasks) setup; PYTHONPATH=$root/src:$PYTHONPATH exec .venv/bin/python test/tasks/check.py "$@" ;;
   pythons) # shellcheck disable=SC2046 # one word each

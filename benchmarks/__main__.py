@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import fleet, grade, loop, node, plot, remote, render
+from benchmarks import cockpit, fleet, grade, loop, node, plot, remote, render
 from benchmarks.cores import one_core
 from drone_sim.files import writing
 from drone_sim.render.renderer import Renderer
@@ -35,6 +35,7 @@ BENCHMARKS: dict[str, Callable[[], list[Row]]] = {
     "fleet": fleet.measure,
     "remote": remote.measure,
     "grade": grade.measure,
+    "cockpit": cockpit.measure,
 }
 
 

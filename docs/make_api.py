@@ -22,6 +22,7 @@ from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.windows import Windows
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "api.md"
@@ -59,6 +60,7 @@ def apis() -> dict[str, Api]:
         signals=Signals(),
         own_script="Drone",
         drawings=Drawings(shown=False),
+        windows=Windows(),
     )
     sim = make_sim(host, Surroundings(lambda: 0.0, 0.05))
     return {"sim": sim, "simROS": make_sim_ros(MessageBus("drone")), **make_plugins(host)}

@@ -8,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PYTHONPATH=$PWD/src:$PYTHONPATH
 python=.venv/bin/python
 pictures=docs/pictures
-sections=(diagrams cameras plots remote weather report tasks cockpit rviz)
+sections=(diagrams cameras plots remote weather report tasks cockpit cockpit-film rviz)
 
 # The diagrams of docs/tutorial.md.
 diagrams() { "$python" docs/draw_diagrams.py "$pictures"; }
@@ -48,6 +48,9 @@ tasks() { "$python" docs/make_textures.py && "$python" docs/take_task_pictures.p
 
 # The cockpit of docs/cockpit.md; needs what ./dev.sh test-web installs.
 cockpit() { "$python" docs/take_cockpit_picture.py "$pictures/cockpit.png"; }
+
+# The same in motion, for README.md; three minutes, on a machine that does nothing else.
+cockpit-film() { "$python" docs/film_cockpit.py "$pictures/cockpit.webp"; }
 
 # rviz, as drone.launch shows it, and with the target sphere dragged.
 rviz() { docs/take_rviz_pictures.sh "$pictures"; }

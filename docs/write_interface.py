@@ -9,6 +9,7 @@ from pathlib import Path
 
 from drone_sim.config.comments import CONFIG, rows
 from drone_sim.run import parameters
+from drone_sim.run.pace import FACTOR
 from drone_sim.vehicles.tunable import tunables
 
 PAGE = Path(__file__).resolve().parents[1] / "docs/interface.md"
@@ -19,7 +20,7 @@ _CAMERA = re.compile(r"^cameras/(\w+)/")
 
 def tuned_names() -> dict[str, list[str]]:
     """Return what each parameter is called where it is tuned, by its name in the table."""
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[str]] = {FACTOR: [FACTOR]}  # by the node's server, the others by a vehicle's
     for name, leaf in tunables(parameters.load().fleet[0], {}).items():
         keys = [one for one in leaf.location if isinstance(one, str)]
         found.setdefault("/".join(keys), []).append(name)

@@ -293,6 +293,12 @@ SIM: dict[str, list[Example]] = {
     "getDialogInput": [Example("NAME(1)", [""])],
     "auxiliaryConsoleOpen": [Example("NAME('title', 10, 0) > 0", [True])],
     "auxiliaryConsolePrint": [Example("NAME(1, 'a line')", [1])],
+    "auxiliaryConsoleShow": [Example("NAME(sim.auxiliaryConsoleOpen('title', 10, 0), false)", [1])],
+    "auxiliaryConsoleClose": [Example("NAME(sim.auxiliaryConsoleOpen('title', 10, 0))", [1])],
+    "endDialog": [Example("NAME(sim.displayDialog('title', 'text'))", [1]), Example("NAME(-1)", [0])],
+    "floatingViewAdd": [Example("NAME(0.9, 0.9, 0.2, 0.2, 0) > 0", [True])],
+    "adjustView": [Example("NAME(sim.floatingViewAdd(0.9, 0.9, 0.2, 0.2, 0), CAMERA, 64)", [1])],
+    "floatingViewRemove": [Example("NAME(sim.floatingViewAdd(0.9, 0.9, 0.2, 0.2, 0))", [1])],
     "getVisionSensorCharImage": [
         Example("NAME(CAMERA)", ["\0\1\2\3\4\5", 1, 2]),
         Example("NAME(CAMERA + sim.handleflag_greyscale, 0, 1, 1, 1)", ["\3", 1, 1]),

@@ -10,22 +10,26 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 pytest.importorskip("viser")
 
+import rospy
 import trimesh
 import viser
 from browser_scene import Scene, marker
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, TransformStamped
+from std_msgs.msg import ColorRGBA
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit import looks
+from drone_sim.ros.cockpit import looks, settings
+from drone_sim.ros.cockpit.cockpit import Cockpit
 from drone_sim.ros.cockpit.flying import Flying, read_command
-from drone_sim.ros.cockpit.found import Found, find
+from drone_sim.ros.cockpit.found import Found, Source, find
 from drone_sim.ros.cockpit.frames import Frames
 from drone_sim.ros.cockpit.gate import WIRE, Gate
 from drone_sim.ros.cockpit.markers import Markers
 from drone_sim.ros.cockpit.page import Page
-from drone_sim.ros.cockpit.shelf import Shelf, ShelfError
+from drone_sim.ros.cockpit.serving import Serving
 from drone_sim.ros.cockpit.simulator import script_failure
 from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.tools.commands import Command
@@ -90,7 +94,7 @@ def test_the_token_lets_in_and_leaves_the_address(served):
 
 def test_the_page_that_is_served_is_the_one_in_the_source():
     source = Path(__file__).parents[2] / "web" / "src"
-    for name in ("index.html", "cockpit.css"):  # the script is built of it: web/package.json
+    for name in ("index.html", "cockpit.css", "script.css"):  # the script is built of it: web/package.json
         assert Page().find(f"/{name}")[1] == (source / name).read_bytes(), "cd web && npm ci && npm run build"
 
 
@@ -166,52 +170,6 @@ def test_nan_is_no_speed():
     assert read_command({"vz": -2}) == Command(vz=-2.0)
 
 
-# ---- which files
-
-
-@pytest.fixture(name="shelf")
-def _shelf(tmp_path):
-    package = tmp_path / "package"
-    for folder in ("src/drone_sim/child_scripts", "docs/tutorial"):
-        (package / folder).mkdir(parents=True)
-    (package / "src/drone_sim/child_scripts/pilot.py").write_text("shipped", encoding="utf-8")
-    return Shelf(tmp_path / "mine", package)
-
-
-def test_a_script_of_the_package_becomes_a_copy(shelf, tmp_path):
-    pilot = shelf.find("built-in/pilot.py")
-    own, version = shelf.save(pilot, "changed", shelf.read(pilot)[1])
-    assert own.name == "mine/pilot.py" and (tmp_path / "mine/pilot.py").read_text() == "changed"
-    assert shelf.read(pilot)[0] == "shipped"
-    again, _ = shelf.save(own, "changed again", version)
-    assert again == own and shelf.original(own) == "shipped"
-    assert shelf.save(pilot, "other", "")[0].name == "mine/pilot_2.py", "nothing is lost"
-
-
-def test_what_another_has_changed_is_not_overwritten(shelf, tmp_path):
-    own, version = shelf.save(shelf.find("built-in/pilot.py"), "mine", "")
-    (tmp_path / "mine/pilot.py").write_text("theirs", encoding="utf-8")
-    with pytest.raises(ShelfError, match="changed by somebody else"):
-        shelf.save(own, "mine again", version)
-    assert (tmp_path / "mine/pilot.py").read_text() == "theirs"
-
-
-@pytest.mark.parametrize("name", ["/etc/passwd", "mine/../../x.py", "built-in/../x", "", None, 3, ["a"]])
-def test_only_what_is_listed_is_read(shelf, name):
-    with pytest.raises(ShelfError, match="no such script"):
-        shelf.find(name)
-
-
-def test_scripts_have_limits(shelf, tmp_path):
-    with pytest.raises(ShelfError, match="larger than"):
-        shelf.save(shelf.find("built-in/pilot.py"), "x" * (1 << 21), "")
-    folder = tmp_path / "mine"
-    folder.mkdir()
-    (folder / "binary.py").write_bytes(b"\xff\xfe")
-    with pytest.raises(ShelfError, match="utf-8"):
-        shelf.read(shelf.find("mine/binary.py"))
-
-
 def test_a_failure_is_read_from_a_line():
     failure = script_failure("script error: [actuation] /home/a b/x.py:12: NameError: y: z")
     assert failure == ("actuation", "/home/a b/x.py", 12, "NameError: y: z")
@@ -226,11 +184,14 @@ def test_what_the_master_knows():
         ("/other/odom", "nav_msgs/Odometry"),
         ("/drone/front/compressed", "sensor_msgs/CompressedImage"),
     ]
-    assert find(topics) == Found("/drone", ("drone",), ("/drone/front/compressed",))
+    assert find(topics) == Found("/drone", ("drone",), (Source("/drone/front", "/drone/front/compressed"),))
     assert find(topics[1:]) == Found()
 
 
 # ---- what is shown
+
+
+LINE = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)]
 
 
 def test_markers_come_move_and_go():
@@ -253,6 +214,65 @@ def test_markers_come_move_and_go():
     markers.hear(MarkerArray([Marker(action=Marker.DELETEALL)]))
     markers.show()
     assert not scene.nodes
+
+
+@pytest.mark.parametrize(
+    "before, after, seen",
+    [
+        ({"type": Marker.TEXT_VIEW_FACING, "text": "one"}, {"text": "three"}, lambda node: node.text == "three"),
+        ({"type": Marker.LINE_STRIP, "points": LINE[:2]}, {"points": LINE}, lambda node: len(node.points) == 2),
+        ({"type": Marker.LINE_LIST, "points": LINE[:2]}, {"points": LINE[1:]}, lambda node: node.points[0][0][0] == 1),
+    ],
+)
+def test_words_and_lines_change_in_place(before, after, seen):
+    scene = Scene()
+    markers = Markers(scene, "scene", Frames(scene))
+    for number, values in enumerate((before, {**before, **after})):
+        message = Marker(ns="a", **values)
+        message.header.frame_id, message.pose.position.x = "world", number
+        markers.hear(MarkerArray([message]))
+        markers.show()
+    (node,) = scene.nodes.values()
+    assert scene.added == ["/scene/a/0"] and seen(node) and node.position[0] == 1.0
+    markers.hear(MarkerArray([Marker(ns="a", type=before["type"], header=message.header)]))
+    markers.show()
+    assert len(scene.nodes) == (before["type"] == Marker.TEXT_VIEW_FACING), "lines of no points are nothing"
+
+
+def transform(parent, child, x=0.0):
+    made = TransformStamped(child_frame_id=child)
+    made.header.frame_id, made.transform.translation.x, made.transform.rotation.w = parent, x, 1.0
+    return made
+
+
+def test_a_frame_waits_for_its_parents():
+    scene = Scene()
+    frames = Frames(scene)
+    loop = [transform("a", "b"), transform("b", "a"), transform("c", "c")]
+    for message, shown in (
+        ([transform("propeller", "blades"), *loop], []),
+        ([transform("body", "propeller", 0.1)], []),
+        ([transform("world", "body")], ["/body", "/body/propeller", "/body/propeller/blades"]),
+    ):
+        frames.hear(TFMessage(message))
+        frames.show()
+        assert sorted(scene.nodes) == [f"/frames{name}" for name in shown]
+    frames.hear(TFMessage([transform("world", "body", 2.0)]))
+    frames.show()
+    assert scene.nodes["/frames/body"].position == (2.0, 0.0, 0.0) and len(scene.added) == 3
+    frames.forget()
+    assert not scene.nodes
+
+
+def test_lines_of_another_colour_are_made_anew():
+    scene = Scene()
+    markers = Markers(scene, "scene", Frames(scene))
+    painted = marker(0, Marker.LINE_STRIP, points=LINE)
+    painted.color = ColorRGBA(0, 1, 0, 1)
+    for message in (marker(0, Marker.LINE_STRIP, points=LINE[:2]), painted):
+        markers.hear(MarkerArray([message]))
+        markers.show()
+    assert scene.added == ["/scene/a/0"] * 2
 
 
 @pytest.mark.parametrize(
@@ -296,3 +316,45 @@ def test_a_mesh_has_no_metal(tmp_path):
     length = int.from_bytes(node.arguments[0][12:16], "little")
     tree = json.loads(node.arguments[0][20 : 20 + length])
     assert [one["pbrMetallicRoughness"]["metallicFactor"] for one in tree["materials"]] == [0.0]
+
+
+def test_a_page_that_is_opened_early_is_answered_when_all_is_there(tmp_path):
+    serving = Serving(settings.read({"port": 0, "scripts": str(tmp_path)}))
+    host, token = serving.address.removeprefix("http://").split("/?token=")
+    cookie = {"Cookie": f"drone_sim_{host.rpartition(':')[2]}={token}"}
+
+    async def wire(connection):
+        await connection.send(f"heard {await connection.recv()}")
+
+    with connect(f"ws://{host}/wire", subprotocols=[WIRE], additional_headers=cookie) as early:
+        early.send("this")
+        with pytest.raises(TimeoutError):
+            early.recv(timeout=0.1)
+        serving.begin(wire, lambda path: ("image/png", path.encode()))
+        assert early.recv(timeout=5) == "heard this"
+    connection = http.client.HTTPConnection(host, timeout=5)
+    connection.request("GET", "/a.png", headers=cookie)
+    assert connection.getresponse().read() == b"/a.png"
+    serving.server.stop()
+
+
+def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
+    """Whoever ends and starts a launch anew keeps the page, and what stands in the editor."""
+
+    def refuse(*_):
+        raise ConnectionRefusedError(111, "Connection refused")
+
+    given = settings.read({"port": 0, "scripts": str(tmp_path)})
+    shown = Cockpit(given, Serving(given))
+    monkeypatch.setattr(
+        rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
+    )
+    monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
+    shown._ask_master()
+    assert shown._found.namespace == "/drone"
+    for gone in ("get_param", "get_published_topics"):  # it may go between the two
+        monkeypatch.setattr(rospy, gone, refuse)
+        shown._ask_master()
+        assert shown._found == Found()
+        assert shown._panel._state.value == "no simulation"
+    shown._server.stop()

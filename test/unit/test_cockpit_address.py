@@ -1,10 +1,11 @@
-"""Where the cockpit listens, and the addresses that it prints: they can be opened."""
+"""Where the cockpit listens, the addresses that it prints, which can be opened, and what else may be set."""
 
 import socket
+from pathlib import Path
 
 import pytest
 
-from drone_sim.ros.cockpit import address
+from drone_sim.ros.cockpit import address, settings
 
 
 @pytest.fixture
@@ -73,3 +74,31 @@ def test_without_a_network_the_machine_goes_by_its_name(monkeypatch):
     monkeypatch.setattr(socket.socket, "connect", refuse)
     monkeypatch.setattr(socket, "gethostname", lambda: "lab7")
     assert address.urls("0.0.0.0", 8080, "T")[1] == "http://lab7:8080/?token=T"
+
+
+def test_settings_have_defaults():
+    assert settings.read({}) == ("127.0.0.1", 8080, Path.home() / "drone_scripts", "drone_sim")
+    assert settings.read({"port": 8081, "scripts": "/a/b", "simulator": "/x"})[1:] == (8081, Path("/a/b"), "/x")
+
+
+def test_scripts_are_relative_to_the_shell(monkeypatch):
+    monkeypatch.setenv("PWD", "/somewhere")
+    assert settings.read({"scripts": "mine"}).scripts == Path("/somewhere/mine")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"prot": 8081}, "prot: is no parameter of the cockpit; near names are port"),
+        ({"scripts": 5}, "scripts = 5: must be the name of a folder"),
+        ({"scripts": ""}, "scripts = '': must be the name of a folder"),
+        ({"scripts": "~nobody_at_all/x"}, "no such home: '~nobody_at_all/x'"),
+        ({"simulator": "bad name!"}, "simulator = 'bad name!': must be the name of a node, such as drone_sim"),
+        ({"simulator": [1]}, "simulator = [1]: must be the name of a node, such as drone_sim"),
+        (5, "the node's parameters: must be a mapping, not 5"),
+    ],
+)
+def test_wrong_settings_are_told_in_a_line(given, words):
+    with pytest.raises((ValueError, OSError)) as raised:
+        settings.read(given)
+    assert str(raised.value) == words

@@ -93,3 +93,23 @@ def test_a_beat_is_soon_after_a_change_and_seldom_without_one():
     assert (beat.left(changed=True), beat.left(changed=False)) == (0.0, 0.5)
     beat.restart()
     assert (beat.left(changed=True), beat.left(changed=False)) == (0.25, 1.0)
+
+
+def test_another_period_holds_for_the_step_that_is_waited_for():
+    pacer, clock = make(50.0)
+    assert pacer.is_far
+    clock.work(1.0)
+    pacer.change(0.05)
+    assert not pacer.is_far and passes(pacer, clock, [0.01] * 3) == [1.0, 1.05, 1.1]
+    assert pacer.overruns == 0, "nobody was late"
+    pacer.change(0.2)
+    assert passes(pacer, clock, [0.01] * 2) == [1.3, 1.5]
+
+
+def test_a_pace_without_an_end_begins_and_ends():
+    pacer, clock = make()
+    pacer.change(0.0)
+    assert passes(pacer, clock, [0.01] * 3) == [0.0, 0.01, 0.02]
+    pacer.change(0.05)
+    assert passes(pacer, clock, [0.01] * 2) == [0.08, 0.13]
+    assert pacer.overruns == 0

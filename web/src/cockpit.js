@@ -1,11 +1,15 @@
-// The page around the scene: held keys, and the script in an editor. Everything else is viser's, in the frame.
-import { Editor } from "./editor.js";
+// The page around the scene: held keys, the script in an editor with its text, and what floats over the scene. The rest
+// is viser's, in the frame.
 import { Flying } from "./flying.js";
+import { Lesson } from "./lesson.js";
+import { Scripts } from "./scripts.js";
+import { split } from "./split.js";
+import { Windows } from "./windows.js";
 import { Wire } from "./wire.js";
 
 const at = (id) => document.getElementById(id);
 
-function show({ saved, said, bad = false, scripts, script }) {
+function show({ saved, said, bad = false, lists, script, of, question }) {
   if (saved !== undefined) {
     at("saved").textContent = saved;
     at("saved").classList.toggle("bad", bad);
@@ -14,16 +18,42 @@ function show({ saved, said, bad = false, scripts, script }) {
     at("said").textContent = said;
     at("said").classList.toggle("bad", bad);
   }
-  if (scripts) at("script").replaceChildren(...scripts.map((name) => new Option(name, name)));
+  if (lists) offer(lists);
   if (script) at("script").value = script;
+  if (of !== undefined) lesson.has(script, of);
+  if (question !== undefined) ask(question);
 }
 
+function offer({ groups, lessons, folder }) {
+  const made = groups.map(({ name, scripts }) => {
+    const group = document.createElement("optgroup");
+    group.label = name === "mine" ? `mine: ${folder}` : name;
+    group.append(...scripts.map((one) => new Option(one, one)));
+    return group;
+  });
+  at("script").replaceChildren(...made);
+  lesson.offer(lessons);
+}
+
+// A question above the text, with an answer for each button.
+function ask(question) {
+  at("question").hidden = !question;
+  if (!question) return;
+  const buttons = question.choices.map(([label, action]) => {
+    const button = document.createElement("button");
+    button.textContent = label;
+    button.onclick = () => action().catch(tell);
+    return button;
+  });
+  at("question").replaceChildren(question.said, " ", ...buttons);
+}
+
+const tell = (error) => show({ said: error.message, bad: true });
+
 function told(message) {
-  if (message.failure) {
-    const { file, line, said, phase } = message.failure;
-    show({ said: `${phase}, line ${line}: ${said}`, bad: true });
-    if (file.endsWith(editor.script.split("/").pop())) editor.mark({ line, said });
-  }
+  if (message.windows) windows.show(message.windows);
+  if (message.pictures) windows.showPictures(message.pictures);
+  if (message.failure) scripts.fail(message.failure);
 }
 
 // viser paints everything, shadows too, with whatever the browser has.
@@ -33,16 +63,39 @@ function paintsInSoftware() {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "");
 }
 
-async function opened() {
-  if (paintsInSoftware()) wire.ask("spare").catch(tell);
-  const flown = await editor.list();
-  if (!editor.script) await editor.open(flown);
-  show({ said: "" });
-}
+const run = () => scripts.run(lesson.name).catch(tell);
+const open = (script) => scripts.open(script).catch(tell);
 
-const tell = (error) => show({ said: error.message, bad: true });
-const wire = new Wire(told, () => opened().catch(tell), () => show({ said: "the cockpit's node does not answer", bad: true }));
-const editor = new Editor(at("text"), (...question) => wire.ask(...question), show);
+const lesson = new Lesson(
+  {
+    choice: at("lesson"), before: at("before"), after: at("after"), fold: at("fold"),
+    body: at("lesson-body"), start: at("start"), flies: at("flies"), text: at("lesson-text"),
+    grade: at("grade"), graded: at("graded"),
+  },
+  (...question) => wire.ask(...question),
+  open,
+  () => scripts.save(),
+);
+let isLost = false;
+const wire = new Wire(
+  told,
+  (data) => windows.picture(data),
+  () => {
+    if (isLost) show({ said: "" });
+    isLost = false;
+    if (paintsInSoftware()) wire.ask("spare").catch(tell);
+    wire.ask("windows").then(told, () => {}); // told anyway, once the node is ready
+    scripts.connected().catch(tell);
+  },
+  () => {
+    isLost = true;
+    windows.clear();
+    show({ said: "the cockpit's node does not answer; what you write is kept here until it does. Started anew, it has a new address.", bad: true });
+  },
+);
+const windows = new Windows(at("windows"), wire);
+const scripts = new Scripts(at("text"), wire, { show }, (name) => lesson.go(name));
+scripts.onRun = run;
 const flying = new Flying(
   (command) => wire.hold(command),
   ({ vx, vy, vz, wz }) => {
@@ -51,20 +104,39 @@ const flying = new Flying(
   },
 );
 
-at("script").onchange = () => editor.open(at("script").value).catch(tell);
-at("run").onclick = () => editor.run().catch(tell);
-at("revert").onclick = () => editor.revert().catch(tell);
+at("script").onchange = () => open(at("script").value);
+at("run").onclick = run;
+at("revert").onclick = () => scripts.revert().catch(tell);
+at("as").onclick = () => {
+  at("as-form").hidden = !at("as-form").hidden;
+  at("name").value = scripts.is.script.split("/").pop();
+  if (!at("as-form").hidden) at("name").select();
+};
+at("as-form").onsubmit = (event) => {
+  event.preventDefault();
+  scripts.saveAs(at("name").value.trim()).then(() => (at("as-form").hidden = true)).catch(tell);
+};
+at("name").onkeydown = (event) => {
+  if (event.key === "Escape") at("as-form").hidden = true;
+};
 at("toggle").onclick = () => {
   const wide = document.body.classList.toggle("wide");
   at("toggle").setAttribute("aria-expanded", String(!wide));
 };
 window.addEventListener("keydown", (event) => {
-  if (event.key === "Enter" && event.ctrlKey) editor.run().catch(tell);
+  if (event.defaultPrevented || !(event.ctrlKey || event.metaKey)) return;
+  if (event.key === "Enter") run();
+  if (event.key !== "s") return;
+  event.preventDefault(); // the browser would save the page
+  scripts.save().catch(tell);
 });
 const letGo = (event) => event.key === "Escape" && wire.ask("let go").catch(tell);
 window.addEventListener("keydown", letGo);
 at("scene").addEventListener("load", () => at("scene").contentWindow.addEventListener("keydown", letGo));
-window.addEventListener("beforeunload", (event) => editor.dirty && event.preventDefault());
+window.addEventListener("beforeunload", (event) => scripts.drafts.isSafe(scripts.is.script) || event.preventDefault());
+split(at("beside"), "--editor", "x", 300, () => window.innerWidth - 320, (event) => window.innerWidth - event.clientX);
+const above = () => at("lesson-body").getBoundingClientRect().top;
+split(at("under"), "--lesson", "y", 60, () => window.innerHeight - 260, (event) => event.clientY - above());
 flying.listenTo(window);
 at("scene").addEventListener("load", () => flying.listenTo(at("scene").contentWindow));
 flying.stick(at("left"), "wz", "vz");

@@ -1,106 +1,79 @@
-// The child script: written to the node's disk soon after every change, so that nothing is lost.
+// The text of one script at a time; each keeps its own cursor and its own history of changes.
 import { basicSetup } from "codemirror";
-import { EditorView } from "@codemirror/view";
-import { Compartment } from "@codemirror/state";
-import { StreamLanguage } from "@codemirror/language";
+import { indentWithTab } from "@codemirror/commands";
+import { EditorState, Prec } from "@codemirror/state";
+import { EditorView, keymap } from "@codemirror/view";
+import { StreamLanguage, indentUnit } from "@codemirror/language";
 import { setDiagnostics } from "@codemirror/lint";
 import { python } from "@codemirror/lang-python";
 import { lua } from "@codemirror/legacy-modes/mode/lua";
 
-const QUIET = 800; // ms without a key before it is saved
-
 export class Editor {
-  constructor(parent, ask, show) {
-    this.ask = ask;
-    this.show = show; // { saved, said, bad, scripts, script }
-    this.language = new Compartment();
+  constructor(parent, onChange, onRun) {
+    this.states = new Map(); // of scripts that have been open, by name
     this.script = "";
-    this.version = "";
-    this.dirty = false;
-    this.saving = Promise.resolve();
-    const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && this.change());
-    this.view = new EditorView({ parent, extensions: [basicSetup, this.language.of([]), changed] });
+    const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && onChange());
+    const run = { key: "Mod-Enter", run: () => (onRun(), true) }; // else it would begin a line, too
+    this.common = [
+      Prec.highest(keymap.of([run])),
+      basicSetup,
+      keymap.of([indentWithTab]),
+      indentUnit.of("    "),
+      EditorView.contentAttributes.of({ "aria-label": "Text of the child script; Escape and then Tab leaves it" }),
+      changed,
+    ];
+    this.view = new EditorView({ parent, state: this.begin("", "") });
+  }
+
+  begin(script, text) {
+    const language = script.endsWith(".lua") ? StreamLanguage.define(lua) : python();
+    return EditorState.create({ doc: text, extensions: [this.common, language] });
   }
 
   get text() {
     return this.view.state.doc.toString();
   }
 
-  fill(text) {
-    this.filling = true;
-    this.view.dispatch({ changes: { from: 0, to: this.view.state.doc.length, insert: text } });
-    this.filling = false;
-    this.mark(null);
-  }
-
-  async list() {
-    const { scripts, flown } = await this.ask("scripts");
-    this.show({ scripts, script: this.script || flown });
-    return flown;
-  }
-
-  async open(script) {
-    await this.save();
-    const answer = await this.ask("open", { script });
-    this.script = answer.script;
-    this.version = answer.version;
-    this.fill(answer.text);
-    const kind = this.script.endsWith(".lua") ? StreamLanguage.define(lua) : python();
-    this.view.dispatch({ effects: this.language.reconfigure(kind) });
-    this.dirty = false;
-    this.show({ saved: "", script: this.script });
-  }
-
-  change() {
-    this.dirty = true;
-    this.show({ saved: "..." });
-    clearTimeout(this.later);
-    this.later = setTimeout(() => this.save().catch(() => {}), QUIET);
-  }
-
-  // One after the other: the second would not know the version of the first.
-  save() {
-    this.saving = this.saving.catch(() => {}).then(() => this.write());
-    return this.saving;
-  }
-
-  async write() {
-    if (!this.dirty) return;
-    this.dirty = false;
-    try {
-      const before = this.script;
-      const answer = await this.ask("save", { script: this.script, text: this.text, version: this.version });
-      this.script = answer.script;
-      this.version = answer.version;
-      this.show({ saved: `saved as ${answer.script}` });
-      if (before !== answer.script) await this.list();
-    } catch (error) {
-      this.dirty = true;
-      this.show({ saved: error.message, bad: true });
-      throw error;
-    }
-  }
-
-  async revert() {
-    const { text } = await this.ask("revert", { script: this.script });
+  // Shows a script where it was left; its text is what the disk has now.
+  show(script, text) {
+    this.leave();
+    this.script = script;
+    const known = this.states.get(script);
+    this.view.setState(known?.state ?? this.begin(script, text));
     this.fill(text);
-    this.change();
+    if (known) this.view.dispatch({ effects: known.scroll });
   }
 
-  async run() {
-    await this.save();
+  leave() {
+    if (this.script) this.states.set(this.script, { state: this.view.state, scroll: this.view.scrollSnapshot() });
+  }
+
+  rename(script) {
+    this.states.delete(this.script);
+    this.script = script;
+  }
+
+  // Puts another text there, as one change that can be undone; what is the same stays, and the cursor with it.
+  fill(text) {
+    const before = this.text;
     this.mark(null);
-    this.show({ said: "starting ..." });
-    const { done, said, line } = await this.ask("run", { script: this.script });
-    this.show({ said, bad: !done });
-    if (line) this.mark({ line, said });
+    if (text === before) return;
+    const most = Math.min(text.length, before.length);
+    let from = 0;
+    while (from < most && text[from] === before[from]) from++;
+    let end = 0;
+    while (end < most - from && text[text.length - 1 - end] === before[before.length - 1 - end]) end++;
+    this.filling = true;
+    const insert = text.slice(from, text.length - end);
+    this.view.dispatch({ changes: { from, to: before.length - end, insert } });
+    this.filling = false;
   }
 
   // Shows a failure at its line, or none.
   mark(failure) {
     const doc = this.view.state.doc;
     const found = [];
-    if (failure && failure.line <= doc.lines) {
+    if (failure && failure.line >= 1 && failure.line <= doc.lines) {
       const { from, to } = doc.line(failure.line);
       found.push({ from, to, severity: "error", message: failure.said });
       this.view.dispatch({ effects: EditorView.scrollIntoView(from, { y: "center" }) });

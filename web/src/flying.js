@@ -20,9 +20,9 @@ export class Flying {
     setInterval(() => this.tell(true), AGAIN);
   }
 
-  // Keys count in the page and in the scene, but not where somebody writes.
+  // Keys count in the page and in the scene, but not where somebody writes, reads or moves a bar.
   listenTo(window) {
-    const writes = (target) => target.closest?.("input, textarea, select, [contenteditable]");
+    const writes = (target) => target.closest?.("input:not([type=checkbox], [type=radio]), textarea, select, article, [contenteditable], [role=separator]");
     window.addEventListener("keydown", (event) => {
       if (event.key === "Shift") this.fast = true;
       if (!(event.code in KEYS) || writes(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;

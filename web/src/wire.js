@@ -2,8 +2,9 @@
 const AGAIN = 1000; // ms
 
 export class Wire {
-  constructor(onTell, onOpen, onClose) {
+  constructor(onTell, onPicture, onOpen, onClose) {
     this.onTell = onTell;
+    this.onPicture = onPicture;
     this.onOpen = onOpen;
     this.onClose = onClose;
     this.waiting = new Map();
@@ -14,7 +15,8 @@ export class Wire {
   connect() {
     this.socket = new WebSocket(`ws${location.protocol === "https:" ? "s" : ""}://${location.host}/wire`, "drone_sim");
     this.socket.onopen = () => this.onOpen();
-    this.socket.onmessage = (event) => this.take(JSON.parse(event.data));
+    this.socket.binaryType = "arraybuffer";
+    this.socket.onmessage = ({ data }) => (typeof data === "string" ? this.take(JSON.parse(data)) : this.onPicture(data));
     this.socket.onclose = () => {
       for (const { reject } of this.waiting.values()) reject(new Error("the connection is lost"));
       this.waiting.clear();
@@ -42,7 +44,11 @@ export class Wire {
     return new Promise((resolve, reject) => this.waiting.set(id, { resolve, reject }));
   }
 
+  say(message) {
+    if (this.open) this.socket.send(JSON.stringify(message));
+  }
+
   hold(command) {
-    if (this.open) this.socket.send(JSON.stringify({ hold: command }));
+    this.say({ hold: command });
   }
 }

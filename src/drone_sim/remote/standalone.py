@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from drone_sim.remote.server import Server
+from drone_sim.run.pace import period
 from drone_sim.run.pacing import Pacer
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.player import Player
@@ -32,9 +33,7 @@ def play(parameters: Parameters, over: Callable[[], bool], listening: Callable[[
 
 
 def _play(player: Player, server: Server, over: Callable[[], bool]) -> None:
-    parameters = player.simulation.parameters
-    factor = parameters.real_time_factor
-    pacer = Pacer(parameters.time_step / factor if factor else 0.0, sleep=server.wait)
+    pacer = Pacer(period(player.simulation.parameters), sleep=server.wait)
     while not over():
         if player.playing and not server.holds:
             pacer.wait(over)

@@ -27,6 +27,17 @@ class Pacer:
         self._due = clock() + period
         self._excused = False
 
+    @property
+    def is_far(self) -> bool:
+        """Whether the next period begins so late that whoever asks for something meanwhile would wait."""
+        return self._due - self._clock() > _SLICE
+
+    def change(self, period: float) -> None:
+        """Let the periods be others (real seconds; 0: as fast as it can), the one that has begun too."""
+        now = self._clock()
+        begun = self._due - self._period if self._period else now
+        self._period, self._due = period, max(now, begun + period)
+
     def wait(self, interrupted: Callable[[], bool] = lambda: False) -> float:
         """Sleep until the next period begins, or until interrupted; return the lateness in seconds.
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
+from drone_sim.config.changing import changed
 from drone_sim.config.errors import Problem, line_of, problems, told
 from drone_sim.config.types import (
     ADDRESS,
@@ -56,13 +57,18 @@ class RemoteApiParameters(Checked):
     port: Annotated[int, Within(0, 65535)]
 
 
-class Parameters(EquipmentParameters):
+class PaceParameters(Checked):
+    """How fast the simulation goes."""
+
+    real_time_factor: Annotated[Finite, Within(1e-3, 1e3, or_zero=True)]
+
+
+class Parameters(PaceParameters, EquipmentParameters):
     """Everything in config/drone.yaml."""
 
     config: FileName
     gui: Switch
     script_time_limit: Annotated[Finite, Within(0.01, 1e4, or_zero=True)]
-    real_time_factor: Annotated[Finite, Within(1e-3, 1e3, or_zero=True)]
     remote_api: RemoteApiParameters
     time_step: Annotated[Finite, Within(1e-4, 1)]
     sub_step: Annotated[Finite, Within(1e-5, 1)]
@@ -120,6 +126,13 @@ class Parameters(EquipmentParameters):
     def with_vehicles(self, entries: Any) -> Parameters:
         """Return the parameters with other `vehicles` given beside the scene file's. Raises ParameterError."""
         return _in_scene({**self._given, "vehicles": entries}, self.scene_file)
+
+    def at_pace(self, factor: Any) -> Parameters:
+        """Return the parameters with another real-time factor, also for scenes read later. Raises ParameterError."""
+        pace = changed(PaceParameters(real_time_factor=self.real_time_factor), {"real_time_factor": factor})
+        made = self.model_copy(update=pace.model_dump())
+        made._given = {**self._given, **pace.model_dump()}
+        return made
 
     def varied(
         self, weather: WeatherParameters, scene: SceneParameters, fleet: tuple[VehicleParameters, ...]

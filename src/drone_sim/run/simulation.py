@@ -24,6 +24,7 @@ from drone_sim.scene.scene import Scene
 from drone_sim.scripting import load
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.windows import Windows
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
 from drone_sim.sensors.camera import Vision
@@ -72,6 +73,7 @@ class Simulation:
         self.running = False
         self._backend, self._gui = backend, gui
         self._drawings = drawings if drawings is not None else Drawings(shown=False)
+        self.windows = Windows()
         self.watch: Callable[[int], None] | None = None  # called like `between` of World.advance, to look and no more
         self._runs = 0
         self._era = 0  # another one whenever what is in the world has become something else
@@ -106,6 +108,7 @@ class Simulation:
             script_time_limit=parameters.script_time_limit,
             backend=self._backend,
             drawings=self._drawings,
+            windows=self.windows,
             weather=Weather(parameters.weather, lambda: self.time),
         )
         return Setting(parameters, shared)
@@ -140,6 +143,7 @@ class Simulation:
         self._runs += 1
         self._changed_vehicles()
         self._drawings.clear()
+        self.windows.clear()
 
     def _changed_vehicles(self) -> None:
         self._era += 1
@@ -216,6 +220,10 @@ class Simulation:
         self._setting.remove(name)
         self._changed_vehicles()
         tell(errors)
+
+    def set_pace(self, factor: Any) -> None:
+        """Have whoever plays it play at another real-time factor, through every start. Raises ParameterError."""
+        self.parameters = self.parameters.at_pace(factor)
 
     # ---- start and stop
 
@@ -339,7 +347,7 @@ class Simulation:
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
         shared = self._setting.shared
-        kept = (shared.objects, shared.signals, shared.data, shared.tubes, self._drawings)
+        kept = (shared.objects, shared.signals, shared.data, shared.tubes, self._drawings, self.windows)
         parts: list[Any] = [*kept, *self._flying, *self._setting.cast.attached, self.scene, shared.weather]
         return Snapshot(self.steps, self.world.snapshot(), tuple(one.remember() for one in parts), self._era)
 

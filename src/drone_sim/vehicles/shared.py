@@ -17,13 +17,14 @@ from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.api.tubes import Tubes
+from drone_sim.scripting.api.windows import Windows
 from drone_sim.sensors.camera import Vision
 from drone_sim.world import World
 
 
 @dataclass
 class Shared:
-    """World, weather, objects, signals, scripts, custom data, tubes, drawings, messages, eyes and clock.
+    """World, weather, objects, signals, scripts, custom data, tubes, drawings, windows, messages, eyes and clock.
 
     `time` returns the simulated time in s; `time_step` and `sub_step` in s; `script_time_limit` in s of real time;
     `gravity` in m/s² along z; `magnetic_field` in T. `names` has for each body in the world what a person calls it,
@@ -40,6 +41,7 @@ class Shared:
     magnetic_field: Vector
     script_time_limit: float
     drawings: Drawings
+    windows: Windows
     weather: Weather
     backend: Backend | None = None
     objects: ObjectTree = field(default_factory=ObjectTree)

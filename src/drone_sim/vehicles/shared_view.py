@@ -6,11 +6,12 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.windows import Windows
 from drone_sim.vehicles.shared import Shared
 
 
 class SharedView:
-    """Objects, scripts, signals and drawings of the simulation."""
+    """Objects, scripts, signals, drawings and windows of the simulation."""
 
     def __init__(self, shared: Shared):
         """Show these."""
@@ -35,3 +36,8 @@ class SharedView:
     def drawings(self) -> Drawings:
         """What scripts draw."""
         return self._shared.drawings
+
+    @property
+    def windows(self) -> Windows:
+        """What scripts open for a person to look at."""
+        return self._shared.windows

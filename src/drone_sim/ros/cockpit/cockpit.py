@@ -1,11 +1,7 @@
-"""`rosrun drone_sim cockpit`: the simulation in a browser, from a node that only knows its topics and services."""
+"""The simulation in a browser, from a node that only knows its topics and services."""
 
 from __future__ import annotations
 
-import contextlib
-import io
-import secrets
-import sys
 import threading
 import time
 from collections.abc import Mapping
@@ -13,32 +9,31 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import rosgraph
 import rospy
-import viser
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.cockpit.address import free_place, urls
 from drone_sim.ros.cockpit.choice import Choice
 from drone_sim.ros.cockpit.commanding import Commanding
 from drone_sim.ros.cockpit.editing import Editing
 from drone_sim.ros.cockpit.flying import Flying
 from drone_sim.ros.cockpit.found import Found, find
-from drone_sim.ros.cockpit.gate import Gate
+from drone_sim.ros.cockpit.happenings import Happenings
 from drone_sim.ros.cockpit.hearing import Hearing
-from drone_sim.ros.cockpit.page import Page
+from drone_sim.ros.cockpit.lessons import Lessons
 from drone_sim.ros.cockpit.panel import Panel
 from drone_sim.ros.cockpit.scene_view import SceneView
+from drone_sim.ros.cockpit.serving import Serving
+from drone_sim.ros.cockpit.settings import Settings
 from drone_sim.ros.cockpit.shelf import Shelf
 from drone_sim.ros.cockpit.sight import Sight
-from drone_sim.ros.cockpit.simulator import Simulator
+from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.sunlight import Sunlight
+from drone_sim.ros.cockpit.windows import Windows
 from drone_sim.ros.cockpit.wire import Wire
-from drone_sim.ros.node.starting import init_node, reported
 
-_NAME = "cockpit"
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
+_NO_SCENE = "none"  # as the launch file says it
 _PERIOD = 0.05  # s between two looks: 20 a second
 _ASKING = 2.0  # s between two questions to the master
 
@@ -46,9 +41,9 @@ _ASKING = 2.0  # s between two questions to the master
 class Cockpit:
     """One page for one simulation. While no browser is open, it listens to nothing."""
 
-    def __init__(self) -> None:
-        """Serve; init_node must have been called. Raises AddressError where nothing can listen."""
-        self._simulator = Simulator(rospy.get_param("~simulator", "drone_sim"))
+    def __init__(self, settings: Settings, serving: Serving):
+        """Fill what is served."""
+        self._simulator = Simulator(settings.simulator)
         self._found = Found()
         self._view: SceneView | None = None
         self._hearing: Hearing | None = None
@@ -56,14 +51,10 @@ class Cockpit:
         self._commanding = Commanding()
         self._sight, self._choice = Sight(), Choice()
         flying = Flying(self._commanding.send)
-        shelf = Shelf(Path(rospy.get_param("~scripts", "~/drone_sim")).expanduser())
-        answers = {**Editing(shelf, self._simulator).answers, "let go": self._let_go, "spare": self._spare}
-        self._wire = Wire(flying, answers)
-        token = secrets.token_urlsafe(16)
-        gate = Gate(token, Page(), self._wire.serve)
-        host, port = free_place(rospy.get_param("~address", "127.0.0.1"), rospy.get_param("~port", 8080))
-        with gate.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
-            self._server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
+        shelf, lessons = Shelf(settings.scripts), Lessons()
+        editing = Editing(shelf, lessons, self._simulator, Happenings(self._simulator.node))
+        self._wire = Wire(flying, {**editing.answers, "let go": self._let_go, "spare": self._spare})
+        self._server = serving.server
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._server.scene.set_up_direction("+z")
         self._server.scene.set_background_image(_sky())
@@ -71,8 +62,10 @@ class Cockpit:
         panel = self._server.gui.main_panel
         panel.dock_right()
         panel.set_width(_WIDTH)
-        self.address, self.address_elsewhere = urls(host, self._server.get_port(), token)
-        self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight, self._choice)
+        self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight, self._choice, self._wire)
+        self._windows = Windows(self._simulator.node, self._panel.cameras, self._wire)
+        self._wire.answer_also(self._windows.answers)
+        serving.begin(self._wire.serve, lessons.picture)
         threading.Thread(target=flying.watch, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
 
     def run(self) -> None:
@@ -118,6 +111,7 @@ class Cockpit:
         self._view = SceneView(self._server.scene, namespace, self._sun, self._choice) if namespace else None
         self._hearing = Hearing(self._simulator.node, self._panel, self._wire) if namespace else None
         self._panel.cameras.rest(not namespace)
+        self._windows.listen(bool(namespace))
         if not namespace:
             self._panel.plots.follow("")
             self._panel.tuning.follow("")
@@ -134,12 +128,13 @@ class Cockpit:
     def _ask_master(self) -> None:
         try:
             self._found = find(rospy.get_published_topics())
-        except (OSError, rosgraph.MasterException):
-            self._found = Found()
+            scene = str(self._simulator.parameter("scene_file", "") or _NO_SCENE)
+        except FAILURES:  # another master may come
+            self._found, scene = Found(), ""
         if not self._found.namespace:
             self._panel.show_state("no simulation")
         scenes = tuple(f"package://drone_sim/config/scenes/{one.name}" for one in _scenes())
-        self._panel.offer(self._found, ("", *scenes), str(self._simulator.parameter("scene_file", "")))
+        self._panel.offer(self._found, (_NO_SCENE, *scenes), scene)
 
 
 def _sky() -> np.ndarray:
@@ -150,21 +145,3 @@ def _sky() -> np.ndarray:
 
 def _scenes() -> list[Path]:
     return sorted((package_path() / "config" / "scenes").glob("*.yaml"))
-
-
-def main() -> int:
-    """Serve until the node ends; return the exit status."""
-    return reported(_NAME, _serve)
-
-
-def _serve() -> Any:
-    if not init_node(_NAME):
-        return 1
-    cockpit = Cockpit()
-    elsewhere = f" (on other machines: {cockpit.address_elsewhere} )" if cockpit.address_elsewhere else ""
-    rospy.loginfo(f"the cockpit is at {cockpit.address}{elsewhere}")
-    return cockpit.run()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 _VIEW, _ODOMETRY = "/view/bodies", "/odom"
-_PICTURES = "sensor_msgs/CompressedImage"
+_PICTURES, _COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
+_TRANSPORT = "/compressed"
+
+
+class Source(NamedTuple):
+    """A topic of pictures, and where they come compressed, '' where they do not."""
+
+    topic: str
+    compressed: str = ""
 
 
 class Found(NamedTuple):
-    """Namespace of what is shown ('' where there is no simulation), vehicles, and their compressed cameras' topics."""
+    """Namespace of what is shown ('' where there is no simulation), vehicles, and all topics of pictures."""
 
     namespace: str = ""
     vehicles: tuple[str, ...] = ()
-    cameras: tuple[str, ...] = ()
+    cameras: tuple[Source, ...] = ()
 
 
 def find(topics: Iterable[tuple[str, str]]) -> Found:
@@ -25,5 +33,16 @@ def find(topics: Iterable[tuple[str, str]]) -> Found:
         return Found()
     vehicles = [name.removesuffix(_ODOMETRY).lstrip("/") for name in kinds if name.endswith(_ODOMETRY)]
     own = [name for name in sorted(vehicles) if f"/{name}/propellers" in kinds]
-    cameras = [name for name, kind in sorted(kinds.items()) if kind == _PICTURES]
-    return Found(sorted(views)[0], tuple(own), tuple(cameras))
+    return Found(sorted(views)[0], tuple(own), tuple(_cameras(kinds)))
+
+
+def _cameras(kinds: Mapping[str, str]) -> Iterator[Source]:
+    """Yield each topic of pictures once, however many transports it has."""
+    packed = {
+        name.removesuffix(_TRANSPORT): name
+        for name, kind in kinds.items()
+        if kind == _COMPRESSED and name.endswith(_TRANSPORT)
+    }
+    plain = {name for name, kind in kinds.items() if kind == _PICTURES}
+    for name in sorted(packed.keys() | plain):
+        yield Source(name, packed.get(name, ""))

@@ -27,6 +27,7 @@ class Frames:
         self._lock = threading.Lock()
         self._nodes: dict[str, Any] = {}
         self._names: dict[str, str] = {}
+        self._places: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}  # position and wxyz of nodes
         self._axes = False
         self.new = False  # whether the tree has grown since somebody asked
 
@@ -43,19 +44,25 @@ class Frames:
             self._heard, self._changed = {}, set()
         for node in sorted(self._nodes.values(), key=lambda one: -one.name.count("/")):  # what hangs on others first
             node.remove()
-        self._nodes, self._names = {}, {}
+        self._nodes, self._names, self._places = {}, {}, {}
 
     def show(self) -> None:
         """Put into the scene what has changed."""
         with self._lock:
-            changed = {frame: self._heard[frame] for frame in self._changed}
-            self._changed.clear()
             parents = {frame: parent for frame, (parent, _) in self._heard.items()}
+            known = {frame for frame in self._changed if frame in self._nodes or _is_rooted(frame, parents)}
+            changed = {frame: self._heard[frame] for frame in known}
+            self._changed -= known
         for frame, (_, transform) in changed.items():
             at, turn = transform.translation, transform.rotation
             node = self._nodes.get(frame) or self._make(frame, parents)
-            node.position = at.x, at.y, at.z
-            node.wxyz = turn.w, turn.x, turn.y, turn.z
+            position, wxyz = self._places.get(frame, ((), ()))
+            now = (at.x, at.y, at.z), (turn.w, turn.x, turn.y, turn.z)
+            if now[0] != position:
+                node.position = now[0]
+            if now[1] != wxyz:
+                node.wxyz = now[1]
+            self._places[frame] = now
 
     def _make(self, frame: str, parents: dict[str, str]) -> Any:
         self._names[frame] = name = _path(frame, parents)
@@ -94,11 +101,19 @@ class Frames:
             return sorted(frame for frame in self._heard if frame.endswith(_OPTICAL))
 
 
+def _is_rooted(frame: str, parents: dict[str, str]) -> bool:
+    """Tell whether all parents of a frame are known, up to the root: only then has it a place, and a name."""
+    for _ in range(len(parents) + 1):
+        if frame == ROOT:
+            return True
+        frame = parents.get(frame, "")
+    return False
+
+
 def _path(frame: str, parents: dict[str, str]) -> str:
-    """Return a frame's name in the scene, below those of its parents; a loop among them ends it."""
+    """Return a rooted frame's name in the scene, below those of its parents."""
     names: list[str] = []
-    here: str | None = frame
-    while here and here != ROOT and here not in names:
-        names.append(here)
-        here = parents.get(here)
+    while frame != ROOT:
+        names.append(frame)
+        frame = parents[frame]
     return "/frames/" + "/".join(name.replace("/", "_") for name in reversed(names))

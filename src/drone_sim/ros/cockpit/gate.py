@@ -20,6 +20,7 @@ from drone_sim.ros.cockpit.page import Page
 
 WIRE = "drone_sim"  # the subprotocol of our own socket; the scene's is viser's
 _SCENE = "/scene/"  # where viser's page is
+_LARGEST = 8 << 20  # bytes of a message from a browser: a script, with all that JSON makes longer
 _REFUSED = "The cockpit opens with the address that the simulation has printed: it ends in ?token=..."
 _SAFE = {
     "Referrer-Policy": "no-referrer",
@@ -62,7 +63,7 @@ class Gate:
                 port,
                 process_request=lambda connection, request: self._answer(connection, request, scene_page),
                 select_subprotocol=lambda connection, offered: WIRE if WIRE in offered else choose(connection, offered),
-                **options,
+                **{**options, "max_size": _LARGEST},
             )
 
         return guarded

@@ -6,6 +6,7 @@ from typing import Any
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from dynamic_reconfigure.msg import Config
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import String
 
@@ -27,6 +28,7 @@ class Hearing:
             ("/rosout_agg", Log, self._on_log),
             ("/diagnostics", DiagnosticArray, self._on_diagnostics),
             (f"{node}/state", String, lambda message: panel.show_state(message.data)),
+            (f"{node}/parameter_updates", Config, panel.pace.hear),
         )
         self._listening = [rospy.Subscriber(*one, queue_size=20) for one in heard]
 
@@ -44,6 +46,12 @@ class Hearing:
             self._wire.tell({"failure": failure._asdict()})
 
     def _on_diagnostics(self, message: Any) -> None:
-        wrong = [one for one in message.status if one.level != DiagnosticStatus.OK]
-        lines = [f"{one.name.rpartition(': ')[2]}: {one.message}" for one in wrong]
-        self._panel.diagnose("\n".join(lines) or "nothing is wrong")
+        own = f"{self._node.strip('/')}: "
+        found = {one.name.removeprefix(own): one for one in message.status if one.name.startswith(own)}
+        if not found:  # another node's
+            return
+        wrong = [f"{name}: {one.message}" for name, one in found.items() if one.level != DiagnosticStatus.OK]
+        fine = [f"{name}: {one.message}" for name, one in found.items() if one.level == DiagnosticStatus.OK]
+        self._panel.diagnose([*(wrong or ["nothing is wrong"]), "", *fine])
+        values = {one.key: one.value for one in found["simulation"].values} if "simulation" in found else {}
+        self._panel.pace.show_reached(values.get("real-time factor", ""))

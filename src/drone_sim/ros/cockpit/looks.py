@@ -34,6 +34,21 @@ def show(scene: Any, name: str, marker: Marker, casts: bool = False) -> Any:
     return make(scene, name, marker) if make else None
 
 
+def change(handle: Any, marker: Marker) -> bool:
+    """Give what `show` returned other points or other words; tell whether that is possible for a marker of its kind.
+
+    A browser does so at once, where it would make something new in several steps.
+    """
+    if marker.type == Marker.TEXT_VIEW_FACING:
+        handle.text = marker.text
+        return True
+    ends = _ENDS[marker.type](marker) if marker.type in _ENDS else None
+    if ends is None:
+        return False
+    handle.points = ends
+    return True
+
+
 def place(marker: Marker) -> dict[str, tuple[float, ...]]:
     """Return position (m) and orientation (wxyz) of a marker in its frame."""
     at, turn = marker.pose.position, marker.pose.orientation
@@ -80,17 +95,22 @@ def _arrow(scene: Any, name: str, marker: Marker) -> Any:
     return scene.add_arrows(name, points=ends[None], colors=_rgb(marker.color), **look, **place(marker))
 
 
-def _line_strip(scene: Any, name: str, marker: Marker) -> Any:
+def _strip_ends(marker: Marker) -> np.ndarray | None:
+    """Return the ends of lines from each point to the next, (n, 2, 3), None where there are none."""
     points = _points(marker)
-    return _lines(scene, name, marker, np.stack((points[:-1], points[1:]), axis=1)) if len(points) > 1 else None
+    return np.stack((points[:-1], points[1:]), axis=1) if len(points) > 1 else None
 
 
-def _line_list(scene: Any, name: str, marker: Marker) -> Any:
+def _list_ends(marker: Marker) -> np.ndarray | None:
+    """Return the ends of lines between points two by two, (n, 2, 3), None where there are none."""
     points = _points(marker)
-    return _lines(scene, name, marker, points[: len(points) // 2 * 2].reshape(-1, 2, 3)) if len(points) > 1 else None
+    return points[: len(points) // 2 * 2].reshape(-1, 2, 3) if len(points) > 1 else None
 
 
-def _lines(scene: Any, name: str, marker: Marker, ends: np.ndarray) -> Any:
+def _lines(scene: Any, name: str, marker: Marker) -> Any:
+    ends = _ENDS[marker.type](marker)
+    if ends is None:
+        return None
     return scene.add_line_segments(name, points=ends, colors=_rgb(marker.color), line_width=_PIXELS, **place(marker))
 
 
@@ -199,10 +219,11 @@ def _points(marker: Marker) -> np.ndarray:
     return np.array([(one.x, one.y, one.z) for one in marker.points], dtype=float).reshape(-1, 3)
 
 
+_ENDS = {Marker.LINE_STRIP: _strip_ends, Marker.LINE_LIST: _list_ends}
 _MAKERS = {
     Marker.ARROW: _arrow,
-    Marker.LINE_STRIP: _line_strip,
-    Marker.LINE_LIST: _line_list,
+    Marker.LINE_STRIP: _lines,
+    Marker.LINE_LIST: _lines,
     Marker.CUBE_LIST: _point_cloud,
     Marker.SPHERE_LIST: _point_cloud,
     Marker.POINTS: _point_cloud,

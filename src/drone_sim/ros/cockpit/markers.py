@@ -20,9 +20,14 @@ _DIGITS = 2  # of a size in m
 _SHADES = 1  # digits of a colour
 
 
+class _Look(NamedTuple):
+    kind: bytes
+    form: bytes  # points and words, which may change in place
+
+
 class _Shown(NamedTuple):
     handle: Any  # None where there is nothing to see
-    look: bytes
+    look: _Look
     marker: Marker
 
 
@@ -88,11 +93,8 @@ class Markers:
 
     def _put(self, key: _Key, marker: Marker) -> None:
         before, look = self._shown.get(key), _look(marker)
-        if before is not None and before.look == look:
-            if before.handle is not None and before.marker.pose != marker.pose:
-                place = looks.place(marker)
-                before.handle.position, before.handle.wxyz = place["position"], place["wxyz"]
-            self._shown[key] = before._replace(marker=marker)
+        if before is not None and self._change(before, look, marker):
+            self._shown[key] = before._replace(look=look, marker=marker)
             return
         parent = self._frames.name(marker.header.frame_id)
         if parent is None:
@@ -108,21 +110,39 @@ class Markers:
             self._on_new(marker, handle)
         self._shown[key] = _Shown(handle, look, marker)
 
+    @staticmethod
+    def _change(before: _Shown, look: _Look, marker: Marker) -> bool:
+        """Show a marker by what is there already; tell whether that was possible."""
+        same = before.look == look
+        if before.handle is None or before.look.kind != look.kind:
+            return same
+        if not (same or looks.change(before.handle, marker)):
+            return False
+        if before.marker.pose != marker.pose:
+            place = looks.place(marker)
+            before.handle.position, before.handle.wxyz = place["position"], place["wxyz"]
+        return True
+
     def _remove(self, key: _Key) -> None:
         gone = self._shown.pop(key, None)
         if gone is not None and gone.handle is not None:
             gone.handle.remove()
 
 
-def _look(marker: Marker) -> bytes:
+def _look(marker: Marker) -> _Look:
     """Return what differs between two markers that look different; their poses, times and ids do not.
 
     Colours and sizes that nobody could tell apart are the same: what is made anew is gone for a moment.
     """
     bare = copy.copy(marker)
-    bare.header, bare.pose = Header(frame_id=marker.header.frame_id), Pose()
+    bare.header, bare.pose, bare.points, bare.text = Header(frame_id=marker.header.frame_id), Pose(), [], ""
     bare.scale = Vector3(*(round(value, _DIGITS) for value in (marker.scale.x, marker.scale.y, marker.scale.z)))
     bare.colors = [ColorRGBA(*(round(value, _SHADES) for value in (c.r, c.g, c.b, c.a))) for c in marker.colors]
+    form = Marker(points=marker.points, text=marker.text)
+    return _Look(_bytes(bare), _bytes(form))
+
+
+def _bytes(marker: Marker) -> bytes:
     data = io.BytesIO()
-    bare.serialize(data)
+    marker.serialize(data)
     return data.getvalue()

@@ -9,18 +9,29 @@ from drone_sim.ros.cockpit.cameras import Cameras
 from drone_sim.ros.cockpit.choice import Choice
 from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
 from drone_sim.ros.cockpit.found import Found
+from drone_sim.ros.cockpit.pace import Pace
 from drone_sim.ros.cockpit.plots import Plots
-from drone_sim.ros.cockpit.simulator import Simulator
+from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.tuning import Tuning
+from drone_sim.ros.cockpit.wire import Wire
+from drone_sim.ros.cockpit.words import Words
 
-_LINES = 12  # of the log that are shown
+_LINES = 50  # of the log that are shown
 
 
 class Panel:
     """Buttons that call the simulation's services, and what it says."""
 
-    def __init__(self, gui: Any, simulator: Simulator, commanding: Commanding, eyes: sight.Sight, choice: Choice):
-        """Draw it."""
+    def __init__(
+        self,
+        gui: Any,
+        simulator: Simulator,
+        commanding: Commanding,
+        eyes: sight.Sight,
+        choice: Choice,
+        wire: Wire,
+    ):
+        """Draw it; `wire` takes pictures to the browsers."""
         self._gui = gui
         self._simulator = simulator
         self._commanding = commanding
@@ -35,14 +46,14 @@ class Panel:
         with tabs.add_tab("View"):
             self._view(eyes)
         with tabs.add_tab("Cameras"):
-            self.cameras = Cameras(gui)
+            self.cameras = Cameras(gui, wire)
         with tabs.add_tab("Plots"):
             self.plots = Plots(gui)
         with tabs.add_tab("Tune"):
             self.tuning = Tuning(gui, self.say)
         with tabs.add_tab("Log"):
-            self._log = gui.add_text("Log", "", disabled=True, multiline=True)
-            self._diagnosis = gui.add_text("Why", "", disabled=True, multiline=True)
+            self._diagnosis = Words(gui, "Diagnosis")
+            self._log = Words(gui, "Log")
 
     def _toolbar(self) -> None:
         gui = self._gui
@@ -50,6 +61,7 @@ class Panel:
         run.on_click(lambda event: self._call(event.target.value))
         stand = gui.add_button_group("Stand still", ("pause", "go on", "step"))
         stand.on_click(lambda event: self._stand(event.target.value))
+        self.pace = Pace(gui, self._simulator.node, self.say)
         keep = gui.add_button_group("Remember", ("snapshot", "restore"))
         keep.on_click(lambda event: self._call(event.target.value))
         self._scene = gui.add_dropdown("Scene", ("",))
@@ -82,7 +94,11 @@ class Panel:
     def _load(self, event: Any) -> None:
         if event.client is None:  # the server itself has set it
             return
-        self._simulator.set_parameter("scene_file", event.target.value)
+        try:
+            self._simulator.set_parameter("scene_file", event.target.value)
+        except FAILURES as error:
+            self.say(f"load_scene: failed: {' '.join(str(error).split())}")
+            return
         self._call("load_scene")
 
     # ---- what is said
@@ -99,12 +115,11 @@ class Panel:
     def log(self, line: str) -> None:
         """Add a line to the log."""
         self._lines = [*self._lines[1 - _LINES :], line]
-        self._log.value = "\n".join(self._lines)
+        self._log.show(self._lines)
 
-    def diagnose(self, text: str) -> None:
+    def diagnose(self, lines: list[str]) -> None:
         """Show what /diagnostics says."""
-        if self._diagnosis.value != text:
-            self._diagnosis.value = text
+        self._diagnosis.show(lines)
 
     def offer_sights(self, choices: tuple[str, ...]) -> None:
         """Offer where to look from."""

@@ -15,7 +15,7 @@ from std_msgs.msg import Float32MultiArray
 from drone_sim.mechanics import frames
 
 _KEPT = 600  # steps: half a minute
-_EVERY = 5  # ticks between two drawings
+_EVERY = 10  # ticks between two drawings, each of which sends 70 kB
 _SCALES = {"x": {"time": False, "auto": True}, "y": {"auto": True}}
 _COLORS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd")
 _CHARTS = {
@@ -81,7 +81,7 @@ class Plots:
             self._rows.append(row)
 
     def show(self) -> None:
-        """Draw what has come, a few times a second."""
+        """Draw what has come, twice a second."""
         self._ticks += 1
         if self._ticks % _EVERY:
             return

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import http.client
 import re
 import threading
+import xmlrpc.client
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import rosgraph
 import rospy
 from std_srvs.srv import SetBool, Trigger
 
-FAILURES = (rospy.ServiceException, rospy.ROSException, rospy.exceptions.ROSInternalException, OSError)
+FAILURES = (  # what calls raise where the node, or the master, is gone or refuses
+    rospy.ServiceException,
+    rospy.ROSException,
+    rospy.exceptions.ROSInternalException,
+    rosgraph.MasterException,
+    http.client.HTTPException,
+    xmlrpc.client.Error,
+    OSError,
+)
 _ERROR = re.compile(r"\[(\w+)\] (.+?):(\d+): (.*)", re.DOTALL)
 
 
@@ -44,11 +55,11 @@ class Simulator:
         threading.Thread(target=lambda: then(*self.call(service, *request)), name=service, daemon=True).start()
 
     def parameter(self, name: str, default: Any = None) -> Any:
-        """Return a parameter of the node."""
+        """Return a parameter of the node. Raises one of `FAILURES`."""
         return rospy.get_param(f"{self.node}/{name}", default)
 
     def set_parameter(self, name: str, value: Any) -> None:
-        """Set a parameter of the node, which it reads when a service says so."""
+        """Set a parameter of the node, which it reads when a service says so. Raises one of `FAILURES`."""
         rospy.set_param(f"{self.node}/{name}", value)
 
 

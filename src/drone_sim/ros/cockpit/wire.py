@@ -1,8 +1,9 @@
-"""Our own socket: held keys, and the script editor. Messages are JSON; every question has an `id`, and one answer."""
+"""Our own socket: held keys, script editor, windows. Messages are JSON; every question has an `id`, and one answer."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import itertools
 import json
 from collections.abc import Callable, Mapping
@@ -12,8 +13,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
 from drone_sim.ros.cockpit.flying import Flying, read_command
-
-_BUSY = 32  # messages to a browser that does not take them, after which the oldest go
+from drone_sim.ros.cockpit.outbox import Outbox
 
 Answer = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 
@@ -26,14 +26,18 @@ class Wire:
         self._flying = flying
         self._answers = answers
         self._numbers = itertools.count()
-        self._out: dict[int, tuple[asyncio.AbstractEventLoop, asyncio.Queue[str]]] = {}
+        self._out: dict[int, tuple[asyncio.AbstractEventLoop, Outbox]] = {}
+
+    def answer_also(self, answers: Mapping[str, Answer]) -> None:
+        """Answer other questions, too."""
+        self._answers = {**self._answers, **answers}
 
     async def serve(self, connection: ServerConnection) -> None:
         """Talk with one browser until it goes."""
         browser = next(self._numbers)
-        queue: asyncio.Queue[str] = asyncio.Queue()
-        self._out[browser] = asyncio.get_running_loop(), queue
-        sending = asyncio.create_task(_send_from(queue, connection))
+        box = Outbox()
+        self._out[browser] = asyncio.get_running_loop(), box
+        sending = asyncio.create_task(_send_from(box, connection))
         try:
             async for text in connection:
                 await self._take(browser, text, connection)
@@ -47,8 +51,28 @@ class Wire:
     def tell(self, message: Mapping[str, Any]) -> None:
         """Send something to all browsers; any thread may call."""
         text = json.dumps(message)
-        for loop, queue in list(self._out.values()):
-            loop.call_soon_threadsafe(_offer, queue, text)
+        self._leave(lambda box: box.put(text))
+
+    def wants_picture(self, name: str) -> bool:
+        """Whether any browser has shown the last picture of that name; any thread may call."""
+        return any(box.wants(name) for _, box in list(self._out.values()))
+
+    def show_picture(self, said: Mapping[str, str], content: bytes) -> None:
+        """Send a picture to all browsers that have shown the last one of its name; any thread may call.
+
+        `said` has its name as `picture`, and what else the page is to know of it; `content` is a JPEG or PNG.
+        """
+        picture = json.dumps(said).encode() + b"\n" + content
+        self._leave(lambda box: box.put_picture(said["picture"], picture))
+
+    def close_picture(self, name: str) -> None:
+        """Send no more of that name; any thread may call."""
+        self._leave(lambda box: box.forget(name))
+
+    def _leave(self, leave: Callable[[Outbox], None]) -> None:
+        for loop, box in list(self._out.values()):
+            with contextlib.suppress(RuntimeError):  # the server ends, and its loop with it
+                loop.call_soon_threadsafe(leave, box)
 
     async def _take(self, browser: int, text: str | bytes, connection: ServerConnection) -> None:
         try:
@@ -57,6 +81,9 @@ class Wire:
                 raise ValueError("a message must be a mapping")
             if "hold" in message:
                 self._flying.hold(browser, read_command(message["hold"]))
+                return
+            if "shown" in message:
+                self._out[browser][1].shown(str(message["shown"]))
                 return
             ask = self._answers.get(message.get("ask", ""))
             if ask is None:
@@ -74,15 +101,9 @@ def _answered(ask: Answer, message: Mapping[str, Any]) -> str:
         return json.dumps({"id": message.get("id"), "error": " ".join(str(error).split())})
 
 
-async def _send_from(queue: asyncio.Queue[str], connection: ServerConnection) -> None:
+async def _send_from(box: Outbox, connection: ServerConnection) -> None:
     try:
         while True:
-            await connection.send(await queue.get())
+            await connection.send(await box.take())
     except ConnectionClosed:
         return
-
-
-def _offer(queue: asyncio.Queue[str], text: str) -> None:
-    while queue.qsize() >= _BUSY:
-        queue.get_nowait()
-    queue.put_nowait(text)

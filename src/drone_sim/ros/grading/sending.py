@@ -56,6 +56,11 @@ class Sender:
             _, publisher, message = self._left.pop(0)
             publisher.publish(message)
 
+    def close(self) -> None:
+        """Advertise no more."""
+        for one in self._publishers:
+            one.unregister()
+
 
 def entries_of(timeline: Timeline, wanted: Parameters, there: Parameters) -> list[Entry]:
     """Return what brings a seed's places and wind about at the beginning, and then the timeline's entries.

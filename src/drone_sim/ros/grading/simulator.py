@@ -8,12 +8,14 @@ from typing import Any
 
 import rosgraph
 import rospy
+from dynamic_reconfigure.encoding import decode_config
+from dynamic_reconfigure.msg import Config
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from drone_sim.grading.plan import Plan
-from drone_sim.ros.node.starting import parameters_of, use_sim_time
+from drone_sim.ros.node.given import parameters_of, use_sim_time
 from drone_sim.run.parameters import Parameters
 from drone_sim.wording import shown
 
@@ -57,7 +59,7 @@ class Simulator:
             raise Unfit("grading goes by simulated time: start the simulator with use_sim_time:=true")
         wanted = plan.parameters()
         running = parameters_of(self.name, scene_file=wanted.scene_file)
-        if not running.real_time_factor and plan.timeline:
+        if plan.timeline and not self._factor():
             raise Unfit("real_time_factor = 0: a timeline by topics comes too late without a pace; 1 to 5 is well")
         found = [one for one in _differences(wanted.model_dump(), running.model_dump(), ()) if one]
         if found:
@@ -65,6 +67,14 @@ class Simulator:
             told = "; ".join(found[:_MOST])
             raise Unfit(f"the simulator flies with other parameters than the plan: {told}{more}; see its config:=")
         return running
+
+    def _factor(self) -> float:
+        """Return the real-time factor in force, which the parameters of its start do not know. Raises Unfit."""
+        try:
+            message = rospy.wait_for_message(f"{self.name}/parameter_updates", Config, self._patience)
+        except rospy.ROSException:
+            raise Unfit(f"no simulator {self.name} says at what real_time_factor it goes") from None
+        return float(decode_config(message)["real_time_factor"])
 
     def start(self, scene: str) -> None:
         """Start anew, in the scene of a file, '' for that of the parameters. Raises Unfit."""

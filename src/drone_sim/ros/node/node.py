@@ -22,19 +22,23 @@ from drone_sim.mechanics.frames import position, to_euler
 from drone_sim.remote import outside
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.ending import Ending
+from drone_sim.ros.node.given import read_parameters, use_sim_time
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.launch_arguments import check_launch_arguments
 from drone_sim.ros.node.master_watch import MasterWatch
 from drone_sim.ros.node.services import Services
-from drone_sim.ros.node.starting import init_node, read_parameters, reported, use_sim_time
+from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.ros.node.step_time import StepTime
+from drone_sim.ros.node.windows import WindowTopics
 from drone_sim.ros.rviz.handles import Handles
 from drone_sim.ros.rviz.object_handles import ObjectHandles
 from drone_sim.ros.rviz.rviz_view import RvizView
 from drone_sim.ros.vehicle.fleet_topics import FleetTopics
 from drone_sim.ros.vehicle.script_topics import RosBackend
+from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.run.diagnosis.diagnosis import Diagnosis
 from drone_sim.run.guardian import Guardian
+from drone_sim.run.pace import Pace, period
 from drone_sim.run.pacing import Beat, Pacer
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.player import Player
@@ -68,12 +72,13 @@ class Node:
         self.player = Player(self.simulation, self._step_and_show, self._state.publish, self._time.simulated)
         self._inbox = Inbox()
         self._outside = outside.let_in(parameters.remote_api, self.player, backend)
-        factor = parameters.real_time_factor
-        self._pacer = Pacer(parameters.time_step / factor if factor else 0.0, sleep=self._outside.wait)
+        self._pacer = Pacer(period(parameters), sleep=self._outside.wait)
         if self._outside.address:
             self._inbox.sleep_by(self._outside.wait, self._outside.wake)
         self._topics = FleetTopics(self.simulation, self._inbox)
+        self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
+        self._windows = WindowTopics(self.simulation, self._inbox)
         self._handles = Handles(self.simulation, self._inbox)
         self._object_handles = ObjectHandles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
@@ -107,8 +112,7 @@ class Node:
         while not over():
             began = time.monotonic()
             if self._goes():
-                self._wait(over)
-                steps += self.step()
+                steps += self._wait(over) and self.step()
                 seconds += time.monotonic() - began
             else:
                 self._stand()
@@ -118,13 +122,19 @@ class Node:
         late = f"{self._pacer.overruns} late steps, by {self._pacer.worst * 1e3:.0f} ms at most"
         rospy.loginfo(f"drone_sim: flew {flown:.2f} s at {factor}, {late}")
 
-    def _wait(self, over: Callable[[], bool]) -> None:
+    def _wait(self, over: Callable[[], bool]) -> bool:
+        """Wait until the next step is due; return whether it still is to be run."""
         if self.player.begun:  # reading scene and script took its time, which no step is late for
             self.player.begun = False
             self._pacer.restart()
+        if self._pacer.is_far:  # at such a pace, who asks for something is not to wait for the step
+            self._inbox.wait(_SOON)
+            self._take_in()
+            return False
         late = self._pacer.wait(over)
         if late:
             rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
+        return True
 
     def _goes(self) -> bool:
         return self.player.playing and not self._outside.holds
@@ -138,9 +148,12 @@ class Node:
 
     def step(self) -> bool:
         """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
+        self._take_in()
+        return self._goes() and self.player.step()
+
+    def _take_in(self) -> None:
         self._inbox.empty()
         self._outside.serve()
-        return self._goes() and self.player.step()
 
     def _step_and_show(self) -> None:
         self._time.begin()
@@ -200,6 +213,7 @@ class Node:
         self._handles.update()
         self._object_handles.update()
         self._view.update()
+        self._windows.update(self._time.stamp)
         if self._parameters.gui:
             track = self.simulation.drone.track
             self.simulation.world.look_from_behind(position(track), to_euler(track)[2])

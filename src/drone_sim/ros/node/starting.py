@@ -1,4 +1,4 @@
-"""What may be wrong before a node runs: the environment, the master, the parameters. Each gets one line."""
+"""What may be wrong before a node runs: the environment, the master. Each gets one line."""
 
 from __future__ import annotations
 
@@ -14,11 +14,7 @@ from urllib.parse import urlsplit
 import rosgraph
 import rospy
 
-from drone_sim.ros.node.paths import from_shell
-from drone_sim.run import parameters as parameters_module
-from drone_sim.run.parameters import ParameterError, Parameters
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.load import script_path
 
 _MASTER_GONE = (ConnectionError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
 _EXPECTED = (ScriptError, ValueError, RuntimeError, OSError, rospy.ROSException)  # their messages are for the user
@@ -82,33 +78,3 @@ def reported(name: str, action: Callable[[], Any]) -> int:
         said = str(error)
     rospy.logfatal(f"{name}: {' '.join(said.split())}")
     return 1
-
-
-def read_parameters() -> Parameters:
-    """Return the node's private parameters. Raises ParameterError, and ScriptError for a script that is not there."""
-    parameters = parameters_of(rospy.get_name())
-    script_path(parameters.script)  # a file that is not there ends the node; an error in one that is stops the flight
-    return parameters
-
-
-def parameters_of(name: str, **others: Any) -> Parameters:
-    """Return the private parameters of the simulator that has this name, `others` in place of some.
-
-    Raises ParameterError.
-    """
-    given: dict[str, Any] = rospy.get_param(name, {})
-    if not isinstance(given, dict):
-        raise ParameterError(f"parameter {name} = {str(given)[:80]}: must hold parameters, such as {name}/script")
-    for key in ("config", "script", "scene_file"):
-        if isinstance(given.get(key), str):
-            names = given[key].split(",") if key == "config" else [given[key]]
-            given[key] = ",".join(map(from_shell, names))
-    return parameters_module.load({**given, **others})
-
-
-def use_sim_time() -> bool:
-    """Return ROS's parameter /use_sim_time. Raises ParameterError."""
-    given = rospy.get_param("/use_sim_time", False)
-    if not isinstance(given, bool):
-        raise ParameterError(f"parameter /use_sim_time = {str(given)[:80]}: must be true or false")
-    return given

@@ -24,6 +24,7 @@ from drone_sim.vehicles.vehicle import Vehicle
 _ABOVE_FLOOR = 0.004  # m, so that the shadow is not hidden by it
 _SHADOW = 0.24, 0.05  # m, its radius, and what a metre of height adds to it
 _DARK = 0.55  # opacity of the shadow's middle
+_MILLIMETRES = 3  # digits: what hovers looks the same from step to step, and is drawn once
 _RIM = 24  # corners
 _TICK = 0.5  # m
 _TICKS = 40
@@ -61,15 +62,24 @@ class CommandMarkers:
         """Advertise."""
         self._simulation = simulation
         self._topic = MarkerTopic(f"{namespace(simulation)}/view/command", EYES)
-        self._shown: list[tuple[Twist, frames.Matrix, State]] = []
+        self._shown: list[_Told | None] = []
 
     def update(self) -> None:
         """Publish commands and places where they have changed, if anybody listens."""
         vehicles = self._simulation.vehicles.values()
-        seen = [(vehicle.command, vehicle.track, vehicle.state) for vehicle in vehicles]
+        seen = [_told(vehicle) for vehicle in vehicles]
         if seen != self._shown and self._topic.due():
             self._shown = seen
             self._topic.show([marker for vehicle in vehicles for marker in _commanded(vehicle)])
+
+
+_Told = tuple[Twist, frames.Matrix, State]
+
+
+def _told(vehicle: Vehicle) -> _Told | None:
+    """Return what its arrows are made of, None where it has none."""
+    command = vehicle.command
+    return (command, vehicle.track, vehicle.state) if any((*command.linear, command.angular[2])) else None
 
 
 class StateText:
@@ -117,7 +127,7 @@ def _text(vehicle: Vehicle, text: str) -> Marker:
 def _below(vehicle: Vehicle) -> list[Marker | None]:
     state = vehicle.state
     height = state.position[2]
-    return [_shadow(state), beside(vehicle, _plumb_line(height))] if height > 0 else [None, None]
+    return [_shadow(state), beside(vehicle, _plumb_line(round(height, _MILLIMETRES)))] if height > 0 else [None, None]
 
 
 def _commanded(vehicle: Vehicle) -> list[Marker | None]:
@@ -128,7 +138,7 @@ def _commanded(vehicle: Vehicle) -> list[Marker | None]:
 def _shadow(state: State) -> Marker:
     """Return a disc on the floor, dark in the middle, wider and paler with the height."""
     x, y, height = state.position
-    radius = _SHADOW[0] + _SHADOW[1] * height
+    radius = round(_SHADOW[0] + _SHADOW[1] * height, _MILLIMETRES)
     angles = [2 * math.pi * number / _RIM for number in range(_RIM)]
     rim = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
     points: list[Sequence[float]] = []

@@ -27,6 +27,7 @@ HOVER = 0.2  # m, an arrow of a quarter of the vehicle's weight
 LONGEST = 1.0  # m, of a contact's arrow: a crash has forces of a hundred weights
 WIND = 0.07  # m for each m/s
 _EARTH = 9.81  # m/s², the scale's where there is no gravity
+_FINE = 4  # digits of an arrow's length in m: of what hovers it stays the same, and is drawn once
 _SHORTEST = 1e-3  # m; what is shorter is not drawn
 _WIDTH, _POINT = 0.009, 0.025  # m, of a line and of a contact
 _CROSS = 0.045  # m, half a side of a lost propeller's
@@ -109,7 +110,7 @@ def _thrusts(vehicle: Vehicle, felt: _Felt, scale: float) -> Marker | None:
     points: list[Vector] = []
     colors: list[ColorRGBA] = []
     for link, thrust, share in zip(vehicle.propulsion.rotors.links, felt.thrusts, felt.effectiveness):
-        place, way = frames.position(link), _times(scale * thrust, (link[2], link[6], link[10]))
+        place, way = frames.position(link), _times(round(scale * thrust, _FINE), (link[2], link[6], link[10]))
         lines = arrow(place, way) if abs(scale * thrust) > _SHORTEST else []
         lines += [] if share else star(place, _CROSS)
         points += lines

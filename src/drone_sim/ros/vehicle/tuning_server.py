@@ -1,4 +1,4 @@
-"""dynamic_reconfigure for a vehicle: `rosrun dynamic_reconfigure dynparam set /drone Kzref 2`, and rqt_reconfigure.
+"""dynamic_reconfigure for a vehicle, or the node: `rosrun dynamic_reconfigure dynparam set /drone Kzref 2`.
 
 Of the library only its messages and their encoding are used. Its Server brings what is not allowed silently within the
 limits, takes what an earlier node has left on the parameter server, cannot change its description when a script
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Protocol
 
 import rospy
 from dynamic_reconfigure.encoding import encode_config, encode_description
@@ -19,19 +19,32 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest, Reconfigure
 from drone_sim.config.leaves import Leaf
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.vehicles.tuning_message import TOPIC
-from drone_sim.vehicles.vehicle import Vehicle
 
-_GROUPS, _REST = ("control", "weather", "faults", "cameras", "sensors", "script_parameters"), "limits"
+_GROUPS = ("control", "weather", "faults", "cameras", "sensors", "script_parameters")
 _TYPES = {float: "double", int: "int", bool: "bool", str: "str"}
 
 
-class TuningServer:
-    """`set_parameters`, `parameter_descriptions` and `parameter_updates` in the namespace of a vehicle."""
+class Tunable(Protocol):
+    """Something of which values may be changed while it runs."""
 
-    def __init__(self, vehicle: Vehicle, inbox: Inbox):
-        """Advertise, and say what there is."""
-        self._vehicle, self._inbox = vehicle, inbox
-        name = self._name = rospy.resolve_name(vehicle.name)
+    @property
+    def known(self) -> Mapping[str, Leaf]:
+        """What may be changed now, by name."""
+
+    def values(self) -> dict[str, Any]:
+        """Return what holds now, by name."""
+
+    def change(self, changes: Mapping[str, Any]) -> None:
+        """Let other values hold, by name: all, or none. Raises ParameterError."""
+
+
+class TuningServer:
+    """`set_parameters`, `parameter_descriptions` and `parameter_updates` in a namespace."""
+
+    def __init__(self, namespace: str, tuning: Tunable, inbox: Inbox, rest: str = "limits"):
+        """Advertise, and say what there is; `rest` is the group of what has none of its own."""
+        self._tuning, self._inbox, self._rest = tuning, inbox, rest
+        name = self._name = rospy.resolve_name(namespace)
         self._description, self._updates = (
             rospy.Publisher(f"{name}/{topic}", kind, queue_size=1, latch=True)
             for topic, kind in (("parameter_descriptions", ConfigDescription), (TOPIC, Config))
@@ -39,16 +52,16 @@ class TuningServer:
         self._known: dict[str, Leaf] = {}
         self._said: dict[str, Any] = {}
         self._config = Config()
-        self.follow(vehicle)
+        self.follow(tuning)
         self._service = rospy.Service(f"{name}/set_parameters", Reconfigure, self._set)
 
-    def follow(self, vehicle: Vehicle) -> None:
-        """Be the server of this vehicle from now on; say what has changed since."""
-        self._vehicle = vehicle
-        known, values = vehicle.tuning.known, vehicle.tuning.values()
+    def follow(self, tuning: Tunable) -> None:
+        """Be the server of this from now on; say what has changed since."""
+        self._tuning = tuning
+        known, values = dict(tuning.known), tuning.values()
         if known != self._known:
             self._known = known
-            self._description.publish(encode_description(_described(known, values)))
+            self._description.publish(encode_description(_described(known, values, self._rest)))
         if values != self._said:
             self._say(values)
 
@@ -77,17 +90,17 @@ class TuningServer:
 
     def _change(self, changes: Mapping[str, Any]) -> str:
         try:
-            self._vehicle.tuning.change(changes)
+            self._tuning.change(changes)
         finally:
-            self._say(self._vehicle.tuning.values())  # also what was refused: a slider goes back
+            self._say(self._tuning.values())  # also what was refused: a slider goes back
         return ""
 
 
-def _described(known: Mapping[str, Leaf], values: Mapping[str, Any]) -> SimpleNamespace:
+def _described(known: Mapping[str, Leaf], values: Mapping[str, Any], rest: str) -> SimpleNamespace:
     """Return what a module that is generated of a .cfg file holds, as far as the encoding reads it."""
     groups: dict[str, list[dict[str, Any]]] = {}
     for name, one in known.items():
-        groups.setdefault(_group(one), []).append(_parameter(name, one))
+        groups.setdefault(_group(one) or rest, []).append(_parameter(name, one))
     whole = {"name": "Default", "type": "", "id": 0, "parent": 0, "parameters": []}
     parts = [
         {"name": group, "type": "", "id": number, "parent": 0, "parameters": parameters, "groups": []}
@@ -103,7 +116,7 @@ def _described(known: Mapping[str, Leaf], values: Mapping[str, Any]) -> SimpleNa
 
 def _group(leaf: Leaf) -> str:
     first = str(leaf.location[0])
-    return first if first in _GROUPS else _REST
+    return first if first in _GROUPS else ""
 
 
 def _bound(leaf: Leaf, bound: Any) -> Any:

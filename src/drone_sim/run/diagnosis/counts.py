@@ -18,6 +18,7 @@ class Counts(NamedTuple):
     at: float  # s of real time
     run: int
     state: str
+    asked: float  # the real-time factor
     steps: int
     late: int  # steps
     pictures: int
@@ -53,6 +54,7 @@ def count(player: Player, pacer: Pacer, at: float) -> Counts:
         at=at,
         run=simulation.run,
         state=player.state,
+        asked=simulation.parameters.real_time_factor,
         steps=simulation.steps,
         late=pacer.overruns,
         pictures=vision.pictures,
@@ -65,6 +67,8 @@ def count(player: Player, pacer: Pacer, at: float) -> Counts:
 def between(before: Counts | None, now: Counts) -> Since | None:
     """Return what has been in between; None where nothing can be said of it."""
     if before is None or before.run != now.run or not 0 < now.at - before.at < _FRESH:
+        return None
+    if before.asked != now.asked:
         return None
     if (before.state, now.state) != ("flying", "flying") or now.steps < before.steps:  # a snapshot came back
         return None

@@ -19,6 +19,7 @@ from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.api.tubes import Tubes
 from drone_sim.scripting.api.turns import Turns
+from drone_sim.scripting.api.windows import Windows
 
 
 def _call(function: Callable[[], Any]) -> Any:
@@ -58,6 +59,10 @@ class Host(Protocol):
     @property
     def drawings(self) -> Drawings:
         """What is drawn, by all drones together."""
+
+    @property
+    def windows(self) -> Windows:
+        """The views, dialogs and consoles that scripts have opened."""
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m).

@@ -34,13 +34,10 @@ _PARTICLES = Group(
 _VIEWS = Group(
     "there is no window of CoppeliaSim's; rviz and rosrun drone_sim view look",
     {
-        "floatingViewAdd": HANDLE,
-        "adjustView": 0,
         "getNavigationMode": 0,
         "getPage": 0,
         "addBanner": HANDLE,
-        **_nothing("floatingViewRemove", "cameraFitToView", "setNavigationMode", "setPage", "removeBanner"),
-        **_nothing("auxiliaryConsoleClose", "auxiliaryConsoleShow", "endDialog", "refreshDialogs"),
+        **_nothing("cameraFitToView", "setNavigationMode", "setPage", "removeBanner", "refreshDialogs"),
         "announceSceneContentChange": 0,
     },
 )

@@ -37,6 +37,7 @@ from drone_sim.scripting.api.scripts import Scripts
 from drone_sim.scripting.api.sensors import Sensors
 from drone_sim.scripting.api.simulation import SimulationFunctions
 from drone_sim.scripting.api.threads import Threads
+from drone_sim.scripting.api.views import Views
 from drone_sim.scripting.api.vision import VisionSensors
 
 
@@ -59,6 +60,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         ScriptCalls(host, surroundings, names),
         SimulationFunctions(surroundings, ignored),
         Dialogs(host, ignored),
+        Views(host),
         VisionSensors(host, surroundings),
         Sensors(host),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 _KINDS = {
@@ -12,14 +13,18 @@ _KINDS = {
 }
 
 
-class Page:
-    """The files of a folder, read once."""
+Found = tuple[str, bytes] | None
 
-    def __init__(self, folder: Path = Path(__file__).parent):
+
+class Page:
+    """The files of a folder, read once, and what is found `beside` them, such as pictures."""
+
+    def __init__(self, folder: Path = Path(__file__).parent, beside: Callable[[str], Found] = lambda _: None):
         """Read them; raises OSError."""
+        self._beside = beside
         files = [file for file in sorted(folder.iterdir()) if file.suffix in _KINDS]
         self._files = {f"/{file.name}": (_KINDS[file.suffix], file.read_bytes()) for file in files}
 
-    def find(self, path: str) -> tuple[str, bytes] | None:
+    def find(self, path: str) -> Found:
         """Return the content type and the content of a path; None for what is not there."""
-        return self._files.get("/index.html" if path == "/" else path)
+        return self._files.get("/index.html" if path == "/" else path) or self._beside(path)

@@ -1,0 +1,173 @@
+"""What scripts open for a person to look at: floating views, dialogs and consoles, all of them bounded."""
+
+from __future__ import annotations
+
+import copy
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+MOST = 16  # of each kind; of more, the oldest go
+_TITLE, _TEXT, _LINE, _LINES = 200, 4000, 300, 100  # characters, and lines of a console
+
+OK = "ok"
+_Kind = TypeVar("_Kind")
+
+
+@dataclass
+class View:
+    """A picture of a vision sensor, by the name of its object; '' before a script has chosen one."""
+
+    sensor: str = ""
+    label: str = ""
+
+
+@dataclass
+class Dialog:
+    """A title, a text, buttons, and a field to write into, unless `typed` is None.
+
+    `answer` is the button that was pressed, '' before one was.
+    """
+
+    title: str
+    text: str
+    buttons: tuple[str, ...] = ()
+    typed: str | None = None
+    answer: str = ""
+
+
+@dataclass
+class Console:
+    """The last lines that were printed there."""
+
+    title: str
+    lines: deque[str] = field(default_factory=deque)
+    shown: bool = True
+
+
+class Windows:
+    """What is open in a run, by handle. `changes` counts, so that whoever shows it sees that something has changed."""
+
+    def __init__(self) -> None:
+        """Begin with none, and with nobody who could answer a dialog."""
+        self.views: dict[int, View] = {}
+        self.dialogs: dict[int, Dialog] = {}
+        self.consoles: dict[int, Console] = {}
+        self.changes = 0
+        self.can_answer: Callable[[], bool] = lambda: False
+
+    # ---- what scripts do
+
+    def add_view(self, handle: int) -> None:
+        """Open a view, of nothing yet."""
+        self._put(self.views, handle, View())
+
+    def aim(self, handle: int, sensor: str, label: str) -> None:
+        """Let a view show what a vision sensor sees."""
+        self.views[handle] = View(sensor, label[:_TITLE])
+        self.changes += 1
+
+    def add_dialog(self, handle: int, dialog: Dialog) -> None:
+        """Open a dialog."""
+        dialog.title, dialog.text = dialog.title[:_TITLE], dialog.text[:_TEXT]
+        if dialog.typed is not None:
+            dialog.typed = dialog.typed[:_TEXT]
+        self._put(self.dialogs, handle, dialog)
+
+    def add_console(self, handle: int, title: str, lines: int) -> None:
+        """Open a console that keeps so many lines, where that is not too many."""
+        kept: deque[str] = deque(maxlen=min(max(1, lines), _LINES))
+        self._put(self.consoles, handle, Console(title[:_TITLE], kept))
+
+    def print(self, handle: int, text: str | None) -> None:
+        """Print to a console, where the last line ended; None empties it."""
+        console = self.consoles[handle]
+        self.changes += 1
+        if text is None:
+            console.lines.clear()
+            return
+        first, *others = text[-_LINE * _LINES :].split("\n")
+        before = console.lines.pop() if console.lines else ""
+        console.lines.extend(one[:_LINE] for one in (before + first, *others))
+
+    def show_console(self, handle: int, shown: bool) -> None:
+        """Show a console, or hide it."""
+        self.consoles[handle].shown = shown
+        self.changes += 1
+
+    def close(self, kind: dict[int, Any], handle: int) -> bool:
+        """Close a window of one of the kinds; return whether it was there."""
+        self.changes += handle in kind
+        return kind.pop(handle, None) is not None
+
+    def _put(self, kind: dict[int, _Kind], handle: int, window: _Kind) -> None:
+        while len(kind) >= MOST:
+            del kind[next(iter(kind))]
+        kind[handle] = window
+        self.changes += 1
+
+    # ---- what a person does
+
+    def answer(self, handle: int, button: str, typed: str = "") -> None:
+        """Press a button of a dialog that is open. Raises ValueError for one that there is not."""
+        dialog = self.dialogs.get(handle)
+        if dialog is None or dialog.answer:
+            raise ValueError(f"no open dialog has the handle {handle}")
+        if button not in dialog.buttons:
+            raise ValueError(f"the dialog '{dialog.title}' has no button '{button[:80]}', but {_said(dialog.buttons)}")
+        dialog.answer = button
+        if dialog.typed is not None:
+            dialog.typed = typed[:_TEXT]
+        self.changes += 1
+
+    def assume_ok(self, handle: int) -> None:
+        """Let a dialog count as answered with ok, and nothing typed: nobody is there."""
+        dialog = self.dialogs[handle]
+        dialog.answer, dialog.typed = OK, None
+        self.changes += 1
+
+    def state(self) -> dict[str, list[dict[str, Any]]]:
+        """Return what is to be seen, as JSON has it."""
+        open_dialogs = {handle: one for handle, one in self.dialogs.items() if not one.answer}
+        shown = {handle: one for handle, one in self.consoles.items() if one.shown}
+        return {
+            "views": [{"handle": handle, **vars(one)} for handle, one in self.views.items() if one.sensor],
+            "dialogs": [
+                {"handle": handle, "title": one.title, "text": one.text, "buttons": one.buttons, "typed": one.typed}
+                for handle, one in open_dialogs.items()
+            ],
+            "consoles": [
+                {"handle": handle, "title": one.title, "lines": list(one.lines)} for handle, one in shown.items()
+            ],
+        }
+
+    # ---- runs and snapshots
+
+    def clear(self) -> None:
+        """Close all, as at the beginning of a run."""
+        self._be({}, {}, {})
+
+    def remember(self) -> Callable[[], None]:
+        """Return a function that brings back what is open now."""
+        kept = copy.deepcopy((self.views, self.dialogs, self.consoles))
+        return lambda: self._be(*copy.deepcopy(kept))
+
+    def _be(self, views: dict[int, View], dialogs: dict[int, Dialog], consoles: dict[int, Console]) -> None:
+        if views or dialogs or consoles or self.views or self.dialogs or self.consoles:
+            self.changes += 1
+        self.views, self.dialogs, self.consoles = views, dialogs, consoles
+
+
+def read_answer(given: Any) -> tuple[int, str, str]:
+    """Return handle, button and text of an answer as JSON has it. Raises ValueError."""
+    if not isinstance(given, Mapping) or not isinstance(given.get("handle"), int):
+        raise ValueError("an answer has a handle (a whole number), a button, and what was typed, if anything")
+    button, typed = given.get("button"), given.get("typed") or ""
+    if not (isinstance(button, str) and isinstance(typed, str)):
+        raise ValueError("an answer's button, and what was typed, are texts")
+    return given["handle"], button, typed
+
+
+def _said(buttons: tuple[str, ...]) -> str:
+    return " and ".join(buttons) or "none"

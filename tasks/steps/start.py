@@ -1,0 +1,10 @@
+"""To begin with: the tutorial's controller, which obeys what `on_twist` keeps; that is not much yet."""
+
+from tutorial import sysCall_actuation, sysCall_cleanup, sysCall_init, sysCall_sensing  # noqa: F401 -- as they are
+
+# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
+
+
+def on_twist(msg):
+    """Keep the command that has come: `linear` in m/s, `angular` in rad/s, ahead, to the left and up."""
+    self.vx = msg.linear.x  # the others are self.vy, self.vz and self.rz

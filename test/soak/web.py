@@ -1,0 +1,224 @@
+#!/usr/bin/env python3
+"""`./dev.sh soak-web [MINUTES] [--seed N] [roslaunch args]`: the cockpit, and browsers that come and go.
+
+Chromium now and then, where it is installed, and several clients that speak as the page does: they fly, watch a
+camera, press buttons and write scripts; some vanish while they hold a key, some take nothing of what they are sent.
+Every minute a line on cockpit and simulation. Exit status 1 where one of them died or grew, a traceback was printed,
+or the cockpit still listens after the last browser has gone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib.util
+import json
+import os
+import re
+import shutil
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+from xmlrpc.client import ServerProxy
+
+from measure import Sample, late_steps, slope
+from run import ENDS, STARTS, Launch
+
+OFTEN, EVERY = 10.0, 60.0  # s between two samples, two lines
+MOST_MEMORY, LEAST_MEMORY = 0.3, 6.0  # MB a minute over the last half, and MB in all below which no slope is judged
+MOST_MORE = 8  # threads, descriptors, registrations
+JUDGED = 300.0  # s of a run's last half, below which growth is not judged
+SETTLES = 5.0  # s until the cockpit has found the vehicle, and may command it
+QUIET = 90.0  # s after the last browser in which the cockpit becomes quiet: a deaf one is given up after 40
+HERE = Path(__file__).parent
+NODES = ("cockpit", "drone_sim")
+
+
+class State(NamedTuple):
+    """A node at a moment: its process (memory is its share of what it uses), and its registrations with the master."""
+
+    process: Sample
+    registrations: int
+
+
+def look(pid: int, node: str) -> State:
+    """Look at a node now. Raises OSError where it has died."""
+    folder = Path(f"/proc/{pid}")
+    share = re.search(r"^Pss:\s+(\d+)", (folder / "smaps_rollup").read_text(), re.MULTILINE)
+    threads, descriptors = len(os.listdir(folder / "task")), len(os.listdir(folder / "fd"))
+    memory = int(share[1]) * 1024 / 1e6 if share else 0.0
+    return State(Sample(time.monotonic(), memory, threads, descriptors), registrations(node))
+
+
+def registrations(node: str) -> int:
+    """Return how many topics and services a node has with the master."""
+    state: Any = ServerProxy(os.environ["ROS_MASTER_URI"]).getSystemState("/soak")
+    return sum(f"/{node}" in names for kind in state[2] for _, names in kind)
+
+
+def pid_of(node: str) -> int:
+    """Return the process of a node."""
+    answer: Any = ServerProxy(os.environ["ROS_MASTER_URI"]).lookupNode("/soak", f"/{node}")
+    process: Any = ServerProxy(answer[2]).getPid("/soak")
+    return int(process[2])
+
+
+def address(launch: Launch) -> str:
+    """Return where the cockpit is, when it has said so."""
+    end = time.monotonic() + STARTS
+    while time.monotonic() < end:
+        for line in launch.lines:
+            found = re.search(r"the cockpit is at (\S+)", line)
+            if found:
+                return found[1]
+        time.sleep(0.1)
+    raise SystemExit("the cockpit does not start:\n" + "\n".join(launch.lines[-20:]))
+
+
+@contextlib.contextmanager
+def browsers(where: str, seed: int, folder: Path) -> Iterator[list[subprocess.Popen]]:
+    """Let browsers at the cockpit; they yield to the nodes."""
+    programs = ["browsers.py"]
+    if shutil.which("chromium") and importlib.util.find_spec("playwright"):
+        programs.append("chromium.py")
+    else:
+        print("no chromium, or no playwright (./dev.sh test-web installs both): the browsers are Python alone")
+    started = []
+    for program in programs:
+        command = ["nice", "-n", "10", sys.executable, str(HERE / program), where, str(seed), str(folder)]
+        with (folder / f"{program}.log").open("w") as log:
+            started.append(subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True))
+    try:
+        yield started
+    finally:
+        for one in started:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(one.pid, signal.SIGKILL)
+            one.wait()
+
+
+def soak(launch: Launch, folder: Path, minutes: float) -> dict[str, list[State]]:
+    """Look for so long, and say every minute how it is; return what was seen of each node."""
+    began = time.monotonic()
+    pids = {node: pid_of(node) for node in NODES}
+    seen: dict[str, list[State]] = {node: [] for node in NODES}
+    due = began + EVERY
+    with contextlib.suppress(OSError):
+        while time.monotonic() < began + 60 * minutes:
+            time.sleep(OFTEN)
+            for node, pid in pids.items():
+                seen[node].append(look(pid, node))
+            if time.monotonic() > due:
+                due += EVERY
+                print(line(seen, launch, diary(folder), time.monotonic() - began), flush=True)
+    return seen
+
+
+def diary(folder: Path) -> list[Any]:
+    """Return all visits: what was done, s until the scene had come, what went wrong."""
+    lines = [one for path in folder.glob("*.jsonl") for one in path.read_text(encoding="utf-8").splitlines()]
+    return [json.loads(one) for one in lines]
+
+
+def line(seen: dict[str, list[State]], launch: Launch, visits: list[Any], time_: float) -> str:
+    """Return the line of now."""
+    parts = [f"{time_ / 60:5.1f} min"]
+    for node, states in seen.items():
+        (_, memory, threads, descriptors), registered = states[-1]
+        grows = slope([one.process for one in last_half(states)])
+        parts.append(
+            f"{node} {memory:6.1f} MB {grows:+5.2f} MB/min {threads:3d} threads {descriptors:3d} descriptors "
+            f"{registered:3d} registrations"
+        )
+    return "   ".join([*parts, f"{late_steps(launch.lines)} late   {len(visits)} visits"])
+
+
+def last_half(states: list[State]) -> list[State]:
+    """Return the later half."""
+    return states[len(states) // 2 :]
+
+
+def growth(node: str, states: list[State]) -> list[str]:
+    """Name what grew over the last half, if that was long enough."""
+    rest = last_half(states)
+    samples = [one.process for one in rest]
+    if not samples or samples[-1].at - samples[0].at < JUDGED:
+        return []
+    third = len(rest) // 3
+    early, late = rest[:third], rest[-third:]
+    found = []
+    risen = min(one.process.memory for one in late) - min(one.process.memory for one in early)
+    if slope(samples) > MOST_MEMORY and risen > LEAST_MEMORY:
+        found.append(f"{node}: memory grows by {slope(samples):.2f} MB a minute")
+    for what in ("threads", "descriptors"):
+        more = min(getattr(one.process, what) for one in late) - min(getattr(one.process, what) for one in early)
+        if more > MOST_MORE:
+            found.append(f"{node}: {more} {what} more")
+    more = min(one.registrations for one in late) - min(one.registrations for one in early)
+    return [*found, f"{node}: {more} registrations more"] if more > MOST_MORE else found
+
+
+def quiet(before: State) -> list[str]:
+    """Wait until the cockpit listens to no more than before the first browser; name what it still has."""
+    end = time.monotonic() + QUIET
+    while time.monotonic() < end:
+        now = look(pid_of("cockpit"), "cockpit")
+        if now.registrations <= before.registrations and now.process.threads <= before.process.threads + MOST_MORE:
+            return []
+        time.sleep(1.0)
+    return [f"nobody looks, and the cockpit has {now}; it began with {before}"]
+
+
+def verdict(launch: Launch, seen: dict[str, list[State]], visits: list[Any]) -> list[str]:
+    """Say what there was of visits; return what went wrong."""
+    done = [one for one in visits if not one[2]]
+    for role in sorted({one[0] for one in visits}):
+        came = [one[1] for one in done if one[0] == role]
+        early, late = came[: len(came) // 3 + 1], came[-(len(came) // 3 + 1) :]
+        if came:
+            waits = f"{statistics.median(early):.2f} s at first, {statistics.median(late):.2f} s in the end"
+            print(f"{role}: {len(came)} visits; until the scene had come {waits}")
+    for role, _, trouble in [one for one in visits if one[2]][:10]:
+        print(f"{role}: {trouble[:200]}")
+    died = [f"{node} died" for node in NODES if not Path(f"/proc/{pid_of(node)}").exists()]
+    printed = [f"printed: {one[:200]}" for one in launch.lines if "Traceback" in one]
+    return [*died, *printed[:5], *(fault for node, states in seen.items() for fault in growth(node, states))]
+
+
+def main() -> int:
+    """Run."""
+    parser = argparse.ArgumentParser(
+        prog="./dev.sh soak-web", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("minutes", nargs="?", type=float, default=10.0, help="how long (default: 10)")
+    parser.add_argument("--seed", type=int, default=0, help="of what the browsers do (default: 0)")
+    options, arguments = parser.parse_known_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and tidy up
+    folder = Path(tempfile.mkdtemp(prefix="soak"))
+    try:
+        with Launch(folder, ["web:=true", *arguments]) as launch:
+            where = address(launch)
+            time.sleep(SETTLES)
+            before = look(pid_of("cockpit"), "cockpit")
+            with browsers(where, options.seed, folder) as started:
+                seen = soak(launch, folder, options.minutes)
+                found = [f"a client of the soak ended: {one.args}" for one in started if one.poll() is not None]
+            found += quiet(before) + verdict(launch, seen, diary(folder))
+            took = launch.end()
+            found += [f"the node took {took:.1f} s to end"] if took > ENDS else []
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    log = HERE.parents[1] / "build" / "soak_web.log"
+    log.write_text("\n".join(launch.lines), encoding="utf-8")
+    print(f"what the nodes printed is in {log}", *found, "something broke" if found else "nothing broke", sep="\n")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

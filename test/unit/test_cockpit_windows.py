@@ -1,0 +1,314 @@
+"""Pictures, and what scripts open, on their way to the browsers: no browser is needed for any of it."""
+
+import asyncio
+import json
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+pytest.importorskip("viser")
+
+import cv2
+from cv_bridge import CvBridge
+from dynamic_reconfigure.encoding import encode_config
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import String
+
+from drone_sim.ros.cockpit import cameras as cameras_module
+from drone_sim.ros.cockpit.cameras import Cameras
+from drone_sim.ros.cockpit.found import Source, find
+from drone_sim.ros.cockpit.outbox import Outbox
+from drone_sim.ros.cockpit.pace import Pace
+from drone_sim.ros.cockpit.pictures import packed
+from drone_sim.ros.cockpit.windows import Windows
+from drone_sim.ros.cockpit.words import Words
+
+
+async def taken(box):
+    """Return all that an outbox gives at once."""
+    found = []
+    while True:
+        task = asyncio.create_task(box.take())
+        await asyncio.sleep(0)
+        if not task.done():
+            task.cancel()
+            return found
+        found.append(task.result())
+
+
+def test_a_browser_that_shows_nothing_gets_one_picture_and_later_the_latest():
+    async def talk():
+        box = Outbox()
+        for number in range(1000):
+            box.put_picture("front", b"%d" % number)
+        assert await taken(box) == [b"999"] and not box.wants("front")
+        box.put_picture("front", b"1000")
+        box.put_picture("front", b"1001")
+        assert await taken(box) == [], "the first has not been shown"
+        box.shown("front")
+        assert await taken(box) == [b"1001"]
+        box.put_picture("front", b"1002")
+        box.forget("front")
+        assert await taken(box) == [] and box.wants("front")
+
+    asyncio.run(talk())
+
+
+def test_messages_to_a_browser_that_takes_none_are_bounded():
+    async def talk():
+        box = Outbox()
+        for number in range(1000):
+            box.put(str(number))
+        assert await taken(box) == [str(number) for number in range(968, 1000)]
+
+    asyncio.run(talk())
+
+
+# ---- pictures
+
+
+def picture(content):
+    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+
+
+def message(image, encoding):
+    return CvBridge().cv2_to_imgmsg(np.ascontiguousarray(image), encoding)
+
+
+def test_compressed_pictures_go_as_they_came():
+    assert packed(CompressedImage(data=b"\xff\xd8 a JPEG")) == (b"\xff\xd8 a JPEG", "")
+
+
+@pytest.mark.parametrize("encoding, unit", [("32FC1", 1.0), ("16UC1", 1000)])
+def test_depths_are_coloured_and_say_what_the_colours_mean(encoding, unit):
+    depths = np.full((60, 80), 2.0)
+    depths[:, 40:] = 8.0
+    depths[:20] = 0.0
+    content, note = packed(message((depths * unit).astype(np.uint16 if unit == 1000 else np.float32), encoding))
+    assert note == "2.00 m (blue) to 8.00 m (red)"
+    near, far, nothing = (picture(content)[at].astype(int) for at in ((40, 10), (40, 70), (5, 40)))
+    assert near[0] > near[2] and far[2] > far[0] and nothing.max() < 20
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
+def test_depths_of_nothing_are_black(value):
+    content, note = packed(message(np.full((10, 10), value, np.float32), "32FC1"))
+    assert picture(content).max() == 0 and note == "nothing within its range"
+
+
+def test_colours_and_greys_of_any_size():
+    red = np.zeros((8, 2000, 3), np.uint8)
+    red[:, :, 0] = 255
+    shown = picture(packed(message(red, "rgb8"))[0])
+    assert shown.shape[1] == 500 and shown[1, 250, 2] > 200 > 50 > shown[1, 250, 0]
+    assert picture(packed(message(red, "bgr8"))[0])[1, 250, 0] > 200
+    assert picture(packed(message(np.full((4, 4), 200, np.uint8), "mono8"))[0])[2, 2].min() > 190
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        Image(encoding="nonsense", height=1, width=1, step=1, data=b"1"),
+        Image(encoding="rgb8", height=100, width=100, step=300, data=b"too short"),
+        Image(encoding="rgb8"),
+        Image(encoding="rgb16", height=1, width=1, step=6, data=b"123456"),
+    ],
+)
+def test_what_is_no_picture_is_refused_in_one_line(wrong):
+    with pytest.raises(ValueError, match=r"^[^\n]+$"):
+        packed(wrong)
+
+
+def test_every_topic_of_pictures_is_offered_once():
+    topics = [
+        ("/drone/view/bodies", "visualization_msgs/MarkerArray"),
+        ("/drone/front", "sensor_msgs/Image"),
+        ("/drone/front/compressed", "sensor_msgs/CompressedImage"),
+        ("/drone/depth/image", "sensor_msgs/Image"),
+        ("/drone/depth/image/compressedDepth", "sensor_msgs/CompressedImage"),
+        ("/robot/eye/compressed", "sensor_msgs/CompressedImage"),
+    ]
+    assert find(topics).cameras == (
+        Source("/drone/depth/image"),
+        Source("/drone/front", "/drone/front/compressed"),
+        Source("/robot/eye", "/robot/eye/compressed"),
+    )
+
+
+# ---- switches
+
+
+class Box:
+    """A checkbox, or text, as viser has it."""
+
+    def __init__(self, value):
+        self._value, self.then, self.there = value, lambda event: None, True
+        self.content = value
+
+    def on_update(self, then):
+        self.then = then
+
+    @property
+    def value(self):
+        return self._value
+
+    @value.setter
+    def value(self, value):
+        self._value = value
+        self.then(type("Event", (), {"target": self, "client": None}))
+
+    def remove(self):
+        self.there = False
+
+
+class Gui:
+    def __init__(self):
+        self.boxes = {}
+
+    def add_folder(self, _name):
+        return self
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        return None
+
+    def add_checkbox(self, name, value):
+        self.boxes[name] = Box(value)
+        return self.boxes[name]
+
+    def add_dropdown(self, name, options, initial_value, hint):
+        assert hint
+        self.boxes[name] = Box(initial_value)
+        self.boxes[name].options = options
+        return self.boxes[name]
+
+    def add_text(self, name, value, disabled, hint):
+        assert disabled and hint
+        return self.add_checkbox(name, value)
+
+    def add_html(self, content):
+        return Box(content)
+
+
+class Sent:
+    """Remembers what would go to the browsers."""
+
+    def __init__(self):
+        self.told, self.pictures = [], []
+        self.ready = True
+
+    def tell(self, message):
+        self.told.append(message)
+
+    def wants_picture(self, _name):
+        return self.ready
+
+    def show_picture(self, said, content):
+        self.pictures.append((said, content))
+
+    def close_picture(self, name):
+        self.told.append(f"closed {name}")
+
+
+class Subscriber:
+    there: ClassVar[dict] = {}
+
+    def __init__(self, topic, _kind, hear, **_options):
+        self.topic = topic
+        self.there[topic] = hear
+
+    def unregister(self):
+        del self.there[self.topic]
+
+
+@pytest.fixture(name="sent")
+def _sent():
+    return Sent()
+
+
+@pytest.fixture(name="cameras")
+def _cameras(monkeypatch, sent):
+    monkeypatch.setattr(cameras_module.rospy, "Subscriber", Subscriber)
+    Subscriber.there.clear()
+    found = Cameras(Gui(), sent)
+    found.offer((Source("/drone/front", "/drone/front/compressed"), Source("/drone/depth/image")))
+    return found
+
+
+def test_cameras_are_listened_to_while_they_are_shown_to_somebody(cameras, sent):
+    cameras.rest(False)
+    assert not Subscriber.there
+    cameras.turn("/drone/front", True)
+    assert list(Subscriber.there) == ["/drone/front/compressed"] and sent.told == [{"pictures": ["/drone/front"]}]
+    hear = Subscriber.there["/drone/front/compressed"]
+    for number in range(3):
+        hear(CompressedImage(data=b"%d" % number))
+    cameras.show()
+    cameras.show()
+    assert sent.pictures == [({"picture": "/drone/front", "name": "drone/front", "note": ""}, b"2")]
+    sent.ready = False
+    hear(CompressedImage(data=b"3"))
+    cameras.show()
+    assert len(sent.pictures) == 1, "no browser has shown the last one"
+    cameras.rest(True)
+    assert not Subscriber.there
+    cameras.rest(False)
+    assert Subscriber.there
+    cameras.turn("/drone/front", False)
+    assert not Subscriber.there and sent.told[-2:] == ["closed /drone/front", {"pictures": []}]
+
+
+def test_a_view_of_a_script_switches_its_camera(cameras):
+    cameras.rest(False)
+    cameras.follow_views(frozenset({"/drone/depth/image", "/later"}))
+    assert cameras.shown == ["/drone/depth/image"]
+    cameras.offer((Source("/drone/depth/image"), Source("/later")))
+    assert cameras.shown == ["/drone/depth/image", "/later"]
+    cameras.turn("/drone/depth/image", False)
+    cameras.follow_views(frozenset({"/drone/depth/image", "/later"}))
+    assert cameras.shown == ["/later"], "closed by a person"
+    cameras.follow_views(frozenset())
+    assert cameras.shown == []
+    cameras.turn("/later", True)
+    cameras.offer(())
+    assert cameras.shown == [] and not Subscriber.there
+
+
+@pytest.mark.parametrize("wrong", ["nonsense", "[" * 100_000, "3", '{"views": 3}', '{"views": [], "dialogs": []}'])
+def test_what_is_no_state_of_windows_changes_nothing(cameras, sent, wrong):
+    windows = Windows("/drone_sim", cameras, sent)
+    view = {"handle": 1, "topic": "/drone/front", "label": "x"}
+    windows._hear(String(json.dumps({"views": [view, 7], "dialogs": [], "consoles": []})))
+    windows._hear(String(wrong))
+    assert cameras.shown == ["/drone/front"]
+    assert windows.answers["windows"]({}) == {
+        "windows": {"views": [view], "dialogs": [], "consoles": []},
+        "pictures": ["/drone/front"],
+    }
+    with pytest.raises(ValueError, match="no simulation"):
+        windows.answers["answer"]({"handle": 1, "button": "ok"})
+
+
+def test_the_speed_follows_what_others_set():
+    gui = Gui()
+    pace = Pace(gui, "/drone_sim", print)
+    for factor, words in ((2.0, "2 times real time"), (0.0, "as fast as it can"), (3.7, "3.7 times real time")):
+        pace.hear(encode_config({"real_time_factor": factor}))
+        assert gui.boxes["Speed"].value == words and words in gui.boxes["Speed"].options
+    pace.hear(encode_config({"real_time_factor": 1.0}))
+    pace.hear(encode_config({"Kzref": 3.0}))
+    assert gui.boxes["Speed"].value == "real time"
+    for said, words in (("1.98", "1.98 times real time"), ("not known", ""), ("", "")):
+        pace.show_reached(said)
+        assert gui.boxes["Reached"].value == words
+
+
+def test_words_are_text():
+    words = Words(Gui(), "<i>Log</i>")
+    words.show(["<script>alert(1)</script>", "x" * 10_000])
+    assert "<script>" not in words._drawn.content and "&lt;script&gt;" in words._drawn.content
+    assert len(words._drawn.content) < 2000

@@ -1,0 +1,136 @@
+"""Scripts and texts in the cockpit's page: a stage, a task in its scene, and edits that nothing can take away."""
+
+import contextlib
+import json
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+import rospy
+from cockpit_page import wait_until
+
+from drone_sim.files.resources import package_path
+
+PILOT = "src/drone_sim/child_scripts/pilot.py"
+DRAFT = "drone_sim/draft/mine/edited.py"
+
+
+@contextlib.contextmanager
+def page_without_scene(cockpit, browser):
+    """Give the page at once: nothing is drawn."""
+    context = browser.new_context(viewport={"width": 1280, "height": 720})
+    page = context.new_page()
+    page.troubles = []
+    page.on("pageerror", lambda error: page.troubles.append(str(error)))
+    page.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
+    page.goto(cockpit.address)
+    wait_until(page, lambda: len(text(page)) > 100)
+    yield page
+    assert page.troubles == []
+    context.close()
+
+
+@pytest.fixture(name="desk", scope="module")
+def _desk(cockpit, browser):
+    """A page that these tests share; what they have written, flown and loaded is gone in the end."""
+    before = {path.name for path in cockpit.scripts.glob("*")}
+    with page_without_scene(cockpit, browser) as page:
+        yield page
+        open_script(page, "built-in/pilot.py", "takes off")
+        page.click("#run")
+        wait_until(page, lambda: said(page).startswith("started"))
+    for path in cockpit.scripts.glob("*"):
+        if path.name not in before:
+            path.unlink()
+
+
+def said(page):
+    return page.inner_text("#said")
+
+
+def text(page):
+    return page.inner_text("#text .cm-content")
+
+
+def open_script(page, script, words):
+    page.select_option("#script", script)
+    wait_until(page, lambda: words in text(page))
+
+
+def write_at_the_end(page, words):
+    page.locator("#text .cm-content").click()
+    page.keyboard.press("Control+End")
+    page.keyboard.insert_text(words)
+
+
+def test_a_stages_text_is_beside_it_and_the_next_follows(desk):
+    open_script(desk, "tutorial/1_thrust.py", "constant thrust")
+    wait_until(desk, lambda: "A propeller blows particles" in desk.inner_text("#lesson-text"))
+    assert desk.locator("#lesson-text math").count() > 3 and desk.locator("#lesson-text .tok-number").count() > 3
+    wait_until(
+        desk, lambda: desk.evaluate("[...document.querySelectorAll('#lesson-text img')].every(one => one.naturalWidth)")
+    )
+    assert not desk.locator("#lesson-text a", has_text="Solution").count()
+    desk.click("#after")
+    wait_until(desk, lambda: desk.input_value("#script") == "tutorial/2_elevation.py" and "zref" in text(desk))
+    assert "Two wishes" in desk.inner_text("#lesson-text")
+    desk.locator("#lesson-body").focus()
+    desk.keyboard.down("ArrowDown")
+    assert "-" not in desk.inner_text("#command"), "who reads does not fly"
+    desk.keyboard.up("ArrowDown")
+
+
+def test_a_task_flies_in_its_scene_and_after_it_the_users_comes_back(cockpit, desk):
+    before = rospy.get_param("/drone_sim/scene_file")
+    open_script(desk, "tasks/hover.py", "how far the wind")
+    wait_until(desk, lambda: "weather/wind = [2.5, 1, 0]" in desk.inner_text("#flies"))
+    desk.click("#run")
+    wait_until(desk, lambda: said(desk) == "started in the scene of the task hover")
+    wait_until(desk, lambda: cockpit.drone.place[2] > 1.1)
+    assert rospy.get_param("/drone_sim/scene_file").endswith("tasks/hover.yaml")
+    open_script(desk, "tutorial/2_elevation.py", "zref")
+    desk.click("#run")
+    wait_until(desk, lambda: "the launch" in said(desk))
+    assert rospy.get_param("/drone_sim/scene_file") == before
+
+
+def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(cockpit, desk):
+    open_script(desk, "tutorial/1_thrust.py", "constant thrust")
+    write_at_the_end(desk, "# mine\n")
+    wait_until(desk, lambda: desk.inner_text("#saved").startswith("saved as mine/1_thrust"))
+    file = cockpit.scripts / desk.input_value("#script").partition("/")[2]
+    file.write_text(file.read_text().replace("# mine", "# theirs"))
+    wait_until(desk, lambda: "# theirs" in text(desk) and "changed by another program" in said(desk), 5)
+    desk.locator("#text .cm-content").press("Control+z")
+    wait_until(desk, lambda: "# mine" in file.read_text())
+    write_at_the_end(desk, "# not saved yet")
+    file.write_text("# written meanwhile\n")
+    desk.get_by_role("button", name="The other's").click()
+    wait_until(desk, lambda: text(desk).startswith("# written meanwhile"))
+    other = cockpit.scripts / said(desk).rpartition("/")[2]
+    assert other != file and "# not saved yet" in other.read_text() and file.read_text() == "# written meanwhile\n"
+    open_script(desk, "built-in/pilot.py", "takes off")
+    desk.locator("#text .cm-content").press("Control+z")
+    assert "takes off" in text(desk), "each script has a history of its own"
+    desk.click("#as")
+    desk.keyboard.type("named.py")
+    desk.keyboard.press("Enter")
+    wait_until(desk, lambda: desk.input_value("#script") == "mine/named.py")
+    assert (cockpit.scripts / "named.py").read_text() == (package_path() / PILOT).read_text()
+
+
+def test_what_was_not_saved_is_there_after_a_reload(cockpit, desk, browser):
+    cockpit.scripts.mkdir(exist_ok=True)
+    (cockpit.scripts / "edited.py").write_text("first")
+    with page_without_scene(cockpit, browser) as page:
+        page.evaluate(
+            f"localStorage[{json.dumps(DRAFT)}] = {json.dumps(json.dumps({'text': 'second', 'version': 'old'}))}"
+        )
+        page.reload()
+        wait_until(page, lambda: page.is_visible("#question"))
+        assert text(page) == "second"
+        page.get_by_role("button", name="Mine").click()
+        wait_until(page, lambda: (cockpit.scripts / "edited.py").read_text() == "second")
+        assert (cockpit.scripts / "edited_2.py").read_text() == "first"
+        assert page.evaluate(f"localStorage[{json.dumps(DRAFT)}] === undefined")

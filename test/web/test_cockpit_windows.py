@@ -1,0 +1,73 @@
+"""What scripts open, in the page: a sensor's picture, a dialog that is answered, a console; and the pace."""
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_page import wait_until
+from dynamic_reconfigure.client import Client
+
+SCRIPT = """
+def sysCall_init():
+    view = sim.floatingViewAdd(0.9, 0.9, 0.2, 0.2, 0)
+    sim.adjustView(view, sim.getObjectHandle('Quadricopter_floorCamera'), 64)
+    depth = sim.floatingViewAdd(0.7, 0.9, 0.2, 0.2, 0)
+    sim.adjustView(depth, sim.getObjectHandle('DepthVision'), 64, 'how far')
+    self.dialog = sim.displayDialog('Height', 'How <b>high</b>?', sim.dlgstyle_input, False, '0.8')
+    self.console = sim.auxiliaryConsoleOpen('Said', 5, 0)
+
+def sysCall_actuation():
+    if self.dialog and sim.getDialogResult(self.dialog) == sim.dlgret_ok:
+        sim.auxiliaryConsolePrint(self.console, 'answered ' + sim.getDialogInput(self.dialog))
+        self.dialog = None
+"""
+
+
+@pytest.fixture(name="flown")
+def _flown(cockpit, opened):
+    """The page while that script flies."""
+    cockpit.scripts.mkdir(exist_ok=True)
+    (cockpit.scripts / "opens.py").write_text(SCRIPT)
+    opened.reload()
+    opened.wait_for_function(
+        "[...document.querySelectorAll('#script option')].some((one) => one.value === 'mine/opens.py')"
+    )
+    opened.select_option("#script", "mine/opens.py")
+    opened.wait_for_function("document.querySelector('.cm-content').innerText.includes('floatingViewAdd')")
+    opened.click("#run")
+    wait_until(opened, lambda: opened.inner_text("#said") == "started")
+    yield opened
+    opened.select_option("#script", "built-in/pilot.py")
+    opened.wait_for_function("!document.querySelector('.cm-content').innerText.includes('floatingViewAdd')")
+    opened.click("#run")
+    opened.wait_for_function("!document.querySelector('.window')")
+
+
+def test_views_dialogs_and_consoles_of_a_script(flown):
+    for picture in ("Quadricopter_floorCamera", "how far"):
+        window = flown.locator(".picture", has_text=picture)
+        wait_until(flown, lambda window=window: window.locator("img").evaluate("one => one.naturalWidth") > 0)
+    assert " m (blue) to " in flown.locator(".picture", has_text="how far").inner_text()
+    dialog = flown.locator(".dialog")
+    assert "How <b>high</b>?" in dialog.inner_text(), "text, not HTML"
+    field = dialog.locator("input")
+    assert field.input_value() == "0.8"
+    field.fill("1.2 m")
+    dialog.get_by_role("button", name="ok").click()
+    wait_until(flown, lambda: flown.locator(".console pre").inner_text() == "answered 1.2 m")
+    wait_until(flown, lambda: dialog.count() == 0)
+
+
+def test_the_pace_is_changed_and_follows(cockpit, opened):
+    node = Client("/drone_sim", timeout=20)
+    scene = opened.frame_locator("#scene")
+    field = scene.get_by_label("Speed")
+    field.click()
+    scene.get_by_role("option", name="0.5 times real time", exact=True).click()
+    wait_until(opened, lambda: (node.get_configuration() or {}).get("real_time_factor") == 0.5)
+    reached = scene.locator("input[disabled]").nth(1)
+    wait_until(opened, lambda: reached.input_value().startswith(("0.4", "0.5")))
+    node.update_configuration({"real_time_factor": 3.0})
+    wait_until(opened, lambda: field.input_value() == "3 times real time")
+    node.update_configuration({"real_time_factor": 1.0})
+    node.close()

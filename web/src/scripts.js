@@ -1,0 +1,242 @@
+// The scripts: opened, written to the node's disk soon after every change, watched, and flown. No edit is ever lost.
+import { Drafts } from "./drafts.js";
+import { Editor } from "./editor.js";
+
+const QUIET = 800; // ms without a key before it is saved
+const LOOK = 1000; // ms between two looks at the file
+const RETRY = 4000; // ms after which what could not be saved is tried again
+const LARGEST = 1 << 20; // bytes
+
+const size = (text) => new TextEncoder().encode(text).length;
+
+export class Scripts {
+  // `page` shows what is told: { saved, said, bad, lists, script, question }; `onOpen` hears of the text that a script has.
+  constructor(parent, wire, page, onOpen) {
+    this.ask = (...question) => wire.ask(...question);
+    this.wire = wire;
+    this.page = page;
+    this.onOpen = onOpen;
+    this.drafts = new Drafts();
+    this.editor = new Editor(parent, () => this.change(), () => this.onRun());
+    this.is = { script: "", file: "", version: "", text: "" }; // what the disk has, as far as we know
+    this.dirty = false;
+    this.conflict = false;
+    this.turn = Promise.resolve();
+    setInterval(() => this.watch(), LOOK);
+    document.addEventListener("visibilitychange", () => this.watch());
+  }
+
+  // One after the other: the second would not know the version that the first has made.
+  inTurn(action) {
+    this.turn = this.turn.catch(() => {}).then(action);
+    return this.turn;
+  }
+
+  // ---- what there is
+
+  async list() {
+    const lists = await this.ask("scripts");
+    this.shelf = lists.shelf;
+    this.page.show({ lists, script: this.is.script || lists.flown });
+    return lists;
+  }
+
+  // After the connection is there, again: what was not saved comes first.
+  async connected() {
+    const { flown } = await this.list();
+    await this.save().catch(() => {});
+    const left = this.drafts.scripts.filter((script) => script !== this.is.script);
+    for (const script of left) await this.open(script).catch((error) => this.page.show({ said: error.message, bad: true }));
+    if (!this.is.script) await this.open(flown);
+  }
+
+  open(script) {
+    return this.save().catch(() => {}).then(() => this.inTurn(() => this.take(script)));
+  }
+
+  async take(script) {
+    const draft = this.drafts.get(script);
+    let gone = "";
+    const answer = await this.ask("open", { script }).catch((error) => {
+      this.page.show({ script: this.is.script });
+      if (!draft || !this.wire.open) throw error;
+      gone = error.message;
+      return { script, file: "", version: "", text: "", lesson: "" };
+    });
+    this.know(answer);
+    this.conflict = this.dirty = false;
+    this.page.show({ saved: "", script, of: answer.lesson, question: null });
+    this.editor.show(script, answer.text);
+    if (draft && draft.text !== answer.text) this.resume(draft, gone);
+    else this.drafts.drop(script);
+    this.onOpen(answer.lesson);
+  }
+
+  // Goes on with what was not saved.
+  resume(draft, gone) {
+    this.editor.fill(draft.text);
+    this.dirty = true;
+    if (gone || (draft.version !== this.is.version && this.isOwn)) return this.disagree(gone);
+    this.page.show({ said: "what was not saved yet is here again" });
+    setTimeout(() => this.save().catch(() => {}));
+  }
+
+  get isOwn() {
+    return this.is.script.startsWith("mine/"); // all others are never written: they become a copy
+  }
+
+  know({ script, file, version, text = this.editor.text }) {
+    this.is = { script, file, version, text };
+  }
+
+  // ---- what is changed here
+
+  change() {
+    this.dirty = true;
+    this.drafts.put(this.is.script, { text: this.editor.text, version: this.is.version });
+    if (this.conflict) return;
+    this.page.show({ saved: "..." });
+    clearTimeout(this.later);
+    this.later = setTimeout(() => this.save().catch(() => {}), QUIET);
+  }
+
+  save() {
+    return this.inTurn(() => this.write());
+  }
+
+  async write() {
+    if (!this.dirty) return;
+    if (this.conflict) throw new Error("first choose which of the two texts is to stay");
+    const text = this.editor.text;
+    const { script, version } = this.is;
+    try {
+      if (size(text) > LARGEST) throw new Error(`has more than ${LARGEST} bytes`);
+      const answer = await this.ask("save", { script, text, version });
+      if (answer.changed) return await this.compare();
+      this.written(answer, text);
+    } catch (error) {
+      this.failed = Date.now();
+      this.page.show({ saved: `not saved: ${error.message}`, bad: true });
+      throw error;
+    }
+  }
+
+  written(answer, text) {
+    const before = this.is.script;
+    this.know({ ...answer, text });
+    this.drafts.drop(before);
+    this.dirty = this.editor.text !== text; // more has been written meanwhile
+    if (this.dirty) this.drafts.put(this.is.script, { text: this.editor.text, version: this.is.version });
+    if (before !== this.is.script) this.editor.rename(this.is.script);
+    this.page.show({ saved: `saved as ${this.is.script}`, script: this.is.script, of: answer.lesson });
+    if (before !== this.is.script) return this.list();
+  }
+
+  async saveAs(name) {
+    await this.inTurn(async () => {
+      const text = this.editor.text;
+      const answer = await this.ask("save_as", { name, text });
+      this.conflict = false;
+      this.page.show({ question: null });
+      await this.written(answer, text);
+    });
+  }
+
+  async revert() {
+    const { text } = await this.ask("revert", { script: this.is.script });
+    if (text === this.editor.text) return;
+    this.editor.fill(text);
+    this.change();
+  }
+
+  // ---- what others change
+
+  watch() {
+    if (document.hidden || !this.wire.open || !this.is.script || this.looking) return;
+    this.looking = true;
+    this.inTurn(() => this.look())
+      .catch(() => {})
+      .then(() => (this.looking = false));
+  }
+
+  async look() {
+    const { script, version } = this.is;
+    const now = await this.ask("look", { script });
+    if (now.shelf !== this.shelf) await this.list();
+    if (this.conflict) return;
+    if (now.version !== version) await this.compare();
+    else if (this.dirty && Date.now() - (this.failed ?? 0) > RETRY) await this.write();
+  }
+
+  // The file is not what we have last seen: it is told, and nothing of either text is lost.
+  async compare() {
+    const { script } = this.is;
+    const theirs = await this.ask("open", { script }).catch((error) => ({ error }));
+    if (theirs.error && !this.wire.open) throw theirs.error;
+    if (theirs.error) return this.disagree(theirs.error.message);
+    const isTouched = theirs.text === this.is.text || !this.isOwn; // another version of the same
+    const isOurs = theirs.text === this.editor.text;
+    if (this.dirty && !isTouched && !isOurs) return this.disagree();
+    this.know(theirs);
+    if (this.dirty && !isOurs) return this.write(); // with the version of now
+    this.dirty = false;
+    this.drafts.drop(script);
+    if (isOurs) return;
+    this.editor.fill(theirs.text);
+    this.page.show({ saved: "", said: `${script} has been changed by another program: this is the new text. Ctrl+Z brings yours back.` });
+  }
+
+  disagree(why = "") {
+    this.conflict = true;
+    const { script } = this.is;
+    const gone = why.includes("no such script");
+    const keep = (mine) => () => this.keep(mine);
+    this.drafts.put(script, { text: this.editor.text, version: this.is.version });
+    const said = gone
+      ? `${script} has been removed or renamed by another program. Its text is still here.`
+      : why || `${script} has been changed by another program while you wrote. Both texts will be kept; which stays under this name?`;
+    const again = ["Write it again", keep(true)];
+    const others = gone ? ["Let it go", () => this.letGo()] : ["The other's", keep(false)];
+    const choices = why && !gone ? [again] : [gone ? again : ["Mine", keep(true)], others];
+    this.page.show({ saved: "not saved", said: "", bad: true, question: { said, choices } });
+  }
+
+  async keep(mine) {
+    await this.inTurn(async () => {
+      const answer = await this.ask("keep", { script: this.is.script, text: this.editor.text, mine });
+      this.conflict = this.dirty = false;
+      this.drafts.drop(this.is.script);
+      this.editor.fill(answer.text);
+      this.know(answer);
+      const other = answer.other ? `${mine ? "the other's" : "your"} text is in ${answer.other}` : "";
+      this.page.show({ question: null, saved: `saved as ${answer.script}`, said: other });
+      await this.list();
+    });
+  }
+
+  letGo() {
+    this.drafts.drop(this.is.script);
+    this.conflict = this.dirty = false;
+    this.is = { ...this.is, script: "" };
+    this.page.show({ question: null });
+    return this.connected();
+  }
+
+  // ---- flown
+
+  async run(lesson) {
+    await this.save();
+    this.editor.mark(null);
+    this.page.show({ said: "starting ..." });
+    const { done, said, line } = await this.ask("run", { script: this.is.script, lesson });
+    this.page.show({ said, bad: !done });
+    if (line) this.editor.mark({ line, said });
+  }
+
+  // A failure while it flies, or at its start.
+  fail({ file, line, said, phase }) {
+    const where = file === this.is.file ? `line ${line}` : `${file.split("/").pop()}, line ${line}`;
+    this.page.show({ said: `${phase}, ${where}: ${said}`, bad: true });
+    if (file === this.is.file) this.editor.mark({ line, said });
+  }
+}
