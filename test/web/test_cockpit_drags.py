@@ -45,6 +45,12 @@ class Screen:
 def _mouse(opened):
     yield opened.mouse
     opened.mouse.up()
+    load("")  # as it was
+
+
+def load(scene):
+    rospy.set_param("/drone_sim/scene_file", str(scene))
+    assert rospy.ServiceProxy("/drone_sim/load_scene", Trigger)().success
 
 
 def take(page, point, feedback):
@@ -79,8 +85,7 @@ def test_the_drone_goes_where_its_arrow_is_dragged(cockpit, opened, mouse):
 def test_an_object_that_is_clicked_on_has_arrows_and_falls_when_it_is_let_go(cockpit, opened, mouse, tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text(SCENE)
-    rospy.set_param("/drone_sim/scene_file", str(scene))
-    assert rospy.ServiceProxy("/drone_sim/load_scene", Trigger)().success
+    load(scene)
     shown, feedback = (
         listen("/drone/scene", MarkerArray),
         listen("/drone/objects/feedback", InteractiveMarkerFeedback),
