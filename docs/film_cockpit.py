@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test" / "web"))
 from cockpit_page import ready
 from launched import launched
 
-SIZE = {"width": 1120, "height": 660}  # px of the page
+SIZE = {"width": 960, "height": 560}  # px of the page
 WIDTH = 800  # px of the film
 STEP = 0.05  # s, of the simulation and of the film
 SLOWER = 0.08  # real-time factor
