@@ -94,7 +94,7 @@ class Film:
 
     def click(self, element, count=8):
         """Move to an element, and click."""
-        box = element.bounding_box(timeout=5000)
+        box = element.bounding_box(timeout=PATIENCE / 2)
         self.move((box["x"] + min(box["width"], 80) / 2, box["y"] + box["height"] / 2), count)
         self.page.mouse.click(*self.at)
         self.take()
