@@ -28,6 +28,8 @@ ros=$(sourced_ros)
 python=/usr/bin/python3
 if [ -x "$ros/bin/python3" ]; then python=$ros/bin/python3; fi
 
+: "${HOME:=$(getent passwd "$(id -u)" | cut -d: -f6)}" # which cron leaves out
+export HOME
 venv=$root/.venv
 venv_options=--system-site-packages
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim
@@ -133,7 +135,16 @@ build() {
   echo "$wanted" >build/.made-from
 }
 
+# ROS itself would end with a traceback.
+check_home() {
+  local folder
+  for folder in "$cache" "${ROS_HOME:-$HOME/.ros}"; do
+    { mkdir -p "$folder" && [ -w "$folder" ]; } 2>/dev/null || fail "cannot write to $folder: set HOME to a folder of yours"
+  done
+}
+
 setup() {
+  check_home
   # shellcheck disable=SC2046 # one word each
   install_packages $(packages)
   grep -qw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
@@ -182,8 +193,8 @@ run_tests() {
   if ! command -v chromium >/dev/null || ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
     say "no chromium, or no playwright: the tests in a browser are left out (./dev.sh test-web installs both)"
   fi
-  # Every core tests; of the tests with a master, each with its own, two run at a time.
-  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS=-j2
+  # Every core tests; tests with a master, each with its own, wait a third of their time: one more of them than cores.
+  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$(($(nproc) + 1))"
 }
 
 # A python of that version which can make an environment. pyenv's are found where it has put them: its shims on the

@@ -21,7 +21,7 @@ DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), 
  python3-pil, python3-roslaunch, python3-rospy, python3-rosbag, python3-rosmsg, python3-rosnode, python3-rosservice,
  python3-scipy, python3-rostopic, python3-sensor-msgs, python3-std-msgs,
  python3-std-srvs, python3-tf2-ros, python3-tqdm, python3-visualization-msgs, python3-yaml, ros-environment,
- python3-tf2-msgs, python3-zmq, rosbash"
+ python3-tf2-msgs, python3-zmq, rosbash, libdynamic-reconfigure-config-init-mutex-dev"
 
 mkdir -p "$stage" build/deb
 cmake -S . -B "$out/build" -DCMAKE_INSTALL_PREFIX=/usr -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF \
@@ -53,7 +53,7 @@ Section: science
 Priority: optional
 Installed-Size: $(du -sk "$stage/usr" | cut -f1)
 Depends: $DEPENDS
-Recommends: bubblewrap, rviz, python3-tk, libdynamic-reconfigure-config-init-mutex-dev
+Recommends: bubblewrap, rviz, python3-tk
 Description: drone of a V-REP tutorial, without V-REP
  PyBullet underneath, ROS 1 around it: roslaunch drone_sim drone.launch
 CONTROL

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """V-REP's way of working through ROS: start, stop, pause, step, edit the script, save the scene, drag things."""
 
+import json
 import math
 import sys
 import tempfile
@@ -62,6 +63,16 @@ def sysCall_sensing():
     self.x += 1
     sim.addDrawingObjectItem(self.path, [self.x, 0, 1])
     sim.addDrawingObjectItem(self.ball, [self.x, 0, 1])
+"""
+OPENS = """
+def sysCall_init():
+    sim.adjustView(sim.floatingViewAdd(0.9, 0.9, 0.2, 0.2, 0), sim.getObject('/floorCamera'), 64)
+    self.asked = sim.displayDialog('Land?', 'now?', sim.dlgstyle_yes_no, False)
+
+def sysCall_actuation():
+    if self.asked and sim.getDialogResult(self.asked) == sim.dlgret_no:
+        sim.auxiliaryConsolePrint(sim.auxiliaryConsoleOpen('Said', 5, 0), 'no')
+        self.asked = None
 """
 
 
@@ -126,6 +137,23 @@ class Toolbar(unittest.TestCase):
         with self.assertRaisesRegex(rospy.ServiceException, "the script ended before it answered"):
             ask(True)
         waiting.join()
+
+    def test_windows_of_a_script_are_told_and_a_dialog_is_answered(self):
+        windows, answers = Listener("~windows", String), rospy.Publisher("~window_answers", String, queue_size=5)
+        connected(answers)
+        self.script.write_text(OPENS)
+        self.call("restart")
+        said = windows.wait_for(lambda m: '"Land?"' in m.data, after=0).data
+        state = json.loads(said)
+        self.assertEqual(state["views"][0]["topic"], "/drone/floor/image")
+        for wrong in ("nonsense", '{"handle": 1000, "button": "no"}'):
+            answers.publish(wrong)
+        self.log.wait_for(lambda m: m.msg.startswith("window_answers: refused: "), after=0)
+        answers.publish(json.dumps({"handle": state["dialogs"][0]["handle"], "button": "no"}))
+        windows.wait_for(lambda m: json.loads(m.data)["consoles"][:1] and not json.loads(m.data)["dialogs"], after=0)
+        self.call("stop")
+        windows.wait_for(lambda m: not any(json.loads(m.data).values()), after=0)
+        answers.unregister()
 
     def test_pause_and_single_steps(self):
         self.call("step", expected=False)
@@ -352,7 +380,7 @@ class Toolbar(unittest.TestCase):
         message = InteractiveMarkerFeedback(client_id="rviz", marker_name="Drone")
         message.event_type = InteractiveMarkerFeedback.MOUSE_DOWN
         feedback.publish(message)
-        held = self.node._handles._held
+        held = self.node._handles[0]._held
         for expected in ({"Drone"}, set()):
             self.wait_until(lambda expected=expected: held.names() == expected)
         handles.wait_for(lambda m: any(pose.name == "Drone" for pose in m.poses))

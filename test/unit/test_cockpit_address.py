@@ -77,7 +77,7 @@ def test_without_a_network_the_machine_goes_by_its_name(monkeypatch):
 
 
 def test_settings_have_defaults():
-    assert settings.read({}) == ("127.0.0.1", 8080, Path.home() / "drone_sim", "drone_sim")
+    assert settings.read({}) == ("127.0.0.1", 8080, Path.home() / "drone_scripts", "drone_sim")
     assert settings.read({"port": 8081, "scripts": "/a/b", "simulator": "/x"})[1:] == (8081, Path("/a/b"), "/x")
 
 

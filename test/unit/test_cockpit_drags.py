@@ -1,12 +1,17 @@
 """The cockpit's handles, and its light, without a browser."""
 
+import io
+
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 pytest.importorskip("viser")
 
+import numpy as np
+import trimesh
 from browser_scene import Scene, marker
 from geometry_msgs.msg import Point, Pose, Quaternion
+from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import (
     InteractiveMarker,
     InteractiveMarkerInit,
@@ -141,3 +146,13 @@ def test_an_object_called_sky_is_shown():
     markers.hear(MarkerArray([sky]))
     markers.show()
     assert scene.nodes
+
+
+def test_colours_look_as_they_do_in_the_cameras():
+    painted = marker(0, Marker.TRIANGLE_LIST, points=[Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)])
+    painted.color = ColorRGBA(0.5, 1.0, 0.0, 1.0)
+    data = looks.show(Scene(), "/x", painted).arguments[0]
+    (mesh,) = trimesh.load(io.BytesIO(data), file_type="glb").geometry.values()
+    np.testing.assert_array_equal(
+        mesh.visual.vertex_attributes["color"][0], (55, 255, 0, 255), "0.5 is 21.4 % of the light"
+    )

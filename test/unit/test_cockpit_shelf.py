@@ -1,4 +1,4 @@
-"""The cockpit's scripts and texts without a browser: what may be read and written, and where a script flies."""
+"""The cockpit's scripts and texts without a browser: what may be read and written, and what stands beside it."""
 
 import json
 import os
@@ -8,20 +8,13 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-import rospy
+from cockpit_asked import LESSONS, Asked
 
-from drone_sim.files.resources import package_path
-from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit import task_scenes
-from drone_sim.ros.cockpit.editing import Editing
 from drone_sim.ros.cockpit.lessons import Lessons
 from drone_sim.ros.cockpit.script_files import LARGEST, ShelfError
 from drone_sim.ros.cockpit.shelf import Shelf
-from drone_sim.run import parameters
-from drone_sim.run.simulation import Simulation
 
-LESSONS = Lessons()
 STAGES = [
     f"tutorial/{name}.py" for name in ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera")
 ]
@@ -38,51 +31,6 @@ def _shelf(tmp_path, own):
     pilot = tmp_path / "pilot.py"
     pilot.write_text("shipped", encoding="utf-8")
     return Shelf(own, {"built-in": lambda: {"pilot.py": pilot}})
-
-
-class Node:
-    """A simulator that remembers what it was asked, and fails as it is told."""
-
-    def __init__(self):
-        self.parameters, self.asked, self.fails = {"scene_file": "none", "script": "pilot"}, [], {}
-
-    def call(self, service):
-        self.asked.append(service)
-        return service not in self.fails, self.fails.get(service, service)
-
-    def parameter(self, name, default=None):
-        return self.parameters.get(name, default)
-
-    def set_parameter(self, name, value):
-        self.parameters[name] = value
-
-
-class Happenings:
-    """Remembers whose timeline was sent."""
-
-    def __init__(self):
-        self.prepared = self.begun = None
-
-    def prepare(self, plan):
-        self.prepared, self.begun = plan, False
-
-    def begin(self):
-        self.begun = True
-
-    def end(self):
-        self.prepared = None
-
-
-class Asked:
-    """What a browser asks."""
-
-    def __init__(self, shelf):
-        self.node = Node()
-        self.happenings = Happenings()
-        self.answers = Editing(shelf, LESSONS, self.node, self.happenings).answers
-
-    def __call__(self, ask, **message):
-        return self.answers[ask](message)
 
 
 @pytest.fixture(name="ask")
@@ -262,84 +210,3 @@ def test_only_the_pictures_of_the_texts_are_served():
         "/docs/pictures/tutorial_no.png",
     ):
         assert LESSONS.picture(path) is None
-
-
-# ---- where they fly
-
-
-@pytest.mark.parametrize("name", tasks.names())
-def test_a_tasks_scene_is_what_its_plan_says(name, tmp_path):
-    plan = plans.read(tasks.find(name))
-    wanted, file = plan.parameters(), task_scenes.scene_of(plan, tmp_path)
-    found = parameters.load({"scene_file": file})
-    assert found.model_dump(exclude={"vehicles", "scene_file"} | _carried(found)) == wanted.model_dump(
-        exclude={"vehicles", "scene_file"} | _carried(found)
-    )
-    assert [one.model_dump() for one in found.fleet] == [one.model_dump() for one in wanted.fleet]
-    assert plan.name in task_scenes.told(plan)
-
-
-def _carried(found):
-    """What the vehicles carry themselves; the keys at the top are of none then."""
-    return set(type(found.fleet[0]).model_fields) & set(type(found).model_fields) if found.vehicles else set()
-
-
-@pytest.mark.parametrize("name", tasks.names())
-def test_what_a_task_begins_with_flies(name, tmp_path):
-    plan = plans.read(tasks.find(name))
-    start = Shelf(tmp_path).find(f"tasks/{name}.py")
-    simulation = Simulation(plan.parameters(script=str(start.path)))
-    for _ in range(3):
-        simulation.step()
-    simulation.close()
-
-
-def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_path):
-    node = ask.node
-    node.parameters["scene_file"] = "mine.yaml"
-    said = ask("run", script="tasks/hover.py", lesson="tasks/hover")
-    assert said["done"] and said["said"] == "started in the scene of the task hover"
-    assert "weather/wind = [2.5, 1, 0]" in ask("lesson", lesson="tasks/hover")["flies"]
-    assert node.parameters == {
-        "scene_file": str(tmp_path / ".ros/drone_sim/tasks/hover.yaml"),
-        "script": _start("hover"),
-    }
-    ask("run", script="tutorial/4_pitch.py", lesson="stage-4-pitch")
-    assert node.parameters["scene_file"] == str(package_path() / "config/scenes/empty.yaml")
-    assert ask("lesson", lesson="stage-1-constant-thrust")["flies"] == "back in mine.yaml"
-    said = ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust")["said"]
-    assert said == "started back in mine.yaml"
-    assert node.parameters["scene_file"] == "mine.yaml"
-    node.asked.clear()
-    assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"
-    assert node.asked == ["restart"] and ask.happenings.prepared is None
-
-
-def test_a_scene_that_the_user_has_chosen_meanwhile_stays(ask):
-    ask("run", script="tasks/gates.py", lesson="tasks/gates")
-    ask.node.parameters["scene_file"] = "other.yaml"
-    assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"
-    assert ask.node.parameters["scene_file"] == "other.yaml"
-
-
-def test_a_script_that_fails_in_a_tasks_scene_is_shown_at_its_line_and_one_that_has_no_scene_leaves_all_as_it_was(ask):
-    ask.node.fails = {"load_scene": f"[init] {_start('gates')}:7: NameError: x"}
-    failed = ask("run", script="tasks/gates.py", lesson="tasks/gates")
-    assert not failed["done"] and failed["line"] == 7 and "gates.yaml" in ask.node.parameters["scene_file"]
-    ask.node.parameters["scene_file"] = "mine.yaml"
-    ask.node.fails = {"load_scene": "gates.yaml: no such file"}
-    assert ask("run", script="tasks/gates.py", lesson="tasks/gates")["said"] == "gates.yaml: no such file"
-    assert ask.node.parameters["scene_file"] == "mine.yaml"
-
-
-def test_a_master_that_has_gone_is_one_line(ask, monkeypatch):
-    def gone(*_):
-        raise rospy.ROSException("no master")
-
-    monkeypatch.setattr(ask.node, "parameter", gone)
-    with pytest.raises(ValueError, match="no master"):
-        ask("scripts")
-
-
-def _start(name):
-    return str(Path(tasks.folder()) / name / "start.py")

@@ -1,6 +1,7 @@
 """Pictures, and what scripts open, on their way to the browsers: no browser is needed for any of it."""
 
 import asyncio
+import json
 from typing import ClassVar
 
 import numpy as np
@@ -11,13 +12,17 @@ pytest.importorskip("viser")
 
 import cv2
 from cv_bridge import CvBridge
+from dynamic_reconfigure.encoding import encode_config
 from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import String
 
 from drone_sim.ros.cockpit import cameras as cameras_module
 from drone_sim.ros.cockpit.cameras import Cameras
 from drone_sim.ros.cockpit.found import Source, find
 from drone_sim.ros.cockpit.outbox import Outbox
+from drone_sim.ros.cockpit.pace import Pace
 from drone_sim.ros.cockpit.pictures import packed
+from drone_sim.ros.cockpit.windows import Windows
 from drone_sim.ros.cockpit.words import Words
 
 
@@ -175,6 +180,16 @@ class Gui:
         self.boxes[name] = Box(value)
         return self.boxes[name]
 
+    def add_dropdown(self, name, options, initial_value, hint):
+        assert hint
+        self.boxes[name] = Box(initial_value)
+        self.boxes[name].options = options
+        return self.boxes[name]
+
+    def add_text(self, name, value, disabled, hint):
+        assert disabled and hint
+        return self.add_checkbox(name, value)
+
     def add_html(self, content):
         return Box(content)
 
@@ -261,6 +276,35 @@ def test_a_view_of_a_script_switches_its_camera(cameras):
     cameras.turn("/later", True)
     cameras.offer(())
     assert cameras.shown == [] and not Subscriber.there
+
+
+@pytest.mark.parametrize("wrong", ["nonsense", "[" * 100_000, "3", '{"views": 3}', '{"views": [], "dialogs": []}'])
+def test_what_is_no_state_of_windows_changes_nothing(cameras, sent, wrong):
+    windows = Windows("/drone_sim", cameras, sent)
+    view = {"handle": 1, "topic": "/drone/front", "label": "x"}
+    windows._hear(String(json.dumps({"views": [view, 7], "dialogs": [], "consoles": []})))
+    windows._hear(String(wrong))
+    assert cameras.shown == ["/drone/front"]
+    assert windows.answers["windows"]({}) == {
+        "windows": {"views": [view], "dialogs": [], "consoles": []},
+        "pictures": ["/drone/front"],
+    }
+    with pytest.raises(ValueError, match="no simulation"):
+        windows.answers["answer"]({"handle": 1, "button": "ok"})
+
+
+def test_the_speed_follows_what_others_set():
+    gui = Gui()
+    pace = Pace(gui, "/drone_sim", print)
+    for factor, words in ((2.0, "2 times real time"), (0.0, "as fast as it can"), (3.7, "3.7 times real time")):
+        pace.hear(encode_config({"real_time_factor": factor}))
+        assert gui.boxes["Speed"].value == words and words in gui.boxes["Speed"].options
+    pace.hear(encode_config({"real_time_factor": 1.0}))
+    pace.hear(encode_config({"Kzref": 3.0}))
+    assert gui.boxes["Speed"].value == "real time"
+    for said, words in (("1.98", "1.98 times real time"), ("not known", ""), ("", "")):
+        pace.show_reached(said)
+        assert gui.boxes["Reached"].value == words
 
 
 def test_words_are_text():

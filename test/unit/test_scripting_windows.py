@@ -1,9 +1,11 @@
 """Floating views, dialogs and consoles of scripts: what is to be seen of them, and what a person answers."""
 
 import json
+import re
 
 import pytest
 
+from drone_sim.files.resources import package_path
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.windows import MOST, Dialog, Windows, read_answer
@@ -20,7 +22,8 @@ def sysCall_init():
     self.results = []
 
 def sysCall_actuation():
-    self.results.append((sim.getDialogResult(self.asked), sim.getDialogResult(self.input), sim.getDialogInput(self.input)))
+    asked, answered = sim.getDialogResult(self.asked), sim.getDialogResult(self.input)
+    self.results.append((asked, answered, sim.getDialogInput(self.input)))
     sim.auxiliaryConsolePrint(self.console, f'step {len(self.results)}\\n')
     sim.setStringSignal('results', repr(self.results[-1]))
     if sim.getInt32Signal('close'):
@@ -98,6 +101,18 @@ def test_what_a_script_closes_is_closed_and_a_snapshot_opens_it_again(fly):
     assert [len(one) for one in simulation.windows.state().values()] == [0, 2, 0]
     simulation.restore(snapshot)
     assert simulation.windows.state() == before
+
+
+def test_the_example_asks_and_prints(fly):
+    text = (package_path() / "docs" / "scripts.md").read_text(encoding="utf-8").partition("## Windows")[2]
+    simulation = fly(re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0])
+    windows = simulation.windows
+    windows.can_answer = lambda: True
+    simulation.step()
+    windows.answer(handles(simulation, "dialogs")[0], "ok", "1.5")
+    simulation.step()
+    state = windows.state()
+    assert (len(state["views"]), state["dialogs"], state["consoles"][0]["lines"]) == (1, [], ["asked for 1.5 m", ""])
 
 
 def test_a_stop_closes_all(fly):

@@ -1,28 +1,36 @@
-"""What the tests of the cockpit's page share: what the node says of the drone, and how they wait for it."""
+"""What the tests of the cockpit's page share: a page that is opened, what the node says of the drone, and waiting."""
 
+import contextlib
 import time
 
 WAIT = 30_000  # ms; a browser without a GPU is slow
 
 
 class Drone:
-    """What the node says of it; needs ROS, and a node that is initialised."""
+    """What the node says of a drone; needs ROS, and a node that is initialised."""
 
-    def __init__(self):
+    def __init__(self, name="drone"):
         import rospy
         from geometry_msgs.msg import TwistStamped
         from nav_msgs.msg import Odometry
+        from std_msgs.msg import String
 
-        self.place = self.command = None
-        rospy.Subscriber("/drone/odom", Odometry, self._on_odometry, queue_size=1)
-        rospy.Subscriber("/drone/command", TwistStamped, self._on_command, queue_size=1)
+        self.place = self.command = self.pose = self.velocity = self.state = None
+        self.flown = {}  # places and commands (vx, vy, vz, wz), by their stamps
+        rospy.Subscriber(f"/{name}/odom", Odometry, self._on_odometry)
+        rospy.Subscriber(f"/{name}/command", TwistStamped, self._on_command)
+        rospy.Subscriber(f"/{name}/state", String, lambda message: setattr(self, "state", message.data))
 
     def _on_odometry(self, message):
-        at = message.pose.pose.position
+        self.pose, self.velocity = message.pose.pose, message.twist.twist.linear
+        at = self.pose.position
         self.place = at.x, at.y, at.z
+        self.flown.setdefault(message.header.stamp, {})["place"] = self.place
 
     def _on_command(self, message):
-        self.command = message.twist.linear.x, message.twist.linear.z, message.twist.angular.z
+        linear, turn = message.twist.linear, message.twist.angular.z
+        self.command = linear.x, linear.z, turn
+        self.flown.setdefault(message.header.stamp, {})["command"] = (linear.x, linear.y, linear.z, turn)
 
 
 def wait_until(page, condition, seconds=30):
@@ -31,6 +39,64 @@ def wait_until(page, condition, seconds=30):
     while not condition():
         assert time.monotonic() < until, "it did not come to pass"
         page.wait_for_timeout(50)
+
+
+@contextlib.contextmanager
+def open_page(cockpit, browser, init="", **options):
+    """Give the page in a browser of its own, with the flown script in the editor.
+
+    `init` is run in it before anything else; `options` are of the browser's context.
+    """
+    context = browser.new_context(viewport={"width": 1000, "height": 500}, **options)
+    context.add_init_script(init)
+    page = context.new_page()
+    page.set_default_timeout(WAIT)
+    page.troubles = []
+    page.on("pageerror", lambda error: page.troubles.append(str(error)))
+    page.goto(cockpit.address)
+    ready(page)
+    wait_until(page, lambda: cockpit.drone.place is not None)
+    yield page
+    assert page.troubles == []
+    context.close()
+
+
+class Panel:
+    """The panel beside the scene, as a user reads and presses it."""
+
+    def __init__(self, page):
+        self.page = page
+        self.scene = page.frame_locator("#scene")
+
+    def field(self, label):
+        """What stands beside a label; viser's text fields are not tied to theirs."""
+        beside = f"//label[normalize-space()='{label}']/ancestor::div[following-sibling::div][1]/following-sibling::div"
+        return self.scene.locator(f"xpath={beside}//*[self::input or self::textarea]").first
+
+    @property
+    def says(self):
+        return self.field("Says").input_value()
+
+    @property
+    def state(self):
+        return self.field("State").input_value()
+
+    def press(self, button, answer=""):
+        """Press a button, and wait until the panel answers so."""
+        self.scene.get_by_role("button", name=button, exact=True).click()
+        if answer:
+            self.wait_for(answer)
+
+    def wait_for(self, answer):
+        wait_until(self.page, lambda: answer in self.says)
+
+    def show(self, tab):
+        self.scene.get_by_role("tab", name=tab).click()
+
+    def choose(self, field, choice):
+        """Choose something of a list."""
+        self.field(field).click()
+        self.scene.get_by_role("option", name=choice, exact=True).click()
 
 
 def ready(page):

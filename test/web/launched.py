@@ -23,6 +23,21 @@ class Launched:
         self.scripts = scripts
         self.log = log
 
+    def call(self, service, *request):
+        """Call a service of the simulation; return what it says."""
+        import rospy
+        from std_srvs.srv import SetBool, Trigger
+
+        return rospy.ServiceProxy(f"/drone_sim/{service}", SetBool if request else Trigger)(*request).message
+
+    def start_afresh(self):
+        """Fly the pilot from the start, as after the launch."""
+        import rospy
+
+        rospy.set_param("/drone_sim/script", "pilot")
+        self.call("pause", False)
+        self.call("restart")
+
 
 @contextlib.contextmanager
 def launched(*arguments):
@@ -43,7 +58,7 @@ def launched(*arguments):
             process = subprocess.Popen([*command, *options], env=environment, stdout=output, stderr=subprocess.STDOUT)
         try:
             os.environ["ROS_MASTER_URI"] = environment["ROS_MASTER_URI"]
-            yield Launched(_address(process, log), Path(folder) / "drone_sim", log)
+            yield Launched(_address(process, log), Path(folder) / "drone_scripts", log)
         finally:
             process.send_signal(signal.SIGINT)
             process.wait(_PATIENCE)

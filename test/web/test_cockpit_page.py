@@ -65,12 +65,17 @@ def test_buttons_fields_and_pictures(cockpit, opened):
     opened.keyboard.down("w")  # the focus is on a switch, into which nobody writes
     wait_until(opened, lambda: cockpit.drone.command[0] == 1.0)
     opened.keyboard.up("w")
-    wait_until(opened, lambda: scene.locator("img").evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
+    picture = opened.locator(".picture img")
+    wait_until(opened, lambda: picture.evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
+    scene.get_by_label("drone/front").click()
+    wait_until(opened, lambda: not picture.count())
     scene.get_by_role("tab", name="Tune").click()
     field = scene.get_by_label("Kzref", exact=True)
-    field.fill("2")
-    field.press("Enter")
-    wait_until(opened, lambda: "Kzref = 2" in scene.locator("textarea").first.input_value())
+    before = field.input_value()
+    for value in ("2", before):
+        field.fill(value)
+        field.press("Enter")
+        wait_until(opened, lambda value=value: f"Kzref = {value}" in scene.locator("textarea").first.input_value())
 
 
 def test_a_second_address_needs_the_token(cockpit, browser):

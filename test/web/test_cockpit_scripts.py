@@ -10,6 +10,9 @@ pytest.importorskip("rospy", reason="needs ROS")
 import rospy
 from cockpit_page import wait_until
 
+from drone_sim.files.resources import package_path
+
+PILOT = "src/drone_sim/child_scripts/pilot.py"
 DRAFT = "drone_sim/draft/mine/edited.py"
 
 
@@ -110,6 +113,11 @@ def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(coc
     open_script(desk, "built-in/pilot.py", "takes off")
     desk.locator("#text .cm-content").press("Control+z")
     assert "takes off" in text(desk), "each script has a history of its own"
+    desk.click("#as")
+    desk.keyboard.type("named.py")
+    desk.keyboard.press("Enter")
+    wait_until(desk, lambda: desk.input_value("#script") == "mine/named.py")
+    assert (cockpit.scripts / "named.py").read_text() == (package_path() / PILOT).read_text()
 
 
 def test_what_was_not_saved_is_there_after_a_reload(cockpit, desk, browser):

@@ -70,9 +70,11 @@ const lesson = new Lesson(
   {
     choice: at("lesson"), before: at("before"), after: at("after"), fold: at("fold"),
     body: at("lesson-body"), start: at("start"), flies: at("flies"), text: at("lesson-text"),
+    grade: at("grade"), graded: at("graded"),
   },
   (...question) => wire.ask(...question),
   open,
+  () => scripts.save(),
 );
 let isLost = false;
 const wire = new Wire(
@@ -82,11 +84,12 @@ const wire = new Wire(
     if (isLost) show({ said: "" });
     isLost = false;
     if (paintsInSoftware()) wire.ask("spare").catch(tell);
-    wire.ask("windows").then(told).catch(tell);
+    wire.ask("windows").then(told, () => {}); // told anyway, once the node is ready
     scripts.connected().catch(tell);
   },
   () => {
     isLost = true;
+    windows.clear();
     show({ said: "the cockpit's node does not answer; what you write is kept here until it does. Started anew, it has a new address.", bad: true });
   },
 );
@@ -113,13 +116,19 @@ at("as-form").onsubmit = (event) => {
   event.preventDefault();
   scripts.saveAs(at("name").value.trim()).then(() => (at("as-form").hidden = true)).catch(tell);
 };
-at("name").onkeydown = (event) => event.key === "Escape" && (at("as-form").hidden = true);
+at("name").onkeydown = (event) => {
+  if (event.key === "Escape") at("as-form").hidden = true;
+};
 at("toggle").onclick = () => {
   const wide = document.body.classList.toggle("wide");
   at("toggle").setAttribute("aria-expanded", String(!wide));
 };
 window.addEventListener("keydown", (event) => {
-  if (event.key === "Enter" && (event.ctrlKey || event.metaKey) && !event.defaultPrevented) run();
+  if (event.defaultPrevented || !(event.ctrlKey || event.metaKey)) return;
+  if (event.key === "Enter") run();
+  if (event.key !== "s") return;
+  event.preventDefault(); // the browser would save the page
+  scripts.save().catch(tell);
 });
 const letGo = (event) => event.key === "Escape" && wire.ask("let go").catch(tell);
 window.addEventListener("keydown", letGo);

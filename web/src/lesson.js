@@ -4,12 +4,26 @@ import { render } from "./markdown.js";
 // The tutorial is written for a terminal: what does the same here.
 const HERE = "Here, Run is its roslaunch; a click on the drone pushes it, its arrows put it elsewhere, the keys below are its commands.";
 
+const ASK_AGAIN = 500; // ms, for what is being graded
+
+function showGrade(element, script, { error, points, of, rows = [] }) {
+  const table = document.createElement("table");
+  for (const one of rows) {
+    const row = table.insertRow();
+    row.className = one.passed ? "passed" : "failed";
+    for (const cell of [one.passed ? "ok" : "no", one.name, `${one.points}/${one.of}`, one.said]) row.insertCell().textContent = cell;
+  }
+  const sum = rows.length ? `${script}: ${points} of ${of} points` : "";
+  element.replaceChildren([sum, error].filter(Boolean).join(". "), table);
+}
+
 export class Lesson {
-  // `parts` are elements: choice, before, after, fold, body, start, flies, text.
-  constructor(parts, ask, open) {
+  // `parts` are elements: choice, before, after, fold, body, start, flies, grade, graded, text. `save` saves the script.
+  constructor(parts, ask, open, save) {
     this.parts = parts;
     this.ask = ask;
     this.open = open; // a script
+    this.save = save;
     this.all = []; // { lesson, title, task, script } in the order of reading
     this.name = "";
     this.opened = { script: "", lesson: "" };
@@ -18,6 +32,7 @@ export class Lesson {
     parts.after.onclick = () => this.turn(1);
     parts.fold.onclick = () => this.folded(!parts.body.hidden);
     parts.start.onclick = () => open(this.script);
+    parts.grade.onclick = () => this.grade();
   }
 
   offer(all) {
@@ -44,6 +59,7 @@ export class Lesson {
     if (!name) return this.folded(true);
     const { text, folder, script, flies } = await this.ask("lesson", { lesson: name });
     if (name !== this.name) return; // another one has been chosen meanwhile
+    this.parts.graded.replaceChildren();
     this.script = this.opened.lesson === name ? this.opened.script : script; // there may be several
     const isTask = this.all[this.place]?.task;
     this.parts.flies.textContent = [flies && `Run flies ${flies}.`, isTask ? "" : HERE].filter(Boolean).join(" ");
@@ -68,6 +84,29 @@ export class Lesson {
     if (this.script) this.open(this.script);
   }
 
+  // Grades the script by this task, beside what flies, and shows how it did.
+  async grade() {
+    const { grade, graded } = this.parts;
+    const task = this.name;
+    grade.disabled = true;
+    graded.textContent = "flying without a picture ...";
+    try {
+      await this.save();
+      const { script } = this.opened;
+      const { number } = await this.ask("grade", { script, lesson: task });
+      let result = {};
+      while (!("error" in result)) {
+        await new Promise((resolve) => setTimeout(resolve, ASK_AGAIN));
+        result = await this.ask("graded", { number });
+      }
+      if (task === this.name) showGrade(graded, script, result);
+    } catch (error) {
+      graded.textContent = error.message;
+    } finally {
+      grade.disabled = false;
+    }
+  }
+
   get place() {
     return this.all.findIndex((one) => one.lesson === this.name);
   }
@@ -80,7 +119,8 @@ export class Lesson {
   }
 
   aim() {
-    const { before, after, start } = this.parts;
+    const { before, after, start, grade } = this.parts;
+    grade.hidden = !this.all[this.place]?.task;
     before.disabled = this.place <= 0;
     after.disabled = this.place + 1 >= this.all.length;
     start.hidden = !this.name || !this.script || this.opened.lesson === this.name;

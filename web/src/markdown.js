@@ -5,7 +5,7 @@ import { classHighlighter, highlightCode } from "@lezer/highlight";
 import { pythonLanguage } from "@codemirror/lang-python";
 
 const FORMULA = /\$\$([\s\S]+?)\$\$|\$(?!\s)((?:[^$\\`]|\\.)+?)(?<!\s)\$(?!\d)/y; // $$on a line of its own$$, $in a line$
-const STAGE = /^\/docs\/tutorial\/([^/]+\.(?:py|lua))$/;
+const STAGE = /^\/docs\/tutorial\/([0-9][^/]*\.(?:py|lua))$/;
 const BUILT_IN = /^\/src\/drone_sim\/child_scripts\/([^/]+\.(?:py|lua))$/;
 const PICTURE = /^\/(?:docs\/pictures|tasks\/\w+)\/\w+\.png$/;
 
@@ -37,11 +37,21 @@ function coloured(code, language) {
   return made;
 }
 
+// The place of a link in the package, null for what is not in it.
+function within(link, folder) {
+  try {
+    const url = new URL(link, `http://package/${folder}/`);
+    return url.host === "package" ? url : null;
+  } catch {
+    return null;
+  }
+}
+
 // Where a link of a text leads: out into the web, to a script of ours, to another text, or nowhere.
 function target(href, folder) {
   if (/^https?:/i.test(href)) return { web: href };
-  const url = new URL(href, `http://package/${folder}/`);
-  if (url.host !== "package") return {};
+  const url = within(href, folder);
+  if (!url) return {};
   if (href.startsWith("#") || url.pathname === "/docs/tutorial.md") return { lesson: url.hash.slice(1) };
   const stage = STAGE.exec(url.pathname);
   const builtIn = BUILT_IN.exec(url.pathname);
@@ -62,8 +72,8 @@ export function render(element, text, folder, knows, go) {
     } else link.replaceWith(...link.childNodes); // it leads to what is only in the repository
   }
   for (const picture of element.querySelectorAll("img")) {
-    const path = new URL(picture.getAttribute("src"), `http://package/${folder}/`);
-    if (path.host === "package" && PICTURE.test(path.pathname)) picture.src = path.pathname;
+    const path = within(picture.getAttribute("src"), folder)?.pathname;
+    if (path && PICTURE.test(path)) picture.src = path;
     else picture.replaceWith(picture.alt);
   }
 }

@@ -17,6 +17,11 @@ export class Windows {
     this.keep("console", consoles, (one) => this.console(one));
   }
 
+  clear() {
+    this.show({ views: [], dialogs: [], consoles: [] });
+    this.showPictures([]);
+  }
+
   showPictures(topics) {
     this.keep("picture", topics.map((topic) => ({ handle: topic })), (one) => this.figure(one.handle));
   }

@@ -33,6 +33,7 @@ from drone_sim.ros.cockpit.wire import Wire
 
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
+_NO_SCENE = "none"  # as the launch file says it
 _PERIOD = 0.05  # s between two looks: 20 a second
 _ASKING = 2.0  # s between two questions to the master
 
@@ -127,13 +128,13 @@ class Cockpit:
     def _ask_master(self) -> None:
         try:
             self._found = find(rospy.get_published_topics())
-            scene = str(self._simulator.parameter("scene_file", ""))
+            scene = str(self._simulator.parameter("scene_file", "") or _NO_SCENE)
         except FAILURES:  # another master may come
             self._found, scene = Found(), ""
         if not self._found.namespace:
             self._panel.show_state("no simulation")
         scenes = tuple(f"package://drone_sim/config/scenes/{one.name}" for one in _scenes())
-        self._panel.offer(self._found, ("", *scenes), scene)
+        self._panel.offer(self._found, (_NO_SCENE, *scenes), scene)
 
 
 def _sky() -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any
 
 import rosgraph
 
+from drone_sim.ros.cockpit.grader import Grader
 from drone_sim.ros.cockpit.happenings import Happenings
 from drone_sim.ros.cockpit.lessons import Lesson, Lessons
 from drone_sim.ros.cockpit.places import Places, plan_of
@@ -28,6 +29,7 @@ class Editing:
         self._simulator = simulator
         self._places = Places(simulator)
         self._happenings = happenings
+        self._grader = Grader()
 
     @property
     def answers(self) -> dict[str, Answer]:
@@ -42,6 +44,8 @@ class Editing:
             "revert": lambda message: {"text": self._shelf.original(self._book(message))},
             "lesson": self._lesson,
             "run": self._run,
+            "grade": self._grade,
+            "graded": lambda message: self._grader.result(message.get("number")),
         }
         return {name: _told(answer) for name, answer in asked.items()}
 
@@ -139,6 +143,13 @@ class Editing:
             said = f"no simulation answers: {said}"
         failure = None if done else script_failure(said)
         return {"done": done, "said": said, "line": failure.line if failure and failure.file == path else 0}
+
+    def _grade(self, message: _Message) -> dict[str, Any]:
+        """Begin to grade a script by the task beside it."""
+        lesson, book = self._find_lesson(message), self._book(message)
+        if lesson is None or not lesson.task:
+            raise ShelfError("grade: needs a task; choose one above the text")
+        return {"number": self._grader.start(lesson.task, book.path)}
 
 
 def _text(message: _Message) -> str:

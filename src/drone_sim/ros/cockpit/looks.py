@@ -136,7 +136,7 @@ def _triangles(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
     colors = marker.colors if len(marker.colors) == len(corners) else [marker.color] * len(corners)
     rgba = np.array([(one.r, one.g, one.b, one.a) for one in colors])
     mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
-    mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=np.uint8(np.clip(rgba, 0, 1) * 255))
+    mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=_linear(rgba))
     glb = as_glb(mesh, is_lit=True, is_clear=bool((rgba[:, 3] < 1).any()))
     return scene.add_glb(name, glb, **shade, **place(marker))
 
@@ -166,7 +166,7 @@ def _glb(resource: str, rgba: tuple[float, ...] | None) -> bytes | None:
 
 
 def _tint(loaded: Any, rgba: tuple[float, ...]) -> None:
-    color = np.uint8(np.clip(rgba, 0, 1) * 255)
+    color = _linear(np.array(rgba))
     for mesh in loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]:
         mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(color, (len(mesh.faces), 1)))
 
@@ -205,6 +205,14 @@ def as_glb(mesh: Any, is_lit: bool, is_clear: bool = False) -> bytes:
 
     whole = mesh if isinstance(mesh, trimesh.Scene) else trimesh.Scene(mesh)
     return bytes(export_glb(whole, tree_postprocessor=finish))
+
+
+def _linear(rgba: np.ndarray) -> np.ndarray:
+    """Return colours (..., 4), 0..1 as screens take them, as glTF's vertices have them: 0..255, linear in light."""
+    clipped = np.clip(rgba, 0, 1)
+    rgb = clipped[..., :3]
+    clipped[..., :3] = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)  # IEC 61966-2-1
+    return np.asarray(np.round(clipped * 255), dtype=np.uint8)
 
 
 def _points(marker: Marker) -> np.ndarray:

@@ -52,7 +52,7 @@ class Panel:
         with tabs.add_tab("Tune"):
             self.tuning = Tuning(gui, self.say)
         with tabs.add_tab("Log"):
-            self._diagnosis = Words(gui, "Why it does not fly")
+            self._diagnosis = Words(gui, "Diagnosis")
             self._log = Words(gui, "Log")
 
     def _toolbar(self) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 
-_WIDEST = 640  # px; of a larger one, every other pixel, or less, is shown
+_WIDEST, _WIDEST_DEPTHS = 640, 320  # px; of a larger one, every other pixel, or less, is shown
 _COLORS = cv2.COLORMAP_TURBO  # near is blue, far is red
 _JPEG = (cv2.IMWRITE_JPEG_QUALITY, 80)
 _MILLIMETRES = "16UC1"  # REP-118
@@ -26,9 +26,10 @@ def packed(message: CompressedImage | Image) -> tuple[bytes, str]:
         raise ValueError(f"encoding '{message.encoding[:40]}': {error}") from None
     if not image.size:
         raise ValueError("has no pixels")
-    step = -(-image.shape[1] // _WIDEST)
+    is_depth = image.ndim == 2 and image.dtype != np.uint8
+    step = -(-image.shape[1] // (_WIDEST_DEPTHS if is_depth else _WIDEST))
     image = image[::step, ::step]
-    if image.ndim == 2 and image.dtype != np.uint8:
+    if is_depth:
         return _depths(image.astype(np.float32) * (1e-3 if message.encoding == _MILLIMETRES else 1.0))
     return _encoded(_as_bgr(image, message.encoding)), ""
 

@@ -19,7 +19,7 @@ class Settings(NamedTuple):
 
     address: Any = "127.0.0.1"
     port: Any = 8080
-    scripts: Path = Path("~/drone_sim")
+    scripts: Path = Path("~/drone_scripts")  # not ~/drone_sim, where a checkout of this package may be
     simulator: str = "drone_sim"
 
 

@@ -46,7 +46,7 @@ def told(plan: Plan) -> str:
     lacks = [key for key in config if key not in _KNOWN]
     said = [f"in the scene of the task {plan.name}", *_flat({key: config[key] for key in config if key in _KNOWN})]
     said += [f"but without {', '.join(lacks)}, which only a launch can set"] if lacks else []
-    said += [f"and sends the {len(plan.timeline)} commands and displacements of its plan"] if plan.timeline else []
+    said += ["and sends what its plan says happens"] if plan.timeline else []
     return ", ".join(said)
 
 

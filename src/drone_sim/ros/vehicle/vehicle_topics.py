@@ -36,7 +36,7 @@ class VehicleTopics:
         self._sensors = {
             name: SensorOutput(vehicle.parameters, sensor) for name, sensor in vehicle.instruments.by_name.items()
         }
-        self._tuning = TuningServer(vehicle.name, vehicle.tuning, inbox)
+        self._tuning = _tuning_server(vehicle, inbox)
         set_description(vehicle.parameters)
 
     @property
@@ -59,13 +59,15 @@ class VehicleTopics:
 
     def show_tuning(self) -> None:
         """Say what holds now of what may be tuned, where that is news."""
-        self._tuning.follow(self.vehicle.tuning)
+        if self._tuning is not None:
+            self._tuning.follow(self.vehicle.tuning)
 
     def close(self) -> None:
         """Hear and publish no more."""
         self._inputs.close()
         self._outputs.close()
-        self._tuning.close()
+        if self._tuning is not None:
+            self._tuning.close()
         for camera in self._cameras.values():
             camera.close()
         for sensor in self._sensors.values():
@@ -93,3 +95,11 @@ class VehicleTopics:
     def publish_command(self, stamp: Callable[[], rospy.Time]) -> None:
         """Publish the command in force."""
         self._outputs.publish_command(self.vehicle, stamp)
+
+
+def _tuning_server(vehicle: Vehicle, inbox: Inbox) -> TuningServer | None:
+    """Return what tunes a vehicle, None for one in whose namespace the node's own server is."""
+    if rospy.resolve_name(vehicle.name) != rospy.get_name():
+        return TuningServer(vehicle.name, vehicle.tuning, inbox)
+    rospy.logwarn(f"vehicle {vehicle.name} cannot be tuned in flight: it has the name of the node")
+    return None

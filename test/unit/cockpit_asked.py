@@ -1,0 +1,51 @@
+"""What the tests of the cockpit's scripts ask, and the simulator that they ask it of."""
+
+from drone_sim.ros.cockpit.editing import Editing
+from drone_sim.ros.cockpit.lessons import Lessons
+
+LESSONS = Lessons()
+
+
+class Node:
+    """A simulator that remembers what it was asked, and fails as it is told."""
+
+    def __init__(self):
+        self.parameters, self.asked, self.fails = {"scene_file": "none", "script": "pilot"}, [], {}
+
+    def call(self, service):
+        self.asked.append(service)
+        return service not in self.fails, self.fails.get(service, service)
+
+    def parameter(self, name, default=None):
+        return self.parameters.get(name, default)
+
+    def set_parameter(self, name, value):
+        self.parameters[name] = value
+
+
+class Happenings:
+    """Remembers whose timeline was sent."""
+
+    def __init__(self):
+        self.prepared = self.begun = None
+
+    def prepare(self, plan):
+        self.prepared, self.begun = plan, False
+
+    def begin(self):
+        self.begun = True
+
+    def end(self):
+        self.prepared = None
+
+
+class Asked:
+    """What a browser asks."""
+
+    def __init__(self, shelf):
+        self.node = Node()
+        self.happenings = Happenings()
+        self.answers = Editing(shelf, LESSONS, self.node, self.happenings).answers
+
+    def __call__(self, ask, **message):
+        return self.answers[ask](message)

@@ -1,0 +1,182 @@
+"""Where a script of the cockpit flies, what happens to it there, and how it is graded, without a browser."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+import rospy
+from cockpit_asked import Asked
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Header, String
+
+from drone_sim.files.resources import package_path
+from drone_sim.grading import plan as plans
+from drone_sim.grading import tasks
+from drone_sim.ros.cockpit import grader, task_scenes
+from drone_sim.ros.cockpit.happenings import Happenings
+from drone_sim.ros.cockpit.script_files import ShelfError
+from drone_sim.ros.cockpit.shelf import Shelf
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+
+@pytest.fixture(name="ask")
+def _ask(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    return Asked(Shelf(tmp_path / "mine"))
+
+
+# ---- where they fly
+
+
+@pytest.mark.parametrize("name", tasks.names())
+def test_a_tasks_scene_is_what_its_plan_says(name, tmp_path):
+    plan = plans.read(tasks.find(name))
+    wanted, file = plan.parameters(), task_scenes.scene_of(plan, tmp_path)
+    found = parameters.load({"scene_file": file})
+    assert found.model_dump(exclude={"vehicles", "scene_file"} | _carried(found)) == wanted.model_dump(
+        exclude={"vehicles", "scene_file"} | _carried(found)
+    )
+    assert [one.model_dump() for one in found.fleet] == [one.model_dump() for one in wanted.fleet]
+    assert plan.name in task_scenes.told(plan)
+
+
+def _carried(found):
+    """What the vehicles carry themselves; the keys at the top are of none then."""
+    return set(type(found.fleet[0]).model_fields) & set(type(found).model_fields) if found.vehicles else set()
+
+
+@pytest.mark.parametrize("name", tasks.names())
+def test_what_a_task_begins_with_flies(name, tmp_path):
+    plan = plans.read(tasks.find(name))
+    start = Shelf(tmp_path).find(f"tasks/{name}.py")
+    simulation = Simulation(plan.parameters(script=str(start.path)))
+    for _ in range(3):
+        simulation.step()
+    simulation.close()
+
+
+def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_path):
+    node = ask.node
+    node.parameters["scene_file"] = "mine.yaml"
+    said = ask("run", script="tasks/hover.py", lesson="tasks/hover")
+    assert said["done"] and said["said"] == "started in the scene of the task hover"
+    assert "weather/wind = [2.5, 1, 0]" in ask("lesson", lesson="tasks/hover")["flies"]
+    assert node.parameters == {
+        "scene_file": str(tmp_path / ".ros/drone_sim/tasks/hover.yaml"),
+        "script": _start("hover"),
+    }
+    ask("run", script="tutorial/4_pitch.py", lesson="stage-4-pitch")
+    assert node.parameters["scene_file"] == str(package_path() / "config/scenes/empty.yaml")
+    assert ask("lesson", lesson="stage-1-constant-thrust")["flies"] == "back in mine.yaml"
+    said = ask("run", script="tutorial/1_thrust.py", lesson="stage-1-constant-thrust")["said"]
+    assert said == "started back in mine.yaml"
+    assert node.parameters["scene_file"] == "mine.yaml"
+    node.asked.clear()
+    assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"
+    assert node.asked == ["restart"] and ask.happenings.prepared is None
+
+
+def test_a_scene_that_the_user_has_chosen_meanwhile_stays(ask):
+    ask("run", script="tasks/gates.py", lesson="tasks/gates")
+    ask.node.parameters["scene_file"] = "other.yaml"
+    assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"
+    assert ask.node.parameters["scene_file"] == "other.yaml"
+
+
+def test_a_script_that_fails_in_a_tasks_scene_is_shown_at_its_line_and_one_that_has_no_scene_leaves_all_as_it_was(ask):
+    ask.node.fails = {"load_scene": f"[init] {_start('gates')}:7: NameError: x"}
+    failed = ask("run", script="tasks/gates.py", lesson="tasks/gates")
+    assert not failed["done"] and failed["line"] == 7 and "gates.yaml" in ask.node.parameters["scene_file"]
+    ask.node.parameters["scene_file"] = "mine.yaml"
+    ask.node.fails = {"load_scene": "gates.yaml: no such file"}
+    assert ask("run", script="tasks/gates.py", lesson="tasks/gates")["said"] == "gates.yaml: no such file"
+    assert ask.node.parameters["scene_file"] == "mine.yaml"
+
+
+def test_a_script_is_graded_in_a_process_of_its_own(ask):
+    begun = ask("grade", script="tasks/hover.py", lesson="tasks/hover")
+    with pytest.raises(ShelfError, match="another script is being graded"):
+        ask("grade", script="tasks/hover.py", lesson="tasks/hover")
+    while not (result := ask("graded", number=begun["number"])):
+        time.sleep(0.02)
+    assert (result["error"], result["points"], result["of"]) == ("", 3.0, 6.0)
+    assert [(one["name"], one["passed"]) for one in result["rows"]][:2] == [("place", False), ("height", True)]
+    for message, words in (({"lesson": "stage-3-yaw"}, "needs a task"), ({"lesson": None}, "needs a task")):
+        with pytest.raises(ShelfError, match=words):
+            ask("grade", script="tasks/hover.py", **message)
+    with pytest.raises(ShelfError, match="graded since"):
+        ask("graded", number=-1)
+
+
+def test_a_grading_that_does_not_end_is_ended(monkeypatch, tmp_path):
+    monkeypatch.setattr(grader, "_MOST", 0.0)
+    one = grader.Grader()
+    number = one.start("hover", tmp_path / "x.py")
+    while not (result := one.result(number)):
+        time.sleep(0.01)
+    assert result == {"error": "it took more than 0 s"}
+
+
+def test_a_master_that_has_gone_is_one_line(ask, monkeypatch):
+    def gone(*_):
+        raise rospy.ROSException("no master")
+
+    monkeypatch.setattr(ask.node, "parameter", gone)
+    with pytest.raises(ValueError, match="no master"):
+        ask("scripts")
+
+
+def _start(name):
+    return str(Path(tasks.folder()) / name / "start.py")
+
+
+# ---- what a task's plan says happens
+
+
+class Topics:
+    """The subscribers and publishers that were made, and what was published."""
+
+    def __init__(self):
+        self.hears, self.sent = {}, []
+
+    def subscriber(self, name, _kind, callback, **_):
+        self.hears[name] = callback
+        return Topic(lambda: self.hears.pop(name, None))
+
+    def publisher(self, name, *_, **__):
+        return Topic(lambda: None, lambda message: self.sent.append((name, message.linear.x)))
+
+
+class Topic:
+    def __init__(self, unregister, publish=None):
+        self.unregister, self.publish = unregister, publish
+
+
+@pytest.fixture(name="topics")
+def _topics(monkeypatch):
+    topics = Topics()
+    monkeypatch.setattr(rospy, "Subscriber", topics.subscriber)
+    monkeypatch.setattr(rospy, "Publisher", topics.publisher)
+    return topics
+
+
+def test_what_happens_in_a_task_is_sent_by_the_count_of_steps(topics):
+    happenings = Happenings("/drone_sim")
+    happenings.prepare(plans.read(tasks.find("steps")))
+    assert not topics.hears, "nothing is listened to before it flies"
+    happenings.begin()
+    stamps = [100 + 0.06 * step for step in range(25) for _ in range(2)]  # twice each: it stood still in between
+    for stamp in stamps:
+        topics.hears["/drone/odom"](Odometry(header=Header(stamp=rospy.Time.from_sec(stamp))))
+        if len(topics.sent) == 1:
+            break
+    assert topics.sent == [("/drone/cmd_vel", 1.0)] and stamp == 100 + 0.06 * 19, "after 20 steps of 0.05 s"
+    topics.hears["/drone_sim/state"](String("stopped"))
+    assert not topics.hears
+    happenings.prepare(plans.read(tasks.find("gates")))
+    happenings.begin()
+    assert not topics.hears, "nothing happens in this one"

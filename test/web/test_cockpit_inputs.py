@@ -1,0 +1,82 @@
+"""What flies besides keys: touch sticks and a gamepad; and when keys are released, with one browser and with two."""
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_page import Panel, open_page, wait_until
+
+PAD = "window.pad = null; navigator.getGamepads = () => [window.pad];"
+STILL = (0.0, 0.0, 0.0)
+
+
+@pytest.fixture(name="tablet", scope="module")
+def _tablet(cockpit, browser):
+    """A page on a touch screen, with a gamepad at hand."""
+    with open_page(cockpit, browser, init=PAD, has_touch=True, is_mobile=True) as page:
+        yield page
+
+
+@pytest.fixture(autouse=True)
+def _afresh(cockpit, tablet):
+    cockpit.start_afresh()
+    wait_until(tablet, lambda: cockpit.drone.command == STILL)
+
+
+def nearly(command, wanted):
+    return all(abs(one - other) < 0.1 for one, other in zip(command, wanted))
+
+
+def test_two_sticks_on_a_touch_screen(cockpit, tablet):
+    fingers = tablet.context.new_cdp_session(tablet)
+    boxes = [tablet.locator(f"#{stick}").bounding_box() for stick in ("left", "right")]
+    middles = [(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2) for box in boxes]
+
+    def touch(kind, *shifts):
+        points = [{"x": x + dx, "y": y + dy, "id": id} for id, ((x, y), (dx, dy)) in enumerate(zip(middles, shifts))]
+        fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    touch("touchStart", (0, 0), (0, 0))
+    touch("touchMove", (0, -40), (0, -40))  # both up: climb, and forward
+    wait_until(tablet, lambda: nearly(cockpit.drone.command, (0.85, 0.85, 0.0)))
+    touch("touchMove", (40, 0), (0, 0))  # turn to the right
+    wait_until(tablet, lambda: nearly(cockpit.drone.command, (0.0, 0.0, -0.85)))
+    touch("touchEnd")
+    wait_until(tablet, lambda: cockpit.drone.command == STILL)
+
+
+def test_a_gamepad_in_the_standard_mapping(cockpit, tablet):
+    tablet.evaluate("pad = { axes: [-0.5, 0.05, 0, -1], buttons: [], mapping: 'standard', connected: true }")
+    wait_until(tablet, lambda: nearly(cockpit.drone.command, (1.0, 0.0, 0.5)))
+    tablet.evaluate("pad = null")
+    wait_until(tablet, lambda: cockpit.drone.command == STILL)
+
+
+def test_keys_are_released_when_the_window_is_left(cockpit, tablet):
+    tablet.locator("#command").click()
+    tablet.keyboard.down("w")
+    wait_until(tablet, lambda: cockpit.drone.command[0] == 1.0)
+    tablet.locator("#script").focus()  # still in the window
+    assert cockpit.drone.command[0] == 1.0
+    tablet.frame_locator("#scene").locator("body").evaluate("body => { body.tabIndex = -1; body.focus() }")
+    wait_until(tablet, lambda: cockpit.drone.command == STILL)
+    tablet.keyboard.up("w")
+
+
+def test_two_browsers_see_the_same_and_the_keys_of_both_count(cockpit, browser, tablet):
+    with open_page(cockpit, browser) as other:
+        panels = Panel(tablet), Panel(other)
+        panels[1].press("pause", "paused at")
+        wait_until(tablet, lambda: panels[0].state == panels[1].state == "paused")
+        panels[0].press("go on", "goes on")
+        wait_until(other, lambda: panels[1].state == "flying")
+        for page in (tablet, other):
+            page.locator("#command").click()
+        tablet.keyboard.down("w")
+        wait_until(tablet, lambda: cockpit.drone.command == (1.0, 0.0, 0.0))
+        other.keyboard.down("r")
+        wait_until(tablet, lambda: cockpit.drone.command == (0.0, 1.0, 0.0))
+        tablet.keyboard.up("w")
+        wait_until(tablet, lambda: cockpit.drone.command == (0.0, 1.0, 0.0))
+        other.context.close()
+    wait_until(tablet, lambda: cockpit.drone.command == STILL)
