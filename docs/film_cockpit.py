@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test" / "web"))
 from cockpit_page import ready
 from launched import launched
 
-SIZE = {"width": 1120, "height": 660}  # px of the page
+SIZE = {"width": 960, "height": 560}  # px of the page
 WIDTH = 800  # px of the film
 STEP = 0.05  # s, of the simulation and of the film
 SLOWER = 0.08  # real-time factor
@@ -94,9 +94,10 @@ class Film:
 
     def click(self, element, count=8):
         """Move to an element, and click."""
-        box = element.bounding_box(timeout=5000)
-        self.move((box["x"] + min(box["width"], 80) / 2, box["y"] + box["height"] / 2), count)
-        self.page.mouse.click(*self.at)
+        box = element.bounding_box(timeout=PATIENCE / 2)
+        inside = {"x": min(box["width"], 80) / 2, "y": box["height"] / 2}
+        self.move((box["x"] + inside["x"], box["y"] + inside["y"]), count)
+        element.click(position=inside)
         self.take()
 
     def hold(self, key, count):
@@ -134,6 +135,7 @@ def edit(film):
     keyboard = film.page.keyboard
     line = film.page.locator(".cm-line", has_text=OLD)
     line.scroll_into_view_if_needed()
+    film.page.wait_for_timeout(1000)
     film.take(6)
     film.click(line)
     keyboard.press("End")
@@ -194,7 +196,8 @@ def switch_camera(film):
 
 
 def fly(film):
-    """Fly through the gate."""
+    """Fly through the gate; a click beside the keys lets them count."""
+    film.click(film.page.locator("#command"))
     film.hold("W", 34)
     film.hold("Q", 12)
     film.hold("W", 20)
