@@ -13,7 +13,7 @@ HOSTILE = '<img src=x onerror="window.top.hacked = true">'
 HEIGHTS = """() => {
     const charts = Object.values(window.__viserTestpoints?.uplots ?? {}).map((one) => one.chart);
     const chart = charts.find((one) => one.series[1].label === "z");
-    if (!chart) return null;
+    if (!chart?.ctx.canvas.width) return null;
     const canvas = chart.ctx.canvas;
     const colours = chart.ctx.getImageData(0, 0, canvas.width, canvas.height).data;
     let red = 0;
