@@ -20,12 +20,13 @@ export class Flying {
     setInterval(() => this.tell(true), AGAIN);
   }
 
-  // Keys count in the page and in the scene, but not where somebody writes, reads or moves a bar.
+  // Keys count in the page and in the scene, but not where somebody writes, reads or moves a bar; a slider has its arrows.
   listenTo(window) {
     const writes = (target) => target.closest?.("input:not([type=checkbox], [type=radio]), textarea, select, article, [contenteditable], [role=separator]");
+    const takes = ({ code, target }) => writes(target) || (code.startsWith("Arrow") && target.closest?.("[role=slider]"));
     window.addEventListener("keydown", (event) => {
       if (event.key === "Shift") this.fast = true;
-      if (!(event.code in KEYS) || writes(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (!(event.code in KEYS) || takes(event) || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
       event.stopPropagation(); // viser moves its eyes by the same keys
       this.keys.add(event.code);
