@@ -134,7 +134,8 @@ def edit(film):
     """Change the height that is held."""
     keyboard = film.page.keyboard
     line = film.page.locator(".cm-line", has_text=OLD)
-    line.scroll_into_view_if_needed()
+    line.evaluate("one => one.scrollIntoView({ block: 'center', inline: 'nearest' })")
+    film.page.evaluate("document.querySelector('.cm-scroller').scrollLeft = 0")
     film.page.wait_for_timeout(1000)
     film.take(6)
     film.click(line)
