@@ -156,3 +156,19 @@ def test_colours_look_as_they_do_in_the_cameras():
     np.testing.assert_array_equal(
         mesh.visual.vertex_attributes["color"][0], (55, 255, 0, 255), "0.5 is 21.4 % of the light"
     )
+
+
+def test_what_changes_too_little_to_be_seen_or_is_only_rvizs_light_is_not_made_anew():
+    def shown(alpha, size):
+        painted = marker(0, Marker.TRIANGLE_LIST, points=[Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)])
+        painted.colors = [ColorRGBA(0, 0, 0, alpha)] * 3
+        painted.scale.x = size
+        return painted
+
+    for casts, alphas, made in ((False, (0.5, 0.501), 1), (False, (0.5, 0.7), 2), (True, (0.5, 0.7), 1)):
+        scene = Scene()
+        markers = Markers(scene, "scene", Frames(scene), casts=casts)
+        for alpha, size in zip(alphas, (1.0, 1.001)):
+            markers.hear(MarkerArray([shown(alpha, size)]))
+            markers.show()
+        assert len(scene.added) == made, (casts, alphas)

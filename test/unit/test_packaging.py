@@ -3,11 +3,12 @@
 import ast
 import re
 import sys
+import sysconfig
 from xml.etree import ElementTree as Xml
 
 import yaml
 
-from drone_sim.files.resources import package_path
+from drone_sim.files.resources import package_path, python_path
 from drone_sim.ros.cockpit.shelf import Shelf
 
 ROOT = package_path()
@@ -85,3 +86,9 @@ def test_every_script_that_the_editor_offers_is_installed(tmp_path):
     folders.add(SOURCE / "drone_sim")  # by catkin_python_setup
     offered = [book.path for book in Shelf(tmp_path).books()]
     assert [path for path in offered if not folders & set(path.parents)] == [] != offered
+
+
+def test_other_processes_find_our_environment_before_the_system():
+    """Debian's typing_extensions, which lies beside the installed package, is too old for our pydantic."""
+    first, second, others = python_path("/others").split(":")
+    assert (first, second, others) == (sysconfig.get_path("purelib"), str(SOURCE), "/others")

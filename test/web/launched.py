@@ -28,7 +28,9 @@ class Launched:
         import rospy
         from std_srvs.srv import SetBool, Trigger
 
-        return rospy.ServiceProxy(f"/drone_sim/{service}", SetBool if request else Trigger)(*request).message
+        service = f"/drone_sim/{service}"
+        rospy.wait_for_service(service, _PATIENCE)  # the cockpit may be there before the simulation
+        return rospy.ServiceProxy(service, SetBool if request else Trigger)(*request).message
 
     def start_afresh(self):
         """Fly the pilot from the start, as after the launch."""

@@ -45,6 +45,12 @@ class Screen:
 def _mouse(opened):
     yield opened.mouse
     opened.mouse.up()
+    load("")  # as it was
+
+
+def load(scene):
+    rospy.set_param("/drone_sim/scene_file", str(scene))
+    assert rospy.ServiceProxy("/drone_sim/load_scene", Trigger)().success
 
 
 def take(page, point, feedback):
@@ -79,8 +85,7 @@ def test_the_drone_goes_where_its_arrow_is_dragged(cockpit, opened, mouse):
 def test_an_object_that_is_clicked_on_has_arrows_and_falls_when_it_is_let_go(cockpit, opened, mouse, tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text(SCENE)
-    rospy.set_param("/drone_sim/scene_file", str(scene))
-    assert rospy.ServiceProxy("/drone_sim/load_scene", Trigger)().success
+    load(scene)
     shown, feedback = (
         listen("/drone/scene", MarkerArray),
         listen("/drone/objects/feedback", InteractiveMarkerFeedback),
@@ -93,7 +98,15 @@ def test_an_object_that_is_clicked_on_has_arrows_and_falls_when_it_is_let_go(coc
     wait_until(opened, lambda: len(crate()) and math.dist(cockpit.drone.place, (0, 0, 0.8)) < 0.02)
     screen, before, aside = Screen(opened, cockpit.drone), crate()[0], np.array((0, 0.5, 0))
     middle = screen.of(before)
-    opened.mouse.click(*middle)
+    panel = opened.frame_locator("#scene")
+    panel.get_by_role("tab", name="View").click()
+
+    def is_chosen():
+        opened.mouse.click(*middle)  # which takes it, or lets it go
+        opened.wait_for_timeout(1000)
+        return panel.get_by_label("Drag").input_value() == "Crate"
+
+    wait_until(opened, is_chosen)
     left = screen.of(before + aside) - middle
     grip = middle + 0.8 * ARROW_PIXELS * left / np.linalg.norm(left)
     take(opened, grip, feedback)
@@ -101,6 +114,5 @@ def test_an_object_that_is_clicked_on_has_arrows_and_falls_when_it_is_let_go(coc
     wait_until(opened, lambda: np.allclose(crate(), before + aside, atol=0.1))
     opened.wait_for_timeout(1500)
     assert abs(crate()[0, 2] - before[2]) < 0.1, "it is held"
-    opened.screenshot(path="/tmp/objects/drag2.png")
     mouse.up()
     wait_until(opened, lambda: crate()[0, 2] < 0.2)

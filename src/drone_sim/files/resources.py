@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+import sysconfig
 from pathlib import Path
 
 from drone_sim.wording import shown
@@ -19,6 +20,14 @@ def package_path() -> Path:
         if (folder / "package.xml").is_file():
             return folder
     raise FileNotFoundError(f"drone_sim: no config, urdf and package.xml near {_HERE.parent}")
+
+
+def python_path(*others: str) -> str:
+    """Return a PYTHONPATH with which another process of this python imports this package, and what it needs, as here.
+
+    Where the package is installed, the system's packages lie beside it, and are older than those of our environment.
+    """
+    return os.pathsep.join(filter(None, (sysconfig.get_path("purelib"), str(_HERE.parents[2]), *others)))
 
 
 def locate(name: str) -> Path:

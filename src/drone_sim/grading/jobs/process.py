@@ -12,9 +12,9 @@ import tempfile
 import threading
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
+from drone_sim.files.resources import python_path
 from drone_sim.grading import plan as plans
 from drone_sim.grading.flight import ungraded
 from drone_sim.grading.jobs import sandbox
@@ -183,8 +183,7 @@ _starting = threading.Lock()  # or one process inherits the pipes of another
 def _started(around: list[str], temporary: str) -> subprocess.Popen[bytes]:
     arguments = ["-m", "drone_sim.grading.jobs.warm", *(["alone"] if around else [])]
     passed = {name: value for name, value in os.environ.items() if name.startswith(_PASSED)}
-    source = str(Path(__file__).resolve().parents[3])
-    path = os.pathsep.join(filter(None, (source, passed.get("PYTHONPATH"))))
+    path = python_path(passed.get("PYTHONPATH", ""))
     with _starting:
         return subprocess.Popen(
             [*around, sys.executable, *arguments],

@@ -137,7 +137,7 @@ def _triangles(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
     rgba = np.array([(one.r, one.g, one.b, one.a) for one in colors])
     mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
     mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=_linear(rgba))
-    glb = as_glb(mesh, is_lit=True, is_clear=bool((rgba[:, 3] < 1).any()))
+    glb = as_glb(mesh, is_lit=bool(marker.colors), is_clear=bool((rgba[:, 3] < 1).any()))
     return scene.add_glb(name, glb, **shade, **place(marker))
 
 

@@ -8,14 +8,16 @@ import threading
 from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
-from geometry_msgs.msg import Pose
-from std_msgs.msg import Header
+from geometry_msgs.msg import Pose, Vector3
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.ros.cockpit import looks
 from drone_sim.ros.cockpit.frames import Frames
 
 _Key = tuple[str, int]
+_DIGITS = 2  # of a size in m
+_SHADES = 1  # digits of a colour
 
 
 class _Look(NamedTuple):
@@ -66,6 +68,8 @@ class Markers:
                 elif marker.action == Marker.DELETE:
                     self._wanted.pop(key, None)
                 elif marker.ns not in self._hidden:
+                    if self._casts:
+                        marker.colors = []  # light that was painted on for rviz; here is a sun
                     self._wanted[key] = marker
             self._changed = True
 
@@ -126,9 +130,14 @@ class Markers:
 
 
 def _look(marker: Marker) -> _Look:
-    """Return what differs between two markers that look different; their poses, times and ids do not."""
+    """Return what differs between two markers that look different; their poses, times and ids do not.
+
+    Colours and sizes that nobody could tell apart are the same: what is made anew is gone for a moment.
+    """
     bare = copy.copy(marker)
     bare.header, bare.pose, bare.points, bare.text = Header(frame_id=marker.header.frame_id), Pose(), [], ""
+    bare.scale = Vector3(*(round(value, _DIGITS) for value in (marker.scale.x, marker.scale.y, marker.scale.z)))
+    bare.colors = [ColorRGBA(*(round(value, _SHADES) for value in (c.r, c.g, c.b, c.a))) for c in marker.colors]
     form = Marker(points=marker.points, text=marker.text)
     return _Look(_bytes(bare), _bytes(form))
 

@@ -87,10 +87,11 @@ class SceneView:
 
     def _make_pushable(self, marker: Marker, handle: Any) -> None:
         """Let a click on a part of a vehicle, whose name is the marker's namespace, push it."""
+        pusher = self._pusher(marker.ns)  # now: the first message of a new publisher is heard by nobody
 
         @handle.on_click
         def _(event: Any) -> None:
-            push(self._pusher(marker.ns).publish, event.ray_direction, self.strength)
+            push(pusher.publish, event.ray_direction, self.strength)
 
     def _pusher(self, vehicle: str) -> rospy.Publisher:
         if vehicle not in self._pushers:

@@ -6,7 +6,9 @@ import asyncio
 import contextlib
 import io
 import secrets
+import signal
 import sys
+import threading
 from collections.abc import Callable
 
 import rospy
@@ -50,9 +52,19 @@ class Serving:
 def main() -> int:
     """Serve until the node ends; return the exit status."""
     # There may be several. Its time is the person's, who looks on while /clock stands still.
-    if not init_node(_NAME, anonymous=True, disable_rostime=True):
+    if not init_node(_NAME, anonymous=True, disable_rostime=True, disable_signals=True):
         return 1
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _end)
     return reported(_NAME, _serve)
+
+
+def _end(*_: object) -> None:
+    """End the node. rospy's own handler calls the master from within whatever a signal interrupts.
+
+    Where that is a call to the master, too, it would hang for ever; a thread of its own waits for its turn.
+    """
+    threading.Thread(target=rospy.signal_shutdown, args=("signal",), name="end").start()
 
 
 def _serve() -> None:

@@ -6,10 +6,9 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from xml.etree import ElementTree as Xml
 
-from drone_sim.files.resources import package_path
+from drone_sim.files.resources import package_path, python_path
 from drone_sim.ros.doctor.line import HINT, OK, WRONG, Line
 from drone_sim.ros.doctor.probe import FLIGHT, RENDERER
 
@@ -96,8 +95,8 @@ def results(names: Sequence[str]) -> dict[str, tuple[str, str]]:
 
 def _probed(names: Sequence[str]) -> tuple[str, str]:
     """Return what the probe printed, and how it ended."""
-    source = str(Path(__file__).resolve().parents[3])  # whatever a devel space has in its place
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([source, os.environ.get("PYTHONPATH", "")])}
+    # Whatever a devel space has in this package's place.
+    environment = {**os.environ, "PYTHONPATH": python_path(os.environ.get("PYTHONPATH", ""))}
     command = [sys.executable, "-m", "drone_sim.ros.doctor.probe", *names]
     try:
         done = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=PATIENCE)
