@@ -33,6 +33,7 @@ EYE, AIM, TIP = (-1.6, 0.0, 0.7), (0.4, 0.0, 0.0), (0.0, 0.0, 0.2)  # m, from th
 HALF_ANGLE = math.radians(75 / 2)  # of the picture's height
 PULL = 0.35  # m
 POINTER = [(0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12)]  # px
+LEFT = "document.querySelector('.cm-scroller').scrollLeft = 0"  # a long line moves it
 HELD = """([key, on]) => document.querySelectorAll("kbd").forEach((one) => {
   if (one.textContent.trim() === key) one.style.cssText = on ? "background: #e8590c; color: #fff" : "";
 })"""
@@ -134,7 +135,8 @@ def edit(film):
     """Change the height that is held."""
     keyboard = film.page.keyboard
     line = film.page.locator(".cm-line", has_text=OLD)
-    line.scroll_into_view_if_needed()
+    line.evaluate("one => one.scrollIntoView({ block: 'center', inline: 'nearest' })")
+    film.page.evaluate(LEFT)
     film.page.wait_for_timeout(1000)
     film.take(6)
     film.click(line)
@@ -144,9 +146,11 @@ def edit(film):
         keyboard.press("ArrowRight")
     for _ in range(len(OLD)):
         keyboard.press("Shift+ArrowRight")
+    film.page.evaluate(LEFT)
     film.take(4)
     for letter in NEW:
         keyboard.type(letter)
+        film.page.evaluate(LEFT)
         film.take(4)
 
 

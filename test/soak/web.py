@@ -103,10 +103,9 @@ def browsers(where: str, seed: int, folder: Path) -> Iterator[list[subprocess.Po
             one.wait()
 
 
-def soak(launch: Launch, folder: Path, minutes: float) -> dict[str, list[State]]:
+def soak(launch: Launch, pids: dict[str, int], folder: Path, minutes: float) -> dict[str, list[State]]:
     """Look for so long, and say every minute how it is; return what was seen of each node."""
     began = time.monotonic()
-    pids = {node: pid_of(node) for node in NODES}
     seen: dict[str, list[State]] = {node: [] for node in NODES}
     due = began + EVERY
     with contextlib.suppress(OSError):
@@ -164,15 +163,21 @@ def growth(node: str, states: list[State]) -> list[str]:
     return [*found, f"{node}: {more} registrations more"] if more > MOST_MORE else found
 
 
-def quiet(before: State) -> list[str]:
+def quiet(pid: int, before: State) -> list[str]:
     """Wait until the cockpit listens to no more than before the first browser; name what it still has."""
     end = time.monotonic() + QUIET
     while time.monotonic() < end:
-        now = look(pid_of("cockpit"), "cockpit")
+        now = look(pid, "cockpit")
         if now.registrations <= before.registrations and now.process.threads <= before.process.threads + MOST_MORE:
             return []
         time.sleep(1.0)
     return [f"nobody looks, and the cockpit has {now}; it began with {before}"]
+
+
+def dead(pids: dict[str, int], launch: Launch) -> list[str]:
+    """Name the nodes that have died, and what was printed last."""
+    found = [f"{node} died" for node, pid in pids.items() if not Path(f"/proc/{pid}/exe").exists()]
+    return [*found, "printed last:", *launch.lines[-10:]] if found else []
 
 
 def verdict(launch: Launch, seen: dict[str, list[State]], visits: list[Any]) -> list[str]:
@@ -186,9 +191,8 @@ def verdict(launch: Launch, seen: dict[str, list[State]], visits: list[Any]) -> 
             print(f"{role}: {len(came)} visits; until the scene had come {waits}")
     for role, _, trouble in [one for one in visits if one[2]][:10]:
         print(f"{role}: {trouble[:200]}")
-    died = [f"{node} died" for node in NODES if not Path(f"/proc/{pid_of(node)}").exists()]
     printed = [f"printed: {one[:200]}" for one in launch.lines if "Traceback" in one]
-    return [*died, *printed[:5], *(fault for node, states in seen.items() for fault in growth(node, states))]
+    return [*printed[:5], *(fault for node, states in seen.items() for fault in growth(node, states))]
 
 
 def main() -> int:
@@ -205,11 +209,13 @@ def main() -> int:
         with Launch(folder, ["web:=true", *arguments]) as launch:
             where = address(launch)
             time.sleep(SETTLES)
-            before = look(pid_of("cockpit"), "cockpit")
+            pids = {node: pid_of(node) for node in NODES}
+            before = look(pids["cockpit"], "cockpit")
             with browsers(where, options.seed, folder) as started:
-                seen = soak(launch, folder, options.minutes)
+                seen = soak(launch, pids, folder, options.minutes)
                 found = [f"a client of the soak ended: {one.args}" for one in started if one.poll() is not None]
-            found += quiet(before) + verdict(launch, seen, diary(folder))
+            found += dead(pids, launch) or quiet(pids["cockpit"], before)
+            found += verdict(launch, seen, diary(folder))
             took = launch.end()
             found += [f"the node took {took:.1f} s to end"] if took > ENDS else []
     finally:
