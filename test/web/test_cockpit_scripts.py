@@ -133,4 +133,4 @@ def test_what_was_not_saved_is_there_after_a_reload(cockpit, desk, browser):
         page.get_by_role("button", name="Mine").click()
         wait_until(page, lambda: (cockpit.scripts / "edited.py").read_text() == "second")
         assert (cockpit.scripts / "edited_2.py").read_text() == "first"
-        assert page.evaluate(f"localStorage[{json.dumps(DRAFT)}] === undefined")
+        wait_until(page, lambda: page.evaluate(f"localStorage[{json.dumps(DRAFT)}] === undefined"))
