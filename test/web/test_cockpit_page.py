@@ -39,7 +39,7 @@ def test_what_is_written_into_the_editor_is_no_command(cockpit, opened):
 
 def test_a_script_is_edited_into_an_error_mended_and_flown(cockpit, opened):
     opened.select_option("#script", "tutorial/2_elevation.py")
-    opened.wait_for_function("document.querySelector('.cm-content').innerText.includes('zref')")
+    opened.wait_for_function("document.querySelector('.cm-content').innerText.includes('Stage 2 of')")
     opened.locator(".cm-content").click()
     opened.keyboard.press("Control+Home")
     opened.keyboard.type("1 / 0\n")
