@@ -56,10 +56,14 @@ def _cockpit(browser):
 
 @pytest.fixture(name="opened")
 def _opened(cockpit, browser):
-    """The cockpit's page in a browser of its own, while the pilot flies."""
+    """The cockpit's page in a browser of its own, while the pilot flies; what is written in it is gone afterwards."""
     cockpit.start_afresh()
+    before = set(cockpit.scripts.glob("*"))
     with open_page(cockpit, browser) as page:
         yield page
+    cockpit.start_afresh()
+    for script in set(cockpit.scripts.glob("*")) - before:
+        script.unlink()
 
 
 @pytest.fixture(name="panel", scope="module")

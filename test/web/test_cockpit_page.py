@@ -39,7 +39,7 @@ def test_what_is_written_into_the_editor_is_no_command(cockpit, opened):
 
 def test_a_script_is_edited_into_an_error_mended_and_flown(cockpit, opened):
     opened.select_option("#script", "tutorial/2_elevation.py")
-    opened.wait_for_function("document.querySelector('.cm-content').innerText.includes('zref')")
+    opened.wait_for_function("document.querySelector('.cm-content').innerText.includes('Stage 2 of')")
     opened.locator(".cm-content").click()
     opened.keyboard.press("Control+Home")
     opened.keyboard.type("1 / 0\n")
@@ -62,11 +62,11 @@ def test_buttons_fields_and_pictures(cockpit, opened):
     wait_until(opened, lambda: scene.locator("input[disabled]").first.input_value() == "flying")
     scene.get_by_role("tab", name="Cameras").click()
     scene.get_by_label("drone/front").click()
+    picture = opened.locator(".picture img")
+    wait_until(opened, lambda: picture.evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
     opened.keyboard.down("w")  # the focus is on a switch, into which nobody writes
     wait_until(opened, lambda: cockpit.drone.command[0] == 1.0)
     opened.keyboard.up("w")
-    picture = opened.locator(".picture img")
-    wait_until(opened, lambda: picture.evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
     scene.get_by_label("drone/front").click()
     wait_until(opened, lambda: not picture.count())
     scene.get_by_role("tab", name="Tune").click()
