@@ -74,7 +74,7 @@ def test_landing_and_takeoff(cockpit, panel):
 
 def test_another_scene(cockpit, panel):
     scene = "package://drone_sim/config/scenes/empty.yaml"
-    panel.choose("Scene", scene)
+    panel.choose("Scene", "empty")
     panel.wait_for(f"load_scene: started in {scene}")
     assert rospy.get_param("/drone_sim/scene_file") == scene
     panel.choose("Scene", "none")

@@ -5,13 +5,11 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rospy
 
-from drone_sim.files.resources import package_path
 from drone_sim.ros.cockpit.choice import Choice
 from drone_sim.ros.cockpit.commanding import Commanding
 from drone_sim.ros.cockpit.editing import Editing
@@ -22,6 +20,7 @@ from drone_sim.ros.cockpit.hearing import Hearing
 from drone_sim.ros.cockpit.lessons import Lessons
 from drone_sim.ros.cockpit.panel import Panel
 from drone_sim.ros.cockpit.scene_view import SceneView
+from drone_sim.ros.cockpit.scenes import Scenes
 from drone_sim.ros.cockpit.serving import Serving
 from drone_sim.ros.cockpit.settings import Settings
 from drone_sim.ros.cockpit.shelf import Shelf
@@ -33,7 +32,6 @@ from drone_sim.ros.cockpit.wire import Wire
 
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
-_NO_SCENE = "none"  # as the launch file says it
 _PERIOD = 0.05  # s between two looks: 20 a second
 _ASKING = 2.0  # s between two questions to the master
 
@@ -62,7 +60,10 @@ class Cockpit:
         panel = self._server.gui.main_panel
         panel.dock_right()
         panel.set_width(_WIDTH)
-        self._panel = Panel(self._server.gui, self._simulator, self._commanding, self._sight, self._choice, self._wire)
+        scenes = Scenes(settings.scripts)
+        self._panel = Panel(
+            self._server.gui, self._simulator, self._commanding, scenes, self._sight, self._choice, self._wire
+        )
         self._windows = Windows(self._simulator.node, self._panel.cameras, self._wire)
         self._wire.answer_also(self._windows.answers)
         serving.begin(self._wire.serve, lessons.picture)
@@ -128,20 +129,15 @@ class Cockpit:
     def _ask_master(self) -> None:
         try:
             self._found = find(rospy.get_published_topics())
-            scene = str(self._simulator.parameter("scene_file", "") or _NO_SCENE)
+            scene = str(self._simulator.parameter("scene_file", ""))
         except FAILURES:  # another master may come
             self._found, scene = Found(), ""
         if not self._found.namespace:
             self._panel.show_state("no simulation")
-        scenes = tuple(f"package://drone_sim/config/scenes/{one.name}" for one in _scenes())
-        self._panel.offer(self._found, (_NO_SCENE, *scenes), scene)
+        self._panel.offer(self._found, scene)
 
 
 def _sky() -> np.ndarray:
     """Return a column of the sky, paler towards the horizon."""
     height = np.linspace(1.0, 0.0, 64)[:, None, None]
     return np.asarray(_HORIZON + height * (np.array(_ZENITH) - _HORIZON), dtype=np.uint8)
-
-
-def _scenes() -> list[Path]:
-    return sorted((package_path() / "config" / "scenes").glob("*.yaml"))

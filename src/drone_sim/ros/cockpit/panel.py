@@ -11,6 +11,7 @@ from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
 from drone_sim.ros.cockpit.found import Found
 from drone_sim.ros.cockpit.pace import Pace
 from drone_sim.ros.cockpit.plots import Plots
+from drone_sim.ros.cockpit.scenes import Scenes
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
 from drone_sim.ros.cockpit.tuning import Tuning
 from drone_sim.ros.cockpit.wire import Wire
@@ -27,6 +28,7 @@ class Panel:
         gui: Any,
         simulator: Simulator,
         commanding: Commanding,
+        scenes: Scenes,
         eyes: sight.Sight,
         choice: Choice,
         wire: Wire,
@@ -35,6 +37,7 @@ class Panel:
         self._gui = gui
         self._simulator = simulator
         self._commanding = commanding
+        self._scenes = scenes
         self._choice = choice
         self._lines: list[str] = []
         gui.set_panel_label("drone_sim")
@@ -95,7 +98,7 @@ class Panel:
         if event.client is None:  # the server itself has set it
             return
         try:
-            self._simulator.set_parameter("scene_file", event.target.value)
+            self._simulator.set_parameter("scene_file", self._scenes.file(event.target.value))
         except FAILURES as error:
             self.say(f"load_scene: failed: {' '.join(str(error).split())}")
             return
@@ -136,15 +139,15 @@ class Panel:
         if self._objects.value != self._choice.name:
             self._objects.value = self._choice.name
 
-    def offer(self, found: Found, scenes: tuple[str, ...], scene: str) -> None:
-        """Offer vehicles, cameras and scenes that there are."""
+    def offer(self, found: Found, scene: str) -> None:
+        """Offer vehicles, cameras and scenes that there are; `scene` is the file of the one that is flown."""
         vehicles = found.vehicles or ("",)
         if tuple(self._vehicles.options) != vehicles:
             self._vehicles.options = vehicles
             self._commanding.choose(self._vehicles.value)
-        choice = scenes if scene in scenes else (*scenes, scene)
-        if tuple(self._scene.options) != choice:
-            self._scene.options = choice
-        if self._scene.value != scene:
-            self._scene.value = scene
+        scenes, name = self._scenes.offered(scene)
+        if tuple(self._scene.options) != scenes:
+            self._scene.options = scenes
+        if self._scene.value != name:
+            self._scene.value = name
         self.cameras.offer(found.cameras)
