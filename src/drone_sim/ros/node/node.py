@@ -79,8 +79,7 @@ class Node:
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._windows = WindowTopics(self.simulation, self._inbox)
-        self._handles = Handles(self.simulation, self._inbox)
-        self._object_handles = ObjectHandles(self.simulation, self._inbox)
+        self._handles = Handles(self.simulation, self._inbox), ObjectHandles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
         diagnosis = Diagnosis(self.player, self._pacer, self._topics.command_logs, self._time.simulated)
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
@@ -210,8 +209,8 @@ class Node:
 
     def _show_to_eyes(self) -> None:
         self._topics.publish_command(self._time.stamp)
-        self._handles.update()
-        self._object_handles.update()
+        for handles in self._handles:
+            handles.update()
         self._view.update()
         self._windows.update(self._time.stamp)
         if self._parameters.gui:
