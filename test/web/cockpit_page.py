@@ -42,10 +42,11 @@ def wait_until(page, condition, seconds=30):
 
 
 @contextlib.contextmanager
-def open_page(cockpit, browser, init="", **options):
+def open_page(cockpit, browser, init="", scene_first=False, **options):
     """Give the page in a browser of its own, with the flown script in the editor.
 
-    `init` is run in it before anything else; `options` are of the browser's context.
+    `init` is run in it before anything else; `scene_first`: the scene is there before the page's own script comes;
+    `options` are of the browser's context.
     """
     context = browser.new_context(viewport={"width": 1000, "height": 500}, **options)
     context.add_init_script(init)
@@ -53,7 +54,14 @@ def open_page(cockpit, browser, init="", **options):
     page.set_default_timeout(WAIT)
     page.troubles = []
     page.on("pageerror", lambda error: page.troubles.append(str(error)))
-    page.goto(cockpit.address)
+    held = []
+    if scene_first:
+        page.route("**/cockpit.js", lambda route: held.append(route))
+    page.goto(cockpit.address, wait_until="commit")
+    if scene_first:
+        page.frame_locator("#scene").locator("canvas").first.wait_for()
+        page.frames[1].wait_for_load_state()
+        held.pop().continue_()
     ready(page)
     wait_until(page, lambda: cockpit.drone.place is not None)
     yield page

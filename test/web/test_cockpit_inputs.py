@@ -13,7 +13,7 @@ STILL = (0.0, 0.0, 0.0)
 @pytest.fixture(name="tablet", scope="module")
 def _tablet(cockpit, browser):
     """A page on a touch screen, with a gamepad at hand."""
-    with open_page(cockpit, browser, init=PAD, has_touch=True, is_mobile=True) as page:
+    with open_page(cockpit, browser, init=PAD, scene_first=True, has_touch=True, is_mobile=True) as page:
         yield page
 
 
@@ -61,6 +61,10 @@ def test_keys_are_released_when_the_window_is_left(cockpit, tablet):
     tablet.frame_locator("#scene").locator("body").evaluate("body => { body.tabIndex = -1; body.focus() }")
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
     tablet.keyboard.up("w")
+    tablet.keyboard.down("w")  # in the scene
+    wait_until(tablet, lambda: cockpit.drone.command[0] == 1.0)
+    tablet.keyboard.up("w")
+    wait_until(tablet, lambda: cockpit.drone.command == STILL)
 
 
 def test_two_browsers_see_the_same_and_the_keys_of_both_count(cockpit, browser, tablet):

@@ -9,6 +9,13 @@ import { Wire } from "./wire.js";
 
 const at = (id) => document.getElementById(id);
 
+// Does something with the scene's window, which may have been there before this script.
+function inScene(act) {
+  const frame = at("scene");
+  if (frame.contentDocument.readyState === "complete" && frame.contentWindow.location.href !== "about:blank") act(frame.contentWindow);
+  frame.addEventListener("load", () => act(frame.contentWindow));
+}
+
 function show({ saved, said, bad = false, lists, script, of, question }) {
   if (saved !== undefined) {
     at("saved").textContent = saved;
@@ -132,12 +139,12 @@ window.addEventListener("keydown", (event) => {
 });
 const letGo = (event) => event.key === "Escape" && wire.ask("let go").catch(tell);
 window.addEventListener("keydown", letGo);
-at("scene").addEventListener("load", () => at("scene").contentWindow.addEventListener("keydown", letGo));
+inScene((scene) => scene.addEventListener("keydown", letGo));
 window.addEventListener("beforeunload", (event) => scripts.drafts.isSafe(scripts.is.script) || event.preventDefault());
 split(at("beside"), "--editor", "x", 300, () => window.innerWidth - 320, (event) => window.innerWidth - event.clientX);
 const above = () => at("lesson-body").getBoundingClientRect().top;
 split(at("under"), "--lesson", "y", 60, () => window.innerHeight - 260, (event) => event.clientY - above());
 flying.listenTo(window);
-at("scene").addEventListener("load", () => flying.listenTo(at("scene").contentWindow));
+inScene((scene) => flying.listenTo(scene));
 flying.stick(at("left"), "wz", "vz");
 flying.stick(at("right"), "vy", "vx");
