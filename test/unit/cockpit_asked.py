@@ -1,7 +1,7 @@
 """What the tests of the cockpit's scripts ask, and the simulator that they ask it of."""
 
-from drone_sim.ros.cockpit.editing import Editing
-from drone_sim.ros.cockpit.lessons import Lessons
+from drone_sim.ros.cockpit.scripts.editing import Editing
+from drone_sim.ros.cockpit.scripts.lessons import Lessons
 
 LESSONS = Lessons()
 

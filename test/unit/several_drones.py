@@ -11,6 +11,7 @@ from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_sim, make_sim_ros
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.signals import Signals
+from drone_sim.scripting.api.windows import Windows
 from drone_sim.scripting.time_limit import TimeLimit
 
 PARTS = ("Drone", "Quadricopter_base", "Quadricopter_propeller1", "Quadricopter_propeller_respondable1")
@@ -22,6 +23,7 @@ class Scene:
     def __init__(self, shown=True):
         self.objects, self.signals, self.drawings = ObjectTree(), Signals(), Drawings(shown)
         self.scripts = Scripts()
+        self.windows = Windows()
         self.objects.add("Floor", also=("ResizableFloor_5_25",))
 
 
@@ -32,6 +34,7 @@ class Drone:
 
     def __init__(self, scene, suffix="", own=None, also=()):
         self.objects, self.signals, self.drawings = scene.objects, scene.signals, scene.drawings
+        self.windows = scene.windows
         self.own_script, base, propeller, respondable, *others = (f"{name}{suffix}" for name in (*PARTS, *also))
         add = self.objects.add
         self.handles = [

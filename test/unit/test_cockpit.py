@@ -21,17 +21,18 @@ from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit import looks, serving, settings
+from drone_sim.ros.cockpit import serving, settings
 from drone_sim.ros.cockpit.cockpit import Cockpit
-from drone_sim.ros.cockpit.flying import Flying, read_command
+from drone_sim.ros.cockpit.flying.flying import Flying, read_command
 from drone_sim.ros.cockpit.found import Found, Source, find
-from drone_sim.ros.cockpit.frames import Frames
-from drone_sim.ros.cockpit.gate import WIRE, Gate
-from drone_sim.ros.cockpit.markers import Markers
 from drone_sim.ros.cockpit.page import Page
+from drone_sim.ros.cockpit.scene import looks
+from drone_sim.ros.cockpit.scene.frames import Frames
+from drone_sim.ros.cockpit.scene.markers import Markers
+from drone_sim.ros.cockpit.server.gate import WIRE, Gate
+from drone_sim.ros.cockpit.server.wire import Wire
 from drone_sim.ros.cockpit.serving import Serving
 from drone_sim.ros.cockpit.simulator import script_failure
-from drone_sim.ros.cockpit.wire import Wire
 from drone_sim.ros.tools.commands import Command
 
 TOKEN = "secret-token"

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from drone_sim.ros.cockpit import address, settings
+from drone_sim.ros.cockpit import settings
+from drone_sim.ros.cockpit.server import address
 
 
 @pytest.fixture

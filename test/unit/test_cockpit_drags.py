@@ -21,12 +21,12 @@ from visualization_msgs.msg import (
 )
 from visualization_msgs.msg import InteractiveMarkerFeedback as Feedback
 
-from drone_sim.ros.cockpit import looks
-from drone_sim.ros.cockpit.choice import Choice
-from drone_sim.ros.cockpit.frames import Frames
-from drone_sim.ros.cockpit.handles import Handles
-from drone_sim.ros.cockpit.markers import Markers
-from drone_sim.ros.cockpit.sunlight import Sunlight
+from drone_sim.ros.cockpit.scene import looks
+from drone_sim.ros.cockpit.scene.choice import Choice
+from drone_sim.ros.cockpit.scene.frames import Frames
+from drone_sim.ros.cockpit.scene.handles import Handles
+from drone_sim.ros.cockpit.scene.markers import Markers
+from drone_sim.ros.cockpit.scene.sunlight import Sunlight
 
 
 class Dragged:

@@ -15,10 +15,10 @@ from std_msgs.msg import Header, String
 from drone_sim.files.resources import package_path
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit import grader, task_scenes
-from drone_sim.ros.cockpit.happenings import Happenings
-from drone_sim.ros.cockpit.script_files import ShelfError
-from drone_sim.ros.cockpit.shelf import Shelf
+from drone_sim.ros.cockpit.scripts import grader, task_scenes
+from drone_sim.ros.cockpit.scripts.happenings import Happenings
+from drone_sim.ros.cockpit.scripts.script_files import ShelfError
+from drone_sim.ros.cockpit.scripts.shelf import Shelf
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 

@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.cockpit.scenes import Scenes
+from drone_sim.ros.cockpit.panel.scenes import Scenes
 
 GATES = "package://drone_sim/config/scenes/gates.yaml"
 

@@ -11,9 +11,9 @@ pytest.importorskip("rospy", reason="needs ROS")
 from cockpit_asked import LESSONS, Asked
 
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit.lessons import Lessons
-from drone_sim.ros.cockpit.script_files import LARGEST, ShelfError
-from drone_sim.ros.cockpit.shelf import Shelf
+from drone_sim.ros.cockpit.scripts.lessons import Lessons
+from drone_sim.ros.cockpit.scripts.script_files import LARGEST, ShelfError
+from drone_sim.ros.cockpit.scripts.shelf import Shelf
 
 STAGES = [
     f"tutorial/{name}.py" for name in ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera")

@@ -16,14 +16,14 @@ from dynamic_reconfigure.encoding import encode_config
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
-from drone_sim.ros.cockpit import cameras as cameras_module
-from drone_sim.ros.cockpit.cameras import Cameras
 from drone_sim.ros.cockpit.found import Source, find
-from drone_sim.ros.cockpit.outbox import Outbox
-from drone_sim.ros.cockpit.pace import Pace
-from drone_sim.ros.cockpit.pictures import packed
-from drone_sim.ros.cockpit.windows import Windows
-from drone_sim.ros.cockpit.words import Words
+from drone_sim.ros.cockpit.panel import cameras as cameras_module
+from drone_sim.ros.cockpit.panel.cameras import Cameras
+from drone_sim.ros.cockpit.panel.pace import Pace
+from drone_sim.ros.cockpit.panel.pictures import packed
+from drone_sim.ros.cockpit.panel.windows import Windows
+from drone_sim.ros.cockpit.panel.words import Words
+from drone_sim.ros.cockpit.server.outbox import Outbox
 
 
 async def taken(box):

@@ -89,7 +89,7 @@ def test_at_hover_the_thrusts_hold_the_weight_where_the_propellers_are(shown):
         found = arrows(thrust)
         for (start, way), link, newtons in zip(found, drone.propulsion.rotors.links, drone.propulsion.thrusts):
             assert start == pytest.approx(frames.position(link))
-            assert way == pytest.approx(np.array((link[2], link[6], link[10])) * newtons * scale_of(drone))
+            assert way == pytest.approx(np.array((link[2], link[6], link[10])) * newtons * scale_of(drone), abs=5e-5)
         sums.append(sum(np.linalg.norm(way) for _, way in found))
     assert (thrust.header.frame_id, thrust.frame_locked, thrust.ns) == ("base_link", True, "thrust")
     assert np.mean(sums) / scale_of(drone) == pytest.approx(drone.body.mass * 9.81, rel=0.005)

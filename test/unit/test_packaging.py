@@ -9,7 +9,7 @@ from xml.etree import ElementTree as Xml
 import yaml
 
 from drone_sim.files.resources import package_path, python_path
-from drone_sim.ros.cockpit.shelf import Shelf
+from drone_sim.ros.cockpit.scripts.shelf import Shelf
 
 ROOT = package_path()
 SOURCE = ROOT / "src"

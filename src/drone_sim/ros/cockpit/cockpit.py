@@ -10,25 +10,25 @@ from typing import Any
 import numpy as np
 import rospy
 
-from drone_sim.ros.cockpit.choice import Choice
-from drone_sim.ros.cockpit.commanding import Commanding
-from drone_sim.ros.cockpit.editing import Editing
-from drone_sim.ros.cockpit.flying import Flying
+from drone_sim.ros.cockpit.flying.commanding import Commanding
+from drone_sim.ros.cockpit.flying.flying import Flying
 from drone_sim.ros.cockpit.found import Found, find
-from drone_sim.ros.cockpit.happenings import Happenings
 from drone_sim.ros.cockpit.hearing import Hearing
-from drone_sim.ros.cockpit.lessons import Lessons
-from drone_sim.ros.cockpit.panel import Panel
-from drone_sim.ros.cockpit.scene_view import SceneView
-from drone_sim.ros.cockpit.scenes import Scenes
+from drone_sim.ros.cockpit.panel.panel import Panel
+from drone_sim.ros.cockpit.panel.scenes import Scenes
+from drone_sim.ros.cockpit.panel.windows import Windows
+from drone_sim.ros.cockpit.scene.choice import Choice
+from drone_sim.ros.cockpit.scene.scene_view import SceneView
+from drone_sim.ros.cockpit.scene.sight import Sight
+from drone_sim.ros.cockpit.scene.sunlight import Sunlight
+from drone_sim.ros.cockpit.scripts.editing import Editing
+from drone_sim.ros.cockpit.scripts.happenings import Happenings
+from drone_sim.ros.cockpit.scripts.lessons import Lessons
+from drone_sim.ros.cockpit.scripts.shelf import Shelf
+from drone_sim.ros.cockpit.server.wire import Wire
 from drone_sim.ros.cockpit.serving import Serving
 from drone_sim.ros.cockpit.settings import Settings
-from drone_sim.ros.cockpit.shelf import Shelf
-from drone_sim.ros.cockpit.sight import Sight
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
-from drone_sim.ros.cockpit.sunlight import Sunlight
-from drone_sim.ros.cockpit.windows import Windows
-from drone_sim.ros.cockpit.wire import Wire
 
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)

@@ -10,9 +10,9 @@ from dynamic_reconfigure.msg import Config
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import String
 
-from drone_sim.ros.cockpit.panel import Panel
+from drone_sim.ros.cockpit.panel.panel import Panel
+from drone_sim.ros.cockpit.server.wire import Wire
 from drone_sim.ros.cockpit.simulator import script_failure
-from drone_sim.ros.cockpit.wire import Wire
 
 _LEVELS = {Log.WARN: "warning: ", Log.ERROR: "error: ", Log.FATAL: "error: "}
 

@@ -15,9 +15,9 @@ import rospy
 import viser
 from websockets.asyncio.server import ServerConnection
 
-from drone_sim.ros.cockpit.address import free_place, urls
-from drone_sim.ros.cockpit.gate import Gate, Handler
 from drone_sim.ros.cockpit.page import Found, Page
+from drone_sim.ros.cockpit.server.address import free_place, urls
+from drone_sim.ros.cockpit.server.gate import Gate, Handler
 from drone_sim.ros.cockpit.settings import Settings, read
 from drone_sim.ros.node.starting import init_node, reported
 

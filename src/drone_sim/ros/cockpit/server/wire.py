@@ -12,8 +12,8 @@ from typing import Any
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
-from drone_sim.ros.cockpit.flying import Flying, read_command
-from drone_sim.ros.cockpit.outbox import Outbox
+from drone_sim.ros.cockpit.flying.flying import Flying, read_command
+from drone_sim.ros.cockpit.server.outbox import Outbox
 
 Answer = Callable[[Mapping[str, Any]], Mapping[str, Any]]
 

@@ -16,12 +16,12 @@ from visualization_msgs.msg import (
     MarkerArray,
 )
 
-from drone_sim.ros.cockpit.choice import Choice
-from drone_sim.ros.cockpit.frames import Frames
-from drone_sim.ros.cockpit.handles import ANYWHERE, Handles
-from drone_sim.ros.cockpit.markers import Markers
-from drone_sim.ros.cockpit.pushes import push
-from drone_sim.ros.cockpit.sunlight import Sunlight
+from drone_sim.ros.cockpit.scene.choice import Choice
+from drone_sim.ros.cockpit.scene.frames import Frames
+from drone_sim.ros.cockpit.scene.handles import ANYWHERE, Handles
+from drone_sim.ros.cockpit.scene.markers import Markers
+from drone_sim.ros.cockpit.scene.pushes import push
+from drone_sim.ros.cockpit.scene.sunlight import Sunlight
 
 _SCENE, _BODIES, _AROUND = "scene", "view/bodies", "view/surroundings"
 _OTHERS = ("drawing", "view/path", "view/height", "view/command", "view/forces", "view/state")

@@ -13,7 +13,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from drone_sim.ros.cockpit.script_files import ShelfError
+from drone_sim.ros.cockpit.scripts.script_files import ShelfError
 
 _MOST = 180.0  # s of real time; a flight with cameras takes some seconds, and has limits of its own
 _PATIENT = 10  # of `nice`: what flies in real time comes first

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from drone_sim.files.resources import package_path, read_bytes
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit.shelf import Book
+from drone_sim.ros.cockpit.scripts.shelf import Book
 
 _LARGEST = 1 << 20  # bytes of a text
 _TUTORIAL = "docs/tutorial.md"

@@ -12,8 +12,8 @@ from geometry_msgs.msg import Pose, Vector3
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_sim.ros.cockpit import looks
-from drone_sim.ros.cockpit.frames import Frames
+from drone_sim.ros.cockpit.scene import looks
+from drone_sim.ros.cockpit.scene.frames import Frames
 
 _Key = tuple[str, int]
 _DIGITS = 2  # of a size in m

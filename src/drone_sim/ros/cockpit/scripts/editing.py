@@ -7,14 +7,14 @@ from typing import Any
 
 import rosgraph
 
-from drone_sim.ros.cockpit.grader import Grader
-from drone_sim.ros.cockpit.happenings import Happenings
-from drone_sim.ros.cockpit.lessons import Lesson, Lessons
-from drone_sim.ros.cockpit.places import Places, plan_of
-from drone_sim.ros.cockpit.script_files import ShelfError
-from drone_sim.ros.cockpit.shelf import OWN, Book, Shelf
+from drone_sim.ros.cockpit.scripts.grader import Grader
+from drone_sim.ros.cockpit.scripts.happenings import Happenings
+from drone_sim.ros.cockpit.scripts.lessons import Lesson, Lessons
+from drone_sim.ros.cockpit.scripts.places import Places, plan_of
+from drone_sim.ros.cockpit.scripts.script_files import ShelfError
+from drone_sim.ros.cockpit.scripts.shelf import OWN, Book, Shelf
+from drone_sim.ros.cockpit.server.wire import Answer
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator, script_failure
-from drone_sim.ros.cockpit.wire import Answer
 
 _Message = Mapping[str, Any]
 

@@ -15,7 +15,7 @@ from visualization_msgs.msg import (
 )
 
 from drone_sim.mechanics import frames
-from drone_sim.ros.cockpit.frames import ROOT
+from drone_sim.ros.cockpit.scene.frames import ROOT
 
 LARGE = {"scale": 0.25}  # m
 ANYWHERE = {"scale": 90.0, "fixed": True}  # pixels, near or far

@@ -11,8 +11,8 @@ from typing import Any
 
 from drone_sim.files.resources import package_path
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit import script_files
-from drone_sim.ros.cockpit.script_files import ShelfError
+from drone_sim.ros.cockpit.scripts import script_files
+from drone_sim.ros.cockpit.scripts.script_files import ShelfError
 from drone_sim.scripting.python.helpers import BUILT_IN
 
 OWN = "mine"

@@ -9,8 +9,8 @@ from typing import Any
 import rospy
 from std_msgs.msg import String
 
-from drone_sim.ros.cockpit.cameras import Cameras
-from drone_sim.ros.cockpit.wire import Answer, Wire
+from drone_sim.ros.cockpit.panel.cameras import Cameras
+from drone_sim.ros.cockpit.server.wire import Answer, Wire
 
 _KINDS = ("views", "dialogs", "consoles")
 _LONGEST = 1 << 21  # characters of a message; the simulation's own have less

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from drone_sim.mechanics import frames
-from drone_sim.ros.cockpit.frames import Frames
+from drone_sim.ros.cockpit.scene.frames import Frames
 
 FREE, BEHIND = "free", "behind the drone"
 _TRACK = "Track_base"

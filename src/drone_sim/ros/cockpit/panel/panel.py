@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from drone_sim.ros.cockpit import sight
-from drone_sim.ros.cockpit.cameras import Cameras
-from drone_sim.ros.cockpit.choice import Choice
-from drone_sim.ros.cockpit.commanding import REQUESTS, Commanding
+from drone_sim.ros.cockpit.flying.commanding import REQUESTS, Commanding
 from drone_sim.ros.cockpit.found import Found
-from drone_sim.ros.cockpit.pace import Pace
-from drone_sim.ros.cockpit.plots import Plots
-from drone_sim.ros.cockpit.scenes import Scenes
+from drone_sim.ros.cockpit.panel.cameras import Cameras
+from drone_sim.ros.cockpit.panel.pace import Pace
+from drone_sim.ros.cockpit.panel.plots import Plots
+from drone_sim.ros.cockpit.panel.scenes import Scenes
+from drone_sim.ros.cockpit.panel.tuning import Tuning
+from drone_sim.ros.cockpit.panel.words import Words
+from drone_sim.ros.cockpit.scene import sight
+from drone_sim.ros.cockpit.scene.choice import Choice
+from drone_sim.ros.cockpit.server.wire import Wire
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
-from drone_sim.ros.cockpit.tuning import Tuning
-from drone_sim.ros.cockpit.wire import Wire
-from drone_sim.ros.cockpit.words import Words
 
 _LINES = 50  # of the log that are shown
 

@@ -9,8 +9,8 @@ import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
 from drone_sim.ros.cockpit.found import Source
-from drone_sim.ros.cockpit.pictures import packed
-from drone_sim.ros.cockpit.wire import Wire
+from drone_sim.ros.cockpit.panel.pictures import packed
+from drone_sim.ros.cockpit.server.wire import Wire
 
 _BUFFER = 1 << 24  # bytes: more than a picture, or old ones wait in it
 

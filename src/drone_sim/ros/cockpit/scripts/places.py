@@ -5,8 +5,8 @@ from __future__ import annotations
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
 from drone_sim.grading.plan import Plan
-from drone_sim.ros.cockpit import task_scenes
-from drone_sim.ros.cockpit.lessons import Lesson
+from drone_sim.ros.cockpit.scripts import task_scenes
+from drone_sim.ros.cockpit.scripts.lessons import Lesson
 from drone_sim.ros.cockpit.simulator import Simulator, script_failure
 
 _KEY = "scene_file"

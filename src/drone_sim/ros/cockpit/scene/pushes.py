@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from geometry_msgs.msg import Vector3, WrenchStamped
 
-from drone_sim.ros.cockpit.frames import ROOT
+from drone_sim.ros.cockpit.scene.frames import ROOT
 
 
 def push(publish: Callable[[WrenchStamped], None], direction: Sequence[float], strength: float) -> None:

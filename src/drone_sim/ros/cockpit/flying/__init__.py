@@ -1,0 +1,1 @@
+"""Keys, sticks and gamepads of the browsers, as commands."""

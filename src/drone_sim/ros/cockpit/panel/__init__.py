@@ -1,0 +1,1 @@
+"""The panel beside the scene, and the pictures and windows over it."""

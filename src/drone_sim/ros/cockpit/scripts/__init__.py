@@ -1,0 +1,1 @@
+"""The scripts: kept, edited, flown where their texts say, graded."""

@@ -1,0 +1,1 @@
+"""The server: who comes in, where, and what is said over the socket."""
