@@ -3,8 +3,13 @@
 from importlib.util import find_spec
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from drone_sim.render.renderer import Renderer
+
+# The same examples every time, however slow the machine.
+settings.register_profile("same", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("same")
 
 
 @pytest.fixture(name="shared_renderer", scope="session")
