@@ -15,8 +15,8 @@ from drone_sim.run.whereabouts import Diverged
 from drone_sim.scripting.errors import ScriptError
 
 SCRIPTS = Path(__file__).parent / "scripts"
-RUNS = 200
-LEAK = 3 * 2**20  # bytes that 100 runs may add to the process: 30 kB a run
+RUNS = 100
+LEAK = 3 * 2**19  # bytes that 50 runs may add to the process: 30 kB a run
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "track")}
 CLUTTER = [
     {"name": "Tower", "shape": "box", "size": [0.3, 0.3, 0.3], "position": [0.0, 0.0, 0.15], "mass": 0.5},
@@ -73,7 +73,7 @@ def resources():
     return resident, len(os.listdir("/proc/self/fd")), len(clients)
 
 
-def test_200_runs_fly_alike_and_leak_nothing(simulate):
+def test_100_runs_fly_alike_and_leak_nothing(simulate):
     simulation = simulate(scene={"objects": CLUTTER})
     first = None
     for run in range(RUNS):
