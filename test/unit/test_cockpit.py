@@ -184,8 +184,12 @@ def test_what_the_master_knows():
         ("/drone/propellers", "std_msgs/Float32MultiArray"),
         ("/other/odom", "nav_msgs/Odometry"),
         ("/drone/front/compressed", "sensor_msgs/CompressedImage"),
+        ("/drone/imu/data", "sensor_msgs/Imu"),
+        ("/drone/push", "geometry_msgs/WrenchStamped"),
+        ("/other/range", "sensor_msgs/Range"),
     ]
-    assert find(topics) == Found("/drone", ("drone",), (Source("/drone/front", "/drone/front/compressed"),))
+    cameras = (Source("/drone/front", "/drone/front/compressed"),)
+    assert find(topics) == Found("/drone", ("drone",), cameras, {"/drone/imu/data": "sensor_msgs/Imu"})
     assert find(topics[1:]) == Found()
 
 

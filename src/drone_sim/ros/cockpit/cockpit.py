@@ -102,6 +102,7 @@ class Cockpit:
         for one in (self._panel.plots, self._panel.tuning):
             one.follow(vehicle)
             one.show()
+        self._panel.sensor.show()
         self._panel.cameras.show()
 
     def _open(self, namespace: str) -> None:
@@ -115,6 +116,7 @@ class Cockpit:
         self._windows.listen(bool(namespace))
         if not namespace:
             self._panel.plots.follow("")
+            self._panel.sensor.show(listening=False)
             self._panel.tuning.follow("")
 
     def _let_go(self, _message: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -10,6 +10,7 @@ from drone_sim.ros.cockpit.panel.cameras import Cameras
 from drone_sim.ros.cockpit.panel.pace import Pace
 from drone_sim.ros.cockpit.panel.plots import Plots
 from drone_sim.ros.cockpit.panel.scenes import Scenes
+from drone_sim.ros.cockpit.panel.sensor_plot import SensorPlot
 from drone_sim.ros.cockpit.panel.tuning import Tuning
 from drone_sim.ros.cockpit.panel.words import Words
 from drone_sim.ros.cockpit.scene import sight
@@ -52,6 +53,7 @@ class Panel:
             self.cameras = Cameras(gui, wire)
         with tabs.add_tab("Plots"):
             self.plots = Plots(gui)
+            self.sensor = SensorPlot(gui)
         with tabs.add_tab("Tune"):
             self.tuning = Tuning(gui, self.say)
         with tabs.add_tab("Log"):
@@ -151,3 +153,4 @@ class Panel:
         if self._scene.value != name:
             self._scene.value = name
         self.cameras.offer(found.cameras)
+        self.sensor.offer(found.sensors)

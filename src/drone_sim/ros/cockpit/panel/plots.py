@@ -13,16 +13,15 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import Float32MultiArray
 
 from drone_sim.mechanics import frames
+from drone_sim.ros.cockpit.panel.chart import EVERY, add_chart
 
 _KEPT = 600  # steps: half a minute
-_EVERY = 10  # ticks between two drawings, each of which sends 70 kB
-_SCALES = {"x": {"time": False, "auto": True}, "y": {"auto": True}}
-_COLORS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd")
 _CHARTS = {
     "velocity in the track frame, m/s": ("commanded vx", "vx", "commanded vy", "vy"),
     "height, m": ("z",),
     "attitude, rad": ("roll", "pitch", "yaw"),
-    "propellers, m/s": ("front left", "back left", "back right", "front right"),
+    # The tutorial's thrust is what all four have in common.
+    "propellers and thrust, m/s": ("front left", "back left", "back right", "front right", "thrust"),
 }
 
 
@@ -37,13 +36,7 @@ class Plots:
         self._vehicle = ""
         self._listening: list[rospy.Subscriber] = []
         self._ticks = 0
-        self._charts = [self._chart(gui, title, names) for title, names in _CHARTS.items()]
-
-    @staticmethod
-    def _chart(gui: Any, title: str, names: tuple[str, ...]) -> Any:
-        empty = tuple(np.array([0.0, 1.0]) for _ in range(len(names) + 1))
-        lines = [{"label": name, "stroke": color, "width": 1.5} for name, color in zip(names, _COLORS)]
-        return gui.add_uplot(empty, ({"label": "t, s"}, *lines), title=title, height=150, scales=_SCALES)
+        self._charts = [add_chart(gui, title, names) for title, names in _CHARTS.items()]
 
     def follow(self, vehicle: str) -> None:
         """Listen to a vehicle, '' for none."""
@@ -74,7 +67,7 @@ class Plots:
         level = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, -yaw))
         vx, vy, _ = frames.rotate(level, frames.rotate(matrix, (linear.x, linear.y, linear.z)))
         (command_x, command_y), time = self._command, message.header.stamp.to_sec()
-        row = (time, command_x, vx, command_y, vy, at.z, roll, pitch, yaw, *self._propellers)
+        row = (time, command_x, vx, command_y, vy, at.z, roll, pitch, yaw, *self._propellers, sum(self._propellers) / 4)
         with self._lock:
             if self._rows and time <= self._rows[-1][0]:
                 self._rows.clear()  # another run
@@ -83,7 +76,7 @@ class Plots:
     def show(self) -> None:
         """Draw what has come, twice a second."""
         self._ticks += 1
-        if self._ticks % _EVERY:
+        if self._ticks % EVERY:
             return
         with self._lock:
             columns = np.array(self._rows).T
