@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import deque
 from typing import Any
@@ -16,6 +17,7 @@ from drone_sim.mechanics import frames
 from drone_sim.ros.cockpit.panel.chart import EVERY, add_chart
 
 _KEPT = 600  # steps: half a minute
+_UNKNOWN = (math.nan,) * 4  # a gap in the chart
 _CHARTS = {
     "velocity in the track frame, m/s": ("commanded vx", "vx", "commanded vy", "vy"),
     "height, m": ("z",),
@@ -32,7 +34,7 @@ class Plots:
         """Draw empty charts."""
         self._lock = threading.Lock()
         self._rows: deque[tuple[float, ...]] = deque(maxlen=_KEPT)
-        self._command, self._propellers = (0.0, 0.0), (0.0,) * 4
+        self._command, self._propellers = (0.0, 0.0), _UNKNOWN
         self._vehicle = ""
         self._listening: list[rospy.Subscriber] = []
         self._ticks = 0
@@ -45,6 +47,7 @@ class Plots:
         for one in self._listening:
             one.unregister()
         self._vehicle, self._listening = vehicle, []
+        self._command, self._propellers = (0.0, 0.0), _UNKNOWN
         with self._lock:
             self._rows.clear()
         if vehicle:
