@@ -146,7 +146,12 @@ class Flight(unittest.TestCase):
         buffer = tf2_ros.Buffer()
         tf2_ros.TransformListener(buffer)
         infos, images = Listener("/drone/camera_info", CameraInfo), Listener("/drone/front", Image)
-        image = images.wait_for(lambda m: buffer.can_transform(m.header.frame_id, "world", m.header.stamp))
+        image = images.wait_for(
+            lambda m: (
+                any(info.header.stamp == m.header.stamp for info in infos.messages)
+                and buffer.can_transform(m.header.frame_id, "world", m.header.stamp)
+            )
+        )
         info = infos.wait_for(lambda m: m.header.stamp == image.header.stamp, after=0)
         camera = buffer.lookup_transform(image.header.frame_id, "world", image.header.stamp).transform
         expected = project(cube_corners(), camera, np.reshape(info.P, (3, 4)))
