@@ -30,6 +30,7 @@ class Tuning:
         self._lock = threading.Lock()
         self._described: list[Any] | None = None  # what is new: groups of parameters
         self._values: dict[str, Any] = {}
+        self._is_news = False  # whether the fields do not show them yet
         self._fields: dict[str, Any] = {}
         self._folders: list[Any] = []
         self._vehicle = ""
@@ -57,15 +58,18 @@ class Tuning:
 
     def _on_values(self, message: Config) -> None:
         with self._lock:
-            self._values = decode_config(message)
+            self._values, self._is_news = decode_config(message), True
 
     def show(self) -> None:
         """Show what is new."""
         with self._lock:
             described, self._described = self._described, None
+            is_news, self._is_news = self._is_news, False
             values = dict(self._values)
         if described is not None:
             self._build(described, values)
+        if not is_news:  # what somebody has just changed is not to be overwritten before it is read
+            return
         for name, field in self._fields.items():
             if name in values and field.value != values[name]:
                 field.value = values[name]
@@ -115,7 +119,7 @@ class Tuning:
             self._say(f"{name}: {' '.join(str(error).split())}")
             return
         with self._lock:
-            self._values = decode_config(answer.config)
+            self._values, self._is_news = decode_config(answer.config), True
         holds = self._values.get(name)
         self._say(
             f"{name} = {holds}" if holds == value else f"{name} = {value}: refused (the log says why); {holds} stays"
