@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import rospy
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Empty
@@ -17,6 +19,7 @@ class Commanding:
     def __init__(self) -> None:
         """Begin without a vehicle."""
         self.vehicle = ""
+        self._lock = threading.Lock()  # or one thread sends by what another has just put away
         self._command: rospy.Publisher | None = None
         self._requests: dict[str, rospy.Publisher] = {}
 
@@ -25,20 +28,23 @@ class Commanding:
         if vehicle == self.vehicle:
             return
         self.send(Command())
-        for one in (self._command, *self._requests.values()):
+        with self._lock:
+            old = (self._command, *self._requests.values())
+            self.vehicle, self._command, self._requests = vehicle, None, {}
+        for one in old:
             if one is not None:
                 one.unregister()
-        self.vehicle, self._command, self._requests = vehicle, None, {}
         if vehicle:
             self._command = rospy.Publisher(f"/{vehicle}/cmd_vel", Twist, queue_size=1)
             self._requests = {topic: rospy.Publisher(f"/{vehicle}/{topic}", Empty, queue_size=1) for topic in REQUESTS}
 
     def send(self, command: Command) -> None:
         """Send a command, m/s and rad/s in the frame Track_base."""
-        if self._command is not None:
-            twist = Twist()
-            twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.z = command
-            self._command.publish(twist)
+        twist = Twist()
+        twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.z = command
+        with self._lock:
+            if self._command is not None:
+                self._command.publish(twist)
 
     def request(self, topic: str) -> str:
         """Ask for what one of `REQUESTS` does; return one line for the user."""
