@@ -75,11 +75,11 @@ def _merge(robot: Xml.Element) -> RigidBody:
         centre_of_mass=centre,
         inertia=inertia,
         links=poses,
-        parents={name: (_end(joint, "parent"), _origin(joint)) for name, joint in joints.items()},
+        parents={name: (_end(joint, "parent"), origin_of(joint)) for name, joint in joints.items()},
         blade_joints={
             name: joint.attrib["name"] for name, joint in joints.items() if joint.attrib["type"] == "continuous"
         },
-        visuals=tuple((name, _origin(visual)) for name, visual in visuals),
+        visuals=tuple((name, origin_of(visual)) for name, visual in visuals),
         blades=tuple(_blades(visuals, joints, poses)),
         xml=_one_link(robot, roots[0], poses, (mass, centre, inertia)),
     )
@@ -89,7 +89,7 @@ def _pose(link: str, joints: dict[str, Xml.Element]) -> Matrix:
     pose = IDENTITY
     while link in joints:
         joint = joints[link]
-        pose = multiply(_origin(joint), pose)
+        pose = multiply(origin_of(joint), pose)
         link = _end(joint, "parent")
     return pose
 
@@ -103,7 +103,8 @@ def _numbers(text: str) -> tuple[float, ...]:
     return tuple(map(float, text.split()))
 
 
-def _origin(element: Xml.Element | None) -> Matrix:
+def origin_of(element: Xml.Element | None) -> Matrix:
+    """Return the parent's frame from that of an element with an <origin>."""
     origin = None if element is None else element.find("origin")
     if origin is None:
         return IDENTITY
@@ -111,21 +112,23 @@ def _origin(element: Xml.Element | None) -> Matrix:
 
 
 def _inertial(link: Xml.Element, pose: Matrix) -> Inertial:
-    centre = np.array(transform(pose, _origin(link.find("inertial"))[3::4]))
-    return Inertial(_mass(link), centre, _inertia(link, pose))
+    centre = np.array(transform(pose, origin_of(link.find("inertial"))[3::4]))
+    return Inertial(mass_of(link), centre, inertia_tensor(link, pose))
 
 
-def _mass(link: Xml.Element) -> float:
+def mass_of(link: Xml.Element) -> float:
+    """Return the mass (kg) that a link says, else 0."""
     element = link.find("inertial/mass")
     return 0.0 if element is None else float(element.attrib["value"])
 
 
-def _inertia(link: Xml.Element, pose: Matrix) -> np.ndarray:
+def inertia_tensor(link: Xml.Element, pose: Matrix = IDENTITY) -> np.ndarray:
+    """Return the inertia (3, 3), kg m², that a link says, else 0, along the axes in which it is at `pose`."""
     element = link.find("inertial/inertia")
     if element is None:
         return np.zeros((3, 3))
     xx, xy, xz, yy, yz, zz = (float(element.attrib[key]) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-    turn = np.array(multiply(pose, _origin(link.find("inertial")))).reshape(3, 4)[:, :3]
+    turn = np.array(multiply(pose, origin_of(link.find("inertial")))).reshape(3, 4)[:, :3]
     return turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
 
 
@@ -133,7 +136,7 @@ def _blades(
     visuals: Sequence[tuple[str, Xml.Element]], joints: dict[str, Xml.Element], poses: dict[str, Matrix]
 ) -> list[Blades]:
     return [
-        Blades(index, joints[link].attrib["name"], poses[link], _origin(visual))
+        Blades(index, joints[link].attrib["name"], poses[link], origin_of(visual))
         for index, (link, visual) in enumerate(visuals)
         if link in joints and joints[link].attrib["type"] == "continuous"
     ]
@@ -165,7 +168,7 @@ def _write_inertial(link: Xml.Element, mass: float, centre: np.ndarray, inertia:
 
 def _moved(element: Xml.Element, pose: Matrix) -> Xml.Element:
     moved = copy.deepcopy(element)
-    place = multiply(pose, _origin(element))
+    place = multiply(pose, origin_of(element))
     for origin in moved.findall("origin"):
         moved.remove(origin)
     Xml.SubElement(moved, "origin", xyz=" ".join(map(repr, position(place))), rpy=" ".join(map(repr, to_rpy(place))))

@@ -37,6 +37,10 @@ class Geometry(NamedTuple):
 
 
 class UrdfFile(NamedTuple):
-    """A body as a URDF says, which loadURDF reads."""
+    """A body as a URDF says, which loadURDF reads, and the principal moments (kg m²) of each link, by its name.
+
+    In the file is a sphere's inertia, along the same axes: PyBullet takes moments that no solid has for 0.
+    """
 
     path: str
+    moments: Mapping[str, tuple[float, float, float]]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 import trimesh
 from pydantic import Field
 
@@ -14,6 +15,7 @@ from drone_sim.mechanics.frames import from_rpy
 from drone_sim.shapes.bullet import Files, Geometry
 from drone_sim.shapes.primitive import Primitive
 from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.solid import Solid, round_solid
 from drone_sim.shapes.triangles import SECTIONS, Triangles, corners_of, outer
 
 
@@ -42,6 +44,16 @@ class Capsule(SceneShape, ReportedShape):
         radius, length = self.size
         capsule = trimesh.creation.capsule(length, outer(radius), count=[SECTIONS, SECTIONS])
         return (Triangles(corners_of(capsule)),)
+
+    def solid(self) -> Solid:
+        """Return a cylinder and two half balls, whose centroids are 3/8 of the radius away from their flat sides."""
+        r, length = self.size
+        cylinder, ball = np.pi * r**2 * length, 4 / 3 * np.pi * r**3
+        arm = (length / 2 + 3 / 8 * r) ** 2 - (3 / 8 * r) ** 2
+        xx = cylinder * (r**2 / 4 + length**2 / 12) + ball * (2 / 5 * r**2 + arm)
+        zz = cylinder * r**2 / 2 + ball * 2 / 5 * r**2
+        volume = cylinder + ball
+        return round_solid(volume, xx / volume, zz / volume)
 
     def for_rviz(self) -> tuple[Primitive, ...]:
         """Return a cylinder and two spheres."""

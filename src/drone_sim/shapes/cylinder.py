@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 import trimesh
 from pydantic import Field
 
@@ -13,6 +14,7 @@ from drone_sim.config.types import Length
 from drone_sim.shapes.bullet import Files, Geometry
 from drone_sim.shapes.primitive import Primitive
 from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.solid import Solid, round_solid
 from drone_sim.shapes.triangles import SECTIONS, Triangles, corners_of, outer
 
 
@@ -40,6 +42,11 @@ class Cylinder(SceneShape, ReportedShape):
         """Return a prism."""
         radius, length = self.size
         return (Triangles(corners_of(trimesh.creation.cylinder(outer(radius), length, sections=SECTIONS))),)
+
+    def solid(self) -> Solid:
+        """Return the round cylinder."""
+        radius, length = self.size
+        return round_solid(np.pi * radius**2 * length, radius**2 / 4 + length**2 / 12, radius**2 / 2)
 
     def shared(self) -> tuple[Cylinder, tuple[float, float, float]]:
         """Return the cylinder of 1 m radius and 1 m length, and its own."""

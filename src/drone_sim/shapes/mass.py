@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 
 from drone_sim.mechanics.frames import IDENTITY, Matrix
+from drone_sim.mechanics.inertia import Inertial, together
 from drone_sim.shapes.compound import Part
-from drone_sim.shapes.mesh import Mesh
 from drone_sim.shapes.shape import DrawnShape
-
-_THIN = 1e-9  # of the bounds' volume: what has less is taken for a box of its bounds
 
 
 class Inertia(NamedTuple):
@@ -28,15 +25,10 @@ def inertia_of(parts: Sequence[Part], mass: float) -> Inertia:
 
     Raises ValueError, in one line, for a mesh that cannot be read.
     """
-    solids = [_solid(part) for part in parts]
-    volumes = np.array([one.volume for one in solids])
-    masses = mass * volumes / volumes.sum()
-    centre = sum(one.center_mass * part for one, part in zip(solids, masses)) / mass
-    tensor = np.zeros((3, 3))
-    for one, share in zip(solids, masses):
-        arm = one.center_mass - centre
-        tensor += one.moment_inertia * (share / one.volume) + share * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return principal(tensor, centre)
+    filled = [_of_unit_density(part) for part in parts]
+    density = mass / sum(one.mass for one in filled)
+    whole = together([Inertial(density * one.mass, one.centre, density * one.inertia) for one in filled])
+    return principal(whole.inertia, whole.centre)
 
 
 def principal(tensor: np.ndarray, centre: np.ndarray) -> Inertia:
@@ -50,29 +42,11 @@ def principal(tensor: np.ndarray, centre: np.ndarray) -> Inertia:
     return Inertia((a, b, c), tuple(map(float, np.hstack([axes, np.reshape(centre, (3, 1))]).ravel())))
 
 
-def _solid(part: Part) -> trimesh.Trimesh:
-    """Return what a part fills, in the frame of the whole."""
-    shape = part.shape
-    corners = [one.corners for one in shape.triangles()] if isinstance(shape, DrawnShape) else []
-    if not corners:
-        raise ValueError(f"{shape}: its mass cannot be told from its form")
-    whole = trimesh.Trimesh(**trimesh.triangles.to_kwargs(np.concatenate(corners)))
-    whole.merge_vertices()
-    extents = np.maximum(whole.extents, 1e-4)
-    solid = _hull(whole) if isinstance(shape, Mesh) else whole
-    if solid is None or not solid.volume > _THIN * np.prod(extents):
-        solid = trimesh.creation.box(extents, trimesh.transformations.translation_matrix(np.mean(_bounds(corners), 0)))
-    solid.apply_transform(np.reshape((*part.local, 0, 0, 0, 1), (4, 4)))
-    return solid
-
-
-def _hull(solid: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    try:
-        return solid.convex_hull
-    except Exception:  # whatever Qhull says of what is flat
-        return None
-
-
-def _bounds(corners: list[np.ndarray]) -> np.ndarray:
-    points = np.concatenate(corners).reshape(-1, 3)
-    return np.array([points.min(axis=0), points.max(axis=0)])
+def _of_unit_density(part: Part) -> Inertial:
+    """Return a part, filled with 1 kg/m³, in the frame of the whole."""
+    if not isinstance(part.shape, DrawnShape):
+        raise ValueError(f"{part.shape}: its mass cannot be told from its form")
+    solid = part.shape.solid()
+    local = np.reshape(part.local, (3, 4))
+    turn, place = local[:, :3], local[:, 3]
+    return Inertial(solid.volume, turn @ solid.centroid + place, turn @ solid.inertia @ turn.T)

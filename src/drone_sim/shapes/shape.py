@@ -13,6 +13,7 @@ from typing import ClassVar
 
 from drone_sim.shapes.bullet import Files, Geometry, UrdfFile
 from drone_sim.shapes.primitive import Primitive
+from drone_sim.shapes.solid import Solid, hull_of
 from drone_sim.shapes.triangles import Rgba, Triangles
 
 
@@ -60,6 +61,13 @@ class DrawnShape(Shape):
 
         Raises ValueError, in one line that names the file, for one that cannot be read.
         """
+
+    def solid(self) -> Solid:
+        """Return what it fills: its convex hull, which is what of it collides when it moves.
+
+        Raises what `triangles` does.
+        """
+        return hull_of([part.corners for part in self.triangles()])
 
     def shared(self) -> tuple[DrawnShape, tuple[float, float, float]]:
         """Return the shape whose triangles serve all sizes of this one, and the scale (x, y, z) that makes it this."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 import trimesh
 from pydantic import Field
 
@@ -13,6 +14,7 @@ from drone_sim.config.types import Length
 from drone_sim.shapes.bullet import Files, Geometry
 from drone_sim.shapes.primitive import Primitive
 from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.solid import Solid, round_solid
 from drone_sim.shapes.triangles import Triangles, corners_of
 
 _OUTER = 1.0029  # radius of the polyhedron of 1280 faces that has the volume of the unit sphere
@@ -40,6 +42,11 @@ class Sphere(SceneShape, ReportedShape):
     def triangles(self) -> tuple[Triangles]:
         """Return an icosahedron, three times refined."""
         return (Triangles(corners_of(trimesh.creation.icosphere(subdivisions=3, radius=_OUTER * self.size[0]))),)
+
+    def solid(self) -> Solid:
+        """Return the ball."""
+        (radius,) = self.size
+        return round_solid(4 / 3 * np.pi * radius**3, 2 / 5 * radius**2, 2 / 5 * radius**2)
 
     def shared(self) -> tuple[Sphere, tuple[float, float, float]]:
         """Return the sphere of 1 m radius, and its own radius."""

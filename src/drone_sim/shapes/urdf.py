@@ -10,11 +10,12 @@ from drone_sim.config.types import File
 from drone_sim.files import urdf_files
 from drone_sim.shapes.bullet import Files, UrdfFile
 from drone_sim.shapes.shape import SceneShape
+from drone_sim.shapes.urdf_inertials import complete_inertials
 
 
 @dataclass(frozen=True)
 class Urdf(SceneShape):
-    """A URDF, which says itself how it looks; a mass of 0 nails its root link to the world."""
+    """A URDF, which says itself how it looks and what it weighs; a mass of 0 nails its root link to the world."""
 
     word = "urdf"
 
@@ -26,8 +27,13 @@ class Urdf(SceneShape):
         return f"{self.word} {self.file}"
 
     def for_bullet(self, files: Files, moves: bool) -> UrdfFile:
-        """Return the file, checked and cleaned."""
-        return UrdfFile(files.urdf(self._robot()))
+        """Return the file, checked and cleaned, with the inertia of each link."""
+        robot = self._robot()
+        try:
+            moments = complete_inertials(robot)
+        except ValueError as error:
+            raise ValueError(f"{self}: {error}") from None
+        return UrdfFile(files.urdf(robot), moments)
 
     def meshes(self) -> Iterator[tuple[str, Sequence[float]]]:
         """Yield what its visuals and collisions name."""

@@ -1,4 +1,4 @@
-"""Make PyBullet bodies of the objects of a scene."""
+"""Make PyBullet bodies of the objects of a scene that stand still, and of URDFs."""
 
 from __future__ import annotations
 
@@ -13,23 +13,34 @@ from drone_sim.shapes.shape import SceneShape
 from drone_sim.world.own_files import OwnFiles
 
 
-def create(client: int, files: OwnFiles, shape: SceneShape, pose: Pose, *, mass: float, color: Sequence[float]) -> int:
-    """Add an object without its texture; return its body id.
+def create(client: int, files: OwnFiles, shape: SceneShape, pose: Pose, *, moves: bool, color: Sequence[float]) -> int:
+    """Add an object without its texture; return its body id. Only a URDF `moves`, by its own masses.
 
     Raises ValueError, in one line, for a file that cannot be read.
     """
     position, orientation = pose
     try:
-        told = shape.for_bullet(files, moves=mass != 0)
+        told = shape.for_bullet(files, moves)
         if isinstance(told, UrdfFile):
-            return pybullet.loadURDF(told.path, position, orientation, useFixedBase=mass == 0, physicsClientId=client)
+            return _load(client, told, pose, moves)
         solid = pybullet.createCollisionShape(physicsClientId=client, **_collision(told))
         seen = pybullet.createVisualShape(
             getattr(pybullet, told.type), rgbaColor=color, physicsClientId=client, **told.visual
         )
-        return pybullet.createMultiBody(mass, solid, seen, position, orientation, physicsClientId=client)
+        return pybullet.createMultiBody(0, solid, seen, position, orientation, physicsClientId=client)
     except pybullet.error as error:
         raise ValueError(f"{shape}: PyBullet cannot make it ({error})") from None
+
+
+def _load(client: int, told: UrdfFile, pose: Pose, moves: bool) -> int:
+    flags = pybullet.URDF_USE_INERTIA_FROM_FILE  # what PyBullet would derive from the bounds is not right
+    body = pybullet.loadURDF(told.path, *pose, useFixedBase=not moves, flags=flags, physicsClientId=client)
+    links = [pybullet.getBodyInfo(body, client)[0]]
+    links += [pybullet.getJointInfo(body, number, client)[12] for number in range(pybullet.getNumJoints(body, client))]
+    for number, link in enumerate(links, start=-1):
+        moments = told.moments[link.decode()]
+        pybullet.changeDynamics(body, number, localInertiaDiagonal=moments, physicsClientId=client)
+    return body
 
 
 def _collision(told: Geometry) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from drone_sim.files import images, mesh_files
 
 # PyBullet keeps some files by name for as long as the process runs: no name comes twice.
 _NUMBERS = itertools.count()
-_ONE_KILOGRAM = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 
 
 class OwnFiles:
@@ -61,9 +60,6 @@ class OwnFiles:
     def urdf(self, robot: Xml.Element) -> str:
         """Write a URDF with meshes of ours; return its path. Raises what mesh_files.read raises."""
         robot = copy.deepcopy(robot)
-        for link in robot.iter("link"):
-            if link.find("inertial") is None:  # what PyBullet takes it for, with a warning
-                link.append(Xml.fromstring(_ONE_KILOGRAM))
         for kind in ("visual", "collision"):
             for shape in robot.iter(kind):
                 hull = kind == "collision" and shape.get("concave") != "yes"

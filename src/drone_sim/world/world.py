@@ -17,7 +17,11 @@ from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.state import Pose, State, compose, inverse
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
+from drone_sim.shapes.compound import parts_of
+from drone_sim.shapes.mass import inertia_of
 from drone_sim.shapes.shape import DrawnShape, SceneShape
+from drone_sim.shapes.triangles import WHITE, Rgba
+from drone_sim.shapes.urdf import Urdf
 from drone_sim.shapes.visual import Visual
 from drone_sim.world import assemblies, bodies, floor, probing
 from drone_sim.world.assemblies import Link
@@ -112,15 +116,19 @@ class World:
         pose: Pose,
         *,
         mass: float = 0.0,
-        color: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
+        color: Rgba = WHITE,
         texture: str = "",
     ) -> int:
         """Add an object of a scene; return its body id.
 
-        mass: kg, 0 stands still; color: rgba, 0..1; texture: path of an image.
+        mass: kg, 0 stands still; it fills the shape evenly, but for a URDF, which says its own; color: rgba, 0..1;
+        texture: path of an image.
         Raises ValueError, in one line, for a file that cannot be read.
         """
-        body = bodies.create(self._client, self._files, shape, pose, mass=mass, color=color)
+        if mass and not isinstance(shape, Urdf):
+            parts = parts_of(shape, color)
+            return self.add_assembly([Link(parts, mass=mass, inertia=inertia_of(parts, mass))], pose, [texture])[0]
+        body = bodies.create(self._client, self._files, shape, pose, moves=mass != 0, color=color)
         self._cover(body, texture)
         self._set_material(body)
         self.set_pose(body, pose)  # again, for PyBullet reads a URDF's pose in single precision
@@ -137,6 +145,7 @@ class World:
         cannot be read.
         """
         body, numbers = assemblies.create(self._client, self._files, links, pose)
+        self._cover(body, textures[0])
         self._set_material(body)
         self.set_pose(body, pose)  # again, for PyBullet reads a URDF's pose in single precision
         looks = {

@@ -1,0 +1,40 @@
+"""What a shape fills: its volume, where the middle of it is, and how it resists being turned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import trimesh
+
+_THIN = 1e-9  # of the bounds' volume: what has less is taken for a box of its bounds
+_THICKNESS = 1e-4  # m, of that box where the bounds are flat
+
+
+class Solid(NamedTuple):
+    """A volume (m³), its centroid (3,), m, and its inertia tensor (3, 3) about that at 1 kg/m³, kg m²."""
+
+    volume: float
+    centroid: np.ndarray
+    inertia: np.ndarray
+
+
+def round_solid(volume: float, xx: float, zz: float) -> Solid:
+    """Return the solid of what is round about its z axis, and centred, by its radii of gyration squared (m²)."""
+    return Solid(volume, np.zeros(3), volume * np.diag([xx, xx, zz]))
+
+
+def hull_of(corners: Sequence[np.ndarray]) -> Solid:
+    """Return the convex hull of triangles (m, 3, 3) each, as a solid; of what is flat, a thin box of its bounds."""
+    points = np.concatenate(corners).reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    extents = np.maximum(high - low, _THICKNESS)
+    try:
+        hull = trimesh.convex.convex_hull(points)
+    except Exception:  # whatever Qhull says of what is flat
+        hull = None
+    if hull is None or not hull.volume > _THIN * np.prod(extents):
+        middle = (low + high) / 2
+        hull = trimesh.creation.box(extents, trimesh.transformations.translation_matrix(middle))
+    return Solid(float(hull.volume), np.asarray(hull.center_mass), np.asarray(hull.moment_inertia))

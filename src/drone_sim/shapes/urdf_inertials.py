@@ -1,0 +1,103 @@
+"""What each link of a scene's URDF weighs, and how that lies in it, where the file leaves it open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from drone_sim.mechanics import frames, urdf
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.capsule import Capsule
+from drone_sim.shapes.compound import Part
+from drone_sim.shapes.cylinder import Cylinder
+from drone_sim.shapes.mass import Inertia, inertia_of, principal
+from drone_sim.shapes.mesh import Mesh
+from drone_sim.shapes.shape import SceneShape
+from drone_sim.shapes.sphere import Sphere
+from drone_sim.shapes.triangles import WHITE
+
+_UNTOLD = 1.0  # kg, of a link that moves and says no mass; PyBullet takes it for that
+_ROUNDING = 1e-9  # of the largest moment
+
+
+def complete_inertials(robot: Xml.Element) -> dict[str, tuple[float, float, float]]:
+    """Write an <inertial> into each link of a checked URDF; return the links' principal moments (kg m²), by name.
+
+    A link with a mass and no inertia is evenly filled. One without <inertial> weighs nothing where a fixed joint holds
+    it, else 1 kg. Raises ValueError, in one line, for a tensor with a negative moment, and for a mesh that cannot be
+    read.
+    """
+    held = {_child(joint) for joint in robot.findall("joint") if joint.get("type") == "fixed"}
+    return {name: _complete(link, name in held) for link in robot.findall("link") for name in [link.attrib["name"]]}
+
+
+def _child(joint: Xml.Element) -> str:
+    return joint.findall("child")[0].attrib["link"]
+
+
+def _complete(link: Xml.Element, held: bool) -> tuple[float, float, float]:
+    told = link.find("inertial") is not None
+    mass = urdf.mass_of(link) if told else 0.0 if held else _UNTOLD
+    inertia = _told(link) or _evenly_filled(link, mass)
+    least = min(inertia.moments)
+    if least < -_ROUNDING * max(map(abs, inertia.moments)):
+        raise ValueError(f"link {link.attrib['name']}: inertia: principal moment {least:g} kg m²: must be 0 or more")
+    _write(link, mass, inertia)
+    return inertia.moments
+
+
+def _told(link: Xml.Element) -> Inertia | None:
+    """Return the inertia that a link says, None where it says none."""
+    tensor = urdf.inertia_tensor(link)
+    centre = frames.position(urdf.origin_of(link.find("inertial")))
+    return principal(tensor, np.array(centre)) if tensor.any() else None
+
+
+def _evenly_filled(link: Xml.Element, mass: float) -> Inertia:
+    """Return the inertia of a mass that fills what of a link collides, else what of it is seen."""
+    parts = [*_parts(link, "collision")] or [*_parts(link, "visual")]
+    if mass and parts:
+        return inertia_of(parts, mass)
+    return Inertia((mass, mass, mass), urdf.origin_of(link.find("inertial")))
+
+
+def _parts(link: Xml.Element, kind: str) -> Iterator[Part]:
+    for element in link.findall(kind):
+        shape = _shape(element.findall("geometry/*")[0])
+        if shape is not None:
+            yield Part(shape, urdf.origin_of(element), WHITE)
+
+
+def _shape(geometry: Xml.Element) -> SceneShape | None:
+    """Return a shape; None for a plane, which fills nothing."""
+    if geometry.tag == "mesh":
+        x, y, z = _numbers(geometry, "scale")
+        return Mesh(geometry.attrib["filename"], (x, y, z))
+    if geometry.tag == "box":
+        x, y, z = _numbers(geometry, "size")
+        return Box((x, y, z))
+    if geometry.tag == "plane":
+        return None
+    (radius,) = _numbers(geometry, "radius")
+    if geometry.tag == "sphere":
+        return Sphere((radius,))
+    (length,) = _numbers(geometry, "length")
+    return Cylinder((radius, length)) if geometry.tag == "cylinder" else Capsule((radius, length))
+
+
+def _numbers(geometry: Xml.Element, attribute: str) -> list[float]:
+    return [float(word) for word in geometry.attrib[attribute].split()]
+
+
+def _write(link: Xml.Element, mass: float, inertia: Inertia) -> None:
+    for told in link.findall("inertial"):
+        link.remove(told)
+    inertial = Xml.SubElement(link, "inertial")
+    frame = inertia.frame
+    place, turn = (" ".join(map(repr, three)) for three in (frames.position(frame), frames.to_rpy(frame)))
+    Xml.SubElement(inertial, "origin", xyz=place, rpy=turn)
+    Xml.SubElement(inertial, "mass", value=repr(mass))
+    a = b = c = repr(max(inertia.moments))
+    Xml.SubElement(inertial, "inertia", ixx=a, iyy=b, izz=c, ixy="0", ixz="0", iyz="0")
