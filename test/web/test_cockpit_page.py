@@ -72,8 +72,9 @@ def test_buttons_fields_and_pictures(cockpit, opened):
     scene.get_by_role("tab", name="Tune").click()
     field = scene.get_by_label("Kzref", exact=True)
     before = field.input_value()
-    for value in ("2", before):
-        field.fill(value)
+    for value in ("2.5", before):
+        field.press("Control+a")
+        field.press_sequentially(value)  # as a hand does: it holds what is written so far
         field.press("Enter")
         wait_until(opened, lambda value=value: f"Kzref = {value}" in scene.locator("textarea").first.input_value())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -15,7 +16,7 @@ from dynamic_reconfigure.srv import Reconfigure
 from drone_sim.ros.cockpit.simulator import FAILURES
 
 _FIRST = "control"  # the group that is shown unfolded
-_STEPS = 100.0  # of a slider
+_FINEST = 1e-3  # step of a field whose range is wide
 _SLIDER = 20.0  # a wider range than so many times the value is no slider's, but a field's
 
 
@@ -98,8 +99,10 @@ class Tuning:
         elif isinstance(value, str):
             field = self._gui.add_text(label, value, hint=hint)
         elif high - low <= _SLIDER * max(abs(value), 1.0) and isinstance(value, float):
-            step = (high - low) / _STEPS
+            step = _step(low, high)
             field = self._gui.add_slider(label, min=low, max=high, step=step, initial_value=value, hint=hint)
+        elif isinstance(value, float):
+            field = self._gui.add_number(label, value, min=low, max=high, step=_step(low, high), hint=hint)
         else:
             field = self._gui.add_number(label, value, min=low, max=high, hint=hint)
         field.on_update(lambda event: self._on_field(name, event))
@@ -124,6 +127,11 @@ class Tuning:
         self._say(
             f"{name} = {holds}" if holds == value else f"{name} = {value}: refused (the log says why); {holds} stays"
         )
+
+
+def _step(low: float, high: float) -> float:
+    """Return the power of ten that is fine enough for a range: nobody can type what lies between two steps."""
+    return float(min(_FINEST, 10.0 ** math.floor(math.log10((high - low) / 1000))))
 
 
 def _choices(described: Any) -> list[str]:

@@ -79,6 +79,6 @@ def _content(config: Mapping[str, Any], scene: Mapping[str, Any]) -> dict[str, A
 
 def _flat(values: Any, above: str = "") -> list[str]:
     """Return values by name, such as `weather/wind = [2, 0, 0]`."""
-    if isinstance(values, Mapping) and values:
+    if isinstance(values, Mapping):
         return [one for key, value in values.items() for one in _flat(value, f"{above}{key}/")]
     return [f"{above.rstrip('/')} = {json.dumps(values, default=str)}"]
