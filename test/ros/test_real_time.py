@@ -1,6 +1,10 @@
 #!/usr/bin/env python3
-"""At real time: one stamp for everything that a step publishes, one step per 50 ms of stamps."""
+"""At real time: one stamp for everything that a step publishes, one step per 50 ms of stamps.
 
+Beside it two more simulators fly under the same master, in namespaces of their own.
+"""
+
+import subprocess
 import sys
 import unittest
 
@@ -12,6 +16,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState
 from tf2_msgs.msg import TFMessage
 
 STEPS = 60
+SIMULATORS = {"/tf": ("", "a/", "b/hawk/"), "/tf_static": ("drone_sim/", "a/drone_sim/", "b/sim/")}
 
 
 class RealTime(unittest.TestCase):
@@ -42,10 +47,39 @@ class RealTime(unittest.TestCase):
             self.assertGreater(len(common), len(steps) / 2, name)
 
     def test_static_frames_come_together(self):
-        static = Listener("/tf_static", TFMessage).wait_for(after=0)
+        listener = Listener("/tf_static", TFMessage)
+        static = listener.wait_for(lambda m: m._connection_header["callerid"] == "/drone_sim", after=0)
         children = {t.child_frame_id: t.header.frame_id for t in static.transforms}
         self.assertEqual(children["front_optical"], "base_link")
         self.assertEqual(children["propeller_front_left"], "base_link")
+
+    def test_simulators_in_namespaces_of_their_own_make_one_tree(self):
+        parents, senders = {}, {}
+        for topic, last in (("/tf", "blades_front_left"), ("/tf_static", "first")):
+            listener = Listener(topic, TFMessage)
+            for frame in (f"{prefix}{last}" for prefix in SIMULATORS[topic]):
+                listener.wait_for(lambda m, one=frame: one in [t.child_frame_id for t in m.transforms], after=0)
+            for message in list(listener.messages):
+                for one in message.transforms:
+                    parents.setdefault(one.child_frame_id, set()).add(one.header.frame_id)
+                    senders.setdefault(one.child_frame_id, set()).add(message._connection_header["callerid"])
+            listener.close()
+        self.assertEqual({frame for frame in parents if len(parents[frame]) + len(senders[frame]) != 2}, set())
+        self.assertEqual(set().union(*parents.values()) - set(parents), {"world"})
+        for prefix, node in (("", "/drone_sim"), ("a/", "/a/drone_sim"), ("b/hawk/", "/b/sim")):
+            self.assertEqual(senders[f"{prefix}base_link"], {node})
+            self.assertEqual(parents[f"{prefix}front_optical"], {f"{prefix}base_link"})
+        odometry = Listener("/b/hawk/odom", Odometry).wait_for(after=0)
+        self.assertEqual((odometry.header.frame_id, odometry.child_frame_id), ("world", "b/hawk/base_link"))
+
+    def test_a_second_simulator_of_the_same_vehicle_is_refused(self):
+        other = subprocess.run(
+            ["rosrun", "drone_sim", "simulator", "__name:=other"], capture_output=True, text=True, timeout=30
+        )
+        said = other.stdout + other.stderr
+        self.assertEqual(other.returncode, 1, said)
+        self.assertIn("vehicle drone flies already, in /drone_sim: give one of the two a namespace", said)
+        self.assertNotIn("Traceback", said)
 
 
 if __name__ == "__main__":

@@ -259,12 +259,16 @@ def test_a_wrong_vehicle_of_a_scene_is_named_with_its_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "vehicles, frames",
+    "vehicles, prefixes",
     [
-        ({"drone": {"position": [1, 0, 1]}}, ["base_link"]),
-        ({"drone1": {}}, ["drone1/base_link"]),
-        ({"drone": {}, "drone1": {"position": [1, 0, 1]}}, ["drone/base_link", "drone1/base_link"]),
+        ({"drone": {"position": [1, 0, 1]}}, [""]),
+        ({"drone1": {}}, ["drone1/"]),
+        ({"drone": {}, "drone1": {"position": [1, 0, 1]}}, ["drone/", "drone1/"]),
     ],
 )
-def test_the_only_one_has_the_frames_of_the_drone_if_it_has_its_name(vehicles, frames):
-    assert [one.base_link for one in parameters.load({"vehicles": vehicles}).fleet] == frames
+def test_the_only_one_has_the_frames_of_the_drone_if_it_has_its_name(vehicles, prefixes):
+    assert [one.frame_prefix for one in parameters.load({"vehicles": vehicles}).fleet] == prefixes
+
+
+def test_the_only_one_has_frames_of_its_own_where_it_has_another_name():
+    assert parameters.load({"drone": {"name": "red"}}).fleet[0].frame_prefix == "red/"

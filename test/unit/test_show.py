@@ -39,7 +39,7 @@ def test_a_fleet_with_other_names_has_its_topics_frames_and_docks():
     topics = {one for one in texts(view) if one.startswith("/")}
     assert {"/sim2/view/forces", "/sim2/markers/update", "/alpha/front", "/alpha/initialpose"} <= topics
     assert not any(one.startswith(("/drone1/", "/drone_sim/")) for one in topics)
-    assert view["Visualization Manager"]["Views"]["Current"]["Target Frame"] == "drone_sim/first"
+    assert view["Visualization Manager"]["Views"]["Current"]["Target Frame"] == "sim2/first"
     assert {"Front camera of alpha", "Track camera of alpha"} <= docks(view)
     assert docks(view) - {"Displays"} <= set(texts(view))
     assert not re.search(r"\bdrone1\b", text) and "alpha/base_link" in set(texts(view))
@@ -52,3 +52,14 @@ def test_one_with_another_name_has_its_topics():
     assert ("/drone/view/forces", "/hawk/view/forces") in changed
     assert all(one.replace("/drone/", "/hawk/") == other for one, other in changed)
     assert docks(before) == docks(after)
+
+
+def test_in_a_namespace_everything_of_it_is_below():
+    names = {"drone": "a/drone", "drone_sim": "a/drone_sim"}
+    view = yaml.safe_load(show.renamed((FOLDER / "drone.rviz").read_text(), names))
+    assert {one for one in texts(view) if one.startswith("/")} == {
+        one.replace("/drone/", "/a/drone/")
+        for one in texts(yaml.safe_load((FOLDER / "drone.rviz").read_text()))
+        if one.startswith("/")
+    }
+    assert view["Visualization Manager"]["Views"]["Current"]["Target Frame"] == "a/drone_sim/first"

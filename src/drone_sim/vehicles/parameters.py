@@ -35,6 +35,7 @@ from drone_sim.vehicles.object_places import ObjectPlace
 from drone_sim.vehicles.quadricopter_objects import OWN_NAMES
 from drone_sim.wording import near_names
 
+UNPREFIXED = "drone"  # the name with which the only vehicle has frames without a prefix
 MAX_FORCES = 16
 MAX_SENSORS = 64
 MAX_SCRIPT_PARAMETERS = 256
@@ -138,7 +139,7 @@ class VehicleParameters(EquipmentParameters, PlaceParameters):
 
     @classmethod
     def only(cls, drone: DroneParameters, equipment: EquipmentParameters) -> VehicleParameters:
-        """Return the only vehicle of a simulation, whose frames have no prefix."""
+        """Return the only vehicle of a simulation."""
         place = {key: getattr(drone, key) for key in DroneParameters.model_fields}
         carried = {key: getattr(equipment, key) for key in EquipmentParameters.model_fields}
         return cls.model_construct(**place, **carried).alone()
@@ -151,23 +152,13 @@ class VehicleParameters(EquipmentParameters, PlaceParameters):
 
     @property
     def is_alone(self) -> bool:
-        """Whether it begins as the only one, so that its frames need no prefix."""
+        """Whether it begins as the only one."""
         return self._is_alone
 
     @property
     def frame_prefix(self) -> str:
-        """What its frames' names begin with: '' or `drone1/`."""
-        return "" if self._is_alone else f"{self.name}/"
-
-    @property
-    def base_link(self) -> str:
-        """Name of the frame of its root link."""
-        return f"{self.frame_prefix}base_link"
-
-    @property
-    def track_base(self) -> str:
-        """Name of its level frame, in which commands count."""
-        return f"{self.frame_prefix}Track_base"
+        """What its frames' names begin with: `drone1/`, or '' of the only one, where it has its usual name."""
+        return "" if self._is_alone and self.name == UNPREFIXED else f"{self.name}/"
 
 
 def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from drone_sim.ros.cockpit.server.wire import Wire
 from drone_sim.ros.cockpit.serving import Serving
 from drone_sim.ros.cockpit.settings import Settings
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
+from drone_sim.ros.vehicle import frame_names
 
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
@@ -95,7 +96,7 @@ class Cockpit:
             self._view.show(clients.keys())
         self._panel.offer_objects(self._view.objects.names)
         vehicle = self._commanding.vehicle
-        prefix = "" if self._found.namespace.strip("/") == vehicle else f"{vehicle}/"
+        prefix = frame_names.prefix(vehicle, is_alone=self._found.namespace.strip("/") == vehicle)
         self._panel.offer_sights(self._sight.choices(self._view.frames, prefix))
         if not (self._view.handles.held or self._view.objects.held):  # or the eyes would run after the mouse
             self._sight.follow(clients.values(), self._view.frames, prefix)
@@ -130,7 +131,8 @@ class Cockpit:
 
     def _ask_master(self) -> None:
         try:
-            self._found = find(rospy.get_published_topics())
+            below = rospy.get_namespace()  # another simulator may fly in another one
+            self._found = find([one for one in rospy.get_published_topics() if one[0].startswith(below)])
             scene = str(self._simulator.parameter("scene_file", ""))
         except FAILURES:  # another master may come
             self._found, scene = Found(), ""

@@ -26,6 +26,7 @@ from drone_sim.ros.node.given import read_parameters, use_sim_time
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.launch_arguments import check_launch_arguments
 from drone_sim.ros.node.master_watch import MasterWatch
+from drone_sim.ros.node.others import check_others
 from drone_sim.ros.node.services import Services
 from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.ros.node.step_time import StepTime
@@ -75,13 +76,19 @@ class Node:
         self._pacer = Pacer(period(parameters), sleep=self._outside.wait)
         if self._outside.address:
             self._inbox.sleep_by(self._outside.wait, self._outside.wake)
-        self._topics = FleetTopics(self.simulation, self._inbox)
+        self._topics = FleetTopics(self.simulation, self._inbox, self._time.stamp)
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._windows = WindowTopics(self.simulation, self._inbox)
         self._handles = Handles(self.simulation, self._inbox), ObjectHandles(self.simulation, self._inbox)
         self._view = RvizView(self.simulation, self.player, drawings)
-        diagnosis = Diagnosis(self.player, self._pacer, self._topics.command_logs, self._time.simulated)
+        diagnosis = Diagnosis(
+            self.player,
+            self._pacer,
+            self._topics.command_logs,
+            self._time.simulated,
+            frames_below=rospy.get_namespace().lstrip("/"),
+        )
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
         self._beat = Beat(_SOON, _SELDOM)
         self._shown = -1  # the world's changes, when it was shown
@@ -247,7 +254,9 @@ def main(guardian: Guardian) -> int:
 
     def run() -> None:
         check_launch_arguments()
-        nodes.append(Node(read_parameters()))
+        parameters = read_parameters()
+        check_others([one.name for one in parameters.fleet], use_sim_time())
+        nodes.append(Node(parameters))
         MasterWatch(nodes[0].descriptions).start()
         nodes[0].run(ending.asked)
 

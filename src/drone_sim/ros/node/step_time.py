@@ -8,6 +8,7 @@ import rospy
 from rosgraph_msgs.msg import Clock
 
 from drone_sim.ros.node.newcomers import Newcomers
+from drone_sim.ros.vehicle.messages import ros_time
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
 
@@ -38,7 +39,7 @@ class StepTime:
             rospy.Publisher("/clock", Clock, subscriber_listener=self._newcomers, queue_size=10) if simulated else None
         )
         self._throttle = Throttle(_CLOCK_PERIOD)
-        self._began = rospy.Time()
+        self._began = rospy.Time() if simulated else rospy.Time.now()
         self._pace = 0.0  # s of the stamps for a second of simulated time
         self._said = 0.0  # by /clock, s; 0 is no time for ROS
 
@@ -54,19 +55,19 @@ class StepTime:
     def stamp(self, ago: float = 0.0) -> rospy.Time:
         """Return the stamp of what is sent now, and was the case `ago` seconds of simulated time before."""
         if self._clock is None:
-            return self._began - rospy.Duration.from_sec(ago * self._pace) if ago else self._began
+            return self._began - ros_time(ago * self._pace, rospy.Duration) if ago else self._began
         time = self._simulation.time
-        stamp = rospy.Time.from_sec(time)
+        stamp = ros_time(time)
         if time != self._said:
             self._said = time
             if time:
                 self._clock.publish(stamp)
-        return rospy.Time.from_sec(max(0.0, time - ago)) if ago else stamp
+        return ros_time(max(0.0, time - ago)) if ago else stamp
 
     def tell_newcomers(self) -> None:
         """Tell whoever has begun to listen while the clock stands still what time it is."""
         for tell in self._newcomers.take() if self._said else ():
-            tell(Clock(rospy.Time.from_sec(self._said)))
+            tell(Clock(ros_time(self._said)))
 
     def end(self, at_once: bool = False) -> None:
         """Say that the step has been shown; `at_once`: /clock tells of it in any case."""

@@ -7,6 +7,7 @@ from visualization_msgs.msg import Marker
 from drone_sim.ros.rviz.marker_topic import WORDS, MarkerTopic, namespace
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
 from drone_sim.ros.rviz.scene_markers import markers_of
+from drone_sim.ros.vehicle import frame_names
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -34,7 +35,7 @@ class Bodies:
             self._simulation.world.visuals([vehicle.body.number]), vehicle.body.visual_places
         ):
             for marker in markers_of(visual, matrix, self._files):
-                marker.header.frame_id = f"{vehicle.parameters.frame_prefix}{link}"
+                marker.header.frame_id = frame_names.frame(vehicle.parameters, link)
                 marker.ns, marker.frame_locked = vehicle.name, True
                 markers.append(marker)
         return markers

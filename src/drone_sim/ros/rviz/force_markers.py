@@ -19,6 +19,7 @@ from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.state import State
 from drone_sim.ros.rviz.line_arrows import arrow, star
 from drone_sim.ros.rviz.marker_topic import EYES, MarkerTopic, beside, namespace, new_marker
+from drone_sim.ros.vehicle import frame_names
 from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.sensor import Contact
 from drone_sim.vehicles.vehicle import Vehicle
@@ -119,7 +120,7 @@ def _thrusts(vehicle: Vehicle, felt: _Felt, scale: float) -> Marker | None:
         return None
     marker = _named("thrust", new_marker(Marker.LINE_LIST, _GREEN, (_WIDTH, 0, 0), points))
     marker.colors = colors
-    marker.header.frame_id, marker.frame_locked = vehicle.parameters.base_link, True
+    marker.header.frame_id, marker.frame_locked = frame_names.base_link(vehicle.parameters), True
     return marker
 
 

@@ -12,6 +12,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.mechanics import frames
+from drone_sim.ros.vehicle import frame_names
 from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.simulation import Simulation
@@ -105,7 +106,7 @@ def beside(vehicle: Vehicle, marker: Marker) -> Marker:
     world where it was when it was sent.
     """
     back = frames.invert(frames.from_quaternion((0, 0, 0), vehicle.state.orientation))
-    marker.header.frame_id, marker.frame_locked = vehicle.parameters.base_link, True
+    marker.header.frame_id, marker.frame_locked = frame_names.base_link(vehicle.parameters), True
     place = marker.pose.position
     marker.pose.position = Point(*frames.rotate(back, (place.x, place.y, place.z)))
     marker.pose.orientation = Quaternion(*frames.to_quaternion(back))

@@ -26,14 +26,14 @@ from drone_sim.files import writing
 from drone_sim.files.resources import package_path
 from drone_sim.offline.command_line import Parser, status_of
 from drone_sim.ros.node.paths import from_shell
-from drone_sim.ros.vehicle.messages import FIRST_FRAME
+from drone_sim.ros.vehicle import frame_names
 
 _NAME = "show"
 _PERIOD = 0.1  # s, between two questions to the master
 _PATIENCE = 5.0  # s, after which it says that it waits
 _TOPIC = "/view/state"  # that the simulator advertises for rviz: the last one
 _ALONE, _FIRST, _SIMULATOR = "drone", "drone1", "drone_sim"  # as the files of the package name them
-_NAMES = re.compile(rf"\b{_FIRST}\b|(?<=/)(?:{_ALONE}|{_SIMULATOR})(?=/)")
+_NAMES = re.compile(rf"\b{_FIRST}\b|(?<=/)(?:{_ALONE}|{_SIMULATOR})(?=/)|(?<= ){_SIMULATOR}(?=/first$)", re.MULTILINE)
 _TITLES = re.compile(rf"^ *Name: (.*\b{_FIRST})$", re.MULTILINE)
 
 
@@ -56,7 +56,8 @@ def _show(options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:
     config = from_shell(options.config)
     if config and not Path(config).is_file():
         raise OSError(f"--config {config}: no such file")
-    config = config or str(_fitting(options.simulator.strip("/")))
+    simulator = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), options.simulator)
+    config = config or str(_fitting(simulator.strip("/")))
     os.execv(rviz[0], [rviz[0], "-d", config, *remappings])
 
 
@@ -64,7 +65,7 @@ def _fitting(simulator: str) -> Path:
     """Return a file for what flies: one of the package's, or one made of it."""
     above = _topics_of(simulator)
     alone = above != simulator
-    names = {_ALONE: above} if alone else {_SIMULATOR: simulator, _FIRST: _first_vehicle()}
+    names = {_SIMULATOR: simulator, **({_ALONE: above} if alone else {_FIRST: _first_vehicle(simulator)})}
     template = package_path() / "rviz" / ("drone.rviz" if alone else "fleet.rviz")
     if all(name == given for name, given in names.items()):
         return template
@@ -110,15 +111,16 @@ def _topics_of(simulator: str) -> str:
         raise OSError(f"the ROS master at {rosgraph.get_master_uri()} does not answer: {error}") from None
 
 
-def _first_vehicle() -> str:
+def _first_vehicle(simulator: str) -> str:
     """Return the name of the vehicle, one of several, that the view follows. Raises OSError."""
+    first = frame_names.first(simulator)
     found: list[str] = []
     come = threading.Event()
 
     def look(message: TFMessage) -> None:
         for one in message.transforms:
-            if one.child_frame_id == FIRST_FRAME:
-                found.append(one.header.frame_id.partition("/")[0])
+            if one.child_frame_id == first:
+                found.append(one.header.frame_id.rpartition("/")[0])
                 come.set()
 
     rospy.init_node(_NAME, argv=[], anonymous=True, disable_signals=True)
@@ -126,5 +128,5 @@ def _first_vehicle() -> str:
     in_time = come.wait(_PATIENCE)
     rospy.signal_shutdown("done")
     if not in_time:
-        raise OSError(f"nobody broadcasts the frame {FIRST_FRAME}")
+        raise OSError(f"nobody broadcasts the frame {first}")
     return found[-1]

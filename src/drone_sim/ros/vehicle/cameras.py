@@ -9,7 +9,7 @@ from sensor_msgs.msg import CameraInfo, Image
 
 from drone_sim.ros.node.newcomers import Newcomers
 from drone_sim.ros.node.step_time import Stamp
-from drone_sim.ros.vehicle import messages
+from drone_sim.ros.vehicle import frame_names, messages
 from drone_sim.ros.vehicle.compression import CompressedPublisher
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.camera_parameters import CameraParameters
@@ -27,7 +27,7 @@ class CameraOutput:
         `newcomers` notes who begins to.
         """
         topic = f"{vehicle.name}/{parameters.topic}"
-        self._frame = f"{vehicle.frame_prefix}{parameters.frame}"
+        self._frame = frame_names.frame(vehicle, parameters.frame)
         info_topic = topic.rpartition("/")[0] + "/camera_info"  # image_transport's rule
         self._bridge = CvBridge()
         self._image = rospy.Publisher(topic, Image, subscriber_listener=newcomers, queue_size=1)

@@ -11,6 +11,8 @@ import genpy
 import roslib.message
 import rospkg
 
+from drone_sim.ros.vehicle.messages import ros_time
+
 
 def message_class(kind: str) -> type[genpy.Message]:
     """Return the class of a message type such as sensor_msgs/Imu; raises ValueError where it is not installed."""
@@ -57,7 +59,7 @@ def fill(message: genpy.Message, given: Any, path: str) -> genpy.Message:
 def _value(kind: str, value: Any, path: str) -> Any:
     if kind in ("time", "duration"):
         made = genpy.Time if kind == "time" else genpy.Duration
-        return made.from_sec(value) if isinstance(value, (int, float)) else value
+        return ros_time(value, made) if isinstance(value, (int, float)) else value
     if "[" in kind:
         element = kind.partition("[")[0]
         if element in ("uint8", "char") and isinstance(value, (bytes, str)):

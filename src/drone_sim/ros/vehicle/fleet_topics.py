@@ -17,10 +17,11 @@ from drone_sim.run.simulation import Simulation
 class FleetTopics:
     """Topics for every vehicle of a simulation, and their frames."""
 
-    def __init__(self, simulation: Simulation, inbox: Inbox):
-        """Advertise for those that are there."""
+    def __init__(self, simulation: Simulation, inbox: Inbox, stamp: Stamp):
+        """Advertise for those that are there; `stamp` returns that of what is sent now."""
         self._simulation = simulation
         self._inbox = inbox
+        self._stamp = stamp
         self._topics: dict[str, VehicleTopics] = {}
         self._transforms = Transforms()
         self._era = self._tunings = -1
@@ -48,7 +49,7 @@ class FleetTopics:
                 self._topics[name].follow(vehicle)
             else:
                 self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox)
-        self._transforms.tell_fixed(vehicles.values())
+        self._transforms.tell_fixed(vehicles.values(), self._stamp)
 
     def command_logs(self) -> dict[str, CommandLog]:
         """Return what has come in, by vehicle."""

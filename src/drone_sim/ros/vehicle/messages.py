@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
+import genpy
 import rospy
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
@@ -16,7 +18,11 @@ from drone_sim.mechanics.state import State, Twist
 from drone_sim.render.intrinsics import Intrinsics
 
 WORLD_FRAME = "world"
-FIRST_FRAME = "drone_sim/first"  # Track_base of the first vehicle, which rviz follows
+
+
+def ros_time(seconds: float, kind: type[genpy.TVal] = rospy.Time) -> Any:
+    """Return seconds as ROS's time, or as a duration, to the nearest nanosecond; its own from_sec cuts off the rest."""
+    return kind(*divmod(round(seconds * 1e9), 10**9))
 
 
 def odometry(stamp: rospy.Time, state: State, child: str) -> Odometry:

@@ -11,7 +11,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray, String
 
 from drone_sim.ros.node.newcomers import Newcomers
-from drone_sim.ros.vehicle import messages
+from drone_sim.ros.vehicle import frame_names, messages
 from drone_sim.run.pacing import Throttle
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
@@ -25,7 +25,7 @@ class VehicleOutputs:
     def __init__(self, parameters: VehicleParameters, newcomers: Newcomers):
         """Advertise in the vehicle's namespace; `newcomers` notes who begins to listen to odometry."""
         name = parameters.name
-        self._base_link, self._track_base = parameters.base_link, parameters.track_base
+        self._base_link, self._track_base = frame_names.base_link(parameters), frame_names.track_base(parameters)
         self._odometry = rospy.Publisher(f"{name}/odom", Odometry, subscriber_listener=newcomers, queue_size=10)
         self._command = rospy.Publisher(f"{name}/command", TwistStamped, queue_size=10)
         self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=10)

@@ -8,8 +8,8 @@ import genpy
 import rospy
 
 from drone_sim.ros.node.step_time import Stamp
+from drone_sim.ros.vehicle import frame_names
 from drone_sim.ros.vehicle.filling import fill, message_class
-from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.sensors.parameters import SensorParameters
 from drone_sim.sensors.sensor import Instrument, Output
 from drone_sim.vehicles.parameters import VehicleParameters
@@ -29,8 +29,7 @@ class SensorOutput:
     def __init__(self, vehicle: VehicleParameters, sensor: Instrument):
         """Advertise in the vehicle's namespace. Raises ValueError for a message that is not installed."""
         own: SensorParameters = sensor.parameters
-        prefix = "" if own.frame == WORLD_FRAME else vehicle.frame_prefix
-        self._frame = f"{prefix}{own.frame}"
+        self._frame = frame_names.frame(vehicle, own.frame)
         self._base = f"{vehicle.name}/{own.topic}"
         self._topics: list[_Topic] = []
         self.follow(sensor)

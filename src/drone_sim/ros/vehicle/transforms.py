@@ -10,7 +10,7 @@ from tf2_msgs.msg import TFMessage
 
 from drone_sim.mechanics import frames
 from drone_sim.ros.node.newcomers import Newcomers
-from drone_sim.ros.vehicle import messages
+from drone_sim.ros.vehicle import frame_names, messages
 from drone_sim.run.pacing import Throttle
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -22,7 +22,7 @@ class Transforms:
 
     world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says, and sensors
     on what carries them. What does not move on base_link is told once, by /tf_static; so is the frame that
-    rviz follows, Track_base of the first vehicle, whatever that is called.
+    rviz follows, Track_base of the first vehicle, whatever that is called. What they are called: frame_names.py.
     """
 
     def __init__(self) -> None:
@@ -32,16 +32,16 @@ class Transforms:
         self._fixed = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)
         self._eyes = Throttle(_EYES)
 
-    def tell_fixed(self, vehicles: Collection[Vehicle]) -> None:
-        """Say where the links are that do not move; of vehicles that are new, or no longer there."""
-        now = rospy.Time.now()
-        first = next(iter(vehicles)).parameters
-        told = [messages.transform(now, first.track_base, messages.FIRST_FRAME, frames.IDENTITY)]
+    def tell_fixed(self, vehicles: Collection[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
+        """Say where the links are that do not move, under what `stamp` returns; of vehicles that are new, or gone."""
+        now = stamp()
+        first = frame_names.track_base(next(iter(vehicles)).parameters)
+        told = [messages.transform(now, first, frame_names.first(rospy.get_name()), frames.IDENTITY)]
         for one in vehicles:
             told += [_link(now, one, name) for name in one.body.links if name not in one.body.rigid.blade_joints]
             own = one.parameters
             told += [
-                messages.transform(now, own.base_link, f"{own.frame_prefix}{frame}", matrix)
+                messages.transform(now, frame_names.base_link(own), frame_names.frame(own, frame), matrix)
                 for frame, matrix in one.instruments.fixed_frames.items()
             ]
         self._fixed.publish(TFMessage(told))
@@ -65,17 +65,16 @@ class Transforms:
 
 def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
     own, world = vehicle.parameters, messages.WORLD_FRAME
-    prefix = own.frame_prefix
     return [
-        messages.transform(now, world, own.base_link, vehicle.matrix),
-        messages.transform(now, world, own.track_base, vehicle.track),
+        messages.transform(now, world, frame_names.base_link(own), vehicle.matrix),
+        messages.transform(now, world, frame_names.track_base(own), vehicle.track),
         *(
-            messages.transform(now, world, f"{prefix}{camera.frame}", vehicle.optical(camera))
+            messages.transform(now, world, frame_names.frame(own, camera.frame), vehicle.optical(camera))
             for camera in own.cameras.values()
             if camera.mount is not None  # the URDF does not know them
         ),
         *(
-            messages.transform(now, world, f"{prefix}{frame}", pose())
+            messages.transform(now, world, frame_names.frame(own, frame), pose())
             for frame, pose in vehicle.instruments.moving_frames.items()
         ),
     ]
@@ -93,5 +92,5 @@ def _link(now: rospy.Time, vehicle: Vehicle, name: str, angle: float = 0.0) -> T
     parent, matrix = vehicle.body.links[name]
     if angle:
         matrix = frames.multiply(matrix, frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angle)))
-    prefix = vehicle.parameters.frame_prefix
-    return messages.transform(now, f"{prefix}{parent}", f"{prefix}{name}", matrix)
+    own = vehicle.parameters
+    return messages.transform(now, frame_names.frame(own, parent), frame_names.frame(own, name), matrix)

@@ -25,8 +25,13 @@ class Diagnosis:
         logs: Callable[[], Mapping[str, CommandLog]],
         simulated_time: bool,
         clock: Callable[[], float] = time.monotonic,
+        frames_below: str = "",
     ):
-        """Take what plays and paces, what returns the commands that came in, by vehicle, and a monotonic clock (s)."""
+        """Take what plays and paces, what returns the commands that came in, by vehicle, and a monotonic clock (s).
+
+        The names of the vehicles' frames begin with `frames_below`.
+        """
+        self._frames_below = frames_below
         self._player, self._pacer, self._logs = player, pacer, logs
         self._simulated_time = simulated_time
         self._clock = clock
@@ -41,7 +46,9 @@ class Diagnosis:
             pace(self._player, self._pacer, since, self._simulated_time),
             cameras(self._player.simulation, since),
             *(
-                VehicleDiagnosis(vehicle, self._player, logs.get(name) or CommandLog(self._clock), since).finding()
+                VehicleDiagnosis(
+                    vehicle, self._player, logs.get(name) or CommandLog(self._clock), since, self._frames_below
+                ).finding()
                 for name, vehicle in self._player.simulation.vehicles.items()
             ),
         ]

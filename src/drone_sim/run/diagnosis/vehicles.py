@@ -25,8 +25,12 @@ _MOVES = 0.1  # m/s, of a command that means to
 class VehicleDiagnosis:
     """Looks at one vehicle, between two steps."""
 
-    def __init__(self, vehicle: Vehicle, player: Player, log: CommandLog, since: Since | None):
-        """Take what is to be looked at; `since` is what was counted since the last look, None where nothing was."""
+    def __init__(self, vehicle: Vehicle, player: Player, log: CommandLog, since: Since | None, frames_below: str = ""):
+        """Take what is to be looked at; `since` is what was counted since the last look, None where nothing was.
+
+        The names of the vehicles' frames begin with `frames_below`.
+        """
+        self._frames_below = frames_below
         self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
         self._now = log.clock()
         self._tilt = tilt(vehicle)
@@ -139,7 +143,7 @@ class VehicleDiagnosis:
             "contacts": ", ".join(_names(self._contacts)) or "none",
             "put elsewhere": f"{vehicle.jumps} times",
             "script": str(vehicle.parameters.script or self._player.simulation.script or load.DEFAULT),
-            "frame": f"{vehicle.parameters.base_link}, in world",
+            "frame": f"{self._frames_below}{vehicle.parameters.frame_prefix}base_link, in world",
         }
 
     def _ago(self, at: float) -> str:
