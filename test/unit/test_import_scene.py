@@ -129,13 +129,36 @@ def test_the_floor_the_step_and_gravity(imported):
     chunks = [shape(0, "ResizableFloor_5_25", mesh(size=(1, 1, 1))), flat]
     moon = chunk("DYN", chunk("En3", struct.pack("<i3fi", 0, 0, 0, -1.62, 0)))
     content = imported(*chunks, moon, chunk("SIM", integers("Spi", 4)))
-    assert content == {"time_step": 0.01, "gravity": -1.62, "floor": {"size": 2.0}, "objects": []}
+    assert content == {"time_step": 0.01, "gravity": -1.62, "floor": {"size": 2.0}, "vehicles": {}, "objects": []}
     loaded = parameters.load({"scene_file": str(imported.scene)})
     assert (loaded.time_step, loaded.sub_steps, loaded.gravity) == (0.01, 2, -1.62)
     with pytest.raises(
         parameters.ParameterError, match=r"time_step = 0\.01: a simulation that runs with 0\.05 s goes on"
     ):
         parameters.load().in_scene(str(imported.scene))
+
+
+def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(imported, tmp_path):
+    ball = shape(1, "Ball", mesh("sphere", (0.2, 0.2, 0.2)), at=(0, 0, 2), dynamic=True, wrapper=weight(1.0))
+    imported(ball, script(1, "sim.setFloatSignal('height', sim.getObjectPosition(sim.getObject('/Ball'), -1)[3])"))
+    scene = {"scene_file": str(imported.scene)}
+    simulation = Simulation(parameters.load(scene))
+    for _ in range(20):
+        simulation.step()
+    assert not simulation.vehicles
+    assert simulation.scene.things()["Ball"].matrix()[11] == pytest.approx(0.1, abs=0.01), "on the floor"
+    assert simulation.shared.signals.getFloatSignal("height") == 2.0
+    simulation.save_scene(tmp_path / "saved.yaml")
+    simulation.restore(simulation.snapshot())
+    assert simulation.set_vehicles({"guest": {"position": [1, 0, 1]}}) == (["guest"], [])
+    simulation.step()
+    assert simulation.drone.name == "guest"
+    assert simulation.set_vehicles({}) == ([], ["guest"])
+    simulation.close()
+    assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).fleet == ()
+    assert [one.name for one in parameters.load({**scene, "vehicles": 1}).fleet] == ["drone1"]
+    with pytest.raises(parameters.ParameterError, match=r"scene\.yaml: no vehicle flies there \(vehicles: {}\)"):
+        parameters.load(scene).first  # noqa: B018
 
 
 def test_what_cannot_be_brought_is_said_object_by_object(imported):
@@ -146,9 +169,9 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
         "Way: a path: only its place is brought",
         "Drone: is called Drone_2 here",
         "Drone: its customization script is not brought",
-        "no quadricopter is in the file: our own flies",
     ):
         assert line in listed and line in imported.said
+    assert "No quadricopter is in the file: none flies, unless `vehicles` says so" in imported.said
 
 
 def test_scripts_lie_on_their_objects(imported):

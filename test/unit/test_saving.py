@@ -54,6 +54,28 @@ def test_files_keep_the_names_that_they_were_given(simulation, scene):
     assert yaml.safe_load(scene.read_text(encoding="utf-8"))["objects"][0]["name"] == "Å"
 
 
+def test_a_file_that_somebody_wrote_stays_beside_it(simulation, scene):
+    before = scene.read_bytes()
+    for _ in range(2):
+        simulation.save_scene(scene)
+    assert (scene.parent / "scene.yaml.bak").read_bytes() == before
+    saved = yaml.safe_load(scene.read_text(encoding="utf-8"))
+    assert saved.keys() == {"floor", "drone", "objects"} and "rpy" not in saved["objects"][0], "no defaults"
+
+
+def test_what_was_taken_off_and_put_upright_is_so_when_it_is_loaded(tmp_path):
+    above = {"name": "Above", "kind": "dummy", "position": [0, 0, 1]}
+    below = {"name": "Below", "kind": "dummy", "position": [0, 0, 1], "rpy": [0, 0, 1], "parent": "Above"}
+    simulation = Simulation(parameters.load({"scene": {"objects": [above, below]}}))
+    one = simulation.scene.things()["Below"]
+    one.parent = None
+    one.put(frames.from_rpy((1, 2, 3), (0, 0, 0)))
+    simulation.save_scene(tmp_path / "saved.yaml")
+    simulation.close()
+    again = parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.objects[1]
+    assert (again.parent, again.position, again.rpy) == ("", (1, 2, 3), (0, 0, 0))
+
+
 def test_saved_elsewhere_they_are_found_all_the_same(simulation, scene, tmp_path):
     there = tmp_path / "there" / "scene.yaml"
     simulation.save_scene(there)
@@ -98,7 +120,7 @@ def test_a_full_disk_leaves_the_last_scene(simulation, scene, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match=r"scene\.yaml: No space left on device"):
+    with pytest.raises(OSError, match=r"scene\.yaml(\.bak)?: No space left on device"):
         simulation.save_scene(scene)
     assert scene.read_text(encoding="utf-8") == before
     assert sorted(os.listdir(scene.parent)) == ["ball.stl", "pictures", "scene.yaml"]

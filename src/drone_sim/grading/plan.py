@@ -147,7 +147,7 @@ class Plan(Checked):
 
     def vehicle_of(self, parameters: Parameters) -> str:
         """Return the name of the vehicle that is graded."""
-        return self.vehicle or parameters.fleet[0].name
+        return self.vehicle or parameters.first.name
 
     def topics_of(self, parameters: Parameters) -> dict[str, str]:
         """Return the full names of the topics that criteria ask for; a relative one is the graded vehicle's."""
@@ -211,7 +211,7 @@ def _check_with(plan: Plan, parameters: Parameters) -> None:
     steps = plan.duration / parameters.time_step
     if steps > MAX_ROWS:
         raise _refused(("duration",), f"{plan.duration:g}: makes {steps:.0f} steps; at most {MAX_ROWS} are kept")
-    names = [one.name for one in parameters.fleet]
+    names = [one.name for one in parameters.fleet] or [parameters.first.name]
     if plan.vehicle and plan.vehicle not in names:
         raise _refused(("vehicle",), f"{shown(plan.vehicle)}: no such vehicle; {near_names(plan.vehicle, names)}")
     check_objects(parameters, plan.spread)

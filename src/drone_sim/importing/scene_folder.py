@@ -83,10 +83,9 @@ class _Import:
     def run(self) -> Imported:
         content: dict[str, Any] = {**self._world()}
         vehicles = {name: self._vehicle(one) for name, one in zip(self._vehicle_names, self._vehicles)}
-        if vehicles:
-            content["vehicles"] = vehicles
-        else:
-            self._report.add("", "no quadricopter is in the file: our own flies")
+        content["vehicles"] = vehicles
+        if not vehicles:
+            self._report.notes.append("No quadricopter is in the file: none flies, unless `vehicles` says so")
         entries = list(self._entries())
         content["objects"] = entries
         scripts = list(self._attached())

@@ -145,7 +145,7 @@ def _vehicle(name: str | None, parameters: Parameters) -> str:
     names = [one.name for one in parameters.fleet]
     if name is not None and name not in names:
         raise ValueError(f"--vehicle {_shown(name)}: no such vehicle; {near_names(name, names)}")
-    return names[0] if name is None else name
+    return parameters.first.name if name is None else name
 
 
 def _check_plot(path: str, steps: int) -> None:

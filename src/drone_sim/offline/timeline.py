@@ -265,8 +265,8 @@ def _vehicle(name: Any, parameters: Parameters) -> tuple[VehicleParameters, list
     """Return what is allowed of a vehicle, and what is wrong with its name."""
     fleet = {one.name: one for one in parameters.fleet}
     if name == "" or (isinstance(name, str) and name in fleet):
-        return fleet.get(name, parameters.fleet[0]), []
-    return parameters.fleet[0], [
+        return fleet.get(name, parameters.first), []
+    return parameters.first, [
         (("vehicle",), f"vehicle = {shown(name)}: no such vehicle; {near_names(str(name), fleet)}")
     ]
 

@@ -28,19 +28,19 @@ class Arrangement:
 
         Carried by an object that was moved is not moved.
         """
-        objects = self._simulation.drone.objects
+        objects = self._simulation.shared.objects
         changed = (name for name, place in self._places().items() if self._initial.get(name, place) != place)
         return {name: objects[objects.handle(name)].matrix() for name in changed}
 
     def put(self, places: Places) -> None:
         """Put objects there again, as far as there still are some of these names."""
-        objects = self._simulation.drone.objects
+        objects = self._simulation.shared.objects
         for name, place in places.items():
             if name in objects:
                 objects[objects.handle(name)].put(place)
 
     def _places(self) -> Places:
         """Return where every object is: in the world what the dynamics moves, else in its parent."""
-        objects = self._simulation.drone.objects
+        objects = self._simulation.shared.objects
         found = (objects[handle] for handle in objects)
         return {one.name: one.local if one.body is None else one.matrix() for one in found}

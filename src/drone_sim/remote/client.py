@@ -49,7 +49,7 @@ class Client:
         self.tasks: dict[tuple[bytes, ...], list[Task]] = {}  # what is not answered yet, by the way back
         self._simulation = player.simulation
         self._control = Control(player, arrangement, self.stepping, everybody, clock)
-        self._bus = MessageBus(self._simulation.drone.name, {})
+        self._bus = MessageBus(next(iter(self._simulation.vehicles), ""), {})
         self._bus.backend = backend
         self._run = self._era = -1
         self._drawn: set[int] = set()
@@ -83,7 +83,7 @@ class Client:
         self.stepping.let_go()
         self.tasks.clear()
         self._bus.close()
-        drawings = self._simulation.drone.drawings
+        drawings = self._simulation.shared.drawings
         if self._run == self._simulation.run:
             for handle in self._drawn & set(drawings.objects):
                 drawings.remove(handle)

@@ -112,7 +112,7 @@ class Control:
 
     def waitForSignal(self, name: Name) -> Task:
         """Return the value of a signal of any kind, as soon as it is set; nothing where the simulation stops before."""
-        simulation, run, signals = self._simulation, self._simulation.run, self._simulation.drone.signals
+        simulation, run, signals = self._simulation, self._simulation.run, self._simulation.shared.signals
         kinds = (signals.getInt32Signal, signals.getFloatSignal, signals.getStringSignal)
 
         def value() -> Any:

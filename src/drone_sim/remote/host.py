@@ -12,6 +12,7 @@ from drone_sim.scripting.api.registry import Attachment, Callee, Scripts
 from drone_sim.scripting.api.turns import Turns
 from drone_sim.scripting.time_limit import TimeLimit
 from drone_sim.vehicles.child_script import surroundings
+from drone_sim.vehicles.quadricopter_objects import DRONE
 from drone_sim.vehicles.shared_view import SharedView
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -23,7 +24,6 @@ class ClientHost(SharedView):
         """Take the simulation as it is in this era."""
         super().__init__(simulation.shared)
         self._vehicles = list(simulation.vehicles.values())
-        self._first = self._vehicles[0]
 
     def surroundings(self) -> Surroundings:
         """Return clock, cameras and the rest; no client's call is ended after a time."""
@@ -42,7 +42,7 @@ class ClientHost(SharedView):
     @property
     def own_script(self) -> str:
         """Name of the object whose script `sim.handle_self` means: the first vehicle's."""
-        return self._first.own_script
+        return self._vehicles[0].own_script if self._vehicles else DRONE
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m)."""
@@ -53,8 +53,13 @@ class ClientHost(SharedView):
         return self._of(joint).turn_joint(joint, angle)
 
     def _of(self, name: str) -> Vehicle:
-        """Return the vehicle whose objects end in the same suffix; the first for an object of the scene."""
-        return next((one for one in self._vehicles if one.suffix and name.endswith(one.suffix)), self._first)
+        """Return the vehicle whose objects end in the same suffix; the first for an object of the scene.
+
+        Raises ValueError where no vehicle flies.
+        """
+        if not self._vehicles:
+            raise ValueError(f"'{name}' is no vehicle's, of which none flies")
+        return next((one for one in self._vehicles if one.suffix and name.endswith(one.suffix)), self._vehicles[0])
 
 
 class _FromOutside(Scripts):

@@ -99,8 +99,20 @@ class Parameters(PaceParameters, EquipmentParameters):
 
     @property
     def fleet(self) -> tuple[VehicleParameters, ...]:
-        """What flies: the `vehicles`, or the drone alone where there are none, or one that has the drone's name."""
+        """What flies: the `vehicles`, or the drone alone where there are none, or one that has the drone's name.
+
+        Nobody flies where the scene file says `vehicles: {}`, and nothing beside it says otherwise.
+        """
         return self._fleet
+
+    @property
+    def first(self) -> VehicleParameters:
+        """The first vehicle, most often the only one. Raises ParameterError where nobody flies."""
+        if not self._fleet:
+            raise ParameterError(
+                f"{self.scene_file}: no vehicle flies there (vehicles: {{}}); give some, such as vehicles: 1"
+            )
+        return self._fleet[0]
 
     @property
     def in_scene_file(self) -> Mapping[str, Any]:
@@ -254,13 +266,17 @@ def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str
 
     What is wrong may stand in the file `named`, which is the scene file or one laid over config/drone.yaml.
     """
+    nobody = scene.get("vehicles") == {}
+    laid = {key: value for key, value in scene.items() if key != "vehicles"} if nobody else scene
     try:
-        parameters = Parameters.model_validate(merged({**given, "scene_file": file}, scene))
+        parameters = Parameters.model_validate(merged({**given, "scene_file": file}, laid))
     except ValidationError as error:
         found = [one for one in problems(error, Parameters) if _is_given(one, given, scene)]
         raise ParameterError(_told(found, named, bool(scene)), found[0].location if found else ()) from None
     parameters._given = given
     parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
+    if nobody and not parameters.vehicles:
+        parameters._fleet = ()
     return parameters
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -12,46 +13,61 @@ from drone_sim.config.types import Checked, FoundFile, ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.mechanics import frames
-from drone_sim.run.parameters import Parameters
+from drone_sim.run.parameters import Parameters, load
 from drone_sim.scene import scene_parameters, state_now
 from drone_sim.scene.scene import Scene
 from drone_sim.vehicles.vehicle import Vehicle
 
-_UNITS = "# metres, radians; the datum in degrees, the magnetic field in tesla\n"
+_HEAD = "# Written by save_scene: metres, radians; a datum in degrees, a magnetic field in tesla.\n"
 
 
 def save(
     path: Path, parameters: Parameters, scene: Scene, vehicles: Iterable[Vehicle], weather: WeatherParameters
 ) -> None:
-    """Write floor, objects, vehicles and weather as they are now. The scene's own files keep their names.
+    """Write what of floor, objects, vehicles and weather is not as by default. The scene's own files keep their names.
+
+    What was in the file and was not written here stays beside it, as FILE.bak.
 
     Raises ParameterError where that would be no scene that can be loaded, such as with the drone below the
     floor, and OSError; what was in the file is then still there.
     """
-    own = scene.parameters
+    own, default = scene.parameters, load().scene
     said = parameters.in_scene_file
     content: dict[str, Any] = {key: said[key] for key in scene_parameters.WORLD if key in said}
     if "weather" in said or weather != parameters.weather:
         content["weather"] = weather.model_dump(mode="json")
-    content.update(datum=own.datum.model_dump(), magnetic_field=list(own.magnetic_field))
-    content["floor"] = _plain(own.floor, path.parent)
+    if own.datum != default.datum:
+        content["datum"] = own.datum.model_dump()
+    if own.magnetic_field != default.magnetic_field:
+        content["magnetic_field"] = list(own.magnetic_field)
+    if own.floor != default.floor:
+        content["floor"] = _plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))
     content["objects"] = _objects(scene, path.parent)
     if own.scripts:
         content["scripts"] = [_plain(one, path.parent) for one in own.scripts]
-    text = _UNITS + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    text = _HEAD + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
     try:
         parameters.check_scene(yaml_files.parse(text), path)
     except ValueError as error:
         raise ParameterError(f"the scene as it stands cannot be saved: {error}") from None
     path.parent.mkdir(parents=True, exist_ok=True)
+    _keep_what_others_wrote(path)
     writing.write(path, text)
+
+
+def _keep_what_others_wrote(path: Path) -> None:
+    with contextlib.suppress(FileNotFoundError):
+        before = path.read_bytes()
+        if not before.startswith(_HEAD.encode()):
+            with writing.replacing(path.with_name(f"{path.name}.bak"), binary=True) as kept:
+                kept.write(before)
 
 
 def _flying(parameters: Parameters, vehicles: Iterable[Vehicle], folder: Path) -> dict[str, Any]:
     """Return the drone, or the vehicles, where they are, with what the last scene file said of them."""
     said = parameters.in_scene_file
-    if not parameters.vehicles:
+    if parameters.fleet and not parameters.vehicles:
         (drone,) = vehicles
         return {"drone": {**_named(said.get("drone"), folder), **_place(drone)}}
     entries = said.get("vehicles")
@@ -71,7 +87,14 @@ def _named(said: Any, folder: Path) -> dict[str, Any]:
 
 
 def _objects(scene: Scene, folder: Path) -> list[dict[str, Any]]:
-    return [{**_plain(one, folder), **now} for one, now in zip(scene.parameters.objects, state_now.of_all(scene))]
+    here = zip(scene.parameters.objects, state_now.of_all(scene))
+    return [_without_defaults({**_plain(one, folder), **now}) for one, now in here]
+
+
+def _without_defaults(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry without the keys that say that it is upright, or hangs on nothing."""
+    said = {"rpy": any(entry["rpy"]), "parent": entry["parent"] != ""}
+    return {key: value for key, value in entry.items() if said.get(key, True)}
 
 
 def _plain(values: Checked, folder: Path) -> dict[str, Any]:

@@ -171,7 +171,9 @@ class Simulation:
 
     @property
     def drone(self) -> Vehicle:
-        """The first vehicle, most often the only one."""
+        """The first vehicle, most often the only one. Raises LookupError where nobody flies."""
+        if not self._flying:
+            raise LookupError("no vehicle flies in the scene")
         return self._flying[0]
 
     @property

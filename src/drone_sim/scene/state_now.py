@@ -30,8 +30,8 @@ def _of(one: SceneObject) -> dict[str, Any]:
 
 
 def _place(matrix: Matrix, parent: str) -> dict[str, Any]:
-    place = {"position": list(frames.position(matrix)), "rpy": list(frames.to_rpy(matrix))}
-    return {**place, "parent": parent} if parent else place
+    turn = [angle + 0.0 for angle in frames.to_rpy(matrix)]  # without a -0.0
+    return {"position": list(frames.position(matrix)), "rpy": turn, "parent": parent}
 
 
 def _joint(joint: Joint) -> dict[str, Any]:

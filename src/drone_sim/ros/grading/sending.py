@@ -32,7 +32,7 @@ class Sender:
     def __init__(self, entries: list[Entry], parameters: Parameters):
         """Advertise what the entries need. Raises Unfit for an entry that no topic can ask for."""
         self._step = parameters.time_step
-        self._first = parameters.fleet[0].name
+        self._first = parameters.first.name
         push = parameters.push.duration
         self._left: list[tuple[float, rospy.Publisher, Any]] = []
         publishers: dict[str, rospy.Publisher] = {}

@@ -46,6 +46,7 @@ from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.vehicles.vehicle import Vehicle
 
 _NAME = "drone_sim"
 _SOON, _SELDOM = 0.05, 0.2  # s between two messages while the simulation stands: after a change, and without one
@@ -92,7 +93,7 @@ class Node:
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
         self._beat = Beat(_SOON, _SELDOM)
         self._shown = -1  # the world's changes, when it was shown
-        for camera in self.simulation.drone.cameras.values():
+        for camera in [one for vehicle in self._first() for one in vehicle.cameras.values()]:
             camera.look()  # the first picture takes long: compiling shaders must not make a step late
 
     def run(self, ending: Callable[[], bool] = lambda: False) -> None:
@@ -111,7 +112,8 @@ class Node:
         gc.collect()
         gc.freeze()  # what is there by now stays: the collector, looking through it again and again, makes steps late
         commands = ", ".join(rospy.resolve_name(f"{name}/cmd_vel") for name in self.simulation.vehicles)
-        rospy.loginfo(f"drone_sim: {'flying' if self.player.playing else 'stopped'}; commands on {commands}")
+        doing = "flying" if self.player.playing else "stopped"
+        rospy.loginfo(f"drone_sim: {doing}; {f'commands on {commands}' if commands else 'no vehicle is in the scene'}")
         self._diagnostics.start()
         steps, seconds = 0, 0.0
         self._pacer.restart()
@@ -156,6 +158,10 @@ class Node:
         """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
         self._take_in()
         return self._goes() and self.player.step()
+
+    def _first(self) -> list[Vehicle]:
+        """Return the first vehicle, if one flies."""
+        return list(self.simulation.vehicles.values())[:1]
 
     def _take_in(self) -> None:
         self._inbox.empty()
@@ -221,8 +227,8 @@ class Node:
         self._view.update()
         self._windows.update(self._time.stamp)
         if self._parameters.gui:
-            track = self.simulation.drone.track
-            self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
+            for track in [vehicle.track for vehicle in self._first()]:
+                self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
         self._beat.restart()
 
     def descriptions(self) -> list[str]:

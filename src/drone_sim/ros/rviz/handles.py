@@ -49,7 +49,7 @@ class Handles:
         if not self._server.watched or not self._throttle.passes():
             return
         self._show(self._wanted())
-        objects = self._simulation.drone.objects
+        objects = self._simulation.shared.objects
         for name in self._shown.keys() - self._held.names():
             matrix = objects.matrix(objects.handle(self._shown[name].object))
             self._server.setPose(name, pose_message(level(matrix)))

@@ -43,8 +43,8 @@ class _Newcomers(rospy.SubscribeListener):  # type: ignore[misc] # rospy has no 
 
 def namespace(simulation: Simulation) -> str:
     """Return where the topics on all that flies are: in the only vehicle's namespace, or in the node's."""
-    drone = simulation.drone
-    return drone.name if drone.parameters.is_alone else str(rospy.get_name())
+    alone = [one.name for one in simulation.vehicles.values() if one.parameters.is_alone]
+    return alone[0] if alone else str(rospy.get_name())
 
 
 class MarkerTopic:

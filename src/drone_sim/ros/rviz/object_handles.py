@@ -121,6 +121,6 @@ class ObjectHandles:
 
     def _checked(self, feedback: InteractiveMarkerFeedback) -> Matrix:
         """Return where a handle has been dragged. Raises ValueError for what is no pose."""
-        parameters = self._simulation.drone.parameters
+        parameters = self._simulation.parameters
         lowest = -parameters.position_limit  # the grip knows the floor
         return checked_pose(feedback.header.frame_id, feedback.pose, parameters, lowest).matrix

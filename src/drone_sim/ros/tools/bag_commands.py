@@ -127,7 +127,7 @@ def _change(kind: str) -> Callable[[Any], _Action | None]:
 @functools.cache
 def _allowed() -> dict[str, Checked]:
     default = parameters.load()
-    return {"weather": default.weather, "faults": default.fleet[0].faults}
+    return {"weather": default.weather, "faults": default.first.faults}
 
 
 _READ: dict[str, Callable[[Any], _Action | None]] = {

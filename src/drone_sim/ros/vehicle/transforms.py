@@ -21,8 +21,8 @@ class Transforms:
     """Broadcasts where the vehicles are, once a step, and where the links of their URDFs sit on them.
 
     world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says, and sensors
-    on what carries them. What does not move on base_link is told once, by /tf_static; so is the frame that
-    rviz follows, Track_base of the first vehicle, whatever that is called. What they are called: frame_names.py.
+    on what carries them. What does not move on base_link is told once, by /tf_static; so is the frame that rviz
+    follows, Track_base of the first vehicle, whatever that is called, or `world`. What they are called: frame_names.py.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class Transforms:
     def tell_fixed(self, vehicles: Collection[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
         """Say where the links are that do not move, under what `stamp` returns; of vehicles that are new, or gone."""
         now = stamp()
-        first = frame_names.track_base(next(iter(vehicles)).parameters)
+        first = next((frame_names.track_base(one.parameters) for one in vehicles), messages.WORLD_FRAME)
         told = [messages.transform(now, first, frame_names.first(rospy.get_name()), frames.IDENTITY)]
         for one in vehicles:
             told += [_link(now, one, name) for name in one.body.links if name not in one.body.rigid.blade_joints]

@@ -53,7 +53,7 @@ class _Played:
         parameters = plan.parameters()
         entries = entries_of(plan.timeline_of(parameters), parameters, parameters)
         self._sender = Sender(entries, parameters)
-        self._step, self._first = parameters.time_step, parameters.fleet[0].name
+        self._step, self._first = parameters.time_step, parameters.first.name
         self._last = max(one.at for one in entries)
         self._lock = threading.Lock()
         self._listening: list[rospy.Subscriber] = []
