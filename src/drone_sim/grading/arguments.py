@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 from drone_sim.config.types import ParameterError
 from drone_sim.grading import plan as plans
+from drone_sim.grading.flight import ungraded
 from drone_sim.grading.jobs import pool, sandbox, settings
 from drone_sim.grading.jobs.job import Job
 from drone_sim.grading.jobs.pool import Orders, PoolError
@@ -80,6 +81,7 @@ class Runner:
             numbers.limits, numbers.batches, _is_sandboxed(program, options.sandbox), tables, numbers.workers.patience
         )
         self._program = program
+        self._plan = plan
         self._open = contextlib.ExitStack()
         self._fly: pool.Fly | None = None  # once there is something to fly
 
@@ -100,7 +102,10 @@ class Runner:
         with tqdm(total=len(jobs), unit=" flights", disable=quiet or None, leave=False, smoothing=0.1) as bar:
             waiting = []
             for job in jobs:
-                if job.key in known:
+                if job.error:
+                    bar.update()
+                    yield job, ungraded(self._plan, job.script, job.seed, job.changes, job.error)
+                elif job.key in known:
                     bar.update()
                     yield job, replace(known[job.key], script=job.script)
                 else:

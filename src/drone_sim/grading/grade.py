@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -14,13 +15,13 @@ from drone_sim.files import writing
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
 from drone_sim.grading.arguments import Runner, WrongArguments, add_to, status_of
+from drone_sim.grading.jobs.files import Unreadable, given_script
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.outputs import as_json, gradescope, junit, table
 from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.run.guardian import Guardian
-from drone_sim.scripting.load import script_path
 
 PROGRAM = "grade"
 FAILED = 1
@@ -107,13 +108,19 @@ class _Grading:
 
 
 def jobs_of(plan: Plan, scripts: Sequence[str], seeds: int) -> list[Job]:
-    """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError."""
+    """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError.
+
+    A script that is there, and cannot be read, is an error of its own flights.
+    """
     jobs = []
     for given in dict.fromkeys(plan.script_of(one) for one in (scripts or (None,))):
-        found = script_path(given)
-        script = found if Path(given).suffix else given
-        contents = contents_of(plan, script)
-        jobs += [Job(str(plan.path), script, seed, {}, key_of(contents, seed, {})) for seed in range(seeds)]
+        script, contents, error = given, given, ""
+        try:
+            script = given_script(given)
+            contents = contents_of(plan, script)
+        except Unreadable as why:
+            script, error = os.path.abspath(script), str(why)
+        jobs += [Job(str(plan.path), script, seed, {}, key_of(contents, seed, {}), error) for seed in range(seeds)]
     return jobs
 
 
