@@ -28,7 +28,7 @@ from drone_sim.grading.result import Result
 from drone_sim.offline.command_line import SIGNALLED, Parser
 from drone_sim.run.guardian import Guardian
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.wording import shown
+from drone_sim.wording import printable, shown
 
 WRONG = 2  # exit status
 _MOST_JOBS = 1024
@@ -133,7 +133,7 @@ def status_of(program: str, action: Callable[[], int], guardian: Guardian | None
     except KeyboardInterrupt:
         return SIGNALLED + (guardian.asked if guardian is not None and guardian.asked else signal.SIGINT)
     except _EXPECTED as error:
-        print(f"{program}: {' '.join(_said(error).split())}", file=sys.stderr, flush=True)
+        print(f"{program}: {printable(' '.join(_said(error).split()))}", file=sys.stderr, flush=True)
         return WRONG
 
 

@@ -22,6 +22,7 @@ from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.run.guardian import Guardian
+from drone_sim.wording import printable
 
 PROGRAM = "grade"
 FAILED = 1
@@ -81,7 +82,7 @@ class _Grading:
     def _say(self, script: str) -> None:
         """Tell how a script has done, as soon as it is known."""
         (one,) = by_script(result for job, result in self._results.items() if job.script == script)
-        name = Path(script).name or one.label
+        name = printable(Path(script).name) or one.label
         points = f"{one.points:.4g} of {one.of:.4g} points"
         tqdm.write(f"{name}: {one.passed} of {len(one.flights)} flights passed, {points}", file=sys.stderr)
 

@@ -171,7 +171,8 @@ def _named_in(path: Path, folder: Path, is_handed_in: bool) -> Iterator[Path]:
         return
     is_script = path.suffix.lower() in _SCRIPTS
     words = _WORD.findall(_text(path))
-    names = {os.path.normpath(name) for word in words for name in (word, word.replace(".", "/")) if name.strip("./")}
+    forms = {name for word in words for name in (word, word.replace(".", "/"), word.partition(".")[0])}
+    names = {os.path.normpath(name) for name in forms if name.strip("./")}
     for place in {path.parent, folder}:
         beside = {entry.name for entry in os.scandir(place)}
         for name in names:
