@@ -215,6 +215,12 @@ def test_a_process_that_a_script_leaves_is_ended(warm, plan, folder):
     assert not processes()
 
 
+def test_a_script_that_forks_is_graded_once(warm, plan, folder):
+    alone = warm.fly(job_of(plan, script(folder, "alone", "pass"), 0)).result
+    forked = warm.fly(job_of(plan, script(folder, "forks", "import os; os.fork()"), 0)).result
+    assert forked.passed and forked.digest == alone.digest
+
+
 def test_a_flight_has_its_time(plan, folder):
     limits = SETTINGS.limits.model_copy(update={"seconds": 2.0, "seconds_per_second": 0.0, "patience": 1.0})
     with contextlib.closing(Warm(limits, sandboxed=False)) as warm:
@@ -253,7 +259,16 @@ ODD = {  # what is handed in, and what is said of it
 }
 NAMES = ["new\nline.py", "bell\a\33[2J.py", "-rf.py", "--html=.py", os.fsdecode(b"latin\xe9.py"), "\u202eyp.py"]
 # Names of what must not be read, in a comment.
-NAMED = ["/proc/self/mem", "/proc/kmsg", "../../../../../proc/kmsg", "fifo", "away/mem", "away", "/dev/zero", "huge.bin"]
+NAMED = [
+    "/proc/self/mem",
+    "/proc/kmsg",
+    "../../../../../proc/kmsg",
+    "fifo",
+    "away/mem",
+    "away",
+    "/dev/zero",
+    "huge.bin",
+]
 
 
 def test_what_cannot_be_read_costs_its_own_flights(programs, folder, tmp_path, capsys):
@@ -289,7 +304,9 @@ def test_a_script_has_what_it_names_beside_it_but_nobody_elses(plan, tmp_path):
     for name in (*kept, *left):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("" if name not in ("other.py", "others/my.py") else "def sysCall_init(): pass\n")
-    own = Path(script(tmp_path, "own", "import helper, more.deep, other, others; open('gains.csv'); from lib import inner"))
+    own = Path(
+        script(tmp_path, "own", "import helper, more.deep, other, others; open('gains.csv'); from lib import inner")
+    )
     assert {str(one.relative_to(tmp_path)) for one in files.of_script(plan, str(own))} == {"own.py", *kept}
 
 
