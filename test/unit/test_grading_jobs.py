@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import json
 import os
+import resource
 import socket
 import subprocess
 import sys
@@ -422,6 +423,39 @@ def test_what_was_flown_is_not_flown_again(programs, folder, tmp_path, capsys, m
     assert "3 of 3 flights are known" in capsys.readouterr().err
     assert grade.main([*arguments, "--fresh"]) == 0
     assert "known" not in capsys.readouterr().err
+
+
+@contextlib.contextmanager
+def no_room():
+    """No file may be longer than 100 bytes, as where a disk is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_full_disk_is_named_and_loses_no_result(programs, folder, tmp_path, capsys):
+    named = {"--json": "o.json", "--junit": "o.xml", "--gradescope": "results.json", "--html": "report"}
+    outputs = {option: str(tmp_path / name) for option, name in named.items()}
+    written = [word for pair in outputs.items() for word in pair]
+    arguments = [str(folder / "hold.yaml"), "--jobs", "1", "--seeds", "2", "--results", str(tmp_path / "kept")]
+    with no_room():
+        assert grade.main([*arguments, *written]) == 2
+    said = capsys.readouterr()
+    assert "2/2" in said.out and "Traceback" not in said.err
+    for name in (*outputs.values(), str(tmp_path / "kept")):
+        lines = [line for line in said.err.splitlines() if f" {name}" in line]
+        assert len(lines) == 1 and "File too large" in lines[0], (name, said.err)
+    assert grade.main([*arguments, *written]) == 0  # behind the half of a line that is there
+    assert grade.main(arguments) == 0
+    assert "2 of 2 flights are known" in capsys.readouterr().err
+    assert len(json.loads((tmp_path / "o.json").read_text())["results"]) == 2
+    with contextlib.suppress(OSError), open("/dev/full", "w") as full, contextlib.redirect_stdout(full):
+        assert grade.main([*arguments, "--json", str(tmp_path / "again.json")]) == 2
+    assert "grade: standard output: No space left on device" in capsys.readouterr().err
+    assert (tmp_path / "again.json").is_file()
 
 
 @pytest.mark.parametrize(

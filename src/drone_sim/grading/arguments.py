@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
@@ -81,6 +82,7 @@ class Runner:
             numbers.limits, numbers.batches, _is_sandboxed(program, options.sandbox), tables, numbers.workers.patience
         )
         self._program = program
+        self.all_kept = True
         self._plan = plan
         self._open = contextlib.ExitStack()
         self._fly: pool.Fly | None = None  # once there is something to fly
@@ -111,9 +113,18 @@ class Runner:
                 else:
                     waiting.append(job)
             for flight in self._flights(waiting):
-                self.store.add(flight)
+                self._keep(flight)
                 bar.update()
                 yield flight.job, flight.result
+
+    def _keep(self, flight: Flight) -> None:
+        """Keep a flight where there is room; the others fly all the same."""
+        try:
+            self.store.add(flight)
+        except OSError as error:
+            if self.all_kept:
+                tqdm.write(f"{self._program}: {printable(_said(error))}: not all results are kept", file=sys.stderr)
+            self.all_kept = False
 
     def _flights(self, jobs: Sequence[Job]) -> Iterator[Flight]:
         if not jobs:
@@ -122,6 +133,27 @@ class Runner:
             workers = min(self._options.jobs, len(jobs))
             self._fly = self._open.enter_context(pool.opened(self._orders, workers, self._options.scheduler))
         yield from self._fly(jobs)
+
+
+@contextlib.contextmanager
+def on_standard_output() -> Iterator[None]:
+    """Let an OSError say what could not be written to: a full disk, a pipe that nobody reads."""
+    try:
+        yield
+        sys.stdout.flush()
+    except OSError as error:
+        raise OSError(f"standard output: {error.strerror}") from None
+
+
+def all_done(program: str, actions: Iterable[Callable[[], None]]) -> bool:
+    """Do everything, whatever cannot be done, which gets a line; return whether it all was."""
+
+    def done(action: Callable[[], None]) -> int:
+        action()
+        return 0
+
+    statuses = [status_of(program, functools.partial(done, action), None) for action in actions]
+    return not any(statuses)
 
 
 def status_of(program: str, action: Callable[[], int], guardian: Guardian | None) -> int:

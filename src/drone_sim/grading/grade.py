@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import os
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tqdm import tqdm
@@ -14,7 +15,7 @@ from tqdm import tqdm
 from drone_sim.files import writing
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
-from drone_sim.grading.arguments import Runner, WrongArguments, add_to, status_of
+from drone_sim.grading.arguments import WRONG, Runner, WrongArguments, add_to, all_done, on_standard_output, status_of
 from drone_sim.grading.jobs.files import Unreadable, given_script
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.outputs import as_json, gradescope, junit, table
@@ -68,7 +69,8 @@ class _Grading:
             raise
         if self._guardian is not None:
             self._guardian.stand_down()
-        self._tell()
+        if not (self._tell() and self._runner.all_kept):
+            return WRONG
         return 0 if all(result.passed for result in self._results.values()) else FAILED
 
     def _fly(self) -> None:
@@ -86,17 +88,22 @@ class _Grading:
         points = f"{one.points:.4g} of {one.of:.4g} points"
         tqdm.write(f"{name}: {one.passed} of {len(one.flights)} flights passed, {points}", file=sys.stderr)
 
-    def _tell(self) -> None:
+    def _tell(self) -> bool:
+        """Show and write everything that can be; return whether all of it was."""
         results = [self._results[job] for job in self._jobs if job in self._results]
         if not results:
-            return
-        table.show(self._plan, results)
+            return True
+        told: list[Callable[[], None]] = [lambda: self._show(results)]
         for option, write in _WRITERS.items():
-            path = getattr(self._options, option)
-            if path:
-                write(self._plan, results, path)
+            if path := getattr(self._options, option):
+                told.append(functools.partial(write, self._plan, results, path))
         if self._options.html:
-            self._write_html(results)
+            told.append(lambda: self._write_html(results))
+        return all_done(PROGRAM, told)
+
+    def _show(self, results: Sequence[Result]) -> None:
+        with on_standard_output():
+            table.show(self._plan, results)
 
     def _write_html(self, results: Sequence[Result]) -> None:
         from drone_sim.grading.outputs import html
@@ -105,7 +112,8 @@ class _Grading:
         html.write(
             self._plan, results, lambda one: self._runner.store.table(keys[one.script, one.seed]), self._options.html
         )
-        print(f"wrote {Path(self._options.html) / 'index.html'}")
+        with on_standard_output():
+            print(f"wrote {Path(self._options.html) / 'index.html'}")
 
 
 def jobs_of(plan: Plan, scripts: Sequence[str], seeds: int) -> list[Job]:

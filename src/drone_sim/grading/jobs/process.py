@@ -175,6 +175,8 @@ class Warm:
         except NoSandbox:
             raise
         except (OSError, ValueError, KeyError, TypeError) as error:
+            if getattr(error, "filename", None) is not None:  # a full disk, a program that is not there
+                raise
             raise _Died from error
 
     def _running(self, plan: plans.Plan, job: Job) -> subprocess.Popen[bytes]:
