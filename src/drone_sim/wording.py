@@ -23,6 +23,11 @@ def shown(value: Any) -> str:
         return f"(a {type(value).__name__})"
 
 
+def printable(text: str) -> str:
+    """Return text without what a terminal would obey: control characters, lines, bytes of a name that are no text."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
 def near_names(name: str, known: Iterable[str]) -> str:
     """Return 'near names are a, b' for an error message, or what is known where nothing is near."""
     known = sorted(known)

@@ -410,3 +410,38 @@ def test_the_propellers_axis_shows_what_they_do_most_of_the_time(tmp_path, drawn
     (ax,) = (ax for ax in drawn[0].axes if ax.get_ylabel() == "propellers [m/s]")
     assert low < ax.get_ylim()[0] < 5.3 < ax.get_ylim()[1] < high
     assert any(text.get_text().startswith("goes from") for text in ax.texts) == cut
+
+
+# ---- forks
+
+
+@pytest.mark.parametrize(
+    "where", ["", "def sysCall_init():\n    ", "def sysCall_actuation():\n    ", "def sysCall_thread():\n    "]
+)
+def test_a_script_that_forks_flies_once(script, where, tmp_path):
+    """The copy ends where it would go on in the simulator; what else a script may begin does its work."""
+    before = "import multiprocessing, os, subprocess, sys\nself.pid = os.getpid()\n"
+    began = """
+def begun():
+    if os.getpid() == self.pid and not hasattr(self, "child"):
+        with multiprocessing.get_context("fork").Pool(1) as pool:
+            print("pool", pool.map(abs, [-1]))
+        print(subprocess.run([sys.executable, "-c", "print(7)"], stdout=-1, preexec_fn=lambda: None).stdout)
+        self.child = os.fork()
+"""
+    path = script(
+        f"{before}{began}{where}begun()\ndef sysCall_cleanup():\n    print('ended', os.waitpid(self.child, 0)[1])\n"
+    )
+    arguments = ["--script", path, "--duration", "0.2", "--csv", str(tmp_path / "o.csv")]
+    flown = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / "fly"), *arguments],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    said = (flown.stdout + flown.stderr).splitlines()
+    assert flown.returncode == 0 and sum("flew 0.20 s" in line for line in said) == 1, said
+    assert sum("os.fork()" in line for line in said) == 1 and "ended 256" in said
+    assert "pool [1]" in said and "7" in said
+    assert len(read_csv(tmp_path / "o.csv")[1]) == 5

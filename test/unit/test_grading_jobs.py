@@ -4,15 +4,17 @@ import contextlib
 import itertools
 import json
 import os
+import resource
+import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from drone_sim.grading import grade, sweep
+from drone_sim.grading import grade, sweep, tasks
 from drone_sim.grading import plan as plans
-from drone_sim.grading.jobs import pool, sandbox, settings
+from drone_sim.grading.jobs import files, pool, sandbox, settings
 from drone_sim.grading.jobs.job import job_of
 from drone_sim.grading.jobs.pool import Orders, PoolError
 from drone_sim.grading.jobs.process import Warm
@@ -56,6 +58,56 @@ IN_A_SANDBOX = {
     "deletes": "import os; os.unlink({folder!r} + '/hold.yaml')",
     "calls": "import socket; socket.create_connection(('127.0.0.1', {port}), 1)",
 }
+# What each gives, if anything: said in the flight's error.
+LOOKS = {
+    "other submissions": "(HERE / 'other.py').read_text()",
+    "the real folder": "os.listdir({folder!r})",
+    "what lies beside it": "sorted(set(os.listdir(HERE)) - {{'looks.py', 'gains.csv'}})",
+    "a link out of its folder": "(HERE / 'away.csv').read_text()",
+    "solutions": "[str(one) for one in Path({tasks!r}).rglob('*') if one.is_file()]",
+    "the checkout": "[one for one in ('.git', 'test', 'docs', 'dev.sh') if Path({root!r}, one).exists()]",
+    "temporary files": "[one for one in Path('/tmp').rglob('*') if one.is_file() and one.name != 'hold.yaml']",
+    "what runs": "os.listdir('/run')",
+    "homes": "[one for one in ('/root', '/home') if os.path.exists(one) and not needed(one)]",
+    "passwords": "Path('/etc/passwd').read_text()",
+    "a UNIX socket": "connected({folder!r} + '/socket')",
+    "a socket without a file": "connected({abstract!r})",
+    "a FIFO": "os.open({folder!r} + '/fifo', os.O_WRONLY | os.O_NONBLOCK)",
+    "another's root": "os.listdir('/proc/1/root')",
+    "another's files": "[os.readlink(one) for one in Path('/proc/1/fd').iterdir()]",
+    "other processes": "[one for one in os.listdir('/proc') if one.isdigit() and int(one) not in (1, os.getpid())]",
+    "descriptors": "[one for one in os.listdir('/proc/self/fd') if open_elsewhere(one)]",
+}
+LOOKING = """
+import os, socket, stat, sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+
+def connected(path):
+    with socket.socket(socket.AF_UNIX) as one:
+        one.connect(path)
+        return "connected"
+
+def needed(folder):
+    return any(one.startswith(folder) for one in (sys.prefix, sys.base_prefix, {root!r}, {folder!r}))
+
+def open_elsewhere(number):
+    try:
+        mode = os.fstat(int(number)).st_mode
+    except OSError:
+        return False  # that of the listing
+    return stat.S_ISSOCK(mode) or stat.S_ISREG(mode) or stat.S_ISDIR(mode)
+
+def sysCall_init():
+    gains = open(HERE / "gains.csv").read()
+    try:
+        found = LOOK
+    except OSError:
+        found = None
+    if found or gains != "1,2":
+        raise RuntimeError(found)
+"""
 
 
 def no_sandbox():
@@ -135,11 +187,39 @@ def test_in_the_sandbox_nothing_else_is_in_reach(name, warm, plan, folder):
     assert sorted(path.suffix for path in folder.iterdir() if path.stem in ("hold", "written")) == [".yaml"]
 
 
+@pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
+@pytest.mark.parametrize("what", LOOKS)
+def test_in_the_sandbox_nothing_else_is_to_be_seen(what, warm, plan, tmp_path, monkeypatch):
+    (tmp_path / "other.py").write_text("def sysCall_init():\n    pass\n")
+    (tmp_path / "unnamed.csv").write_text("3")
+    (tmp_path / "gains.csv").write_text("1,2")
+    (tmp_path / "away.csv").symlink_to("/etc/passwd")
+    os.mkfifo(tmp_path / "fifo")
+    abstract = f"\0{tmp_path}"
+    values = {"folder": str(tmp_path), "abstract": abstract, "root": str(SOURCE.parent), "tasks": str(tasks.folder())}
+    looking = tmp_path / "looks.py"
+    looking.write_text(LOOKING.replace("LOOK", LOOKS[what]).format(**values))
+    with contextlib.ExitStack() as open_here:
+        open_here.callback(os.close, os.open(tmp_path / "fifo", os.O_RDONLY | os.O_NONBLOCK))
+        monkeypatch.chdir(tmp_path)  # a UNIX socket's whole path may be too long
+        for address in ("socket", abstract):
+            server = open_here.enter_context(socket.socket(socket.AF_UNIX))
+            server.bind(address)
+            server.listen()
+        assert warm.fly(job_of(plan, str(looking), 0)).result.error is None
+
+
 def test_a_process_that_a_script_leaves_is_ended(warm, plan, folder):
     waits = "[sys.executable, '-c', 'input()', 'left-behind'], stdin=-1, start_new_session=True"
     body = f"import subprocess, sys; subprocess.Popen({waits})"
     assert warm.fly(job_of(plan, script(folder, "daemon", body), 0)).result.passed
     assert not processes()
+
+
+def test_a_script_that_forks_is_graded_once(warm, plan, folder):
+    alone = warm.fly(job_of(plan, script(folder, "alone", "pass"), 0)).result
+    forked = warm.fly(job_of(plan, script(folder, "forks", "import os; os.fork()"), 0)).result
+    assert forked.passed and forked.digest == alone.digest
 
 
 def test_a_flight_has_its_time(plan, folder):
@@ -162,6 +242,85 @@ def test_the_table_is_that_of_fly(warm, plan):
     flight = warm.fly(job_of(plan, "", 0), table=True)
     lines = flight.table.decode().splitlines()
     assert lines[0].startswith("t [s],x [m]") and len(lines) == 1 + 5
+
+
+# ---- what cannot be read
+
+ODD = {  # what is handed in, and what is said of it
+    "a FIFO": (os.mkfifo, "is no regular file"),
+    "a folder": (os.mkdir, "is no regular file"),
+    "a link to nothing": (lambda path: path.symlink_to("nowhere.py"), "a link to none"),
+    "a link in a circle": (lambda path: path.symlink_to(path.name), "a link to none"),
+    "a link to a password": (lambda path: path.symlink_to("/etc/shadow"), "a link that leads out of its folder"),
+    "a link to a device": (lambda path: path.symlink_to("/dev/zero"), "is no regular file"),
+    "5 GB": (lambda path: path.touch() or os.truncate(path, 5 * 10**9), "larger than 64 MiB"),
+    "2 MB": (lambda path: path.write_bytes(b"#" * 2 * 10**6), "larger than 1 MiB"),
+    "no UTF-8": (lambda path: path.write_bytes(b"x = '\xff'"), "can't decode byte"),
+    "a NUL": (lambda path: path.write_bytes(b"x = '\0'"), "null bytes"),
+}
+NAMES = ["new\nline.py", "bell\a\33[2J.py", "-rf.py", "--html=.py", os.fsdecode(b"latin\xe9.py"), "\u202eyp.py"]
+# Names of what must not be read, in a comment.
+NAMED = [
+    "/proc/self/mem",
+    "/proc/kmsg",
+    "../../../../../proc/kmsg",
+    "fifo",
+    "away/mem",
+    "away",
+    "/dev/zero",
+    "huge.bin",
+]
+
+
+def test_what_cannot_be_read_costs_its_own_flights(programs, folder, tmp_path, capsys):
+    made = {what: tmp_path / f"odd{number}.py" for number, what in enumerate(ODD)}
+    for what, path in made.items():
+        ODD[what][0](path)
+    good = script(tmp_path, "good", "pass")
+    report = tmp_path / "o.json"
+    scripts = [*map(str, made.values()), good]
+    assert grade.main([str(folder / "hold.yaml"), *scripts, "--jobs", "1", "--json", str(report)]) == 1
+    capsys.readouterr()
+    errors = {one["script"]: one["error"] for one in json.loads(report.read_text())["results"]}
+    assert list(errors) == scripts and errors[good] is None
+    for what, path in made.items():
+        assert ODD[what][1] in errors[str(path)] and str(path) in errors[str(path)] and "\n" not in errors[str(path)]
+
+
+def test_names_in_a_script_lead_to_nothing_that_hangs_or_lies_elsewhere(warm, plan, tmp_path):
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "away").symlink_to("/proc/self")
+    (tmp_path / "huge.bin").touch()
+    os.truncate(tmp_path / "huge.bin", 5 * 10**9)
+    (tmp_path / "helper.py").write_text(f"# {' '.join(NAMED)}\nx = 1\n")
+    named = Path(script(tmp_path, "named", "import helper"))
+    named.write_text(f"# {' '.join(NAMED)} helper\n{named.read_text()}")
+    assert files.of_script(plan, str(named)) == [named, tmp_path / "helper.py"]
+    assert warm.fly(job_of(plan, str(named), 0)).result.passed
+
+
+def test_a_script_has_what_it_names_beside_it_but_nobody_elses(plan, tmp_path):
+    kept = ["helper.py", "gains.csv", "more/__init__.py", "more/deep/one.py", "lib/inner.py"]
+    left = ["other.py", "others/my.py", "others/helper.py", "unnamed.py"]
+    for name in (*kept, *left):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("" if name not in ("other.py", "others/my.py") else "def sysCall_init(): pass\n")
+    own = Path(
+        script(tmp_path, "own", "import helper, more.deep, other, others; open('gains.csv'); from lib import inner")
+    )
+    assert {str(one.relative_to(tmp_path)) for one in files.of_script(plan, str(own))} == {"own.py", *kept}
+
+
+def test_a_script_of_any_name_is_flown_and_told(programs, folder, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in NAMES:
+        Path(name).write_text("def sysCall_init():\n    pass\n")
+    outputs = ["--json", "o.json", "--junit", "o.xml", "--html", "report"]
+    assert grade.main([*outputs, "--jobs", "1", str(folder / "hold.yaml"), "--", *NAMES]) == 0
+    said = capsys.readouterr()
+    assert "7 of" not in said.out and f"{len(NAMES)} of {len(NAMES)} scripts passed" in said.out
+    assert all(letter.isprintable() or letter in "\n\r" for letter in said.out + said.err)
+    assert len(json.loads(Path("o.json").read_text())["results"]) == len(NAMES)
 
 
 # ---- many
@@ -264,6 +423,39 @@ def test_what_was_flown_is_not_flown_again(programs, folder, tmp_path, capsys, m
     assert "3 of 3 flights are known" in capsys.readouterr().err
     assert grade.main([*arguments, "--fresh"]) == 0
     assert "known" not in capsys.readouterr().err
+
+
+@contextlib.contextmanager
+def no_room():
+    """No file may be longer than 100 bytes, as where a disk is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_full_disk_is_named_and_loses_no_result(programs, folder, tmp_path, capsys):
+    named = {"--json": "o.json", "--junit": "o.xml", "--gradescope": "results.json", "--html": "report"}
+    outputs = {option: str(tmp_path / name) for option, name in named.items()}
+    written = [word for pair in outputs.items() for word in pair]
+    arguments = [str(folder / "hold.yaml"), "--jobs", "1", "--seeds", "2", "--results", str(tmp_path / "kept")]
+    with no_room():
+        assert grade.main([*arguments, *written]) == 2
+    said = capsys.readouterr()
+    assert "2/2" in said.out and "Traceback" not in said.err
+    for name in (*outputs.values(), str(tmp_path / "kept")):
+        lines = [line for line in said.err.splitlines() if f" {name}" in line]
+        assert len(lines) == 1 and "File too large" in lines[0], (name, said.err)
+    assert grade.main([*arguments, *written]) == 0  # behind the half of a line that is there
+    assert grade.main(arguments) == 0
+    assert "2 of 2 flights are known" in capsys.readouterr().err
+    assert len(json.loads((tmp_path / "o.json").read_text())["results"]) == 2
+    with contextlib.suppress(OSError), open("/dev/full", "w") as full, contextlib.redirect_stdout(full):
+        assert grade.main([*arguments, "--json", str(tmp_path / "again.json")]) == 2
+    assert "grade: standard output: No space left on device" in capsys.readouterr().err
+    assert (tmp_path / "again.json").is_file()
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
@@ -16,6 +17,7 @@ from tqdm import tqdm
 
 from drone_sim.config.types import ParameterError
 from drone_sim.grading import plan as plans
+from drone_sim.grading.flight import ungraded
 from drone_sim.grading.jobs import pool, sandbox, settings
 from drone_sim.grading.jobs.job import Job
 from drone_sim.grading.jobs.pool import Orders, PoolError
@@ -27,7 +29,7 @@ from drone_sim.grading.result import Result
 from drone_sim.offline.command_line import SIGNALLED, Parser
 from drone_sim.run.guardian import Guardian
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.wording import shown
+from drone_sim.wording import printable, shown
 
 WRONG = 2  # exit status
 _MOST_JOBS = 1024
@@ -80,6 +82,8 @@ class Runner:
             numbers.limits, numbers.batches, _is_sandboxed(program, options.sandbox), tables, numbers.workers.patience
         )
         self._program = program
+        self.all_kept = True
+        self._plan = plan
         self._open = contextlib.ExitStack()
         self._fly: pool.Fly | None = None  # once there is something to fly
 
@@ -100,15 +104,27 @@ class Runner:
         with tqdm(total=len(jobs), unit=" flights", disable=quiet or None, leave=False, smoothing=0.1) as bar:
             waiting = []
             for job in jobs:
-                if job.key in known:
+                if job.error:
+                    bar.update()
+                    yield job, ungraded(self._plan, job.script, job.seed, job.changes, job.error)
+                elif job.key in known:
                     bar.update()
                     yield job, replace(known[job.key], script=job.script)
                 else:
                     waiting.append(job)
             for flight in self._flights(waiting):
-                self.store.add(flight)
+                self._keep(flight)
                 bar.update()
                 yield flight.job, flight.result
+
+    def _keep(self, flight: Flight) -> None:
+        """Keep a flight where there is room; the others fly all the same."""
+        try:
+            self.store.add(flight)
+        except OSError as error:
+            if self.all_kept:
+                tqdm.write(f"{self._program}: {printable(_said(error))}: not all results are kept", file=sys.stderr)
+            self.all_kept = False
 
     def _flights(self, jobs: Sequence[Job]) -> Iterator[Flight]:
         if not jobs:
@@ -117,6 +133,27 @@ class Runner:
             workers = min(self._options.jobs, len(jobs))
             self._fly = self._open.enter_context(pool.opened(self._orders, workers, self._options.scheduler))
         yield from self._fly(jobs)
+
+
+@contextlib.contextmanager
+def on_standard_output() -> Iterator[None]:
+    """Let an OSError say what could not be written to: a full disk, a pipe that nobody reads."""
+    try:
+        yield
+        sys.stdout.flush()
+    except OSError as error:
+        raise OSError(f"standard output: {error.strerror}") from None
+
+
+def all_done(program: str, actions: Iterable[Callable[[], None]]) -> bool:
+    """Do everything, whatever cannot be done, which gets a line; return whether it all was."""
+
+    def done(action: Callable[[], None]) -> int:
+        action()
+        return 0
+
+    statuses = [status_of(program, functools.partial(done, action), None) for action in actions]
+    return not any(statuses)
 
 
 def status_of(program: str, action: Callable[[], int], guardian: Guardian | None) -> int:
@@ -128,7 +165,7 @@ def status_of(program: str, action: Callable[[], int], guardian: Guardian | None
     except KeyboardInterrupt:
         return SIGNALLED + (guardian.asked if guardian is not None and guardian.asked else signal.SIGINT)
     except _EXPECTED as error:
-        print(f"{program}: {' '.join(_said(error).split())}", file=sys.stderr, flush=True)
+        print(f"{program}: {printable(' '.join(_said(error).split()))}", file=sys.stderr, flush=True)
         return WRONG
 
 

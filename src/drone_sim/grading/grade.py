@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import functools
+import os
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tqdm import tqdm
@@ -13,14 +15,15 @@ from tqdm import tqdm
 from drone_sim.files import writing
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
-from drone_sim.grading.arguments import Runner, WrongArguments, add_to, status_of
+from drone_sim.grading.arguments import WRONG, Runner, WrongArguments, add_to, all_done, on_standard_output, status_of
+from drone_sim.grading.jobs.files import Unreadable, given_script
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.outputs import as_json, gradescope, junit, table
 from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.run.guardian import Guardian
-from drone_sim.scripting.load import script_path
+from drone_sim.wording import printable
 
 PROGRAM = "grade"
 FAILED = 1
@@ -66,7 +69,8 @@ class _Grading:
             raise
         if self._guardian is not None:
             self._guardian.stand_down()
-        self._tell()
+        if not (self._tell() and self._runner.all_kept):
+            return WRONG
         return 0 if all(result.passed for result in self._results.values()) else FAILED
 
     def _fly(self) -> None:
@@ -80,21 +84,26 @@ class _Grading:
     def _say(self, script: str) -> None:
         """Tell how a script has done, as soon as it is known."""
         (one,) = by_script(result for job, result in self._results.items() if job.script == script)
-        name = Path(script).name or one.label
+        name = printable(Path(script).name) or one.label
         points = f"{one.points:.4g} of {one.of:.4g} points"
         tqdm.write(f"{name}: {one.passed} of {len(one.flights)} flights passed, {points}", file=sys.stderr)
 
-    def _tell(self) -> None:
+    def _tell(self) -> bool:
+        """Show and write everything that can be; return whether all of it was."""
         results = [self._results[job] for job in self._jobs if job in self._results]
         if not results:
-            return
-        table.show(self._plan, results)
+            return True
+        told: list[Callable[[], None]] = [lambda: self._show(results)]
         for option, write in _WRITERS.items():
-            path = getattr(self._options, option)
-            if path:
-                write(self._plan, results, path)
+            if path := getattr(self._options, option):
+                told.append(functools.partial(write, self._plan, results, path))
         if self._options.html:
-            self._write_html(results)
+            told.append(lambda: self._write_html(results))
+        return all_done(PROGRAM, told)
+
+    def _show(self, results: Sequence[Result]) -> None:
+        with on_standard_output():
+            table.show(self._plan, results)
 
     def _write_html(self, results: Sequence[Result]) -> None:
         from drone_sim.grading.outputs import html
@@ -103,17 +112,24 @@ class _Grading:
         html.write(
             self._plan, results, lambda one: self._runner.store.table(keys[one.script, one.seed]), self._options.html
         )
-        print(f"wrote {Path(self._options.html) / 'index.html'}")
+        with on_standard_output():
+            print(f"wrote {Path(self._options.html) / 'index.html'}")
 
 
 def jobs_of(plan: Plan, scripts: Sequence[str], seeds: int) -> list[Job]:
-    """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError."""
+    """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError.
+
+    A script that is there, and cannot be read, is an error of its own flights.
+    """
     jobs = []
     for given in dict.fromkeys(plan.script_of(one) for one in (scripts or (None,))):
-        found = script_path(given)
-        script = found if Path(given).suffix else given
-        contents = contents_of(plan, script)
-        jobs += [Job(str(plan.path), script, seed, {}, key_of(contents, seed, {})) for seed in range(seeds)]
+        script, contents, error = given, given, ""
+        try:
+            script = given_script(given)
+            contents = contents_of(plan, script)
+        except Unreadable as why:
+            script, error = os.path.abspath(script), str(why)
+        jobs += [Job(str(plan.path), script, seed, {}, key_of(contents, seed, {}), error) for seed in range(seeds)]
     return jobs
 
 

@@ -15,7 +15,7 @@ from drone_sim.files import writing
 from drone_sim.grading import plan as plans
 from drone_sim.grading import ranges as ranges_module
 from drone_sim.grading import tasks
-from drone_sim.grading.arguments import Runner, WrongArguments, add_to, status_of
+from drone_sim.grading.arguments import WRONG, Runner, WrongArguments, add_to, all_done, on_standard_output, status_of
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.ranges import Range
 from drone_sim.grading.result import Result
@@ -74,17 +74,24 @@ class _Sweep:
         if self._guardian is not None:
             self._guardian.stand_down()
         trials.sort(key=lambda one: one.cost(self._options.smallest))
-        print("\n".join(_table(self._ranges, trials)))
+        told = [lambda: self._show(trials)]
         if self._options.csv:
-            _write(self._options.csv, self._ranges, trials)
+            told.append(lambda: _write(self._options.csv, self._ranges, trials))
         if self._options.plot:
-            from drone_sim.grading import heat_map
+            told.append(lambda: self._draw(trials))
+        return 0 if all_done(PROGRAM, told) and self._runner.all_kept else WRONG
 
-            heat_map.save(
-                self._options.plot, self._plan.title or self._plan.name, self._ranges, trials, self._options.smallest
-            )
-            print(f"wrote {self._options.plot}")
-        return 0
+    def _show(self, trials: Sequence[Trial]) -> None:
+        with on_standard_output():
+            print("\n".join(_table(self._ranges, trials)))
+
+    def _draw(self, trials: Sequence[Trial]) -> None:
+        from drone_sim.grading import heat_map
+
+        options, plan = self._options, self._plan
+        heat_map.save(options.plot, plan.title or plan.name, self._ranges, trials, options.smallest)
+        with on_standard_output():
+            print(f"wrote {options.plot}")
 
     def _check(self) -> None:
         options, names = self._options, [one.name or one.kind for one in self._plan.criteria]

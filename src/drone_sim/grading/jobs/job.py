@@ -7,8 +7,7 @@ import hashlib
 import json
 import os
 import platform
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -17,15 +16,10 @@ from typing import Any
 import numpy as np
 
 from drone_sim.files.resources import package_path
+from drone_sim.grading.jobs import files
 from drone_sim.grading.plan import Plan
-from drone_sim.scripting.load import script_path
 
 _LARGEST = 64 * 2**20  # bytes: of a larger file size and time count, not what is in it
-_READ_FOR_NAMES = 2**20  # bytes: a longer file names no others
-_MOST_FILES = 1000
-_WORD = re.compile(r"[\w./-]{1,200}")
-_NAMES_OTHERS = (".py", ".lua", ".yaml", ".yml", ".urdf", ".dae", ".obj", ".mtl")
-_ENDINGS = ("", ".py", ".lua", "/__init__.py", "/init.lua")  # of what `import` and `require` name
 
 
 @dataclass(frozen=True)
@@ -37,10 +31,11 @@ class Job:
     seed: int
     changes: Mapping[str, Any] = field(default_factory=dict, hash=False)
     key: str = ""  # the same for the same contents of all files; see `key_of`
+    error: str = ""  # why the script cannot be flown, in one line
 
 
 def job_of(plan: Plan, script: str, seed: int, changes: Mapping[str, Any] | None = None) -> Job:
-    """Return the job of a flight. Raises OSError for a file that cannot be read, ScriptError for no such script."""
+    """Return the job of a flight. Raises what `contents_of` does."""
     changes = changes or {}
     return Job(str(plan.path), script, seed, dict(changes), key_of(contents_of(plan, script), seed, changes))
 
@@ -55,50 +50,16 @@ def contents_of(plan: Plan, script: str) -> str:
     """Return a digest of all that a flight depends on beside seed and changes: its files, this package, its engine.
 
     Of the files it is the contents that counts, and where each lies beside the one that names it. Raises OSError,
-    and ScriptError for a script that is not there.
+    ScriptError for a script that is not there, and Unreadable for one that cannot be read.
     """
-    files = files_named([*plan.files, Path(script_path(script))])
-    folder = os.path.commonpath([path.parent for path in files])
-    digest = hashlib.sha256(version().encode())
-    for path in files:
-        digest.update(f"\0{os.path.relpath(path, folder)}\0{_digest(path)}".encode(errors="surrogateescape"))
+    flown = files.of_script(plan, script)
+    digests = {path: _digest(path) for path in files.of_plan(plan, {})}
+    digests |= {path: hashlib.sha256(files.read(path)).hexdigest() for path in flown}
+    digest = hashlib.sha256(f"{version()}\0{flown[0].name if flown else script}".encode(errors="surrogateescape"))
+    folder = os.path.commonpath([path.parent for path in digests])
+    for path in sorted(digests):
+        digest.update(f"\0{os.path.relpath(path, folder)}\0{digests[path]}".encode(errors="surrogateescape"))
     return digest.hexdigest()
-
-
-def files_named(paths: list[Path]) -> list[Path]:
-    """Return the files, and those that their texts name (imports, meshes, URDFs, scripts), and so on, sorted.
-
-    A word of a text counts as a name where there is such a file beside it: rather one file too many, for which a
-    flight is flown again, than one too few.
-    """
-    found = dict.fromkeys(path.resolve() for path in paths)
-    waiting = list(found)
-    while waiting and len(found) < _MOST_FILES:
-        for path in _named_in(waiting.pop()):
-            if path not in found:
-                found[path] = None
-                waiting.append(path)
-    return sorted(found)
-
-
-def _named_in(path: Path) -> Iterator[Path]:
-    if path.suffix.lower() not in _NAMES_OTHERS or path.stat().st_size > _READ_FOR_NAMES:
-        return
-    text = path.read_text(encoding="utf-8", errors="replace")
-    names = {name for word in _WORD.findall(text) for name in (word, word.replace(".", "/")) if set(name) - {".", "/"}}
-    beside = {entry.name for entry in os.scandir(path.parent)}
-    for name in names:
-        first = name.split("/", 1)[0]
-        if first in beside or first in ("", "..", ".") or any(first + ending in beside for ending in _ENDINGS):
-            yield from (one.resolve() for one in _candidates(path.parent, name) if one.is_file())
-
-
-def _candidates(folder: Path, name: str) -> Iterator[Path]:
-    for ending in _ENDINGS:
-        try:
-            yield folder / f"{name}{ending}"
-        except ValueError:
-            return
 
 
 def _digest(path: Path) -> str:
@@ -113,12 +74,12 @@ def version() -> str:
     """Return a digest of what simulates: this package's files, Python, NumPy, PyBullet and the processor's kind."""
     here = Path(__file__).resolve().parents[2]
     root = package_path()
-    files = sorted(
+    sources = sorted(
         [*here.rglob("*.py"), *here.rglob("*.lua"), *(root / "config").rglob("*.yaml"), *root.glob("urdf/*")]
     )
     digest = hashlib.sha256(
         f"{platform.python_version()} {np.__version__} {metadata.version('pybullet')} {platform.machine()}".encode()
     )
-    for path in files:
+    for path in sources:
         digest.update(_digest(path).encode())
     return digest.hexdigest()

@@ -11,17 +11,22 @@ import sys
 import tempfile
 import threading
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from drone_sim.files.resources import python_path
 from drone_sim.grading import plan as plans
 from drone_sim.grading.flight import ungraded
-from drone_sim.grading.jobs import sandbox
+from drone_sim.grading.jobs import files, sandbox
+from drone_sim.grading.jobs.files import Unreadable
 from drone_sim.grading.jobs.job import Job
+from drone_sim.grading.jobs.sandbox import NoSandbox
 from drone_sim.grading.jobs.settings import Limits
 from drone_sim.grading.jobs.warm import READY
 from drone_sim.grading.result import Result
+from drone_sim.scripting.errors import ScriptError
 
 _START = 60.0  # s for the imports, on a busy machine; they take one
 _GRACE = 10.0  # s beyond what a flight may take
@@ -77,17 +82,23 @@ class Warm:
         self._process: subprocess.Popen[bytes] | None = None
         self._folder: str | None = None
         self._plans: dict[str, plans.Plan] = {}
+        self._files: dict[str, list[Path]] = {}  # of the last plan, with changes
+        self._shown: dict[Path, _Version] = {}  # what a sandbox was made to show
         self._is_stopped = False
 
     def fly(self, job: Job, table: bool = False) -> Flight:
         """Fly once, whatever the script does. Raises PlanError, Stopped, and NoSandbox where one is wanted."""
         plan = self._plan(job.plan)
+        if job.error:
+            return _lost(job, plan, job.error)
         why = ""
         if self._is_stopped:
             raise Stopped
         for _ in range(_TRIES):
             try:
-                reply, rows = self._ask(self._request(job, plan.duration, table))
+                reply, rows = self._ask(plan, job, table)
+            except Unreadable as error:
+                return _lost(job, plan, str(error))
             except _Died:
                 self.close()
                 if self._is_stopped:
@@ -95,11 +106,11 @@ class Warm:
                 why = "ended the process that watches its flight"
                 continue
             if reply.get("result") is not None:
-                result = Result.from_json(reply["result"])
+                result = _as_asked(job, Result.from_json(reply["result"]))
                 return Flight(job, result, rows if result.flown else b"")
             why = reply.get("lost") or "gave no result"
             break
-        return Flight(job, ungraded(plan, job.script, job.seed, job.changes, f"the script {why}"), is_lost=True)
+        return _lost(job, plan, f"the script {why}")
 
     def stop(self) -> None:
         """Let `fly` raise Stopped, now and from now on; called by another thread."""
@@ -131,11 +142,12 @@ class Warm:
             self._plans[path] = plans.read(path)
         return self._plans[path]
 
-    def _request(self, job: Job, duration: float, table: bool) -> dict[str, Any]:
+    def _request(self, job: Job, duration: float, table: bool, handed_in: Mapping[str, bytes]) -> dict[str, Any]:
         own = self._limits
         return {
             "plan": job.plan,
-            "script": job.script,
+            "script": f"{sandbox.HANDED_IN}{job.script}" if handed_in else job.script,
+            "handed_in": {path: len(content) for path, content in handed_in.items()},
             "seed": job.seed,
             "changes": dict(job.changes),
             "table": table,
@@ -144,30 +156,38 @@ class Warm:
             **own.model_dump(include={"memory", "files", "processes", "open_files"}),
         }
 
-    def _ask(self, request: dict[str, Any]) -> tuple[dict[str, Any], bytes]:
-        """Return what a process replies to a request, and the table. Raises _Died."""
+    def _ask(self, plan: plans.Plan, job: Job, table: bool) -> tuple[dict[str, Any], bytes]:
+        """Return what a process replies to a request, and the table. Raises _Died, Unreadable and NoSandbox."""
+        handed_in = _handed_in(plan, job) if self._sandboxed else {}
+        request = self._request(job, plan.duration, table, handed_in)
         try:
-            process = self._running()
+            process = self._running(plan, job)
             assert process.stdin is not None and process.stdout is not None
             until = time.monotonic() + request["real_time"] + _GRACE
-            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.write(b"".join((json.dumps(request).encode(), b"\n", *handed_in.values())))
             process.stdin.flush()
             line, rest = _line(process.stdout.fileno(), until)
             reply = json.loads(line)
-            table = rest + _bytes(process.stdout.fileno(), reply["table"] - len(rest), until)
+            rows = rest + _bytes(process.stdout.fileno(), reply["table"] - len(rest), until)
             if reply["is_last"]:
                 self.close()
-            return reply, table
+            return reply, rows
+        except NoSandbox:
+            raise
         except (OSError, ValueError, KeyError, TypeError) as error:
+            if getattr(error, "filename", None) is not None:  # a full disk, a program that is not there
+                raise
             raise _Died from error
 
-    def _running(self) -> subprocess.Popen[bytes]:
+    def _running(self, plan: plans.Plan, job: Job) -> subprocess.Popen[bytes]:
         if self._process is not None and self._process.poll() is not None:
             self.close()
+        if self._sandboxed:
+            self._show(plan, job)
         if self._process is None:
             around, temporary = [], sandbox.TEMPORARY
             if self._sandboxed:
-                around = sandbox.command(self._limits.files)
+                around = sandbox.command(self._limits.files, self._shown)
             else:
                 temporary = self._folder = tempfile.mkdtemp(prefix="drone_sim_grading_")
             self._process = _started(around, temporary)
@@ -175,6 +195,52 @@ class Warm:
             if _line(self._process.stdout.fileno(), time.monotonic() + _START) != (READY, b""):
                 raise _Died
         return self._process
+
+    def _show(self, plan: plans.Plan, job: Job) -> None:
+        """End a process that does not see the files of a flight's plan as they are now; the next one will."""
+        texts = {key: one for key, one in job.changes.items() if not isinstance(one, (int, float))}
+        needed = {path: _version(path) for path in self._needed(plan, texts)}
+        if not needed.items() <= self._shown.items():
+            self.close()
+            self._shown = {path: one for path, one in self._shown.items() if _version(path) == one} | needed
+
+    def _needed(self, plan: plans.Plan, changes: Mapping[str, Any]) -> Sequence[Path]:
+        known = json.dumps([str(plan.path), changes], sort_keys=True, default=str)
+        if known not in self._files:
+            self._files.clear()
+            self._files[known] = files.of_plan(plan, changes)
+        return self._files[known]
+
+
+_Version = tuple[int, ...]
+
+
+def _version(path: Path) -> _Version:
+    """Return what is another one where a file is replaced, which a sandbox would not see, or is written anew."""
+    try:
+        status = path.stat()
+    except OSError:
+        return ()
+    return status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size
+
+
+def _handed_in(plan: plans.Plan, job: Job) -> dict[str, bytes]:
+    """Return the files of a job's script. Raises Unreadable."""
+    try:
+        return {str(path): files.read(path) for path in files.of_script(plan, job.script)}
+    except (OSError, ScriptError) as error:
+        raise Unreadable(str(error)) from None
+
+
+def _lost(job: Job, plan: plans.Plan, why: str) -> Flight:
+    return Flight(job, ungraded(plan, job.script, job.seed, job.changes, why), is_lost=True)
+
+
+def _as_asked(job: Job, result: Result) -> Result:
+    """Return a result that names the script where it lies, not where it was flown."""
+    folder = os.path.dirname(job.script)
+    error = result.error and result.error.replace(f"{sandbox.HANDED_IN}{folder}", folder)
+    return replace(result, script=job.script, error=error)
 
 
 _starting = threading.Lock()  # or one process inherits the pipes of another

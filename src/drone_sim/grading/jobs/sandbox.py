@@ -1,30 +1,50 @@
-"""bubblewrap around the process that flies: no network, no file to change, no other process in sight."""
+"""bubblewrap around the process that flies: what it needs to read, nothing else, and no network and other processes."""
 
 from __future__ import annotations
 
 import functools
+import os
 import shutil
+import site
 import subprocess
+import sys
+import sysconfig
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from drone_sim.files.resources import package_path
+from drone_sim.grading.jobs.files import LARGEST
+
 TEMPORARY = "/dev/shm"  # the one folder to write to, in memory
+HANDED_IN = "/handed_in"  # below which the files of a script are laid, each under its whole path; in memory, too
 _TRIED = 20.0  # s, on a busy machine; it takes some 10 ms
 _DEVICES = Path("/dev/dri")  # of the graphics card, which cameras may draw with
+_ABOUT_DEVICES = ("/sys/dev/char", "/sys/devices")
+_MIB = 2**20
+_ROOT = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")  # links, on most systems
+# Not what else is below /usr: whoever manages the system may keep a course there.
+_SYSTEM = (
+    *(f"/usr/{name}" for name in ("bin", "sbin", "lib", "lib32", "lib64", "libx32", "libexec", "share")),
+    *("/usr/local/bin", "/usr/local/lib"),
+    *(f"/etc/{name}" for name in ("alternatives", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime", "fonts")),
+    *("/etc/glvnd", "/etc/drirc", "/etc/python3", f"/etc/python{sysconfig.get_python_version()}"),
+)
+_OF_PYTHON = ("bin", "lib", "lib32", "lib64", "libexec", "share", "etc", "pyvenv.cfg")  # in the folder it lies in
 
 
 class NoSandbox(OSError):
     """bubblewrap is not there, or does not work here; one line says why."""
 
 
-def command(files: int) -> list[str]:
+def command(files: int, paths: Iterable[Path] = ()) -> list[str]:
     """Return what to put before a command so that it runs in the sandbox, with so many MiB in TEMPORARY.
 
-    Raises NoSandbox.
+    It reads Python, what Python imports, this package, and the files `paths`. Raises NoSandbox.
     """
     program, why = _found()
     if why:
         raise NoSandbox(why)
-    return _wrapped(program, files)
+    return _wrapped(program, files, paths)
 
 
 @functools.cache
@@ -35,7 +55,11 @@ def _found() -> tuple[str, str]:
         return "", "bubblewrap is not installed (Debian's package bubblewrap)"
     try:
         tried = subprocess.run(
-            [*_wrapped(program, 1), "true"], stdin=subprocess.DEVNULL, capture_output=True, timeout=_TRIED, check=False
+            [*_wrapped(program, 1), sys.executable, "-S", "-c", ""],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=_TRIED,
+            check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         return "", f"bubblewrap does not work here: {error}"
@@ -45,13 +69,60 @@ def _found() -> tuple[str, str]:
     return program, ""
 
 
-def _wrapped(program: str, files: int) -> list[str]:
+def _wrapped(program: str, files: int, paths: Iterable[Path] = ()) -> list[str]:
     devices = ("--dev-bind", str(_DEVICES), str(_DEVICES)) if _DEVICES.exists() else ()
+    here = os.getcwd()
     return [
         program,
-        # The first of its processes cannot be killed or stopped from within, and with it all others end.
+        # The first of its processes cannot be killed or stopped from within, and with it all others end. The network
+        # is none, of which sockets without a file (abstract ones) are a part.
         *("--unshare-all", "--as-pid-1", "--die-with-parent", "--new-session", "--cap-drop", "ALL"),
-        *("--ro-bind", "/", "/", "--proc", "/proc", "--dev", "/dev", *devices),
-        *("--size", str(files * 2**20), "--tmpfs", TEMPORARY, "--remount-ro", "/dev"),
-        "--",
+        *_shown_system(),
+        *("--proc", "/proc", "--dev", "/dev", *devices),
+        *("--size", str(files * _MIB), "--tmpfs", TEMPORARY, "--size", str(2 * LARGEST), "--tmpfs", HANDED_IN),
+        *(word for path in paths for word in ("--ro-bind", str(path), str(path))),
+        *(word for name in ("/tmp", "/run", here) for word in ("--dir", name)),  # which are empty
+        *("--remount-ro", "/dev", "--remount-ro", "/", "--chdir", here, "--"),
     ]
+
+
+@functools.cache
+def _shown_system() -> tuple[str, ...]:
+    """Return the arguments that show the system's libraries, Python's and this package."""
+    said: list[str] = []
+    for path in map(Path, _ROOT):
+        if path.is_symlink():
+            said += "--symlink", os.readlink(path), str(path)
+        elif path.is_dir():
+            said += "--ro-bind", str(path), str(path)
+    shown: list[Path] = []
+    for path in map(Path, (*_SYSTEM, *_of_python(), *_of_package(), *(_ABOUT_DEVICES if _DEVICES.exists() else ()))):
+        if path.exists() and not any(path.is_relative_to(one) for one in shown):
+            shown.append(path)
+            said += "--ro-bind", str(path), str(path)
+    hidden = package_path() / "tasks"  # with their solutions; what a plan needs of them is shown all the same
+    if any(hidden.is_relative_to(one) for one in shown):
+        said += "--tmpfs", str(hidden), "--remount-ro", str(hidden)
+    return tuple(said)
+
+
+def _of_python() -> Iterator[str]:
+    """Give what this Python, and whoever it imports from, is made of, wherever it lies: pyenv's, conda's, a venv's."""
+    for prefix in dict.fromkeys((sys.prefix, sys.exec_prefix, sys.base_prefix, os.path.realpath(sys.base_prefix))):
+        yield from (os.path.join(prefix, name) for name in _OF_PYTHON)
+    yield from sysconfig.get_paths().values()
+    yield from site.getsitepackages()
+    if site.ENABLE_USER_SITE:
+        yield site.getusersitepackages()
+    for name in ("PYTHONPATH", "LD_LIBRARY_PATH"):
+        yield from (path for path in os.environ.get(name, "").split(os.pathsep) if os.path.isabs(path))
+    program = sys.executable
+    while os.path.islink(program):  # a venv's is a link to another's, which may be one, too
+        program = os.path.join(os.path.dirname(program), os.readlink(program))
+        yield os.path.normpath(program)
+
+
+def _of_package() -> Iterator[str]:
+    """Give this package's own files, but not the tasks, which lie beside them in a checkout."""
+    yield str(Path(__file__).resolve().parents[2])
+    yield from (str(package_path() / name) for name in ("config", "urdf", "package.xml"))

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,21 +55,29 @@ class Store:
         return found
 
     def add(self, flight: Flight) -> None:
-        """Keep a flight, its table first. Raises OSError."""
+        """Keep a flight, its table first. Raises OSError, in one line that names the file."""
         if flight.is_lost:
             return
         if flight.table:
             self._tables.mkdir(exist_ok=True)
             path = self._tables / f"{flight.job.key}.csv"
             unfinished = path.with_suffix(f".{os.getpid()}")
-            unfinished.write_bytes(flight.table)
-            unfinished.replace(path)
+            with _named(path):
+                try:
+                    unfinished.write_bytes(flight.table)
+                    unfinished.replace(path)
+                except OSError:
+                    unfinished.unlink(missing_ok=True)
+                    raise
         line = json.dumps({"key": flight.job.key, "result": flight.result.to_json()}) + "\n"
         before = "" if self._has_begun else "\n"  # half a line may be there
+        self._has_begun = False
+        # One write at the end of the file: two programs at a time mix no lines. On a full disk it may be a part only.
+        with _named(self._file), open(self._file, "ab", buffering=0) as file:
+            content = (before + line).encode()
+            while content:
+                content = content[file.write(content) :]
         self._has_begun = True
-        # One write at the end of the file: two programs at a time mix no lines.
-        with open(self._file, "ab", buffering=0) as file:
-            file.write((before + line).encode())
 
     def table(self, key: str) -> Path | None:
         """Return a flight's table, if it is there."""
@@ -90,6 +98,14 @@ def forget_old(folder: Path, days: float) -> None:
         with contextlib.suppress(OSError):
             if path.stat().st_mtime < oldest:
                 path.unlink()
+
+
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OSError(f"{path}: {error.strerror or error}") from None
 
 
 def _read(line: str) -> tuple[str, Result | None]:

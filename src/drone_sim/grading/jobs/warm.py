@@ -14,6 +14,7 @@ import os
 import select
 import shutil
 import signal
+import stat
 import sys
 import tempfile
 from typing import Any, BinaryIO
@@ -22,6 +23,7 @@ from drone_sim.grading import plan as plans
 from drone_sim.grading.flight import grade, prepare
 from drone_sim.grading.jobs import limits
 from drone_sim.grading.jobs.flying import FlightProcess
+from drone_sim.grading.jobs.sandbox import HANDED_IN
 from drone_sim.grading.plan import Plan, PlanError
 
 READY = b"ready\n"  # said once, after the imports
@@ -40,14 +42,18 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # from the first process of a sandbox the kernel keeps it, then
     requests, replies = _own_streams()
     server = Server(is_alone, requests)
+    folders = [tempfile.gettempdir(), *([HANDED_IN] if is_alone else [])]
     replies.write(READY)
     replies.flush()
     while select.select([requests], [], [], _IDLE)[0]:
         line = requests.readline()
         if not line:
             break
-        reply, table = server.answer(json.loads(line))
-        is_last = not _cleared(tempfile.gettempdir())  # what cannot be removed here, `process` removes
+        request = json.loads(line)
+        for path, size in request["handed_in"].items():
+            _lay(f"{HANDED_IN}{path}", requests.read(size))
+        reply, table = server.answer(request)
+        is_last = not all([_cleared(folder) for folder in folders])  # what cannot be removed here, `process` removes
         replies.write(json.dumps({**reply, "table": len(table), "is_last": is_last}).encode() + b"\n" + table)
         replies.flush()
         if is_last:
@@ -64,8 +70,16 @@ def _own_streams() -> tuple[BinaryIO, BinaryIO]:
     return own
 
 
+def _lay(path: str, content: bytes) -> None:
+    """Write a file of the script that is to be flown."""
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    with open(path, "wb") as file:
+        file.write(content)
+
+
 def _cleared(folder: str) -> bool:
-    """Remove what a flight has left in the folder for temporary files; return whether nothing is there any more."""
+    """Remove what a flight has left in a folder; return whether nothing is there any more."""
+    os.chmod(folder, stat.S_IRWXU)
     for entry in os.scandir(folder):
         with contextlib.suppress(OSError, RecursionError):
             if entry.is_dir(follow_symlinks=False):

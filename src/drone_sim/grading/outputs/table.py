@@ -18,6 +18,7 @@ from drone_sim.grading.outputs.by_script import (
 )
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
+from drone_sim.wording import printable
 
 WIDTH = 80  # columns, where the output is no terminal
 _SCRIPT = 28  # columns at most, of a script's name
@@ -62,7 +63,7 @@ class _Paint:
 def _script_lines(scripts: Sequence[ScriptResults], width: int, paint: _Paint) -> list[str]:
     if not scripts:
         return ["no flights"]
-    name = min(_SCRIPT, max(6, *(len(_clean(one.label)) for one in scripts)))
+    name = min(_SCRIPT, max(6, *(len(printable(one.label)) for one in scripts)))
     rows = [(_fit(one.label, name), *_figures(one)) for one in scripts]
     heads = ("script", "passed", "points", "worst (seed)")
     widths = [max(len(heads[place]), *(len(row[place]) for row in rows)) for place in range(4)]
@@ -89,8 +90,8 @@ def _figures(one: ScriptResults) -> tuple[str, str, str]:
 
 def _trouble(one: ScriptResults) -> str:
     """Return what went wrong: an error first, then the criteria, the most frequent first."""
-    failures = ", ".join(f"{_clean(name)} {count}" for name, count in one.failures)
-    return "; ".join(filter(None, (*map(_clean, one.errors[:1]), failures)))
+    failures = ", ".join(f"{printable(name)} {count}" for name, count in one.failures)
+    return "; ".join(filter(None, (*map(printable, one.errors[:1]), failures)))
 
 
 def _row(fields: Sequence[str], widths: Sequence[int], left: Sequence[bool]) -> str:
@@ -106,15 +107,15 @@ def _flight_lines(result: Result, flights: int, width: int, paint: _Paint) -> li
     worst = f", the worst of {flights}" if flights > 1 else ""
     lines = [_cut(f"{by_script([result])[0].label}, {flight_label(result)}{worst}", width)]
     if result.error:
-        wrapped = textwrap.wrap(_clean(f"error: {result.error}"), width)
+        wrapped = textwrap.wrap(printable(f"error: {result.error}"), width)
         lines += [paint.verdict(line, False) for line in wrapped]
     named = named_outcomes(result)
-    widest = min(_SCRIPT, max((len(_clean(name)) for name, _ in named), default=0))
+    widest = min(_SCRIPT, max((len(printable(name)) for name, _ in named), default=0))
     for name, outcome in named:
         verdict = paint.verdict("ok  " if outcome.passed else "FAIL", outcome.passed)
         start = f"{_fit(name, widest).ljust(widest)}  {points(outcome.points):>4}/{points(outcome.of):<4}  "
         room = width - 8 - len(start)
-        first, *others = textwrap.wrap(_clean(told(outcome)), max(room, _SENTENCE)) or [""]
+        first, *others = textwrap.wrap(printable(told(outcome)), max(room, _SENTENCE)) or [""]
         lines.append(f"  {verdict}  {start}{_cut(first, room)}".rstrip())
         lines += [f"{' ' * (8 + len(start))}{_cut(other, room)}" for other in others]
     lines.append(paint(f"{points(result.points)} of {points(result.of)} points", _BOLD))
@@ -124,19 +125,14 @@ def _flight_lines(result: Result, flights: int, width: int, paint: _Paint) -> li
 # ---- text of any kind in few columns
 
 
-def _clean(words: str) -> str:
-    """Return text without what a terminal would obey."""
-    return "".join(letter if letter.isprintable() else "?" for letter in words)
-
-
 def _cut(words: str, width: int) -> str:
-    words = _clean(words)
+    words = printable(words)
     return words if len(words) <= width else f"{words[: width - 1]}…"
 
 
 def _fit(name: str, width: int) -> str:
     """Return a name with both of its ends: the first says whose it is, the last what."""
-    name = _clean(name)
+    name = printable(name)
     if len(name) <= width:
         return name
     end = (width - 1) * 2 // 3

@@ -20,7 +20,7 @@ from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.errors import ScriptError, UnknownName, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS, THREADS
 from drone_sim.scripting.python.helpers import Helpers
-from drone_sim.scripting.python.process import process_kept
+from drone_sim.scripting.python.process import Forks, end_copy, process_kept
 from drone_sim.scripting.script_log import THREAD_GOES_ON, say, shown
 from drone_sim.scripting.time_limit import Stopped, TimeLimit
 from drone_sim.wording import near_names
@@ -182,10 +182,13 @@ class PythonScript:
 
     def _run(self, phase: str, function: Any, *arguments: Any) -> Any:
         failed = result = None
+        forks = Forks.count
         try:
             result = self._limit.run(function, *arguments)
         except BaseException as error:  # KeyboardInterrupt, too: whose it is cannot be told
             failed = self._error(phase, error)
+        if Forks.count != forks:
+            end_copy(self._path)
         if script_log.lines.count:  # seldom: asked here, a call less in every phase
             script_log.end_call()
         if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive

@@ -26,7 +26,7 @@ from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Outcome, Result
 
 _HERE = Path(__file__).parent
-_SHARED = ("report.css", "replay.js", "view.js", "plots.js", "page.js", "index.js")
+_SHARED = ("replay.js", "report.css", "view.js", "plots.js", "page.js", "index.js")  # first what makes it a report
 _OURS = Path("files", "replay.js")  # a folder that has this holds a report
 _MADE_ANEW = ("scripts", "flights", "files")
 _SLUG = 40  # characters of a page's name
@@ -78,7 +78,7 @@ def write(plan: Plan, results: Sequence[Result], tables: Tables, folder: str | P
         shutil.rmtree(path / name, ignore_errors=True)
         (path / name).mkdir(parents=True)
     for name in _SHARED:
-        shutil.copyfile(_HERE / "files" / name, path / "files" / name)
+        _write(path / "files" / name, (_HERE / "files" / name).read_text(encoding="utf-8"))
     _write(path / "files" / "scene.js", _assignment("scene", scene_of(plan.parameters().scene)))
     draw = _Drawing(plan, tables, path)
     pages = [draw.page(number, script) for number, script in enumerate(by_script(results), start=1)]
