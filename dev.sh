@@ -13,6 +13,11 @@ root=$PWD
 say() { printf '\033[1m[dev.sh]\033[0m %s\n' "$*" >&2; }
 fail() { say "$*"; exit 1; }
 
+# These part what catkin, CMake, setup.bash, rosrun or a script's first line reads.
+case "${root//[-._\/@,=~%]/}" in
+  *[[:space:][:punct:]]*) fail "ROS cannot be built in '$root': move it to a path without spaces and without signs like + # ; :" ;;
+esac
+
 # The folder of a ROS 1 that has been sourced and is not Debian's own, which lies in /usr.
 sourced_ros() {
   local folder IFS=:
@@ -30,13 +35,12 @@ if [ -x "$ros/bin/python3" ]; then python=$ros/bin/python3; fi
 
 : "${HOME:=$(getent passwd "$(id -u)" | cut -d: -f6)}" # which cron leaves out
 export HOME
+export PIP_USER=0 # what cannot be written into .venv goes nowhere, never into ~/.local
 venv=$root/.venv
 venv_options=--system-site-packages
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim
 wheels=$cache/wheels
 PYTHONS="3.10 3.11 3.12 3.13"
-PYBULLET_MINUTES=5 # on one core
-PYBULLET_FILES=267
 
 # ros-environment is what lets setup.bash set ROS_PACKAGE_PATH, and python3-dev is for compiling PyBullet; on
 # Debian 12 other packages bring the first, and there is a wheel of the second. The package.xml without which `rosrun
@@ -69,61 +73,95 @@ install_packages() { # install_packages NAME...
   say "installing ${#missing[@]} packages (a minute or two, once): ${missing[*]}"
   as_root apt-get update -q >&2
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qy --no-install-recommends -o DPkg::Lock::Timeout=600 \
-    "${missing[@]}" >&2
+    "${missing[@]}" >&2 || {
+    [ -z "$(dpkg --audit)$(find /var/lib/dpkg/updates -type f)" ] ||
+      fail "an installation of packages was interrupted: 'sudo dpkg --configure -a' mends that"
+    fail "cannot install: ${missing[*]}"
+  }
 }
 
-# .venv and build/ hold absolute paths: a moved checkout, or other requirements, makes them anew.
-fresh() { [ "$(cat "$1" 2>/dev/null)" = "$2" ]; }
+writable() { # writable FOLDER
+  [ -w "$1" ] || fail "$1 is read-only for $(id -un): './dev.sh $command' needs a checkout that it can write to"
+}
 
+locked() { # locked FOLDER COMMAND...: one dev.sh at a time
+  writable "$1"
+  {
+    flock -n 9 || { say "another dev.sh is at work in $1: waiting for it"; flock 9; }
+    "${@:2}"
+  } 9>>"$1/.lock"
+}
+
+# .venv holds absolute paths, and whoever interrupts pip leaves half a package. So what .venv was made from is written
+# last, and taken away before anything changes; where it does not stand, .venv is made anew.
 make_venv() { # make_venv REQUIREMENTS...
-  local stamp=$venv/.made-from-$1 wanted
-  wanted="$venv $("$python" --version) $(cksum <"$1")"
-  if fresh "$stamp" "$wanted"; then return; fi
-  if ! "$venv/bin/python" -c "import sys; sys.exit(sys.prefix != '$venv')" 2>/dev/null; then
+  if ! made_from "$@"; then locked "$(dirname "$venv")" fill_venv "$@"; fi
+}
+
+stamp() { # stamp REQUIREMENTS...
+  echo "$venv $("$python" --version)"
+  if [ $# != 0 ]; then cksum "$@"; fi
+}
+
+made_from() { # made_from REQUIREMENTS...
+  [ -f "$venv/.made-from" ] && ! grep -qvxFf "$venv/.made-from" <(stamp "$@")
+}
+
+fill_venv() { # fill_venv REQUIREMENTS...
+  local list before=$venv/.made-before
+  if made_from "$@"; then return; fi # by the one that was waited for
+  if made_from; then
+    mv "$venv/.made-from" "$before"
+  else
     say "making $venv"
-    rm -rf "$venv"
+    rm -rf "$venv/.made-from" "$venv"
     "$python" -m venv $venv_options "$venv"
+    stamp >"$before"
   fi
-  if [ "$1" = requirements.txt ]; then make_pybullet; fi
-  say "installing the python packages of $1 (a minute, once)"
-  pip install -q --find-links "$wheels" -r "$1" >&2
-  echo "$wanted" >"$stamp"
+  for list in "$@"; do
+    if grep -qxF "$(cksum "$list")" "$before"; then continue; fi
+    if [ "$list" = requirements.txt ]; then make_pybullet; fi
+    say "installing the python packages of $list (a minute, once)"
+    pip install -q --find-links "$wheels" -r "$list" >&2
+    sed -i "/ $list\$/d" "$before"
+    cksum "$list" >>"$before"
+  done
+  mv "$before" "$venv/.made-from"
+}
+
+# There is no wheel of PyBullet for Python 3.12 and later: it is compiled once, for all checkouts of this user.
+make_pybullet() {
+  local version tag
+  version=$(grep '^pybullet==' requirements.txt)
+  tag=$("$venv/bin/python" -c 'import sys; print("cp{}{}".format(*sys.version_info))')
+  mkdir -p "$wheels"
+  if have_pybullet || pip install -q --dry-run --no-deps --only-binary :all: "$version" >/dev/null 2>&1; then return; fi
+  pip install -q setuptools numpy >&2 # where they are not the system's
+  locked "$wheels" compile_pybullet
+}
+
+have_pybullet() { compgen -G "$wheels/${version/==/-}-$tag-*.whl" >/dev/null; }
+
+compile_pybullet() {
+  if have_pybullet; then return; fi # by the one that was waited for
+  packaging/pybullet.sh "$venv/bin/python" "$version" "$wheels"
 }
 
 pip() { "$venv/bin/python" -m pip --disable-pip-version-check "$@"; }
 
-# There is no wheel of PyBullet for Python 3.12 and later. It is compiled once, on all cores, into a wheel that other
-# checkouts of this user find in $wheels.
-make_pybullet() {
-  local wanted tag scratch log=$venv/pybullet.log compiling
-  wanted=$(grep '^pybullet==' requirements.txt)
-  tag=$("$venv/bin/python" -c 'import sys; print("cp{}{}".format(*sys.version_info))')
-  mkdir -p "$wheels"
-  if compgen -G "$wheels/${wanted/==/-}-$tag-*.whl" >/dev/null; then return; fi
-  if pip install -q --dry-run --no-deps --only-binary :all: "$wanted" >/dev/null 2>&1; then return; fi
-  say "compiling PyBullet, of which there is no wheel for $("$python" --version): about $((PYBULLET_MINUTES / $(nproc) + 1)) minutes, once"
-  pip install -q setuptools numpy >&2 # where they are not the system's
-  # Without debug information, and with numpy's arrays as the wheels have them, for which gcc 14 has to be lenient.
-  scratch=$(mktemp -d)
-  TMPDIR=$scratch CFLAGS="-g0 -w -Wno-incompatible-pointer-types" pip wheel -v --no-deps --no-build-isolation \
-    --no-binary :all: -w "$scratch" "$wanted" >"$log" 2>&1 &
-  compiling=$!
-  while kill -0 $compiling 2>/dev/null; do
-    printf '\r  %d of %d files' "$(find "$scratch" -name '*.o' 2>/dev/null | wc -l)" $PYBULLET_FILES >&2
-    sleep 2
-  done
-  printf '\n' >&2
-  wait $compiling || { tail -20 "$log" >&2; fail "PyBullet cannot be compiled: the whole story is in $log"; }
-  mv "$scratch"/*.whl "$wheels" # whole, or not at all
-  rm -rf "$scratch"
-}
-
+# build/ holds absolute paths, too: a moved checkout makes it anew.
 build() {
   local wanted
   wanted="$root $(cat CMakeLists.txt setup.py package.xml cmake/* | cksum) $(ls test/ros/*.test)"
-  if fresh build/.made-from "$wanted"; then return; fi
+  if ! built; then locked "$root" build_anew; fi
+}
+
+built() { [ "$(cat build/.made-from 2>/dev/null)" = "$wanted" ]; }
+
+build_anew() {
+  if built; then return; fi # by the one that was waited for
   say "building into build/ and devel/"
-  rm -rf build devel
+  rm -rf build/.made-from build devel
   # The venv's python by name: another python3 first on PATH has neither catkin_pkg nor rospy.
   mkdir build
   if ! { cmake -S . -B build -DCATKIN_DEVEL_PREFIX="$root/devel" -DPYTHON_EXECUTABLE="$root/.venv/bin/python" \
@@ -157,10 +195,11 @@ lint_catkin() {
   # catkin_lint wants the folder to be named like the package, and knows nothing of build/, .venv/ and dev.sh.
   local copy
   copy=$(mktemp -d)
+  # shellcheck disable=SC2064 # as it is now
+  trap "rm -rf '$copy'" EXIT
   mkdir "$copy/drone_sim"
   git ls-files -co --exclude-standard | grep -v '^dev.sh$' | tar -cT - | tar -xC "$copy/drone_sim"
   "$1" -q -W2 --strict --ignore uninstalled_script "$copy/drone_sim"
-  rm -r "$copy"
 }
 
 lint() {
@@ -170,6 +209,7 @@ lint() {
   "$bin/ruff" format --check .
   "$bin/mypy"
   PYTHONPATH=src:$PYTHONPATH "$bin/lint-imports"
+  "$bin/shellcheck" -e SC1091 dev.sh .ci/run packaging/*.sh docs/*.sh
   lint_catkin "$bin/catkin_lint"
 }
 
@@ -190,9 +230,7 @@ hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
 
 run_tests() {
   make_venv requirements-dev.txt
-  if ! command -v chromium >/dev/null || ! "$venv/bin/python" -c 'import playwright' 2>/dev/null; then
-    say "no chromium, or no playwright: the tests in a browser are left out (./dev.sh test-web installs both)"
-  fi
+  say "left out: the tests in a browser (./dev.sh test-web runs them)"
   # Every core tests; tests with a master, each with its own, wait a third of their time: one more of them than cores.
   PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$(($(nproc) + 1))"
 }
@@ -228,8 +266,7 @@ test_pythons() { # test_pythons VERSION...
     python=$(find_python "$version")
     [ -n "$python" ] || fail "no Python $version here"
     venv=$cache/python$version
-    make_venv requirements.txt
-    make_venv requirements-dev.txt
+    make_venv requirements.txt requirements-dev.txt
     say "the unit tests that need no ROS, on $("$python" --version)"
     "$venv/bin/python" -m pytest -n auto -rs test/unit
   done
@@ -237,16 +274,16 @@ test_pythons() { # test_pythons VERSION...
 
 command=${1:-help}
 shift || true
+case "$command" in test | test-web | lint | bench | fuzz | soak | soak-web | deb) writable "$root" ;; esac # for what they leave
 case "$command" in
-  setup) setup; say "ready: source $root/devel/setup.bash" ;;
+  setup) setup; make_venv requirements-dev.txt; say "ready: source $root/devel/setup.bash" ;;
   run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   test-web)
     install_packages chromium
     setup
-    make_venv requirements-dev.txt
-    make_venv requirements-web.txt
-    exec .venv/bin/python -m pytest -rs test/web "$@" ;;
+    make_venv requirements-dev.txt requirements-web.txt
+    exec .venv/bin/python -m pytest test/web "$@" ;;
   lint) install_packages git; setup; lint ;;
   bench) setup; make_venv requirements-dev.txt; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
@@ -256,8 +293,9 @@ case "$command" in
   tasks) setup; PYTHONPATH=$root/src:$PYTHONPATH exec .venv/bin/python test/tasks/check.py "$@" ;;
   pythons) # shellcheck disable=SC2046 # one word each
     install_packages $(packages)
+    check_home
     test_pythons "$@" ;;
   deb) install_packages python3-jinja2 python3-matplotlib python3-opencv python3-pil python3-scipy python3-tqdm python3-zmq
-    setup; packaging/deb.sh "$wheels" ;;
+    setup; TMPDIR=$cache packaging/deb.sh "$wheels" ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
 esac

@@ -4,6 +4,7 @@
 # The package lies where Debian's own ROS packages lie, so that roslaunch finds it without a setup.bash. What
 # Debian lacks (PyBullet, lupa, pydantic 2, ...) lies in a python environment of its own under /usr/lib/drone_sim.
 set -eo pipefail
+umask 022
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 out=$(mktemp -d) # not below this folder, where roslaunch would find a second drone.launch
 trap 'rm -rf "$out"' EXIT
@@ -42,6 +43,8 @@ find "$stage" -name __pycache__ -prune -exec rm -rf {} +
 programs=(simulator key_teleop joy_teleop view show fly grade grade_live sweep record plot_flight bag_commands
   video import_scene doctor cockpit)
 sed -i "1s:.*:#!$own/bin/python:" "${programs[@]/#/$stage/usr/lib/drone_sim/}"
+
+chmod -R u=rwX,go=rX "$stage" # whatever the checkout's are
 
 mkdir "$stage/DEBIAN"
 cat >"$stage/DEBIAN/control" <<CONTROL

@@ -4,10 +4,13 @@ import ast
 import re
 import sys
 import sysconfig
+from pathlib import Path
 from xml.etree import ElementTree as Xml
 
+import pytest
 import yaml
 
+from drone_sim.files import resources
 from drone_sim.files.resources import package_path, python_path
 from drone_sim.ros.cockpit.scripts.shelf import Shelf
 
@@ -92,3 +95,10 @@ def test_other_processes_find_our_environment_before_the_system():
     """Debian's typing_extensions, which lies beside the installed package, is too old for our pydantic."""
     first, second, others = python_path("/others").split(":")
     assert (first, second, others) == (sysconfig.get_path("purelib"), str(SOURCE), "/others")
+
+
+def test_a_package_that_is_nowhere_near_is_named(monkeypatch):
+    """From a checkout directly below /, too, which has no share/ above it."""
+    monkeypatch.setattr(resources, "_HERE", Path("/no_drone_sim/src/drone_sim/files/resources.py"))
+    with pytest.raises(FileNotFoundError, match="near /no_drone_sim/src/drone_sim/files"):
+        package_path()

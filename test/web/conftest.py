@@ -1,12 +1,14 @@
-"""A browser for all tests: Debian's chromium, which playwright drives. Without either they are left out."""
+"""A browser for all tests: Debian's chromium, which playwright drives. `./dev.sh test-web` installs both."""
 
 import shutil
 import sys
 from pathlib import Path
 
 import pytest
+import rospy
 from cockpit_page import Drone, Panel, open_page
 from launched import launched
+from playwright.sync_api import sync_playwright
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit"))
 
@@ -16,11 +18,10 @@ DRAWING = ["--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"]
 
 @pytest.fixture(name="browser", scope="session")
 def _browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="./dev.sh test-web installs playwright")
     chromium = shutil.which("chromium")
     if chromium is None:
-        pytest.skip("./dev.sh test-web installs chromium")
-    with playwright.sync_playwright() as driver:
+        pytest.fail("no chromium on the PATH: ./dev.sh test-web installs Debian's")
+    with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=DRAWING)
         yield browser
         browser.close()
@@ -47,7 +48,6 @@ def _page(browser):
 @pytest.fixture(name="cockpit", scope="session")
 def _cockpit(browser):
     """One running simulation for all tests of the page; each leaves it as it has found it."""
-    rospy = pytest.importorskip("rospy", reason="needs ROS")
     with launched() as cockpit:
         rospy.init_node("test_cockpit", anonymous=True, disable_signals=True)
         cockpit.drone = Drone()

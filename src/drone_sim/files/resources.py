@@ -16,7 +16,8 @@ MEBIBYTE = 2**20
 def package_path() -> Path:
     """Return the folder that holds config/, urdf/ and package.xml. Needs no ROS environment."""
     # src/drone_sim/files/resources.py, or lib/python3/dist-packages/drone_sim/files/resources.py when installed.
-    for folder in (_HERE.parents[3], _HERE.parents[5] / "share" / "drone_sim"):
+    # A checkout directly below / has no sixth parent.
+    for folder in (*_HERE.parents[3:4], *(prefix / "share" / "drone_sim" for prefix in _HERE.parents[5:6])):
         if (folder / "package.xml").is_file():
             return folder
     raise FileNotFoundError(f"drone_sim: no config, urdf and package.xml near {_HERE.parent}")

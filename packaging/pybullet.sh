@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# packaging/pybullet.sh PYTHON VERSION WHEELS: compiles PyBullet, of which there is no wheel for Python 3.12 and later,
+# into a wheel in the folder WHEELS. ./dev.sh calls it, one at a time.
+set -eo pipefail
+python=$1 version=$2 wheels=$3
+MINUTES=5 # on one core
+FILES=267
+MEGABYTES=500 # of memory for each compiler
+
+# One compiler for each core, as far as there is memory for them, here and in a container's limit.
+memory=$({ cat /proc/meminfo /sys/fs/cgroup/memory.max 2>/dev/null || true; } |
+  awk '/^MemAvailable/ { most = $2 / 1024 } /^[0-9]+$/ && $1 / 2 ^ 20 < most { most = $1 / 2 ^ 20 } END { print int(most) }')
+jobs=$((memory / MEGABYTES))
+if [ "$jobs" -gt "$(nproc)" ]; then jobs=$(nproc); fi
+if [ "$jobs" -lt 1 ]; then jobs=1; fi
+printf '\033[1m[dev.sh]\033[0m compiling PyBullet, of which there is no wheel for %s: about %d minutes, once\n' \
+  "$("$python" --version)" $((MINUTES / jobs + 1)) >&2
+
+# 735 MB, which a /tmp in memory may not have. Interrupted, it leaves nothing; killed, nothing after the next one.
+scratch=$wheels/compiling
+log=$wheels/pybullet.log
+rm -rf "$scratch"
+mkdir "$scratch"
+trap '{ kill -KILL -- -$! && wait; } 2>/dev/null || true; rm -rf "$scratch"' EXIT
+trap 'exit 130' HUP INT TERM # also while a command that has just ended is waited for
+# PyBullet's setup.py would start two compilers for each core.
+cat >"$scratch/sitecustomize.py" <<LIMIT
+from multiprocessing import pool
+threads = pool.ThreadPool
+pool.ThreadPool = lambda _: threads($jobs)
+LIMIT
+set -m # in a group of its own, which ends as a whole
+# Without debug information, and with numpy's arrays as the wheels have them, for which gcc 14 has to be lenient.
+PYTHONPATH=$scratch TMPDIR=$scratch CFLAGS="-g0 -w -Wno-incompatible-pointer-types" "$python" -m pip wheel -v \
+  --disable-pip-version-check --no-deps --no-build-isolation --no-binary :all: -w "$scratch" "$version" >"$log" 2>&1 &
+compiling=$!
+set +m
+while kill -0 "$compiling" 2>/dev/null; do
+  printf '\r  %d of %d files' "$(find "$scratch" -name '*.o' 2>/dev/null | wc -l)" $FILES >&2
+  sleep 2
+done
+printf '\n' >&2
+if ! wait "$compiling"; then
+  tail -n 20 "$log" >&2
+  echo "PyBullet cannot be compiled: the whole story is in $log" >&2
+  exit 1
+fi
+mv "$scratch"/*.whl "$wheels" # whole, or not at all

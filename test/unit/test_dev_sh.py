@@ -1,0 +1,244 @@
+"""dev.sh on a machine whose python, pip, CMake and apt are stubs: what is interrupted, shared, moved or read-only."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+from drone_sim.files.resources import package_path
+
+ROOT = package_path()
+# Says in the log what it was asked for; where that matches STOP_AT, it says so and waits for the file `go`.
+PYTHON = """#!/bin/bash
+echo "$* [user $PIP_USER]" >>"$STUBS/log"
+if [ -n "$STOP_AT" ] && [[ "$*" = *"$STOP_AT"* ]]; then
+  touch "$STUBS/reached"
+  until [ -e "$STUBS/go" ]; do sleep 0.02; done
+fi
+case "$*" in
+  --version) echo Python 3.11.2 ;;
+  "-m venv"*) mkdir -p "${@: -1}/bin"; cp "$0" "${@: -1}/bin/python" ;;
+esac
+"""
+CMAKE = """#!/bin/bash
+mkdir devel
+touch devel/setup.bash
+"""
+
+
+class Machine:
+    """A checkout with nothing but dev.sh and what it reads, and a ROS that somebody has sourced."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.checkout = folder / "checkout"
+        (self.checkout / "test/ros").mkdir(parents=True)
+        (self.checkout / "test/ros/flight.test").touch()
+        (self.checkout / "packaging").mkdir()
+        shutil.copytree(ROOT / "cmake", self.checkout / "cmake")
+        for name in ("dev.sh", "CMakeLists.txt", "setup.py", "package.xml", "packaging/pybullet.sh"):
+            shutil.copy(ROOT / name, self.checkout / name)
+        for name in ("requirements.txt", "requirements-dev.txt"):
+            (self.checkout / name).write_text("pybullet==1\n", encoding="utf-8")
+        (folder / "ros/share/catkin/cmake").mkdir(parents=True)
+        (folder / "ros/share/catkin/cmake/catkinConfig.cmake").touch()
+        self.stub("ros/bin/python3", PYTHON)
+        self.stub("bin/cmake", CMAKE)
+        self.stub("bin/make", "#!/bin/bash\n")
+        self.environment = {
+            "PATH": f"{folder}/bin:/usr/bin:/bin",
+            "HOME": str(folder),
+            "STUBS": str(folder),
+            "CMAKE_PREFIX_PATH": str(folder / "ros"),
+        }
+
+    def stub(self, name, text):
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        path.chmod(0o755)
+
+    def start(self, *command, **how):
+        """Start `./dev.sh COMMAND...` with further variables, in a process group of its own."""
+        return subprocess.Popen(
+            [str(self.checkout / "dev.sh"), *command],
+            env=self.environment | how.pop("env", {}),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+            **how,
+        )
+
+    def run(self, *command, **how):
+        """Return how it ended, and what it said."""
+        with self.start(*command, **how) as started:
+            said, _ = started.communicate(timeout=60)
+        return started.returncode, re.sub(r"\x1b\[\d*m", "", said)
+
+    def asked(self, what):
+        """Return how often python was asked for `what`."""
+        return (self.folder / "log").read_text(encoding="utf-8").count(what)
+
+    def reached(self):
+        wait_for((self.folder / "reached").exists)
+
+
+def wait_for(there):
+    """Wait until it is there, or fail."""
+    end = time.monotonic() + 60
+    while not there():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.fixture(name="machine")
+def _machine():
+    # Not pytest's own folder, into which another user may not look.
+    with tempfile.TemporaryDirectory() as folder:
+        os.chmod(folder, 0o755)
+        yield Machine(Path(folder).resolve())
+
+
+def test_set_up_once_is_set_up(machine):
+    assert machine.run("setup")[0] == 0
+    assert machine.run("setup")[0] == 0
+    assert machine.asked("-m venv") == 1
+    assert machine.asked("install -q --find-links") == 2
+
+
+@pytest.mark.parametrize("moment", ["-m venv", "-r requirements.txt", "-r requirements-dev.txt"])
+def test_an_interrupted_environment_is_made_anew(machine, moment):
+    with machine.start("setup", env={"STOP_AT": moment}) as killed:
+        machine.reached()
+        os.killpg(killed.pid, signal.SIGKILL)
+    code, said = machine.run("setup")
+    assert code == 0, said
+    assert machine.asked("-m venv") == 2
+    assert machine.asked("-r requirements.txt") >= machine.asked("-r requirements-dev.txt") >= 1
+
+
+def test_other_requirements_are_installed_into_the_same_environment(machine):
+    assert machine.run("setup")[0] == 0
+    (machine.checkout / "requirements.txt").write_text("pybullet==2\n", encoding="utf-8")
+    assert machine.run("setup")[0] == 0
+    assert (machine.asked("-m venv"), machine.asked("-r requirements.txt")) == (1, 2)
+    assert machine.asked("-r requirements-dev.txt") == 1
+
+
+def test_the_second_of_two_waits_for_the_first_and_says_so(machine):
+    with machine.start("setup", env={"STOP_AT": "-r requirements.txt"}) as first:
+        machine.reached()
+        with machine.start("setup") as second:
+            said = second.stdout.readline() + second.stdout.readline()  # the first is about the ROS that it uses
+            (machine.folder / "go").touch()
+            assert first.communicate(timeout=60) and first.returncode == 0
+            assert second.communicate(timeout=60) and second.returncode == 0
+    assert f"another dev.sh is at work in {machine.checkout}: waiting for it" in said
+    assert machine.asked("-m venv") == 1
+
+
+def test_a_moved_checkout_makes_its_environment_anew(machine):
+    assert machine.run("setup")[0] == 0
+    machine.checkout = machine.checkout.rename(machine.folder / "moved")
+    assert machine.run("setup")[0] == 0
+    assert machine.asked(f"-m venv --system-site-packages {machine.checkout}/.venv") == 1
+
+
+@pytest.mark.parametrize("name", ["a checkout", "check+out", "check:out", "check#out"])
+def test_a_path_that_ros_cannot_take_is_refused(machine, name):
+    machine.checkout = machine.checkout.rename(machine.folder / name)
+    code, said = machine.run("setup")
+    assert code == 1
+    assert str(machine.checkout) in said and said.count("\n") == 1
+
+
+def test_a_path_with_other_letters_is_taken(machine):
+    machine.checkout = machine.checkout.rename(machine.folder / "Prüf-stand_2.0")
+    assert machine.run("setup")[0] == 0
+
+
+@pytest.mark.parametrize("command", ["setup", "test", "lint", "deb"])
+def test_a_read_only_checkout_is_named(machine, command):
+    for folder in (machine.checkout, machine.checkout / "test"):
+        folder.chmod(0o555)
+    machine.environment["HOME"] = str(machine.folder / "home")
+    (machine.folder / "home").mkdir()
+    other = {"user": 65534} if os.geteuid() == 0 else {}  # nobody: root may write everywhere
+    (machine.folder / "log").touch()
+    (machine.folder / "log").chmod(0o666)
+    (machine.folder / "home").chmod(0o777)
+    code, said = machine.run(command, **other)
+    machine.checkout.chmod(0o755)
+    assert code == 1
+    assert f"{machine.checkout} is read-only" in said.splitlines()[-1]
+    assert machine.asked("pip") == 0
+
+
+def test_pip_never_falls_back_to_the_users_own_packages(machine):
+    assert machine.run("setup", env={"PIP_USER": "1"})[0] == 0
+    assert machine.asked("[user 0]") > 2 and machine.asked("[user 1]") == 0
+
+
+@pytest.mark.parametrize("interrupted", ["python3-tf2 is half configured", ""])
+def test_an_interrupted_dpkg_is_named_with_its_mend(machine, interrupted):
+    del machine.environment["CMAKE_PREFIX_PATH"]
+    machine.stub("bin/sudo", '#!/bin/bash\nexec "$@"\n')
+    machine.stub("bin/dpkg-query", "#!/bin/bash\nexit 1\n")
+    machine.stub("bin/dpkg", f"#!/bin/bash\necho -n '{interrupted}'\n")
+    machine.stub("bin/find", "#!/bin/bash\n")  # dpkg's journal, which is this machine's
+    machine.stub("bin/apt-get", '#!/bin/bash\n[ "$1" = update ]\n')
+    code, said = machine.run("setup")
+    assert code == 1
+    assert ("'sudo dpkg --configure -a' mends that" in said) == bool(interrupted)
+    assert interrupted or "cannot install: bubblewrap" in said
+
+
+def compile_pybullet(machine, pip):
+    """Start packaging/pybullet.sh with a pip that is a bash script."""
+    machine.stub("python", f"#!/bin/bash\ncase $1 in --version) echo Python 3.13.0 ;; *) {pip} ;; esac\n")
+    (machine.folder / "wheels").mkdir()
+    script = machine.checkout / "packaging/pybullet.sh"
+    return subprocess.Popen(
+        [script, machine.folder / "python", "pybullet==1", machine.folder / "wheels"],
+        env=machine.environment,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def test_compilers_are_limited_by_memory(machine):
+    machine.stub("bin/nproc", "#!/bin/bash\necho 100000\n")
+    with compile_pybullet(machine, 'cp "$PYTHONPATH/sitecustomize.py" "$STUBS"; touch "$TMPDIR/pybullet.whl"') as one:
+        one.communicate(timeout=60)
+    assert one.returncode == 0
+    jobs = int(re.search(r"threads\((\d+)\)", (machine.folder / "sitecustomize.py").read_text(encoding="utf-8"))[1])
+    assert 1 <= jobs <= os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 500e6
+    assert sorted(path.name for path in (machine.folder / "wheels").iterdir()) == ["pybullet.log", "pybullet.whl"]
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_an_interrupted_compilation_leaves_nothing(machine, how):
+    compiler = 'touch "$TMPDIR/a.o"; echo $$ >"$STUBS/pid"; touch "$STUBS/reached"; while :; do sleep 0.02; done'
+    with compile_pybullet(machine, compiler) as interrupted:
+        machine.reached()
+        os.killpg(interrupted.pid, how)
+        interrupted.communicate(timeout=60)
+    assert [path.name for path in (machine.folder / "wheels").iterdir()] == ["pybullet.log"]
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((machine.folder / "pid").read_text(encoding="utf-8")), 0)
+
+
+def test_what_a_change_must_pass_leaves_no_suite_out(machine):
+    (machine.checkout / ".ci").mkdir()
+    shutil.copy(ROOT / ".ci/run", machine.checkout / ".ci/run")
+    machine.stub("checkout/dev.sh", '#!/bin/bash\necho "$1"\n')
+    ran = subprocess.run([machine.checkout / ".ci/run"], stdout=subprocess.PIPE, text=True, check=True)
+    assert ran.stdout.split() == ["lint", "test", "test-web", "pythons"]
