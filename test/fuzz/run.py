@@ -31,6 +31,8 @@ from pool import Trier
 KINDS = (
     "messages",
     "requests",
+    "connections",
+    "bags",
     "parameters",
     "scenes",
     "meshes",

@@ -6,9 +6,12 @@ What counts as a user's mistake is refused with one of REFUSALS, in one line; ev
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
 import logging
 import math
+import socket
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -216,6 +219,22 @@ def _assignments(case: Case, folder: Path) -> str:
     return _status([*(word for text in case.data for word in ("--set", text)), "--duration=0.1"], folder)
 
 
+# ---- bags
+
+
+def _bags(case: Case, folder: Path) -> str:
+    """Read a bag with one of the programs for that; whatever is in it, the program ends with a line or a file."""
+    program = importlib.import_module(f"drone_sim.ros.tools.{case.data}")  # ROS is there for this alone
+    out = folder / {"bag_commands": "out.yaml", "plot_flight": "out.png", "bag_video": "out.mp4"}[case.data]
+    errors = io.StringIO()
+    with contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()):
+        status = program.main([str(folder / "flight.bag"), str(out)])
+    said = errors.getvalue().rstrip("\n")
+    if (status == 0) != (said == "") or (status == 0) != out.exists():
+        raise Fault(f"{case.data}: status {status}, and it said: {said[:300]!r}")
+    return one_line(said, folder) if said else ""
+
+
 # ---- messages
 
 
@@ -265,6 +284,52 @@ def _asked(client: zmq.Socket[bytes], message: bytes, player: Player, server: Se
     return ""
 
 
+# ---- connections
+
+
+def _connections(case: Case, folder: Path) -> str:
+    """Let peers send what they like; each must be let go, none may start the simulation, and a client is answered."""
+    simulation = Simulation(parameters.load(_with_small_pictures({})), started=False)
+    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    server = Server(player, "127.0.0.1", 0)
+    with zmq.Context() as context, context.socket(zmq.DEALER) as client:
+        client.setsockopt(zmq.LINGER, 0)
+        client.connect(f"tcp://127.0.0.1:{server.port}")
+        try:
+            for pieces in case.data:
+                _send_all(server, pieces)
+            if player.playing:
+                raise Fault("a peer that was no client has started the simulation")
+            client.send_multipart([b"", cbor2.dumps({"func": "sim.getSimulationState", "args": []})])
+            for _ in range(1000):
+                server.wait(0.005)
+                if client.poll(0):
+                    return ""
+            raise Fault("a client has no answer any more")
+        finally:
+            server.close()
+            simulation.close()
+
+
+def _send_all(server: Server, pieces: list[bytes]) -> None:
+    with socket.create_connection(("127.0.0.1", server.port), timeout=5) as peer:
+        try:
+            for piece in pieces:
+                peer.sendall(piece)
+                server.wait(0.001)
+            peer.shutdown(socket.SHUT_WR)
+            peer.settimeout(0.001)
+            end = time.monotonic() + 5
+            while time.monotonic() < end:
+                server.wait(0.001)
+                with contextlib.suppress(TimeoutError):
+                    if not peer.recv(65536):
+                        return
+        except OSError:  # it was let go before it had said all
+            return
+    raise Fault("a peer that has said all is not let go")
+
+
 class _Log(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
@@ -284,4 +349,6 @@ _TRIALS: dict[str, Callable[[Case, Path], Any]] = {
     "fly": _fly,
     "messages": _messages,
     "requests": _requests,
+    "connections": _connections,
+    "bags": _bags,
 }

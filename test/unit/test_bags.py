@@ -19,7 +19,7 @@ from std_msgs.msg import String
 from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.recording import Recording
-from drone_sim.ros.tools import bag_video, plot_flight, record
+from drone_sim.ros.tools import bag_commands, bag_video, plot_flight, record
 from drone_sim.ros.tools.bag_flights import BagFlight
 from drone_sim.ros.tools.bags import Bag, BagRefused
 from drone_sim.ros.tools.record import chosen
@@ -220,6 +220,27 @@ def test_no_class_is_made_from_what_a_bag_says(tmp_path):
         bag.write("/drone/odom", other(data="x"), rospy.Time(1))
     with pytest.raises(BagRefused, match="no message on /drone/odom that can be read"):
         BagFlight(Bag(path))
+
+
+@pytest.mark.parametrize(("program", "out"), [(plot_flight, "o.png"), (bag_commands, "o.yaml"), (bag_video, "o.mp4")])
+def test_topics_of_another_kind_are_left_out(tmp_path, capsys, program, out):
+    path = str(tmp_path / "other.bag")
+    kinds = ("cmd_vel", "command", "propellers", "set_pose", "initialpose", "push", "goto", "takeoff", "weather", "state")
+    drone = Odometry()
+    drone.pose.pose.orientation.w = 1.0
+    with rosbag.Bag(path, "w") as bag:
+        for second in (1, 2, 3):
+            drone.header.stamp = rospy.Time(second)
+            bag.write("/drone/odom", drone, rospy.Time(second))
+            bag.write("/drone/front", CvBridge().cv2_to_imgmsg(RED, "bgr8"), rospy.Time(second))
+            for name in kinds:
+                bag.write(f"/drone/{name}", String("x") if name != "state" else Range(), rospy.Time(second))
+        raw = ("os/path", b"", "0" * 32, None, String)
+        bag.write("/drone/imu/data", raw, rospy.Time(4), raw=True)
+    status = program.main([path, str(tmp_path / out)])
+    said = capsys.readouterr().err
+    refusal = "nothing was commanded in it on /drone/cmd_vel and the like" if program is bag_commands else ""
+    assert (status, said.partition(".bag: ")[2].strip()) == (1 if refusal else 0, refusal)
 
 
 def test_pictures_are_recorded_by_choice_and_never_raw():

@@ -1,6 +1,7 @@
 """CoppeliaSim's ZeroMQ remote API: what a client sends, and what comes back."""
 
 import math
+import socket
 import struct
 import threading
 from types import SimpleNamespace
@@ -138,6 +139,14 @@ def test_the_objects_of_every_vehicle_are_there(stage):
         ("sim.getObject", ["/Quadcoptr"], "sim.getObject: no object '/Quadcoptr'; near names are"),
         ("sim.getObjectPosition", [], "sim.getObjectPosition: wrong number of values"),
         ("sim.setObjectPosition", [1, -1, [math.nan, 0, 0]], "finite numbers are expected"),
+        ("sim.setObjectPosition", [1, -1, [10**400, 0, 0]], "finite numbers are expected"),
+        ("sim.setObjectPose", [1, -1, [0, 0, 1, 0, 0, 0, math.nan]], "finite numbers are expected"),
+        ("sim.setObjectPose", [1, -1, [math.inf, 0, 1, 0, 0, 0, 1]], "finite numbers are expected"),
+        ("sim.setObjectPose", [1, -1, [0, 0, 1, 0, 0, 0, 0]], "a quaternion that is not zero is expected"),
+        ("sim.setObjectMatrix", [1, -1, [math.nan] * 12], "finite numbers are expected"),
+        ("sim.addForceAndTorque", [1, [0, 0, math.inf], [0, 0, 0]], "finite numbers are expected"),
+        ("sim.addDrawingObject", [0, math.nan, 0, -1, 10], "finite numbers are expected"),
+        ("sim.createDummy", [math.nan], "finite numbers are expected"),
         ("sim.getObjct", ["/Floor"], "sim has no 'getObjct'; near names are getObject"),
         ("sim.handle_world", [], "handle_world is no function"),
         ("os.system", ["ls"], "no function 'os.system'"),
@@ -188,6 +197,52 @@ def test_a_message_without_a_way_back_and_a_huge_one_do_no_harm(stage):
     stage.client(zmq.DEALER).send_bytes(b"\x00" * (9 * 1024 * 1024))
     stage.client(zmq.PUSH).send_bytes(b"?")
     assert stage.client().sim("getSimulationTime") == 0.0
+
+
+START = cbor2.dumps({"func": "sim.startSimulation", "args": []})
+UNVERSIONED = b"\1\0" + b"\1\0" + bytes([1 + len(START), 0]) + START  # ZMTP 1.0: no name, no way back, a request
+SIGNATURE = b"\xff" + bytes(8) + b"\x7f"
+GREETING = SIGNATURE + b"\3\1NULL" + bytes(16 + 1 + 31)
+READY = b"\4\x26\5READY\x0bSocket-Type\0\0\0\3REQ\x08Identity\0\0\0\0"
+CONVERSATION = GREETING + READY + b"\1\0" + bytes([0, len(START)]) + START
+BROWSER = (
+    b"Host: 127.0.0.1:23000\r\nUser-Agent: Mozilla/5.0 (X11; Linux x86_64; rv:128.0) Firefox/128.0\r\n"
+)
+
+
+def closed(peer):
+    """Return whether the server has ended a connection."""
+    try:
+        return peer.recv(4096) == b""
+    except BlockingIOError:
+        return False
+    except ConnectionResetError:
+        return True
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"\1\0\2\0x",
+        b"GET / HTTP/1.1\r\n" + BROWSER + b"Accept: */*\r\n\r\n",
+        b"GET / HTTP/1.1\r\n" + BROWSER + b"Connection: Upgrade\r\nUpgrade: websocket\r\n\r\n" + CONVERSATION,
+        2 * (b"POST / HTTP/1.1\r\n" + BROWSER + b"Content-Length: %d\r\n\r\n" % len(CONVERSATION) + CONVERSATION),
+        b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + UNVERSIONED,
+        b"\x16\3\1\2\0\1\0\1\xfc\3\3" + bytes(512),  # TLS
+        UNVERSIONED,
+        b"\xff" + bytes(7) + b"\1\0" + UNVERSIONED[2:],  # the same in frames of the long form
+        SIGNATURE + b"\0\5\0\0" + UNVERSIONED,
+        SIGNATURE + b"\1\5\0\0" + b"\1\0" + bytes([0, len(START)]) + START,  # ZMTP 2.0
+        GREETING[:12] + b"PLAIN" + bytes(15 + 1 + 31),
+    ],
+)
+def test_who_does_not_speak_zmtp_3_is_dropped_and_never_served(stage, sent):
+    with socket.create_connection(("127.0.0.1", stage.server.port), timeout=10) as peer:
+        peer.sendall(sent)
+        peer.setblocking(False)
+        assert stage.settled(lambda: closed(peer))
+    assert not stage.server._clients
+    assert stage.client().sim("getSimulationState") == 0
 
 
 def test_what_version_1_sends_and_reads(stage):

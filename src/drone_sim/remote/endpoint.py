@@ -16,7 +16,7 @@ _HEARTBEAT = 2000  # ms, between two questions whether a client's machine is sti
 
 
 class Incoming(NamedTuple):
-    """A message, the way back, and the number of the connection that it came by, -1 where that is not known."""
+    """A message, the way back, and the number of the connection that it came by."""
 
     envelope: tuple[bytes, ...]
     connection: int
@@ -31,6 +31,7 @@ class Endpoint:
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.setsockopt(zmq.LINGER, 0)
+        self._socket.setsockopt(zmq.ZAP_DOMAIN, b"drone_sim")  # ends peers below ZMTP 3, among them all that speak HTTP
         self._socket.setsockopt(zmq.MAXMSGSIZE, _LARGEST)
         self._socket.setsockopt(zmq.RCVHWM, _MOST)
         self._socket.setsockopt(zmq.HEARTBEAT_IVL, _HEARTBEAT)

@@ -15,13 +15,13 @@ from drone_sim.config.types import Checked
 from drone_sim.files import writing
 from drone_sim.mechanics import frames
 from drone_sim.offline.command_line import Parser, status_of
-from drone_sim.ros.tools.bag_flights import BagFlight, BagSteps
+from drone_sim.ros.tools.bag_flights import PUSH, STATE, TWIST, BagFlight, BagSteps
 from drone_sim.ros.tools.bags import Bag, BagRefused, Heard
 from drone_sim.ros.vehicle.conditions import read_changes
 from drone_sim.ros.vehicle.messages import WORLD_FRAME
 from drone_sim.run import parameters
 from drone_sim.vehicles.checks import Refused
-from drone_sim.vehicles.requests import EMPTY, REQUESTS
+from drone_sim.vehicles.requests import EMPTY, POSE, REQUESTS
 
 _NAME = "bag_commands"
 _NEAR = 2  # steps, by which the recorder may have heard of a command earlier or later than the simulator
@@ -46,7 +46,7 @@ def _write(options: argparse.Namespace) -> None:
     with closing(Bag(options.bag)) as bag:
         flight = BagFlight(bag, options.vehicle)
         entries = sorted(_entries(bag, flight), key=lambda one: one["at"])
-        begins = next((one.message.data for one in bag.read(f"{flight.namespace}/state")), "")
+        begins = next((one.message.data for one in bag.read(f"{flight.namespace}/state", STATE)), "")
     if not entries:
         raise BagRefused(f"{options.bag}: nothing was commanded in it on {flight.namespace}/cmd_vel and the like")
     landed = " --set start=landed" if begins == "landed" else ""
@@ -58,11 +58,11 @@ def _write(options: argparse.Namespace) -> None:
 def _entries(bag: Bag, flight: BagFlight) -> Iterator[_Action]:
     """Yield the entries of the timeline. Raises BagRefused."""
     steps = flight.steps()
-    yield from _twists(bag.read(f"{flight.namespace}/cmd_vel"), steps)
-    states = [(steps.row_after(one.at) - 1, one.message.data) for one in bag.read(f"{flight.namespace}/state")]
-    for topic, read in _READ.items():
+    yield from _twists(bag.read(f"{flight.namespace}/cmd_vel", TWIST), steps)
+    states = [(steps.row_after(one.at) - 1, one.message.data) for one in bag.read(f"{flight.namespace}/state", STATE)]
+    for topic, (kind, read) in _READ.items():
         rows = [row for row, state in states if state == _LEADS_TO.get(topic)]
-        for heard in bag.read(f"{flight.namespace}/{topic}"):
+        for heard in bag.read(f"{flight.namespace}/{topic}", kind):
             action, row = read(heard.message), steps.row_after(heard.at)
             row = next((one for one in rows if abs(one - row) <= _NEAR), row)
             if action is not None:
@@ -130,10 +130,14 @@ def _allowed() -> dict[str, Checked]:
     return {"weather": default.weather, "faults": default.first.faults}
 
 
-_READ: dict[str, Callable[[Any], _Action | None]] = {
-    **{topic: _asking(topic) for topic, kind in REQUESTS.items() if kind == EMPTY},
-    **{"goto": _pose("goto"), "set_pose": _pose("pose"), "push": _push, "set_wind": _wind},
-    **{"weather": _change("weather"), "faults": _change("faults")},
+_READ: dict[str, tuple[str, Callable[[Any], _Action | None]]] = {  # by topic: its kind of message, and what reads it
+    **{topic: (kind, _asking(topic)) for topic, kind in REQUESTS.items() if kind == EMPTY},
+    "goto": (POSE, _pose("goto")),
+    "set_pose": (POSE, _pose("pose")),
+    "push": (PUSH, _push),
+    "set_wind": ("geometry_msgs/Vector3Stamped", _wind),
+    "weather": ("diagnostic_msgs/KeyValue", _change("weather")),
+    "faults": ("diagnostic_msgs/KeyValue", _change("faults")),
 }
 
 

@@ -16,7 +16,10 @@ from drone_sim.offline.recording import Recording
 from drone_sim.offline.tables import LARGEST
 from drone_sim.offline.timeline import Entry, Timeline
 from drone_sim.ros.tools.bags import Bag, BagRefused, Heard
+from drone_sim.vehicles.requests import POSE
 
+ODOMETRY, TWIST, COMMAND = "nav_msgs/Odometry", "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
+STATE, PUSH = "std_msgs/String", "geometry_msgs/WrenchStamped"
 _SUFFIX = "/odom"
 _TICK = 1e-6  # s, between stamps that are the same
 _UNIT = 1e-3  # by which a quaternion's norm may be off
@@ -31,11 +34,13 @@ class BagFlight:
     def __init__(self, bag: Bag, vehicle: str | None = None):
         """Read the odometry of a vehicle, by default of the first. Raises BagRefused."""
         self._bag = bag
-        topics = [name for name in bag.topics("nav_msgs/Odometry") if name.endswith(_SUFFIX)]
+        topics = [name for name in bag.topics(ODOMETRY) if name.endswith(_SUFFIX)]
         wanted = None if vehicle is None else f"/{vehicle.strip('/')}{_SUFFIX}"
         topic = bag.named(wanted, topics, "odometry")
         self.namespace = topic.removesuffix(_SUFFIX)
-        rows = {_stamp(heard): (heard.at, *_state(heard.message)) for heard in bag.read(topic)}  # of one stamp the last
+        rows = {
+            _stamp(heard): (heard.at, *_state(heard.message)) for heard in bag.read(topic, ODOMETRY)
+        }  # of one stamp the last
         stamps = [stamp for stamp in sorted(rows) if len(rows[stamp]) > 1]
         if not stamps:
             raise BagRefused(f"{bag.path}: no message on {topic} that can be read")
@@ -56,15 +61,15 @@ class BagFlight:
     def _commands(self) -> np.ndarray:
         """Return, for every row, the command in force or, where those were not recorded, the last that was sent."""
         in_force = f"{self.namespace}/command"
-        if in_force in self._bag.kinds:
-            heard = [(_stamp(one), _command(one.message.twist)) for one in self._bag.read(in_force)]
+        if self._bag.kinds.get(in_force) == COMMAND:
+            heard = [(_stamp(one), _command(one.message.twist)) for one in self._bag.read(in_force, COMMAND)]
             return _held(heard, self._stamps + _TICK, 0.0)
-        sent = [(one.at, _command(one.message)) for one in self._bag.read(f"{self.namespace}/cmd_vel")]
+        sent = [(one.at, _command(one.message)) for one in self._bag.read(f"{self.namespace}/cmd_vel", TWIST)]
         return _held(sent, self._stamps, 0.0)
 
     def _propellers(self) -> np.ndarray:
         """Return, for every row, the propellers' velocities, which are published right after it, without a stamp."""
-        heard = self._bag.read(f"{self.namespace}/propellers")
+        heard = self._bag.read(f"{self.namespace}/propellers", "std_msgs/Float32MultiArray")
         told = [(one.at, list(one.message.data)) for one in heard if len(one.message.data) == 4]
         steps = np.diff(self._came)
         late = float(np.median(steps)) / 2 if len(steps) else _STEP
@@ -73,11 +78,11 @@ class BagFlight:
     def timeline(self) -> Timeline:
         """Return the poses that it was put to, and the pushes. Raises BagRefused."""
         entries = []
-        for name in ("set_pose", "initialpose"):
-            for one in self._bag.read(f"{self.namespace}/{name}"):
+        for name, kind in (("set_pose", POSE), ("initialpose", "geometry_msgs/PoseWithCovarianceStamped")):
+            for one in self._bag.read(f"{self.namespace}/{name}", kind):
                 pose = getattr(one.message.pose, "pose", one.message.pose)
                 entries.append(Entry(self._time(one), Pose((pose.position.x, pose.position.y, pose.position.z))))
-        for one in self._bag.read(f"{self.namespace}/push"):
+        for one in self._bag.read(f"{self.namespace}/push", PUSH):
             wrench = one.message.wrench
             entries.append(Entry(self._time(one), Push(_xyz(wrench.force), _xyz(wrench.torque), _PUSH)))
         end = float(self._stamps[-1]) - self.start
@@ -92,7 +97,7 @@ class BagFlight:
         for topic in self._bag.topics(*_MEASURED):
             name = topic.removeprefix(f"{self.namespace}/")
             if name != topic and name not in _NO_SENSORS and not name.endswith("_raw"):
-                heard = list(self._bag.read(topic))
+                heard = list(self._bag.read(topic, self._bag.kinds[topic]))
                 found += [self._series(name, what, heard) for what in _MEASURED[self._bag.kinds[topic]] if heard]
         return found
 

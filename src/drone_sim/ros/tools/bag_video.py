@@ -13,7 +13,7 @@ from drone_sim.offline import video
 from drone_sim.offline.command_line import Parser, status_of
 from drone_sim.offline.hud import Flight
 from drone_sim.ros.tools import pictures
-from drone_sim.ros.tools.bag_flights import BagFlight
+from drone_sim.ros.tools.bag_flights import ODOMETRY, STATE, BagFlight
 from drone_sim.ros.tools.bags import Bag, Heard
 
 _NAME = "video"
@@ -52,10 +52,10 @@ class _Flown:
     def __init__(self, bag: Bag, vehicle: str):
         """Read it. Raises BagRefused."""
         self._flight = BagFlight(bag, vehicle)
-        states = bag.topics("std_msgs/String")
+        states = bag.topics(STATE)
         own = [name for name in states if name == f"/{vehicle}/state"]
         of_all = [name for name in states if name.endswith("/state") and name.count("/") == 2]
-        heard = [one for name in (own or of_all)[:1] for one in bag.read(name)]
+        heard = [one for name in (own or of_all)[:1] for one in bag.read(name, STATE)]
         self._times = np.array([one.at for one in heard])
         self._states = [str(one.message.data)[:40] for one in heard]
 
@@ -68,7 +68,7 @@ class _Flown:
 def _flight(bag: Bag, topic: str) -> _Flown | None:
     """Return the flight of the vehicle in whose namespace a topic is, if it was recorded."""
     vehicle = topic.split("/")[1]
-    return _Flown(bag, vehicle) if f"/{vehicle}/odom" in bag.topics("nav_msgs/Odometry") else None
+    return _Flown(bag, vehicle) if f"/{vehicle}/odom" in bag.topics(ODOMETRY) else None
 
 
 def _stamp(heard: Heard) -> float:
@@ -77,7 +77,7 @@ def _stamp(heard: Heard) -> float:
 
 def _rate(bag: Bag, topic: str) -> float:
     """Return how many pictures a second were recorded."""
-    steps = np.diff([_stamp(one) for one in itertools.islice(bag.read(topic), _SAMPLE)])
+    steps = np.diff([_stamp(one) for one in itertools.islice(bag.read(topic, bag.kinds[topic]), _SAMPLE)])
     steps = steps[steps > 0]
     rate = 1 / float(np.median(steps)) if len(steps) else _SLOWEST
     return round(min(max(rate, _SLOWEST), video.MAX_RATE), 2)
@@ -85,7 +85,7 @@ def _rate(bag: Bag, topic: str) -> float:
 
 def _timed(bag: Bag, topic: str, rate: float) -> Iterator[tuple[float, np.ndarray, int]]:
     """Yield each picture with its stamp (s), and for how many pictures of a steady rate it is to be seen."""
-    heard = bag.read(topic)
+    heard = bag.read(topic, bag.kinds[topic])
     this = next(heard, None)
     start, shown = _stamp(this) if this else 0.0, 0
     while this is not None:

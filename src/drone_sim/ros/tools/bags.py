@@ -7,7 +7,6 @@ import os
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-import genpy
 import rosbag
 import rosbag.bag
 
@@ -53,20 +52,17 @@ class Bag:
         """Return the names of the topics of these kinds of message."""
         return sorted(name for name, kind in self.kinds.items() if kind in kinds)
 
-    def read(self, topic: str) -> Iterator[Heard]:
+    def read(self, topic: str, kind: str) -> Iterator[Heard]:
         """Yield what was recorded of a topic, in the order of time; nothing for one that is not there.
 
-        Raises BagRefused.
+        What is of another kind of message on it than that (nav_msgs/Odometry, say) is left out. Raises BagRefused.
         """
         if self._counts.get(topic, 0) > MAX_MESSAGES:
             raise BagRefused(f"{self.path}: {self._counts[topic]} messages on {topic}; at most {MAX_MESSAGES} are read")
-        if topic not in self.kinds:
+        if self.kinds.get(topic) != kind:
             return
-        kind = self._installed(topic)
-        if kind is None:
-            return
-        sum_of_ours = kind._md5sum
-        rosbag.bag._message_types[sum_of_ours] = kind  # or rosbag would run code made from the bag's definition
+        sum_of_ours = message_class(kind)._md5sum
+        rosbag.bag._message_types[sum_of_ours] = message_class(kind)  # or rosbag would run code made from the bag's own
         messages = self._bag.read_messages(
             [topic], connection_filter=lambda _topic, _type, md5sum, *_: md5sum == sum_of_ours
         )
@@ -76,12 +72,6 @@ class Bag:
             if found is None:
                 return
             yield Heard(found[2].to_sec(), found[1])
-
-    def _installed(self, topic: str) -> type[genpy.Message] | None:
-        try:
-            return message_class(self.kinds[topic])
-        except ValueError:
-            return None
 
     def named(self, topic: str | None, among: list[str], what: str) -> str:
         """Return the topic that is meant, by default the first of these. Raises BagRefused."""

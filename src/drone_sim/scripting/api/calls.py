@@ -153,6 +153,8 @@ def numbers(values: Sequence[float], count: int) -> tuple[float, ...]:
     expected = f"{count} numbers are expected" if count != 1 else "a number is expected"
     try:
         found = tuple(map(float, values))
+    except OverflowError:  # a whole number beyond all floats
+        raise WrongValue("finite numbers are expected") from None
     except (TypeError, ValueError):
         raise WrongValue(expected) from None
     if len(found) != count:

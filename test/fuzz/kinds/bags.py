@@ -1,0 +1,128 @@
+"""Bags of flights, as rosbag writes them: with odd values, of other types and versions, cut off and damaged."""
+
+import functools
+import io
+import tempfile
+from pathlib import Path
+
+import genpy
+import rosbag
+import roslib.message
+import rospy
+from case import Case
+from hypothesis import strategies as st
+
+from kinds.values import ODD_NUMBERS, mutated, small
+
+_PICTURE = b"P6 2 2 255\n" + bytes(12)
+_KINDS = {
+    "/drone/odom": "nav_msgs/Odometry",
+    "/drone/cmd_vel": "geometry_msgs/Twist",
+    "/drone/command": "geometry_msgs/TwistStamped",
+    "/drone/propellers": "std_msgs/Float32MultiArray",
+    "/drone/state": "std_msgs/String",
+    "/drone_sim/state": "std_msgs/String",
+    "/drone/push": "geometry_msgs/WrenchStamped",
+    "/drone/set_pose": "geometry_msgs/PoseStamped",
+    "/drone/initialpose": "geometry_msgs/PoseWithCovarianceStamped",
+    "/drone/goto": "geometry_msgs/PoseStamped",
+    "/drone/set_wind": "geometry_msgs/Vector3Stamped",
+    "/drone/weather": "diagnostic_msgs/KeyValue",
+    "/drone/takeoff": "std_msgs/Empty",
+    "/drone/range": "sensor_msgs/Range",
+    "/drone/imu/data": "sensor_msgs/Imu",
+    "/drone/front": "sensor_msgs/Image",
+    "/drone/front/compressed": "sensor_msgs/CompressedImage",
+}
+_OTHERS = ("no_such/Message", "nav_msgs", "", "../os/system", "os/path", "x" * 300)
+_floats = st.one_of(small, st.sampled_from([float(one) for one in ODD_NUMBERS[:-1]]))
+_numbers = st.one_of(st.integers(0, 3), st.integers(0, 2**31 - 1), st.just(2**32 - 1))
+_times = st.one_of(st.integers(0, 40).map(lambda tenth: 1e8 * tenth), st.sampled_from([0.0, 1e17, 4.2e18]))  # ns
+
+
+@functools.cache
+def _made_up(name: str) -> type:
+    """Return a class of that name that has other fields."""
+    return genpy.dynamic.generate_dynamic(name, "string data\n")[name]
+
+
+def _set(message: genpy.Message, path: str, value: object) -> None:
+    """Set a field, as far as there is one that takes such a value."""
+    *parents, name = path.split(".")
+    for parent in parents:
+        message = getattr(message, parent, None)
+    if name in getattr(message, "__slots__", ()):
+        setattr(message, name, value)
+
+
+def _defaults(message: genpy.Message, at: float) -> None:
+    for path, value in {
+        "header.stamp": rospy.Time.from_sec(min(at * 1e-9, 4e9)),
+        "pose.pose.orientation.w": 1.0,
+        "pose.orientation.w": 1.0,
+        "linear.x": 1.0,
+        "format": "ppm",
+    }.items():
+        _set(message, path, value)
+    if getattr(message, "_type", "") == "sensor_msgs/CompressedImage":
+        message.data = _PICTURE
+
+
+_FIELDS = {
+    **dict.fromkeys(("pose.pose.position.x", "pose.position.z", "linear.x", "twist.linear.y", "range"), _floats),
+    **dict.fromkeys(("pose.pose.orientation.w", "pose.orientation.x", "twist.twist.angular.z"), _floats),
+    **dict.fromkeys(("wrench.force.x", "vector.x", "linear_acceleration.x"), _floats),
+    **dict.fromkeys(("height", "width", "step"), _numbers),
+    "header.frame_id": st.sampled_from(["", "world", "base_link", "a\nb"]),
+    "encoding": st.sampled_from(["bgr8", "mono8", "32FC1", "16UC1", "", "bgr8; jpeg", "8UC200", "no\nsuch"]),
+    "format": st.sampled_from(["jpeg", "png", "16UC1; compressedDepth png", "a\nb"]),
+    "key": st.sampled_from(["wind", "wind/0", "/", "a" * 5000]),
+    "value": st.sampled_from(["[1, 0, 0]", ".nan", "[" * 1000, "x: &a [*a]"]),
+}
+_CHANGE = st.sampled_from(sorted(_FIELDS)).flatmap(lambda path: st.tuples(st.just(path), _FIELDS[path]))
+_WRITTEN = st.tuples(
+    st.one_of(st.just("/drone/odom"), st.sampled_from(sorted(_KINDS))),
+    st.one_of(*[st.none()] * 15, st.sampled_from(sorted({*_KINDS.values(), *_OTHERS}))),  # another type
+    st.sampled_from([False] * 15 + [True]),  # of that name, with other fields
+    _times,
+    st.lists(_CHANGE, max_size=2),
+)
+
+
+def _bag(written: list, compression: str) -> bytes:
+    """Return the bytes of a bag."""
+    file = tempfile.NamedTemporaryFile(suffix=".bag")
+    with file, rosbag.Bag(file.name, "w", compression=compression, chunk_threshold=2000) as bag:
+        for topic, other, made_up, at, changes in written:
+            kind = other if other is not None else _KINDS[topic]
+            known = None if kind in _OTHERS or made_up else roslib.message.get_message_class(kind)
+            message = (known or _made_up("nav_msgs/Odometry"))()
+            _defaults(message, at)
+            for path, value in changes:
+                _set(message, path, value)
+            buffer = io.BytesIO()
+            message.serialize(buffer)
+            name = kind if known is None else message._type
+            raw = (name, buffer.getvalue(), message._md5sum, None, type(message))
+            bag.write(topic, raw, rospy.Time.from_sec(min(at * 1e-9, 4e9)), raw=True)
+        bag.close()
+        return Path(file.name).read_bytes()
+
+
+@st.composite
+def _lengths(draw: st.DrawFn, content: bytes) -> bytes:
+    """Return a bag where one of the lengths, or whatever else lies there, is huge."""
+    at = draw(st.integers(13, max(len(content) - 4, 13)))
+    return (
+        content[:at] + draw(st.sampled_from([b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", bytes(4)])) + content[at + 4 :]
+    )
+
+
+_BAG = st.builds(
+    _bag, st.lists(_WRITTEN, max_size=12), st.sampled_from([rosbag.Compression.NONE, rosbag.Compression.BZ2, "lz4"])
+)
+CASES = st.builds(
+    lambda content, program: Case("bags", {"flight.bag": content}, program),
+    st.one_of(_BAG, _BAG.flatmap(mutated), _BAG.flatmap(_lengths)),
+    st.sampled_from(["bag_commands", "plot_flight", "bag_video"]),
+)
