@@ -63,6 +63,7 @@ class Fleet(unittest.TestCase):
             for message in list(listener.messages):
                 for one in message.transforms:
                     parents.setdefault(one.child_frame_id, set()).add(one.header.frame_id)
+                    self.assertLess(one.header.stamp.to_sec(), 1e6, "simulated time, on /tf_static, too")
             listener.close()
         self.assertTrue(all(len(above) == 1 for above in parents.values()), "no frame has two parents")
         self.assertEqual(parents["drone_sim/first"], {"drone1/Track_base"})
