@@ -4,6 +4,7 @@
 import sys
 import unittest
 
+import rosparam
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
@@ -32,8 +33,9 @@ class Fleet(unittest.TestCase):
         cls.odometry = {name: Listener(f"{name}/odom", Odometry) for name in THREE}
         cls.commands = {name: connected(rospy.Publisher(f"{name}/cmd_vel", Twist, queue_size=1)) for name in THREE}
 
-    def set_vehicles(self, vehicles):
-        rospy.set_param("/drone_sim/vehicles", vehicles)
+    def set_vehicles(self, vehicles=None):
+        if vehicles is not None:
+            rospy.set_param("/drone_sim/vehicles", vehicles)
         rospy.wait_for_service("/drone_sim/set_vehicles", 20)
         return rospy.ServiceProxy("/drone_sim/set_vehicles", Trigger)()
 
@@ -61,6 +63,7 @@ class Fleet(unittest.TestCase):
             for message in list(listener.messages):
                 for one in message.transforms:
                     parents.setdefault(one.child_frame_id, set()).add(one.header.frame_id)
+                    self.assertLess(one.header.stamp.to_sec(), 1e6, "simulated time, on /tf_static, too")
             listener.close()
         self.assertTrue(all(len(above) == 1 for above in parents.values()), "no frame has two parents")
         self.assertEqual(parents["drone_sim/first"], {"drone1/Track_base"})
@@ -81,7 +84,9 @@ class Fleet(unittest.TestCase):
         bodies.close()
 
     def test_they_come_and_go_in_flight(self):
-        answer = self.set_vehicles({**{name: {} for name in THREE}, **GUEST})
+        # rosparam leaves out empty entries, and lays the others over what is there.
+        rosparam.set_param_raw("/drone_sim/vehicles", {**{name: {} for name in THREE}, **GUEST})
+        answer = self.set_vehicles()
         self.assertTrue(answer.success, answer.message)
         self.assertEqual(answer.message, "drone4 came")
         guest, front = Listener("/drone4/odom", Odometry), Listener("/drone4/front", Image)
@@ -90,12 +95,13 @@ class Fleet(unittest.TestCase):
         guest.close()
         front.close()
         connected(rospy.Publisher("/drone4/cmd_vel", Twist, queue_size=1)).unregister()
-        answer = self.set_vehicles(3)
-        self.assertEqual(answer.message, "drone4 went")
+        rospy.delete_param("/drone_sim/vehicles/drone4")
+        self.assertEqual(self.set_vehicles().message, "drone4 went")
         self.assertEqual([name for name, _ in rospy.get_published_topics("/drone4")], [])
         self.assertIn("position", self.set_vehicles({"drone1": {"position": [0]}}).message)
         for name in THREE:
             self.odometry[name].wait_for()  # they fly on
+        self.assertEqual(self.set_vehicles(3).message, "all are as they were")
 
 
 if __name__ == "__main__":

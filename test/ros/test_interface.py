@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """docs/interface.md says what the node has; /diagnostics says why a drone does not fly; the doctor repeats it."""
 
+import fnmatch
 import itertools
 import re
 import sys
@@ -18,6 +19,7 @@ from geometry_msgs.msg import PoseStamped, Twist
 from listening import Listener, connected
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import Marker
 
 from drone_sim.files.resources import package_path
 from drone_sim.ros.doctor.doctor import examined
@@ -28,6 +30,17 @@ from drone_sim.run import parameters
 
 PAGE = (package_path() / "docs/interface.md").read_text(encoding="utf-8")
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "depth", "track", "floor")}
+BOX = {"name": "Box", "shape": "box", "size": [0.3, 0.3, 0.3], "position": [2, 0, 0.15], "mass": 1.0}
+DRAWS = """
+fly = sysCall_init
+
+
+def sysCall_init():
+    fly()
+    sim.addDrawingObjectItem(sim.addDrawingObject(sim.drawing_points, 5, 0, -1, 1, [1, 0, 0]), [0, 0, 1])
+"""
+STILL = {"contacts", "markers/update", "objects/update"}  # nothing is touched or dragged
+SUB_STEP = 5_000_000  # ns
 BROKEN = "def sysCall_actuation():\n    1 / 0\n"
 OF_ROSPY = {"/clock"}  # what this process hears since it is a node that goes by the clock
 
@@ -52,7 +65,7 @@ class Interface(unittest.TestCase):
         cls.looks, cls.ready = 0, threading.Event()
         cls.folder = tempfile.TemporaryDirectory()
         cls.script = Path(cls.folder.name) / "script.py"
-        cls.script.write_text((package_path() / "src/drone_sim/child_scripts/tutorial.py").read_text())
+        cls.script.write_text((package_path() / "src/drone_sim/child_scripts/tutorial.py").read_text() + DRAWS)
         cls.thread = threading.Thread(target=cls.run_node)
         cls.thread.start()
         cls.ready.wait(20)
@@ -76,6 +89,7 @@ class Interface(unittest.TestCase):
         settings = {
             "config": str(package_path() / "config/sensors.yaml"),
             **{"cameras": SMALL, "real_time_factor": 4.0, "script": str(cls.script)},
+            "scene": {"objects": [BOX]},
         }
         cls.node = Node(parameters.load(settings))
         look = cls.node._diagnostics._look
@@ -107,6 +121,11 @@ class Interface(unittest.TestCase):
         self.assertEqual(said, {name for name in rospy.get_param_names() if name.startswith("/drone/")})
         self.assertEqual(self.looks, 0, "nobody has listened to /diagnostics")
 
+    def test_3_a_look_before_any_command_says_that_none_has_come(self):
+        listener = Listener("/diagnostics", DiagnosticArray)
+        listener.wait_for(lambda m: any("no command has come yet" in one.message for one in m.status), after=0)
+        listener.close()
+
     def test_3_rates_and_frames_are_those_of_the_page(self):
         rows = [row for row in table("Topics") if row[1] == "→" and row[0] not in ("/rosout", "/clock")]
         listeners = {
@@ -114,34 +133,45 @@ class Interface(unittest.TestCase):
             for row in rows
             if not row[0].startswith("/")
         }
-        frames = {
+        trees = {
             name: Listener(name, roslib.message.get_message_class("tf2_msgs/TFMessage"))
             for name in ("/tf", "/tf_static")
         }
+        commands, command = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1)), Twist()
+        command.linear.x, command.angular.z = 0.2, 0.2  # which `view/command` shows
+        commands.publish(command)
         try:
             for topic, _, _, rate, frame, _ in rows:
                 if topic in listeners:
                     with self.subTest(topic):
-                        self.check(listeners[topic], rate, frame.strip("`"))
+                        self.check_rate(listeners[topic], rate)
+                        self.check_frames(listeners[topic], re.findall("`(.*?)`", frame), topic in STILL)
             for frame, parent, topic, _ in table("Frames"):
                 wanted = (frame, parent.strip("`"))
-                frames[topic.strip("`")].wait_for(lambda m, one=wanted: one in links(m), after=0)
-            true = {one for listener in frames.values() for message in listener.messages for one in links(message)}
+                trees[topic.strip("`")].wait_for(lambda m, one=wanted: one in links(m), after=0)
+            true = {one for listener in trees.values() for message in listener.messages for one in links(message)}
             self.assertEqual({(frame, parent.strip("`")) for frame, parent, *_ in table("Frames")}, true)
         finally:
-            for listener in (*listeners.values(), *frames.values()):
+            commands.publish(Twist())
+            commands.unregister()
+            for listener in (*listeners.values(), *trees.values()):
                 listener.close()
 
-    def check(self, listener, rate, frame):
-        """Check what comes at a rate that counts in simulated time, and the frame of whatever comes by itself."""
+    def check_frames(self, listener, said, still):
+        """Check that there are just the frames that are said, of which some may stand for many; or none, if `still`."""
+        for name in () if still else said:
+            listener.wait_for(lambda m, one=name: fnmatch.filter(frames([m]), one), after=0)
+        true = frames(listener.messages)
+        self.assertEqual({one for one in true if not any(fnmatch.fnmatch(one, name) for name in said)}, set())
+
+    def check_rate(self, listener, rate):
+        """Check what comes at a rate that counts in simulated time."""
         seconds = {"step": 0.05}.get(rate) or (1 / float(rate.split()[0]) if rate.endswith("Hz") else None)
         if seconds is None:
             return
         listener.wait_for(lambda _: len(listener.messages) > 2, after=0)
         headers = [m.header for m in listener.messages if hasattr(m, "header")]
-        frames = {header.frame_id for header in headers}
-        frames |= {one.header.frame_id for m in listener.messages for one in getattr(m, "markers", ())}
-        self.assertLessEqual(frames, {frame})
+        self.assertLessEqual({header.stamp.to_nsec() % SUB_STEP for header in headers}, {0})
         times = [header.stamp.to_sec() for header in headers]
         for before, after in itertools.pairwise(times):
             # A busy machine may drop a message; it cannot bring one between two.
@@ -164,7 +194,6 @@ class Interface(unittest.TestCase):
             status = next(filter(fits, array.status))
             return {pair.key: pair.value for pair in status.values}
 
-        told("vehicle drone", DiagnosticStatus.OK, "no command has come yet")
         self.assertEqual(told("simulation", None, "")["state"], "flying")
         commands = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1))
         command = Twist()
@@ -235,8 +264,19 @@ class Interface(unittest.TestCase):
 
 
 def links(message):
-    """Return frames and parents of a message."""
-    return {(one.child_frame_id, one.header.frame_id) for one in message.transforms}
+    """Return frames and parents of a message, as if the node had its usual name."""
+    own = rospy.get_name()[1:]
+    return {(one.child_frame_id.replace(own, "drone_sim"), one.header.frame_id) for one in message.transforms}
+
+
+def frames(messages):
+    """Return the frames of messages, and of what they hold, unless it is to be taken away."""
+    found = set()
+    for message in list(messages):
+        held = [*getattr(message, "markers", ()), *getattr(message, "poses", ())]
+        shown = [one for one in held if getattr(one, "action", Marker.ADD) == Marker.ADD]
+        found |= {one.header.frame_id for one in (message, *shown) if hasattr(one, "header")}
+    return found - {""}
 
 
 if __name__ == "__main__":

@@ -188,6 +188,18 @@ def test_where_nothing_can_be_measured_the_flight_ends_as_without_sensors(simula
         fly(simulation, 3)
 
 
+def test_the_stock_range_sensor_of_a_landed_drone_is_above_the_floor(simulate):
+    simulation = simulate({**ALL, "start": "landed"})
+    fly(simulation, 2)
+    sensor = simulation.drone.instruments.by_name["range"]
+    reading = sensor.latest.value
+    assert 0 < frames.position(sensor.fitting.pose())[2] < sensor.parameters.min_range
+    assert reading.distance == -math.inf  # nearer than it can measure, for REP-117
+    assert (reading.hit.what, reading.hit.distance) == ("Floor", pytest.approx(0, abs=2e-3))
+    assert reading.hit.normal == pytest.approx((0, 0, 1), abs=1e-9)
+    assert reading.normal == pytest.approx((0, 0, -1), abs=1e-9)
+
+
 # ---- scripts
 
 

@@ -1,5 +1,7 @@
 """Rays and contacts of the world."""
 
+import math
+
 import numpy as np
 import pybullet
 import pytest
@@ -38,6 +40,16 @@ def test_a_ray_meets_the_nearest_of_many_in_whatever_order_they_came(world):
     assert (hit.body, hit.distance) == (balls[2], pytest.approx(1.8, abs=1e-9))
     assert world.ray((0, 1, 0), (10, 1, 0)) is None
     assert world.ray((0, 0, 0), (0.7, 0, 0)) is None
+
+
+def test_a_ray_that_begins_in_something_is_met_at_once_by_a_surface_against_it(world):
+    ball = world.add_object(Sphere((1.0,)), Pose((0, 0, 0)))
+    start, end = (0.1, 0.2, 0.01), (0.3, 0.2, -4.0)
+    length = math.dist(start, end)
+    against = pytest.approx([(a - b) / length for a, b in zip(start, end)], abs=1e-12)
+    assert world.ray(start, end) == (ball, 0.0, against)
+    (met,) = world.rays([(start, end)], lambda *_: True)
+    assert (met.body, met.normal) == (ball, against)
 
 
 def test_a_ray_goes_through_the_body_that_is_ignored(world):

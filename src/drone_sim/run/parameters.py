@@ -115,6 +115,16 @@ class Parameters(PaceParameters, EquipmentParameters):
         return self._fleet[0]
 
     @property
+    def vehicle_entries(self) -> dict[str, dict[str, Any]]:
+        """The entries of `vehicles` that stand for what flies; none where the scene file has some."""
+        if "vehicles" in self._in_scene_file:
+            return {}
+        given = self._given.get("vehicles")
+        places = {one.name: {"position": list(one.position), "yaw": one.yaw} for one in self._fleet}
+        own = given if isinstance(given, Mapping) else {}
+        return {name: {**place, **own.get(name, {})} for name, place in places.items()}
+
+    @property
     def in_scene_file(self) -> Mapping[str, Any]:
         """What the scene file says beside the scene: `drone`, `vehicles`, `weather`, `time_step`, ..."""
         return self._in_scene_file

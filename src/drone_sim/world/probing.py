@@ -14,7 +14,10 @@ _NOTHING = -1  # as the body of a ray that meets none
 
 
 class RayHit(NamedTuple):
-    """What a ray met: the body, how far from its start (m), the unit normal of the surface."""
+    """What a ray met: the body, how far from its start (m), the unit normal of the surface.
+
+    Where the ray begins in the body, or 1 mm from it, the distance is 0, and the normal is against the ray.
+    """
 
     body: int
     distance: float
@@ -59,8 +62,16 @@ def ray(client: int, start: Vector, end: Vector, ignoring: int) -> RayHit | None
         if not others:
             return None
         hit = min(others, key=lambda one: one[2])  # PyBullet numbers them in no order
-    body, _, fraction, _, normal = hit
-    return RayHit(body, fraction * dist(start, end), normal)
+    return RayHit(hit[0], hit[2] * dist(start, end), _normal(start, end, hit))
+
+
+def _normal(start: Vector, end: Vector, hit: Any) -> Vector:
+    """Return the unit normal of what a ray met; of what it begins in Bullet knows none, and returns anything."""
+    if hit[2] > 0.0:
+        return hit[4]  # type: ignore[no-any-return] # PyBullet has no types
+    length = dist(start, end)
+    x, y, z = ((a - b) / length for a, b in zip(start, end))
+    return x, y, z
 
 
 def _all_hits(client: int, start: Vector, end: Vector) -> Iterator[Any]:
@@ -82,7 +93,7 @@ def rays(client: int, ends: Sequence[tuple[Vector, Vector]], counts: Callable[[i
             others = [one for one in _all_hits(client, start, stop) if counts(one[0], one[1])]
             hit = min(others, key=lambda one: one[2], default=(_NOTHING,))
         if hit[0] != _NOTHING:
-            found.append(Met(hit[0], hit[1], hit[3], hit[4]))
+            found.append(Met(hit[0], hit[1], hit[3], _normal(start, stop, hit)))
     return found
 
 

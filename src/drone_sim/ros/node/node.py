@@ -239,6 +239,7 @@ class Node:
         """Run the script's cleanup, remove what rviz read, and free the world. Raises ScriptError."""
         self._diagnostics.close()
         self._outside.close()
+        self._services.close()
         self._view.close()
         self.simulation.close()
 

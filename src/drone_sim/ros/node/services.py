@@ -11,6 +11,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, Trig
 from drone_sim.files.resources import locate, package_path
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.node.paths import from_shell
+from drone_sim.ros.node.vehicles_parameter import VehiclesParameter
 from drone_sim.run.parameters import ParameterError
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Snapshot
@@ -32,6 +33,8 @@ class Services:
         self._player = player
         self._inbox = inbox
         self._follow = follow
+        self._vehicles = VehiclesParameter()
+        self._vehicles.tell(player.simulation.parameters)
         self._snapshot: Snapshot | None = None
         jobs = ("start", "stop", "restart", "step", "save_scene", "load_scene", "set_vehicles", "snapshot", "restore")
         for name in jobs:
@@ -40,6 +43,10 @@ class Services:
 
     def _trigger(self, job: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
         return lambda _request: TriggerResponse(*self._answer(job))
+
+    def close(self) -> None:
+        """Leave the parameters as they were given."""
+        self._vehicles.close()
 
     def _on_pause(self, request: SetBoolRequest) -> SetBoolResponse:
         return SetBoolResponse(*self._answer(lambda: self._player.pause(request.data)))
@@ -57,7 +64,7 @@ class Services:
     def start(self) -> str:
         """Read scene and the script of `script` from disk, and begin at time 0."""
         self._take_script()
-        return self._player.start()
+        return self._begun(self._player.start())
 
     def stop(self) -> str:
         """Run cleanup, and restore the initial scene."""
@@ -66,7 +73,7 @@ class Services:
     def restart(self) -> str:
         """Stop, and start."""
         self._take_script()
-        return self._player.restart()
+        return self._begun(self._player.restart())
 
     def step(self) -> str:
         """Run one step while paused."""
@@ -86,7 +93,11 @@ class Services:
         """Start anew in the scene of `scene_file`."""
         file = _scene_parameter()
         self._take_script()
-        return f"{self._player.start(file)} in {file or 'the scene of the parameters'}"
+        return f"{self._begun(self._player.start(file))} in {file or 'the scene of the parameters'}"
+
+    def _begun(self, said: str) -> str:
+        self._vehicles.tell(self._player.simulation.parameters)  # the scene, read anew, may have other ones
+        return said
 
     def _take_script(self) -> None:
         """Let the script fly that the parameter `script` names now. Raises ScriptError where it is not there."""
@@ -96,7 +107,7 @@ class Services:
 
     def set_vehicles(self) -> str:
         """Let those fly that the parameter `vehicles` says; who was there and still is flies on."""
-        came, went = self._player.simulation.set_vehicles(rospy.get_param("~vehicles", {}))
+        came, went = self._player.simulation.set_vehicles(self._vehicles.read())
         self._follow()
         told = [f"{', '.join(names)} {verb}" for names, verb in ((came, "came"), (went, "went")) if names]
         return "; ".join(told) or "all are as they were"

@@ -16,7 +16,7 @@ import rospy
 
 from drone_sim.scripting.errors import ScriptError
 
-_MASTER_GONE = (ConnectionError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
+MASTER_GONE = (ConnectionError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
 _EXPECTED = (ScriptError, ValueError, RuntimeError, OSError, rospy.ROSException)  # their messages are for the user
 _PATIENCE = 5.0  # s, for a master's answer
 
@@ -72,7 +72,7 @@ def reported(name: str, action: Callable[[], Any]) -> int:
     try:
         action()
         return 0
-    except _MASTER_GONE as error:
+    except MASTER_GONE as error:
         said = f"the ROS master at {rosgraph.get_master_uri()} has gone, or refuses: {error}"
     except _EXPECTED as error:
         said = str(error)
