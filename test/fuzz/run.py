@@ -31,6 +31,7 @@ from pool import Trier
 KINDS = (
     "messages",
     "requests",
+    "browsers",
     "parameters",
     "scenes",
     "meshes",
