@@ -59,6 +59,7 @@ def open_page(cockpit, browser, init="", scene_first=False, **options):
     page.set_default_timeout(WAIT)
     page.troubles = []
     page.on("pageerror", lambda error: page.troubles.append(str(error)))
+    page.on("console", lambda message: message.type == "error" and page.troubles.append(message.text))
     held = []
     if scene_first:
         page.route("**/cockpit.js", lambda route: held.append(route))

@@ -30,6 +30,7 @@ _SAFE = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "SAMEORIGIN",
     "Cache-Control": "no-store",
+    "Connection": "close",  # after every answer; a browser would send the next request into it
 }
 # What our page, and viser's in its frame, may load and do: what comes from here, and nothing else.
 _POLICY = (
