@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Mapping
@@ -29,6 +30,7 @@ from drone_sim.ros.cockpit.server.wire import Wire
 from drone_sim.ros.cockpit.serving import Serving
 from drone_sim.ros.cockpit.settings import Settings
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
+from drone_sim.ros.node.master_watch import MasterWatch
 
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
@@ -71,6 +73,8 @@ class Cockpit:
 
     def run(self) -> None:
         """Show what is new, again and again."""
+        logging.getLogger("rosout").addFilter(_is_not_repeated)
+        MasterWatch(meanwhile="the page waits for one").start()
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._look(began)
@@ -132,11 +136,18 @@ class Cockpit:
         try:
             self._found = find(rospy.get_published_topics())
             scene = str(self._simulator.parameter("scene_file", ""))
+            none = "no simulation"
         except FAILURES:  # another master may come
             self._found, scene = Found(), ""
+            none = "no ROS master"
         if not self._found.namespace:
-            self._panel.show_state("no simulation")
+            self._panel.show_state(none)
         self._panel.offer(self._found, scene)
+
+
+def _is_not_repeated(record: logging.LogRecord) -> bool:
+    """Leave out what rospy says of each single topic when there is no master: `MasterWatch` says it once."""
+    return "registrations are now out of sync" not in str(record.msg)
 
 
 def _sky() -> np.ndarray:
