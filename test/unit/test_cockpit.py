@@ -433,6 +433,13 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
         shown._ask_master()
         assert shown._found == Found()
         assert shown._panel._state.value == "no simulation"
+        assert shown._panel._said.value == "no ROS master answers: waiting for one"
+    monkeypatch.setattr(
+        rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
+    )
+    monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
+    shown._ask_master()
+    assert shown._found.namespace == "/drone" and shown._panel._said.value == "the ROS master is there again"
     shown._server.stop()
 
 

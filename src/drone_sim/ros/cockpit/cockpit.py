@@ -47,7 +47,7 @@ class Cockpit:
         self._found = Found()
         self._view: SceneView | None = None
         self._hearing: Hearing | None = None
-        self._asked = 0.0
+        self._asked, self._has_master = 0.0, True
         self._commanding = Commanding()
         self._sight, self._choice = Sight(), Choice()
         flying = Flying(self._commanding.send)
@@ -136,13 +136,18 @@ class Cockpit:
         try:
             self._found = find(rospy.get_published_topics())
             scene = str(self._simulator.parameter("scene_file", ""))
-            none = "no simulation"
+            self._tell_of_master(True)
         except FAILURES:  # another master may come
             self._found, scene = Found(), ""
-            none = "no ROS master"
+            self._tell_of_master(False)
         if not self._found.namespace:
-            self._panel.show_state(none)
+            self._panel.show_state("no simulation")
         self._panel.offer(self._found, scene)
+
+    def _tell_of_master(self, answers: bool) -> None:
+        if answers != self._has_master:
+            self._has_master = answers
+            self._panel.say("the ROS master is there again" if answers else "no ROS master answers: waiting for one")
 
 
 def _is_not_repeated(record: logging.LogRecord) -> bool:
