@@ -92,14 +92,14 @@ def _launched() -> Iterator[tuple[str, float]]:
 
 def _opened(page: Any, address: str) -> float:
     """Open the page; return after how many s the first picture of the scene with the drone in it was drawn."""
-    from cockpit_page import ready
+    from cockpit_page import ready, wait_for
 
     began = time.monotonic()
     page.goto(address)
     ready(page)
-    _scene(page).wait_for_function("window.seen.moves > 0")
+    wait_for(_scene(page), "window.seen.moves > 0")
     drawn = _scene(page).evaluate("window.seen.drawn")
-    _scene(page).wait_for_function("before => window.seen.drawn > before", arg=drawn)
+    wait_for(_scene(page), "before => window.seen.drawn > before", drawn)
     return time.monotonic() - began
 
 

@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import Error, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test" / "web"))
-from cockpit_page import ready
+from cockpit_page import ready, wait_for
 from launched import launched
 
 SIZE = {"width": 960, "height": 560}  # px of the page
@@ -121,7 +121,7 @@ def open_script(film):
     """Have the script in the editor, and nothing before it or the scene, when the film begins."""
     page = film.page
     page.select_option("#script", SCRIPT)
-    page.wait_for_function("text => document.querySelector('.cm-content').innerText.includes(text)", arg=OLD)
+    wait_for(page, "text => document.querySelector('.cm-content').innerText.includes(text)", OLD)
     page.wait_for_timeout(2000)
     if page.locator("#lesson-body").is_visible():
         page.locator("#fold").click()
@@ -157,7 +157,7 @@ def edit(film):
 def run(film):
     """Fly the script."""
     film.click(film.page.locator("#run"))
-    film.page.wait_for_function("document.querySelector('#said').textContent.includes('started')")
+    wait_for(film.page, "document.querySelector('#said').textContent.includes('started')")
     film.take(35, fly=True)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test" / "web"))
+from cockpit_page import wait_for
 from launched import launched
 
 SIZE = {"width": 1280, "height": 760}  # px
@@ -22,9 +23,9 @@ def main(picture: str) -> None:
         page = browser.new_page(viewport=SIZE)
         page.set_default_timeout(PATIENCE)
         page.goto(cockpit.address)
-        page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
+        wait_for(page, "document.querySelector('.cm-content')?.innerText.length > 100")
         page.select_option("#script", "tutorial/2_elevation.py")
-        page.wait_for_function("document.querySelector('#lesson-text').innerText.includes('Two wishes')")
+        wait_for(page, "document.querySelector('#lesson-text').innerText.includes('Two wishes')")
         inner = page.frame_locator("#scene")
         inner.locator("[class*=Notification-closeButton]").click()
         inner.get_by_role("tab", name="Cameras").click()

@@ -33,6 +33,7 @@ KINDS = (
     "requests",
     "connections",
     "bags",
+    "browsers",
     "parameters",
     "scenes",
     "meshes",

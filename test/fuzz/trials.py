@@ -330,6 +330,24 @@ def _send_all(server: Server, pieces: list[bytes]) -> None:
     raise Fault("a peer that has said all is not let go")
 
 
+# ---- browsers
+
+
+def _browsers(case: Case, folder: Path) -> str:
+    """Let browsers say what they say to the cockpit; each question gets one line, and no socket is lost."""
+    import browsing
+
+    global _COCKPIT
+    _COCKPIT = _COCKPIT or browsing.Cockpit()
+    try:
+        return next((one_line(one, folder) for one in list(_COCKPIT.hear(case.data, folder)) if one), "")
+    except browsing.Wrong as wrong:
+        raise Fault(str(wrong)) from None
+
+
+_COCKPIT: Any = None
+
+
 class _Log(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
@@ -351,4 +369,5 @@ _TRIALS: dict[str, Callable[[Case, Path], Any]] = {
     "requests": _requests,
     "connections": _connections,
     "bags": _bags,
+    "browsers": _browsers,
 }

@@ -212,6 +212,26 @@ class Process(unittest.TestCase):
         watchdog.cancel()
         self.assertEqual(node.returncode, 0)
 
+    def test_the_cockpit_waits_for_a_new_master_and_is_found_by_it(self):
+        with socket.socket() as probe:
+            probe.bind(("localhost", 0))
+            port = str(probe.getsockname()[1])
+        surroundings = {"ROS_MASTER_URI": f"http://localhost:{port}"}
+        with master(port):
+            node = started("rosrun", "drone_sim", "cockpit", "_port:=0", **surroundings)
+            watchdog = threading.Timer(4 * HANGS, node.kill)
+            watchdog.start()
+            self.assertIn("the cockpit is at", self.said_until(node, "the cockpit listens at"))
+        gone = self.said_until(node, "the ROS master is gone")
+        with master(port):
+            said = gone + self.said_until(node, "registered again")
+            node.send_signal(signal.SIGINT)
+            said += node.communicate(timeout=HANGS)[0]
+        watchdog.cancel()
+        self.assertEqual(node.returncode, 0)
+        self.assertNotIn("Traceback", said)
+        self.assertNotIn("out of sync", said)
+
     def test_an_argument_that_the_launch_file_does_not_have_ends_it_with_one_line(self):
         command = ["roslaunch", "drone_sim", "drone.launch", "rviz:=false", "scrpt:=mine.py"]
         launched = subprocess.run(command, capture_output=True, text=True, timeout=2 * HANGS, check=False)

@@ -15,6 +15,9 @@ from typing import Any
 
 from playwright.sync_api import sync_playwright
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "web"))
+from cockpit_page import wait_for
+
 SIZE = {"width": 640, "height": 400}  # px
 PATIENCE = 90_000  # ms; others may use the processor
 BETWEEN = (30.0, 120.0)  # s
@@ -29,7 +32,7 @@ def visit(driver: Any, chromium: str, address: str, dice: random.Random) -> floa
         page.set_default_timeout(PATIENCE)
         began = time.monotonic()
         page.goto(address)
-        page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
+        wait_for(page, "document.querySelector('.cm-content')?.innerText.length > 100")
         page.frame_locator("#scene").locator("canvas").first.wait_for()
         waited = time.monotonic() - began
         page.locator("#command").click(force=True)

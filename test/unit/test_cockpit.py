@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import socket
 import threading
 from pathlib import Path
 
@@ -93,6 +94,66 @@ def test_the_token_lets_in_and_leaves_the_address(served):
     assert served.get("/__init__.py", Cookie=served.cookie)[0] == 404
 
 
+@pytest.mark.parametrize("path", ["/", "/cockpit.js", "/scene/", "/scene/nothing", "/nothing", "/?token=wrong"])
+def test_every_answer_says_what_a_browser_may_do_with_it(served, path):
+    cookie = {} if "wrong" in path else {"Cookie": served.cookie}
+    _, answer, _ = served.get(path, **cookie)
+    assert answer.headers.get_all("X-Frame-Options") == ["SAMEORIGIN"]
+    assert answer.headers["Referrer-Policy"] == "no-referrer" and answer.headers["Cache-Control"] == "no-store"
+    assert answer.headers["X-Content-Type-Options"] == "nosniff"
+    policy = dict(one.strip().partition(" ")[::2] for one in answer.headers["Content-Security-Policy"].split(";"))
+    assert policy["default-src"] == policy["base-uri"] == policy["form-action"] == "'none'"
+    assert policy["frame-ancestors"] == "'self'"
+    here = ("'self'", "data:", "blob:", f"ws://{served.host}", f"wss://{served.host}")
+    assert set(policy.get("connect-src", "").split()) <= set(here)
+    assert "unsafe" not in policy.get("script-src", "") or path.startswith("/scene/")
+
+
+def raw(served, *lines):
+    """Return the status and the text that such lines get for an answer."""
+    with socket.create_connection(("127.0.0.1", served.server.get_port()), timeout=5) as one:
+        one.sendall(b"\r\n".join((*lines, b"", b"")))
+        said = b"".join(iter(lambda: one.recv(4096), b""))
+    head, _, body = said.partition(b"\r\n\r\n")
+    return int(head.split()[1]), body.decode()
+
+
+@pytest.mark.parametrize(
+    "path, headers, status, words",
+    [
+        ("/", ["Host: a", "Cookie: a=b", "Cookie: c=d"], 400, "Cookie: must not be given twice"),
+        ("/", ["Host: a", "Host: b"], 400, "Host: must not be given twice"),
+        ("/", ["Host: a", "Origin: a", "Origin: b"], 400, "Origin: must not be given twice"),
+        ("/", ["Host: a", "Upgrade: websocket", "Upgrade: websocket"], 400, "Upgrade: must not be given twice"),
+        ("/scene/", ["Host: a", "Accept-Encoding: gzip", "Accept-Encoding: br"], 400, "Accept-Encoding: must not be"),
+        ("/", ["Host: a; script-src *"], 400, "Host: must be a name or an address"),
+        ("/?token=\xff\xe9", ["Host: a"], 403, "?token="),
+        ("/?token=%ff%ed%a0%80", ["Host: a"], 403, "?token="),
+        ("/", ["Host: a", "Cookie: drone_sim_a=\xe9\xff"], 403, "?token="),
+        ("/", ["Host: a", 'Cookie: "; =[; drone_sim_a'], 403, "?token="),
+        ("//[", ["Host: a"], 403, "?token="),
+        ("http://[/?token=x", ["Host: a"], 403, "?token="),
+        ("/wire", ["Host: a", "Upgrade: websocket", "Origin: http://["], 403, "?token="),
+        ("/", [], 403, "?token="),
+    ],
+)
+def test_odd_headers_get_an_answer_and_leave_no_traceback(served, caplog, path, headers, status, words):
+    lines = [f"GET {path} HTTP/1.1", *headers, "Connection: close"]
+    answer, body = raw(served, *(one.encode("latin-1") for one in lines))
+    assert answer == status and words in body and "\n" not in body
+    assert not caplog.records
+
+
+@pytest.mark.parametrize(
+    "junk", [b"\x01\x00\x02\x00x", b"POST / HTTP/1.1", b"GET / HTTP/1.1\r\nno header", b"\x16\x03\x01"]
+)
+def test_what_is_no_browser_is_hung_up_on(served, caplog, junk):
+    with socket.create_connection(("127.0.0.1", served.server.get_port()), timeout=5) as one:
+        one.sendall(junk + b"\r\n\r\n")
+        said = b"".join(iter(lambda: one.recv(4096), b""))
+    assert b"Traceback" not in said and b"200 OK" not in said and not caplog.records
+
+
 def test_the_page_that_is_served_is_the_one_in_the_source():
     source = Path(__file__).parents[2] / "web" / "src"
     for name in ("index.html", "cockpit.css", "script.css"):  # the script is built of it: web/package.json
@@ -129,6 +190,16 @@ def test_a_browser_that_vanishes_leaves_a_stopped_drone(served):
         ('{"hold": {"vx": "fast"}}', "hold/vx: must be a number"),
         ('{"hold": {"vx": 1e9}}', "hold/vx: must be a number"),
         ('{"hold": {"ax": 1}}', "must be a mapping of vx, vy, vz, wz"),
+        ('{"hold": {"vx": NaN}}', "NaN: is no number"),
+        ('{"hold": [{}]}', "must be a mapping of vx, vy, vz, wz"),
+        ('{"ask": {}}', "must be one of double, or hold"),
+        ('{"ask": ["double"]}', "must be one of double, or hold"),
+        ('{"ask": null}', "must be one of double, or hold"),
+        ('{"shown": {}}', "must be one of double, or hold"),
+        ('{"id": 1e999, "ask": "double"}', "1e999: is no number"),
+        ('{"id": {}, "ask": "double"}', "id: must be a whole number"),
+        ('{"id": ' + "1" * 5000 + "}", "integer"),
+        (b"\xff\xfe", "Expecting value"),
         ("[" * 100_000, ""),
     ],
 )
@@ -362,6 +433,13 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
         shown._ask_master()
         assert shown._found == Found()
         assert shown._panel._state.value == "no simulation"
+        assert shown._panel._said.value == "no ROS master answers: waiting for one"
+    monkeypatch.setattr(
+        rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
+    )
+    monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
+    shown._ask_master()
+    assert shown._found.namespace == "/drone" and shown._panel._said.value == "the ROS master is there again"
     shown._server.stop()
 
 

@@ -10,6 +10,7 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 from cockpit_asked import LESSONS, Asked
 
+from drone_sim.files import writing
 from drone_sim.grading import tasks
 from drone_sim.ros.cockpit.scripts.lessons import Lessons
 from drone_sim.ros.cockpit.scripts.script_files import LARGEST, ShelfError
@@ -167,6 +168,92 @@ def test_what_cannot_be_written_is_told(shelf, own, monkeypatch):
     assert (own / "x.py").read_text() == "kept" and len(list(own.iterdir())) == 1
     with pytest.raises(ShelfError, match=r"File exists|Not a directory"):
         Shelf(own / "x.py", {}).save_as("y.py", "text")
+
+
+# ---- what is in the way
+
+
+def _link(place, outside):
+    place.symlink_to(outside)
+
+
+def _fifo(place, _outside):
+    os.mkfifo(place)
+
+
+def _folder(place, _outside):
+    place.mkdir()
+
+
+@pytest.mark.parametrize("put", [_link, _fifo, _folder])
+def test_whatever_has_the_name_nothing_is_written_through_it(shelf, own, tmp_path, put):
+    own.mkdir()
+    outside = tmp_path / "outside.py"
+    put(own / "pilot.py", outside)  # the link dangles
+    copy, version = shelf.save(shelf.find("built-in/pilot.py"), "text", "")
+    assert copy.name == "mine/pilot_2.py" and (own / "pilot_2.py").read_text() == "text"
+    put(own / "pilot_2_2.py", outside)
+    assert shelf.keep_both(copy.name, "mine", True)[2] == "mine/pilot_2_3.py"
+    put(own / "pilot_2_4.py", outside)
+    assert shelf.keep_both(copy.name, "other", False)[2] == "mine/pilot_2_5.py"
+    for name in ("mine/pilot.py", "mine/pilot_2_2.py"):
+        with pytest.raises(ShelfError, match=rf"{name}: ") as error:
+            shelf.keep_both(name, "text", put is not _link)
+        assert "\n" not in str(error.value)
+    with pytest.raises(ShelfError, match="is there already"):
+        shelf.save_as("pilot.py", "text")
+    assert not outside.exists() and version
+
+
+@pytest.mark.parametrize("put", [_link, _fifo, _folder])
+@pytest.mark.parametrize("how", ["save", "save as", "copy", "keep mine", "keep theirs"])
+def test_what_comes_between_look_and_write_leads_nowhere(shelf, own, tmp_path, monkeypatch, how, put):
+    """As when an archive is unpacked meanwhile: the last look is over, and the name is taken then."""
+    book, version = shelf.save_as("x.py", "first")
+    outside = tmp_path / "outside.py"
+    outside.write_text("theirs", encoding="utf-8")
+    acts = {
+        "save": ("x.py", lambda: shelf.save(book, "text", version)),
+        "save as": ("y.py", lambda: shelf.save_as("y.py", "text")),
+        "copy": ("pilot.py", lambda: shelf.save(shelf.find("built-in/pilot.py"), "text", "")),
+        "keep mine": ("x_2.py", lambda: shelf.keep_both("mine/x.py", "text", True)),
+        "keep theirs": ("x_2.py", lambda: shelf.keep_both("mine/x.py", "text", False)),
+    }
+    name, act = acts[how]
+
+    def before(function):
+        def meanwhile(*given, **options):
+            if not (own / name).is_symlink() and (not (own / name).exists() or name == "x.py"):
+                (own / name).unlink(missing_ok=True)
+                put(own / name, outside)
+            return function(*given, **options)
+
+        return meanwhile
+
+    for function in ("write", "write_new"):
+        monkeypatch.setattr(writing, function, before(getattr(writing, function)))
+    try:
+        act()
+    except ShelfError as error:
+        assert "\n" not in str(error) and f"mine/{name}" in str(error)
+    assert outside.read_text() == "theirs"
+    assert not [one for one in own.iterdir() if one.name.startswith(".")], "no temporary file is left"
+
+
+def test_a_link_to_another_script_of_the_folder_stays_one(shelf, own):
+    book, _ = shelf.save_as("real.py", "first")
+    (own / "again.py").symlink_to("real.py")
+    again = shelf.find("mine/again.py")
+    assert shelf.save(again, "second", shelf.version(again.name))
+    assert (own / "again.py").is_symlink() and book.path.read_text() == "second"
+
+
+def test_a_folder_that_is_a_link_is_the_users_choice(tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    shelf = Shelf(tmp_path / "link", {})
+    book, version = shelf.save_as("x.py", "a")
+    assert shelf.save(book, "b", version) and (tmp_path / "real" / "x.py").read_text() == "b"
 
 
 # ---- texts beside them

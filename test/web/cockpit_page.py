@@ -41,6 +41,11 @@ def wait_until(page, condition, seconds=30):
         page.wait_for_timeout(50)
 
 
+def wait_for(page, expression, *argument):
+    """Wait until an expression is true in a page. Playwright's `wait_for_function` is one that our pages forbid."""
+    wait_until(page, lambda: page.evaluate(expression, *argument))
+
+
 @contextlib.contextmanager
 def open_page(cockpit, browser, init="", scene_first=False, **options):
     """Give the page in a browser of its own, with the flown script in the editor.
@@ -54,6 +59,7 @@ def open_page(cockpit, browser, init="", scene_first=False, **options):
     page.set_default_timeout(WAIT)
     page.troubles = []
     page.on("pageerror", lambda error: page.troubles.append(str(error)))
+    page.on("console", lambda message: message.type == "error" and page.troubles.append(message.text))
     held = []
     if scene_first:
         page.route("**/cockpit.js", lambda route: held.append(route))
@@ -109,7 +115,7 @@ class Panel:
 
 def ready(page):
     """Wait until the editor has its script, and the scene a canvas."""
-    page.wait_for_function("document.querySelector('.cm-content')?.innerText.length > 100")
+    wait_for(page, "document.querySelector('.cm-content')?.innerText.length > 100")
     page.frame_locator("#scene").locator("canvas").first.wait_for()
 
 

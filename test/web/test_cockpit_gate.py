@@ -1,5 +1,7 @@
 """Who the cockpit lets in, asked by a real browser."""
 
+import shutil
+import stat
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import urlsplit
@@ -7,6 +9,8 @@ from urllib.parse import urlsplit
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_page import wait_until
 
 SOCKET = """([path, protocol]) => new Promise(said => {
     const socket = new WebSocket(`ws://${path}`, protocol);
@@ -54,3 +58,78 @@ def test_a_page_of_another_origin_opens_no_socket_though_the_browser_has_the_coo
         for path, protocol in ((f"{host}/wire", "drone_sim"), (f"{host}/scene/", "viser-v1.1.0")):
             assert page.evaluate(SOCKET, [path, protocol]) == outcome, (address, path)
     context.close()
+
+
+def test_the_token_is_in_no_log_but_in_a_file_of_its_user(cockpit):
+    """roslaunch's log and the nodes' lie in ~/.ros, where everybody may read them; rosout has what all nodes say."""
+    token, home = cockpit.address.partition("?token=")[2], cockpit.scripts.parent
+    logs = [file for file in (home / ".ros" / "log").rglob("*") if file.is_file()]
+    assert any("the cockpit listens at" in file.read_text() for file in logs)
+    assert [file for file in logs if token in file.read_text()] == []
+    (kept,) = (home / ".ros" / "drone_sim").glob("cockpit_*.txt")
+    assert kept.read_text() == f"{cockpit.address}\n" and stat.S_IMODE(kept.stat().st_mode) == 0o600
+
+
+@pytest.fixture(name="rebound")
+def _rebound(browser):
+    """A browser that takes this machine for evil.example, as after DNS rebinding."""
+    rules = "--host-resolver-rules=MAP evil.example 127.0.0.1"
+    other = browser.browser_type.launch(executable_path=shutil.which("chromium"), args=[rules])
+    yield other
+    other.close()
+
+
+def test_a_page_under_a_foreign_name_gets_nothing(cockpit, rebound):
+    port = urlsplit(cockpit.address).port
+    context = rebound.new_context()
+    page = context.new_page()
+    page.goto(cockpit.address)  # the browser has the cookie, for this machine's own name
+    foreign = f"http://evil.example:{port}"
+    for path in ("/", "/scene/", "/cockpit.js"):
+        answer = page.goto(foreign + path)
+        assert answer.status == 403 and "token" in page.inner_text("body")
+    host = f"evil.example:{port}"
+    for path, protocol in ((f"{host}/wire", "drone_sim"), (f"{host}/scene/", "viser-v1.1.0")):
+        assert page.evaluate(SOCKET, [path, protocol]) == "refused"
+    # From there to this machine's own name: the browser would send the cookie, were it of the same site.
+    for path, protocol in ((f"127.0.0.1:{port}/wire", "drone_sim"), (f"127.0.0.1:{port}/scene/", "viser-v1.1.0")):
+        assert page.evaluate(SOCKET, [path, protocol]) == "refused"
+    context.close()
+
+
+def test_nobody_elses_page_shows_the_cockpit_in_a_frame(cockpit, browser, stranger):
+    context = browser.new_context()
+    context.request.get(cockpit.address)
+    page = context.new_page()
+    refused = []
+    page.on("console", lambda message: refused.append(message.text))
+    page.goto(stranger)
+    for path in ("", "scene/"):
+        refused.clear()
+        here = cockpit.address.partition("?")[0] + path
+        page.evaluate('there => { document.body.innerHTML = `<iframe src="${there}"></iframe>` }', here)
+        wait_until(page, lambda: any("frame" in line and "ancestors" in line for line in refused))
+        assert not any(frame.url.startswith(here) for frame in page.frames)
+    context.close()
+
+
+def test_a_script_in_our_page_can_neither_load_nor_tell_what_is_not_from_here(cockpit, opened, stranger):
+    tell = "there => fetch(there, { mode: 'no-cors' }).then(() => 'told', () => 'refused')"
+    load = """there => new Promise(said => {
+        const script = document.createElement("script");
+        script.src = there;
+        script.onload = () => said("loaded");
+        script.onerror = () => said("refused");
+        document.head.append(script);
+    })"""
+    scene = next(frame for frame in opened.frames if "/scene/" in frame.url)
+    for where in (opened, scene):
+        assert where.evaluate(tell, stranger) == where.evaluate(load, stranger) == "refused"
+    assert (
+        opened.evaluate(
+            "new Promise(said => { const s = document.createElement('script'); "
+            "s.textContent = 'window.ran = 1'; document.head.append(s); said(window.ran) })"
+        )
+        is None
+    )
+    opened.troubles.clear()

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import wait_until
+from cockpit_page import wait_for, wait_until
 
 
 def test_a_key_that_is_held_flies_and_one_that_is_released_stops(cockpit, opened):
@@ -39,7 +39,7 @@ def test_what_is_written_into_the_editor_is_no_command(cockpit, opened):
 
 def test_a_script_is_edited_into_an_error_mended_and_flown(cockpit, opened):
     opened.select_option("#script", "tutorial/2_elevation.py")
-    opened.wait_for_function("document.querySelector('.cm-content').innerText.includes('Stage 2 of')")
+    wait_for(opened, "document.querySelector('.cm-content').innerText.includes('Stage 2 of')")
     opened.locator(".cm-content").click()
     opened.keyboard.press("Control+Home")
     opened.keyboard.type("1 / 0\n")
@@ -47,7 +47,7 @@ def test_a_script_is_edited_into_an_error_mended_and_flown(cockpit, opened):
     wait_until(opened, lambda: "2_elevation.py:1: ZeroDivisionError" in opened.inner_text("#said"))
     assert opened.locator(".cm-lintRange-error").inner_text() == "1 / 0"
     opened.click("#revert")
-    opened.wait_for_function("!document.querySelector('.cm-content').innerText.includes('1 / 0')")
+    wait_for(opened, "!document.querySelector('.cm-content').innerText.includes('1 / 0')")
     opened.click("#run")
     wait_until(opened, lambda: opened.inner_text("#said") == "started")
     assert opened.locator("#script").input_value() == "mine/2_elevation.py"

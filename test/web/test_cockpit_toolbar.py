@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import Drone, wait_until
+from cockpit_page import Drone, wait_for, wait_until
 from diagnostic_msgs.msg import KeyValue
 
 HOSTILE = '<img src=x onerror="window.top.hacked = true">'
@@ -136,9 +136,9 @@ def test_the_log_shows_a_warning_and_text_is_never_html(cockpit, panel):
     script.write_text(f"raise ValueError({HOSTILE!r})\n")
     page = panel.page
     page.reload()
-    page.wait_for_function("document.querySelectorAll('#script option').length > 3")
+    wait_for(page, "document.querySelectorAll('#script option').length > 3")
     page.select_option("#script", f"mine/{script.name}")
-    page.wait_for_function("document.querySelector('.cm-content').innerText.includes('raise')")
+    wait_for(page, "document.querySelector('.cm-content').innerText.includes('raise')")
     page.click("#run")
     wait_until(page, lambda: f"ValueError: {HOSTILE}" in page.inner_text("#said"))
     script.unlink()

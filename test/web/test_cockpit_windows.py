@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import wait_until
+from cockpit_page import wait_for, wait_until
 from dynamic_reconfigure.client import Client
 
 SCRIPT = """
@@ -29,18 +29,16 @@ def _flown(cockpit, opened):
     cockpit.scripts.mkdir(exist_ok=True)
     (cockpit.scripts / "opens.py").write_text(SCRIPT)
     opened.reload()
-    opened.wait_for_function(
-        "[...document.querySelectorAll('#script option')].some((one) => one.value === 'mine/opens.py')"
-    )
+    wait_for(opened, "[...document.querySelectorAll('#script option')].some((one) => one.value === 'mine/opens.py')")
     opened.select_option("#script", "mine/opens.py")
-    opened.wait_for_function("document.querySelector('.cm-content').innerText.includes('floatingViewAdd')")
+    wait_for(opened, "document.querySelector('.cm-content').innerText.includes('floatingViewAdd')")
     opened.click("#run")
     wait_until(opened, lambda: opened.inner_text("#said") == "started")
     yield opened
     opened.select_option("#script", "built-in/pilot.py")
-    opened.wait_for_function("!document.querySelector('.cm-content').innerText.includes('floatingViewAdd')")
+    wait_for(opened, "!document.querySelector('.cm-content').innerText.includes('floatingViewAdd')")
     opened.click("#run")
-    opened.wait_for_function("!document.querySelector('.window')")
+    wait_for(opened, "!document.querySelector('.window')")
 
 
 def test_views_dialogs_and_consoles_of_a_script(flown):

@@ -12,22 +12,23 @@ from typing import IO, Any
 
 
 @contextlib.contextmanager
-def replacing(path: str | Path, binary: bool = False) -> Iterator[IO[Any]]:
+def replacing(path: str | Path, binary: bool = False, through_links: bool = True) -> Iterator[IO[Any]]:
     """Give a file to write, which takes the place of `path` at the end; on an OSError the old one stays.
 
     It is a temporary file in the same folder until then. Another exception (a flight that fails) keeps what was
     written up to there. A `path` that is no regular file, such as /dev/stdout or a FIFO, is written directly. Text
-    is UTF-8 with \\n. Raises OSError, in one line that names the file.
+    is UTF-8 with \\n. Where not `through_links`, a link or a FIFO of that name is replaced itself, and nothing behind
+    it is touched. Raises OSError, in one line that names the file.
     """
     options: Any = {"mode": "xb"} if binary else {"mode": "x", "encoding": "utf-8", "newline": "\n"}
     with _named(path):
         check(path)
-        if _is_special(path):
+        if through_links and _is_special(path):
             with open(path, **{**options, "mode": options["mode"].replace("x", "w")}) as file:
                 yield file
             return
-        target = os.path.realpath(path)  # a link stays a link
-        folder, name = os.path.split(target)
+        folder, name = os.path.split(os.path.realpath(path) if through_links else os.path.abspath(path))
+        target = os.path.join(folder, name)
         stem, ending = os.path.splitext(name)  # libraries that write by name look at the ending
         temporary = os.path.join(folder, f".{stem:.100}.{secrets.token_hex(4)}{ending:.20}")
         try:
@@ -46,10 +47,22 @@ def replacing(path: str | Path, binary: bool = False) -> Iterator[IO[Any]]:
             raise
 
 
-def write(path: str | Path, content: str) -> None:
-    """Write a text file whole or not at all. Raises OSError, in one line that names the file."""
-    with replacing(path) as file:
+def write(path: str | Path, content: str, through_links: bool = True) -> None:
+    """Write a text file whole or not at all, as `replacing`. Raises OSError, in one line that names the file."""
+    with replacing(path, through_links=through_links) as file:
         file.write(content)
+
+
+def write_new(path: str | Path, content: str | bytes) -> None:
+    """Write a file, text in UTF-8, where nothing is of that name, no link either. Raises FileExistsError, OSError."""
+    with _named(path), open(path, "xb") as file:  # which follows no link
+        try:
+            file.write(content.encode("utf-8") if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())
+        except BaseException:
+            os.unlink(path)
+            raise
 
 
 def check(path: str | Path) -> None:

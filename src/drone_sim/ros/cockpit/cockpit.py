@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Mapping
@@ -29,6 +30,7 @@ from drone_sim.ros.cockpit.server.wire import Wire
 from drone_sim.ros.cockpit.serving import Serving
 from drone_sim.ros.cockpit.settings import Settings
 from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
+from drone_sim.ros.node.master_watch import MasterWatch
 from drone_sim.ros.vehicle import frame_names
 
 _WIDTH = 270  # pixels of the panel
@@ -46,7 +48,7 @@ class Cockpit:
         self._found = Found()
         self._view: SceneView | None = None
         self._hearing: Hearing | None = None
-        self._asked = 0.0
+        self._asked, self._has_master = 0.0, True
         self._commanding = Commanding()
         self._sight, self._choice = Sight(), Choice()
         flying = Flying(self._commanding.send)
@@ -72,6 +74,8 @@ class Cockpit:
 
     def run(self) -> None:
         """Show what is new, again and again."""
+        logging.getLogger("rosout").addFilter(_is_not_repeated)
+        MasterWatch(meanwhile="the page waits for one").start()
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._look(began)
@@ -134,11 +138,23 @@ class Cockpit:
             below = rospy.get_namespace()  # another simulator may fly in another one
             self._found = find([one for one in rospy.get_published_topics() if one[0].startswith(below)])
             scene = str(self._simulator.parameter("scene_file", ""))
+            self._tell_of_master(True)
         except FAILURES:  # another master may come
             self._found, scene = Found(), ""
+            self._tell_of_master(False)
         if not self._found.namespace:
             self._panel.show_state("no simulation")
         self._panel.offer(self._found, scene)
+
+    def _tell_of_master(self, answers: bool) -> None:
+        if answers != self._has_master:
+            self._has_master = answers
+            self._panel.say("the ROS master is there again" if answers else "no ROS master answers: waiting for one")
+
+
+def _is_not_repeated(record: logging.LogRecord) -> bool:
+    """Leave out what rospy says of each single topic when there is no master: `MasterWatch` says it once."""
+    return "registrations are now out of sync" not in str(record.msg)
 
 
 def _sky() -> np.ndarray:

@@ -16,6 +16,7 @@ import viser
 from websockets.asyncio.server import ServerConnection
 
 from drone_sim.ros.cockpit.page import Found, Page
+from drone_sim.ros.cockpit.server import notice
 from drone_sim.ros.cockpit.server.address import free_place, urls
 from drone_sim.ros.cockpit.server.gate import Gate, Handler
 from drone_sim.ros.cockpit.settings import Settings, read
@@ -37,7 +38,14 @@ class Serving:
         host, port = free_place(settings.address, settings.port)
         with gate.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
             self.server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
-        self.address, self.address_elsewhere = urls(host, self.server.get_port(), token)
+        self.port = self.server.get_port()
+        self.address, self.address_elsewhere = urls(host, self.port, token)
+
+    @property
+    def told(self) -> str:
+        """Where it is, for the user, with the token."""
+        elsewhere = self.address_elsewhere
+        return self.address + (f" and, on other machines, at {elsewhere}" if elsewhere else "")
 
     def begin(self, wire: Handler, beside: Callable[[str], Found]) -> None:
         """Let the browsers that are there, and those that come, talk; `beside` finds what belongs to the page."""
@@ -70,12 +78,13 @@ def _end(*_: object) -> None:
 def _serve() -> None:
     settings = read(rospy.get_param("~", {}))
     serving = Serving(settings)
-    elsewhere = f" and, on other machines, at {serving.address_elsewhere}" if serving.address_elsewhere else ""
-    rospy.loginfo(f"the cockpit is at {serving.address}{elsewhere}")
+    with notice.kept(serving.address, serving.port) as where:
+        notice.tell(f"the cockpit is at {serving.told}")
+        rospy.loginfo(f"the cockpit listens at {serving.address.partition('?')[0]}; {where}")
 
-    from drone_sim.ros.cockpit.cockpit import Cockpit  # which takes a second and more
+        from drone_sim.ros.cockpit.cockpit import Cockpit  # which takes a second and more
 
-    Cockpit(settings, serving).run()
+        Cockpit(settings, serving).run()
 
 
 if __name__ == "__main__":

@@ -24,16 +24,17 @@ _USE_SIM_TIME = "/use_sim_time"
 class MasterWatch(threading.Thread):
     """Asks the master for its process number now and then; a daemon thread."""
 
-    def __init__(self, parameters: Callable[[], Iterable[str]]) -> None:
+    def __init__(self, parameters: Callable[[], Iterable[str]] = tuple, meanwhile: str = "flying on") -> None:
         """Remember the master that the node is registered with.
 
-        `parameters` returns the names of those that the node has set, beside its own.
+        `parameters` returns the names of those that the node has set, beside its own; `meanwhile` is what the node
+        does without a master.
         """
         super().__init__(name="master watch", daemon=True)
         self._done = threading.Event()
         self._master = rosgraph.Master(rospy.get_name())
         self._parameters: dict[str, Any] = {}
-        self._names = parameters
+        self._names, self._meanwhile = parameters, meanwhile
         self._pid = self._ask()
         self._lost_peers = LostPeers(self._master)
 
@@ -44,7 +45,9 @@ class MasterWatch(threading.Thread):
         while not self._done.wait(_PERIOD):
             pid = self._ask()
             if pid is None and not lost:
-                rospy.logwarn("the ROS master is gone: flying on; connected nodes stay connected, new ones cannot join")
+                rospy.logwarn(
+                    f"the ROS master is gone: {self._meanwhile}; connected nodes stay connected, new ones cannot join"
+                )
             elif pid is not None and lost and pid == self._pid:
                 rospy.logwarn("the ROS master answers again")
             elif pid is not None and pid != self._pid and self._register_again():

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 from drone_sim.files import writing
 from drone_sim.files.resources import read_bytes
 
 LARGEST = 1 << 20  # bytes
+_LARGEST_COPY = 1 << 26  # bytes of what another program has made of a script
 _NO_VERSION = ""
 
 
@@ -28,8 +30,12 @@ def read(name: str, path: Path) -> tuple[str, str]:
         raise ShelfError(f"{name}: line {line}: is not UTF-8, and cannot be edited here") from None
 
 
-def write(name: str, path: Path, text: str) -> str:
-    r"""Write a file, with lines ended by \r\n where most were, and return its version. Raises ShelfError."""
+def write(name: str, path: Path, text: str, is_new: bool = False) -> str:
+    r"""Write a file, with lines ended by \r\n where most were, and return its version.
+
+    No link is followed: neither one that `path` is, nor one that it becomes meanwhile. What `is_new` takes the place
+    of nothing. Raises ShelfError.
+    """
     try:
         content = text.encode("utf-8")
     except UnicodeEncodeError as error:
@@ -37,22 +43,18 @@ def write(name: str, path: Path, text: str) -> str:
         raise ShelfError(f"{name}: line {line}: holds half of a character, which no file can hold") from None
     if len(content) > LARGEST:
         raise ShelfError(f"{name}: has {len(content)} bytes; at most {LARGEST} are kept")
-    if _has_windows_line_ends(path):
+    if not is_new and _has_windows_line_ends(path):
         text = text.replace("\n", "\r\n")
-    try:
+    with _told_of(name):
         path.parent.mkdir(parents=True, exist_ok=True)
-        writing.write(path, text)
-    except OSError as error:
-        raise ShelfError(f"{name}: {_told(error)}") from None
+        writing.write_new(path, text) if is_new else writing.write(path, text, through_links=False)
     return version_of(path)
 
 
 def copy(name: str, path: Path, to: Path) -> None:
-    """Copy a file, whatever it holds. Raises ShelfError."""
-    try:
-        shutil.copyfile(path, to)
-    except (OSError, shutil.Error) as error:
-        raise ShelfError(f"{name}: {_told(error) if isinstance(error, OSError) else error}") from None
+    """Copy a file, whatever it holds, to where nothing is. Raises ShelfError."""
+    with _told_of(name):
+        writing.write_new(to, read_bytes(path, _LARGEST_COPY))
 
 
 def version_of(path: Path) -> str:
@@ -65,12 +67,8 @@ def version_of(path: Path) -> str:
 
 
 def _bytes(name: str, path: Path) -> bytes:
-    try:
+    with _told_of(name):
         return read_bytes(path, LARGEST)
-    except OSError as error:
-        raise ShelfError(f"{name}: {_told(error)}") from None
-    except ValueError as error:
-        raise ShelfError(f"{name}: {error}") from None
 
 
 def _has_windows_line_ends(path: Path) -> bool:
@@ -81,6 +79,13 @@ def _has_windows_line_ends(path: Path) -> bool:
     return 2 * content.count(b"\r\n") > content.count(b"\n")
 
 
-def _told(error: OSError) -> str:
-    """Return what went wrong, for a user: errno's words with the file, or our own."""
-    return f"{error.filename}: {os.strerror(error.errno)}" if error.errno and error.filename else str(error)
+@contextlib.contextmanager
+def _told_of(name: str) -> Iterator[None]:
+    """Let what goes wrong with a file be told in one line: errno's words with the file, or our own."""
+    try:
+        yield
+    except OSError as error:
+        said = f"{error.filename}: {os.strerror(error.errno)}" if error.errno and error.filename else str(error)
+        raise ShelfError(f"{name}: {said}") from None
+    except ValueError as error:
+        raise ShelfError(f"{name}: {error}") from None

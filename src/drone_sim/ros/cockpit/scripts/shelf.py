@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -68,12 +69,20 @@ class Shelf:
         found = next((book for book in self.books() if book.name == name), None)
         if found is None:
             raise ShelfError(f"{str(name)[:80]!r}: no such script")
-        self._check_place(found)
+        self._place(found)
         return found
 
-    def _check_place(self, book: Book) -> None:
-        if book.is_own and book.path.resolve().parent != self.folder.resolve():
+    def _place(self, book: Book) -> Path:
+        """Return where a script is: a link in the folder may lead to another file there. Raises ShelfError."""
+        if not book.is_own:
+            return book.path
+        try:
+            place = Path(os.path.realpath(book.path))
+        except ValueError as error:
+            raise ShelfError(f"{book.name!r}: {error}") from None
+        if place.parent != self.folder.resolve():
             raise ShelfError(f"{book.name}: is a link that leads out of {self.folder}, and is left alone")
+        return place
 
     def of_file(self, path: str) -> Book | None:
         """Return the script whose file that is, None where it is none of these."""
@@ -104,21 +113,24 @@ class Shelf:
         with self._writing:
             if not book.is_own:
                 original, book = self.read(book)[0], self._copy_of(book)
+                written = script_files.write(book.name, book.path, text, is_new=True)
                 self._originals[book.name] = original
-            elif version != script_files.version_of(book.path):
+                return book, written
+            if version != script_files.version_of(book.path):
                 return None
-            else:
-                self._originals.setdefault(book.name, self.read(book)[0])
-            return book, script_files.write(book.name, book.path, text)
+            place = self._place(book)
+            self._originals.setdefault(book.name, self.read(book)[0])
+            return book, script_files.write(book.name, place, text)
 
     def save_as(self, name: Any, text: str) -> tuple[Book, str]:
         """Write a new script of the user's; return it, and its version. Raises ShelfError."""
         book = self._own(_checked(name))
         with self._writing:
-            if book.path.exists() or book.path.is_symlink():
+            if os.path.lexists(book.path):
                 raise ShelfError(f"{book.name}: is there already; take another name")
+            version = script_files.write(book.name, book.path, text, is_new=True)
             self._originals[book.name] = text
-            return book, script_files.write(book.name, book.path, text)
+            return book, version
 
     def keep_both(self, name: Any, text: str, mine: bool) -> tuple[Book, str, str]:
         """End a conflict about a script of the user's: `text`, or what the file holds, goes into another file.
@@ -128,15 +140,15 @@ class Shelf:
         """
         file_name = str(name).removeprefix(f"{OWN}/")
         book = self._own(file_name if file_name in scripts_in(self.folder) else _checked(file_name))
-        self._check_place(book)
         with self._writing:
-            if not book.path.exists():
-                return book, script_files.write(book.name, book.path, text), ""
+            place = self._place(book)
+            if not os.path.lexists(place):
+                return book, script_files.write(book.name, place, text, is_new=True), ""
             second = self._copy_of(book)
             if mine:
-                script_files.copy(second.name, book.path, second.path)
-                return book, script_files.write(book.name, book.path, text), second.name
-            script_files.write(second.name, second.path, text)
+                script_files.copy(book.name, place, second.path)
+                return book, script_files.write(book.name, place, text), second.name
+            script_files.write(second.name, second.path, text, is_new=True)
             return book, script_files.version_of(book.path), second.name
 
     def original(self, book: Book) -> str:
@@ -151,7 +163,7 @@ class Shelf:
         """Return a script of the user's that does not exist yet, named as another one."""
         stem, ending = Path(book.file_name).stem, book.path.suffix
         names = [stem, *(f"{stem}_{number}" for number in range(2, _MOST))]
-        name = next((one for one in names if not (self.folder / f"{one}{ending}").exists()), None)
+        name = next((one for one in names if not os.path.lexists(self.folder / f"{one}{ending}")), None)
         if name is None:
             raise ShelfError(f"{book.name}: there are too many copies in {self.folder}")
         return self._own(f"{name}{ending}")

@@ -36,7 +36,8 @@ def scene_of(plan: Plan, folder: Path | None = None) -> str:
     file = (folder or _FOLDER.expanduser()) / f"{plan.name}.yaml"
     file.parent.mkdir(parents=True, exist_ok=True)
     # Through JSON: what is a special kind of text to us is none to YAML.
-    writing.write(file, f"# Made of {plan.path}\n" + yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False))
+    text = yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False)
+    writing.write(file, f"# Made of {plan.path}\n{text}", through_links=False)
     return str(file)
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import hmac
 import http
+import re
 from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import replace
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from websockets import Headers
 from websockets.asyncio import server as websocket_server
@@ -17,6 +19,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 from drone_sim.ros.cockpit.page import Page
+from drone_sim.ros.cockpit.server import visitors
 
 WIRE = "drone_sim"  # the subprotocol of our own socket; the scene's is viser's
 _SCENE = "/scene/"  # where viser's page is
@@ -27,7 +30,21 @@ _SAFE = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "SAMEORIGIN",
     "Cache-Control": "no-store",
+    "Connection": "close",  # after every answer; a browser would send the next request into it
 }
+# What our page, and viser's in its frame, may load and do: what comes from here, and nothing else.
+_POLICY = (
+    "default-src 'none'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+    "frame-ancestors 'self'; base-uri 'none'; form-action 'none'; "
+)
+_OF_OUR_PAGE = "script-src 'self'; frame-src 'self'; connect-src 'self' {sockets}"
+# viser's page is one file, which unpacks its script with WebAssembly, and makes scripts and workers of text.
+_OF_THE_SCENE = (
+    "script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; worker-src blob:; font-src 'self' data:; "
+    "connect-src 'self' {sockets} blob: data:"
+)
+_ONCE = ("Host", "Cookie", "Origin", "Upgrade", "Accept-Encoding")  # of what is read here, and in viser
+_HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)
 
 Handler = Callable[[ServerConnection], Awaitable[None]]
 
@@ -56,6 +73,7 @@ class Gate:
 
     def _serve_with(self, serve: Callable[..., Any]) -> Callable[..., Any]:
         def guarded(scene: Handler, host: str, port: int, **options: Any) -> Any:
+            asyncio.get_running_loop().set_exception_handler(visitors.failed)
             scene_page, choose = options.pop("process_request"), options.pop("select_subprotocol")
             return serve(
                 lambda connection: (self._wire if connection.subprotocol == WIRE else scene)(connection),
@@ -64,27 +82,37 @@ class Gate:
                 process_request=lambda connection, request: self._answer(connection, request, scene_page),
                 select_subprotocol=lambda connection, offered: WIRE if WIRE in offered else choose(connection, offered),
                 **{**options, "max_size": _LARGEST},
+                create_connection=visitors.Visitor,
+                logger=visitors.logger(),
             )
 
         return guarded
 
     def _answer(self, connection: ServerConnection, request: Request, scene_page: Callable[..., Any]) -> Any:
         """Return the answer to a request; None lets a socket be opened."""
-        url = urlsplit(request.path)
-        if self._is_token(parse_qs(url.query).get("token", [""])[0]) and not _is_socket(request):
+        try:
+            return self._answered(connection, request, scene_page)
+        except ValueError as error:
+            return _response(http.HTTPStatus.BAD_REQUEST, str(error))
+
+    def _answered(self, connection: ServerConnection, request: Request, scene_page: Callable[..., Any]) -> Any:
+        host = _checked_host(request.headers)
+        path, _, query = request.path.partition("?")
+        if self._is_token(parse_qs(query).get("token", [""])[0]) and not _is_socket(request):
             return self._let_in(request)
         if not self._is_token(_cookie(request, self._name_of_cookie(request))):
             return _response(http.HTTPStatus.FORBIDDEN, _REFUSED)
         if _is_socket(request):
             return None if _is_of_our_page(request) else _response(http.HTTPStatus.FORBIDDEN, "of another origin")
-        if url.path.startswith(_SCENE):
-            # Its headers are viser's own: the browser shows it inside our page.
-            return scene_page(connection, replace(request, path="/" + url.path.removeprefix(_SCENE)))
-        found = self._page.find(url.path)
+        if path.startswith(_SCENE):
+            # The browser shows it inside our page.
+            scene = scene_page(connection, replace(request, path="/" + path.removeprefix(_SCENE)))
+            return _secured(scene, _OF_THE_SCENE, host)
+        found = self._page.find(path)
         if found is None:
             return _response(http.HTTPStatus.NOT_FOUND, "There is no such page.")
         kind, content = found
-        return _response(http.HTTPStatus.OK, content, kind)
+        return _secured(_response(http.HTTPStatus.OK, content, kind), _OF_OUR_PAGE, host)
 
     def _let_in(self, request: Request) -> Response:
         """Remember the token in a cookie, and take it out of the address, which people send to each other."""
@@ -95,12 +123,23 @@ class Gate:
         return response
 
     def _is_token(self, given: str) -> bool:
-        return hmac.compare_digest(given.encode(), self._token.encode())
+        return hmac.compare_digest(given.encode(errors="backslashreplace"), self._token.encode())
 
     @staticmethod
     def _name_of_cookie(request: Request) -> str:
         """Return a name of its own for every port: browsers keep cookies by host alone."""
         return f"drone_sim_{request.headers.get('Host', '').rpartition(':')[2]}"
+
+
+def _checked_host(headers: Headers) -> str:
+    """Return whom a browser thinks that it asks. Raises ValueError for it and for other headers."""
+    for name in _ONCE:
+        if len(headers.get_all(name)) > 1:
+            raise ValueError(f"{name}: must not be given twice")
+    host = headers.get("Host", "")
+    if host and not _HOST.fullmatch(host):
+        raise ValueError("Host: must be a name or an address, and a port")
+    return host
 
 
 def _is_socket(request: Request) -> bool:
@@ -109,8 +148,8 @@ def _is_socket(request: Request) -> bool:
 
 def _is_of_our_page(request: Request) -> bool:
     """Tell whether a socket is opened by our own page; what is no browser says no origin."""
-    origin = request.headers.get("Origin")
-    return origin is None or urlsplit(origin).netloc == request.headers.get("Host")
+    origin, host = request.headers.get("Origin"), request.headers.get("Host", "")
+    return origin is None or origin in (f"http://{host}", f"https://{host}")
 
 
 def _cookie(request: Request, name: str) -> str:
@@ -123,5 +162,15 @@ def _cookie(request: Request, name: str) -> str:
 
 def _response(status: http.HTTPStatus, content: str | bytes, kind: str = "text/plain; charset=utf-8") -> Response:
     body = content if isinstance(content, bytes) else content.encode()
-    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), **_SAFE})
-    return Response(status.value, status.phrase, headers, body)
+    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body))})
+    return _secured(Response(status.value, status.phrase, headers, body), "", "")
+
+
+def _secured(response: Response, policy: str, host: str) -> Response:
+    """Return an answer with what keeps a browser from doing something else with it."""
+    # Older browsers take 'self' for our pages alone, not for our sockets.
+    sockets = f"ws://{host} wss://{host}" if host else ""
+    for name, value in {**_SAFE, "Content-Security-Policy": (_POLICY + policy).format(sockets=sockets)}.items():
+        response.headers.pop(name, None)
+        response.headers[name] = value
+    return response

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import itertools
 import json
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -76,16 +77,15 @@ class Wire:
 
     async def _take(self, browser: int, text: str | bytes, connection: ServerConnection) -> None:
         try:
-            message = json.loads(text)
-            if not isinstance(message, dict):
-                raise ValueError("a message must be a mapping")
+            message = _read(text)
             if "hold" in message:
                 self._flying.hold(browser, read_command(message["hold"]))
                 return
-            if "shown" in message:
-                self._out[browser][1].shown(str(message["shown"]))
+            if isinstance(message.get("shown"), str):
+                self._out[browser][1].shown(message["shown"])
                 return
-            ask = self._answers.get(message.get("ask", ""))
+            asked = message.get("ask")
+            ask = self._answers.get(asked) if isinstance(asked, str) else None
             if ask is None:
                 raise ValueError(f"ask: must be one of {', '.join(self._answers)}, or hold")
         except (ValueError, RecursionError) as error:
@@ -94,10 +94,28 @@ class Wire:
         await connection.send(await asyncio.to_thread(_answered, ask, message))
 
 
+def _read(text: str | bytes) -> dict[str, Any]:
+    """Return a message. Raises ValueError, RecursionError."""
+    message = json.loads(text, parse_constant=_finite, parse_float=_finite)
+    if not isinstance(message, dict):
+        raise ValueError("a message must be a mapping")
+    number = message.get("id", 0)
+    if not isinstance(number, int) or isinstance(number, bool):
+        raise ValueError("id: must be a whole number")
+    return message
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:20]}: is no number that JSON has, or too large")
+    return value
+
+
 def _answered(ask: Answer, message: Mapping[str, Any]) -> str:
     try:
         return json.dumps({"id": message.get("id"), **ask(message)})
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         return json.dumps({"id": message.get("id"), "error": " ".join(str(error).split())})
 
 

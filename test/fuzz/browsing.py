@@ -1,0 +1,141 @@
+"""The cockpit's server without a master, and browsers that say to it what nobody's page does."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import logging
+import os
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import commands  # noqa: F401 - rospy's publishers and subscribers do nothing then
+import viser
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "unit"))
+from cockpit_asked import Asked
+
+from drone_sim.ros.cockpit.flying.flying import Flying
+from drone_sim.ros.cockpit.page import Page
+from drone_sim.ros.cockpit.panel.windows import Windows
+from drone_sim.ros.cockpit.scripts.shelf import Shelf
+from drone_sim.ros.cockpit.server.gate import WIRE, Gate
+from drone_sim.ros.cockpit.server.wire import Wire
+
+_TOKEN = "fuzz-token"
+_PATIENCE = 10.0  # s
+_LEFT_OUT = "grade"  # which is a process of its own
+_LAST = 424242  # the number of a question that is asked after all others
+
+Data = tuple[list[bytes], list[bytes], list[bytes]]
+
+
+class Wrong(Exception):
+    """A browser got what it must not get, or nothing."""
+
+
+class _Cameras:
+    shown: tuple[str, ...] = ()
+
+    def follow_views(self, _topics: Any) -> None:
+        pass
+
+    def turn(self, _name: str, _on: bool) -> None:
+        pass
+
+
+class Cockpit:
+    """One server for all cases: to start it takes longer than most of them."""
+
+    def __init__(self) -> None:
+        """Serve."""
+        self.wire = Wire(Flying(lambda _: None), {})
+        with Gate(_TOKEN, Page(), self.wire.serve).before_viser(), contextlib.redirect_stdout(io.StringIO()):
+            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self._field = self._server.gui.add_slider("Speed", min=0.0, max=1.0, step=0.1, initial_value=0.5)
+        self._port = self._server.get_port()
+
+    def hear(self, data: Data, folder: Path) -> Iterator[str]:
+        """Let browsers say all that; yield each line that they, and the user, are told. Raises Wrong."""
+        self._begin_afresh(folder)
+        lines: list[str] = []
+        log = logging.Handler()
+        log.emit = lambda record: lines.append(record.getMessage())  # type: ignore[method-assign]
+        logging.getLogger("rosout").addHandler(log)
+        try:
+            requests, messages, told = data
+            for one in requests:
+                self._request(one)
+            self._tell_viser(told)
+            lines += self._ask(messages)
+        finally:
+            logging.getLogger("rosout").removeHandler(log)
+        yield from lines
+
+    def _begin_afresh(self, folder: Path) -> None:
+        os.environ["HOME"] = str(folder)  # where the scenes of tasks are made
+        own = folder / "scripts"
+        own.mkdir()
+        (own / "a.py").write_text("# a script\n", encoding="utf-8")
+        (own / "link.py").symlink_to(folder / "outside.py")
+        os.mkfifo(own / "fifo.py")
+        (own / "d.py").mkdir()
+        self._outside = folder / "outside.py"
+        windows = Windows("/drone_sim", _Cameras(), self.wire)  # type: ignore[arg-type]
+        windows.listen(True)
+        self.wire.answer_also({**Asked(Shelf(own)).answers, **windows.answers})
+
+    def _filled(self, content: bytes) -> bytes:
+        known = {b"PORT": str(self._port), b"TOKEN": _TOKEN, b"FIELD": self._field._impl.uuid}
+        for word, value in known.items():
+            content = content.replace(word, value.encode())
+        return content
+
+    def _request(self, content: bytes) -> None:
+        with socket.create_connection(("127.0.0.1", self._port), timeout=_PATIENCE) as one:
+            try:
+                one.sendall(self._filled(content))
+                one.shutdown(socket.SHUT_WR)
+                said = b"".join(iter(lambda: one.recv(1 << 16), b""))
+            except ConnectionError:
+                return
+        if b" 500 " in said[:20] or b"Traceback" in said:
+            raise Wrong(f"a request gets {said[:200]!r}")
+
+    def _open(self, protocol: str) -> Any:
+        cookie = {"Cookie": f"drone_sim_{self._port}={_TOKEN}"}
+        address = f"ws://127.0.0.1:{self._port}/"
+        return connect(address, subprotocols=[protocol], additional_headers=cookie)  # type: ignore[list-item]
+
+    def _tell_viser(self, messages: list[bytes]) -> None:
+        for one in messages:
+            with self._open(f"viser-v{viser.__version__}") as scene, contextlib.suppress(ConnectionClosed):
+                scene.send(self._filled(one))
+
+    def _ask(self, messages: list[bytes]) -> Iterator[str]:
+        try:
+            with self._open(WIRE) as page:
+                for one in messages:
+                    page.send(one.decode("utf-8", "replace"))
+                page.send(json.dumps({"id": _LAST, "ask": "look"}))
+                answer: dict[str, Any] = {}
+                while answer.get("id") != _LAST:
+                    answer = json.loads(page.recv(timeout=_PATIENCE), parse_constant=_no_json)
+                    if "error" in answer:
+                        yield str(answer["error"])
+        except ConnectionClosed as error:
+            raise Wrong(f"the page's socket is closed: {error}") from None
+        except TimeoutError:
+            raise Wrong("the page gets no answer") from None
+        if self._outside.exists():
+            raise Wrong("something was written out of the folder")
+
+
+def _no_json(text: str) -> float:
+    raise Wrong(f"the page gets {text}, which is no JSON")
