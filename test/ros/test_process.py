@@ -245,6 +245,47 @@ class Process(unittest.TestCase):
     def test_rosnode_kill_ends_it_cleanly(self):
         self.assert_ends_cleanly(lambda _: rosnode.kill_nodes(["/drone_sim"]))
 
+    def assert_replaced(self, node, said=""):
+        said += node.communicate(timeout=HANGS)[0]
+        self.assertEqual(node.returncode, 0, said)
+        self.assertEqual(said.count("another node of this name has been started, and takes its place\n"), 1, said)
+        self.assertNotIn("Traceback", said)
+        self.assertNotIn("killed", said)
+
+    def test_of_simulators_of_one_name_the_newest_flies(self):
+        nodes = []
+
+        def more():
+            nodes.append(simulator())
+            return nodes[-1]
+
+        watchdog = threading.Timer(4 * HANGS, lambda: [node.kill() for node in nodes])
+        watchdog.start()
+        older = more()
+        said = self.said_until(older, "flying")
+        newer = more()
+        self.assert_replaced(older, said)
+        self.said_until(newer, "flying")
+        newer.kill()  # of which the master does not know
+        newer.communicate(timeout=HANGS)
+        both = more(), more()  # at once
+        while all(node.poll() is None for node in both):
+            rospy.rostime.wallsleep(0.05)
+        first, last = sorted(both, key=lambda node: node.poll() is None)
+        self.assert_replaced(first)
+        self.said_until(last, "flying")
+        said = "vehicle drone: /drone_sim has one of this name, and its topics: give it another one"
+        self.assert_refused(simulator("__name:=other"), said)
+        last.send_signal(signal.SIGSTOP)
+        try:
+            self.assert_refused(simulator(), "and does not answer: end that process, or take another __name:=")
+        finally:
+            last.send_signal(signal.SIGCONT)
+        last.send_signal(signal.SIGINT)
+        last.communicate(timeout=HANGS)
+        watchdog.cancel()
+        self.assertEqual(last.returncode, 0)
+
     def test_two_processes_fly_alike_to_the_last_bit(self):
         with tempfile.TemporaryDirectory() as folder:
             commands = Path(folder) / "commands.yaml"

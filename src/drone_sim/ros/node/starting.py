@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 import rosgraph
 import rospy
 
+from drone_sim.ros.node import namesake
 from drone_sim.scripting.errors import ScriptError
 
 _MASTER_GONE = (ConnectionError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
@@ -21,22 +22,35 @@ _EXPECTED = (ScriptError, ValueError, RuntimeError, OSError, rospy.ROSException)
 _PATIENCE = 5.0  # s, for a master's answer
 
 
-def init_node(name: str, **options: Any) -> bool:
+def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
     """Call rospy.init_node; return False, after one line on stderr, where it cannot become a node.
 
-    rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach.
+    rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach. Another node
+    of the name has ended by then; `others_wait`: who else wants it waits for namesake.let_others.
     """
     patience = socket.getdefaulttimeout()
     socket.setdefaulttimeout(_PATIENCE)
     try:
         _check_master()
         _check_own_address()
+        own = _own_name(name, bool(options.get("anonymous")))
+        if own:
+            namesake.take_name(own)
     except (ValueError, OSError) as error:
         print(f"{name}: {error}", file=sys.stderr, flush=True)
         return False
     finally:
         socket.setdefaulttimeout(patience)
-    return not reported(name, lambda: rospy.init_node(name, **options))
+    done = not reported(name, lambda: rospy.init_node(name, **options))
+    if not others_wait:
+        namesake.let_others()
+    return done
+
+
+def _own_name(name: str, anonymous: bool) -> str:
+    """Return the name that the node will have, '' for one that nobody else has."""
+    given = rospy.names.get_mappings().get("__name", "" if anonymous else name)
+    return str(rosgraph.names.resolve_name(given, rospy.core.get_caller_id())) if given else ""
 
 
 def _check_master() -> None:
