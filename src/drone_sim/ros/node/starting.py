@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
+import logging
 import os
 import socket
 import sys
@@ -41,10 +43,24 @@ def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
         return False
     finally:
         socket.setdefaulttimeout(patience)
+    logging.FileHandler.handleError = _do_without_log  # type: ignore[method-assign]
     done = not reported(name, lambda: rospy.init_node(name, **options))
     if not others_wait:
         namesake.let_others()
     return done
+
+
+_unwritten: set[str] = set()  # files of the log that cannot be written
+
+
+def _do_without_log(handler: logging.FileHandler, _record: logging.LogRecord) -> None:
+    """Say once that a disk is full: Python itself would print a traceback for every line of the log."""
+    if handler.baseFilename not in _unwritten:
+        _unwritten.add(handler.baseFilename)
+        why = sys.exc_info()[1]
+        said = why.strerror or why if isinstance(why, OSError) else why
+        with contextlib.suppress(OSError):
+            print(f"{handler.baseFilename}: no log is written ({said})", file=sys.stderr, flush=True)
 
 
 def _own_name(name: str, anonymous: bool) -> str:
