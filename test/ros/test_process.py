@@ -117,6 +117,24 @@ class Process(unittest.TestCase):
                 self.assertNotIn("Traceback", output)
                 self.assertEqual(len([line for line in output.splitlines() if "FATAL" in line]), 1, output)
 
+    def test_it_flies_where_no_log_can_be_written(self):
+        for said in (["__log:=/dev/full"], []):
+            with self.subTest(said):
+                node = simulator(*said, **({} if said else {"ROS_LOG_DIR": "/proc/nowhere"}))
+                printed = self.said_until(node, "flying")
+                node.send_signal(signal.SIGINT)
+                printed += node.communicate(timeout=HANGS)[0]
+                self.assertEqual(node.returncode, 0, printed)
+                self.assertEqual(printed.count("no log is written"), 1, printed)
+                self.assertNotIn("Traceback", printed)
+
+    def test_a_recorder_that_cannot_write_ends_with_one_line(self):
+        for folder, why in (("/proc", ""), ("/no/such", "no such folder")):
+            with self.subTest(folder):
+                self.assert_refused(
+                    started("rosrun", "drone_sim", "record", "--folder", folder), f"--folder {folder}: {why}"
+                )
+
     def test_parameters_that_are_none_end_it_with_one_line(self):
         for name, value, expected in (
             ("/drone_sim", 5, "parameter /drone_sim = 5: must hold parameters"),

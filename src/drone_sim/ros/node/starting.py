@@ -14,6 +14,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import rosgraph
+import rospkg
 import rospy
 
 from drone_sim.ros.node import namesake
@@ -43,11 +44,24 @@ def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
         return False
     finally:
         socket.setdefaulttimeout(patience)
-    logging.FileHandler.handleError = _do_without_log  # type: ignore[method-assign]
+    _check_log(name)
     done = not reported(name, lambda: rospy.init_node(name, **options))
     if not others_wait:
         namesake.let_others()
     return done
+
+
+def _check_log(name: str) -> None:
+    """Do without a log, and say so, where none can be written: rospy would say nothing on the terminal then, either."""
+    logging.FileHandler.handleError = _do_without_log  # type: ignore[method-assign]
+    mappings = rospy.names.get_mappings()
+    folder = os.path.dirname(os.path.abspath(mappings["__log"])) if "__log" in mappings else rospkg.get_log_dir()
+    with contextlib.suppress(OSError):
+        os.makedirs(folder, exist_ok=True)
+    if not os.access(folder, os.W_OK):
+        said = f"no log is written: {folder} must not be written to; ROS_LOG_DIR names another folder"
+        print(f"{name}: {said}", file=sys.stderr, flush=True)
+        mappings["__log"] = os.devnull
 
 
 _unwritten: set[str] = set()  # files of the log that cannot be written
