@@ -53,7 +53,7 @@ def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
 
 def _check_log(name: str) -> None:
     """Do without a log, and say so, where none can be written: rospy would say nothing on the terminal then, either."""
-    logging.FileHandler.handleError = _do_without_log  # type: ignore[method-assign]
+    logging.FileHandler.handleError = _do_without_log  # type: ignore[assignment, method-assign]
     mappings = rospy.names.get_mappings()
     folder = os.path.dirname(os.path.abspath(mappings["__log"])) if "__log" in mappings else rospkg.get_log_dir()
     with contextlib.suppress(OSError):
