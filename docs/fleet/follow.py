@@ -5,6 +5,8 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseStamped, TransformStamped
 
+from drone_sim.ros.node.signals import end_on_signals
+
 LEADER = "drone1/Track_base"  # level, so that the wings do not tilt with the leader
 WINGS = {"drone2": (-1.0, 1.0, 0.0), "drone3": (-1.0, -1.0, 0.0)}  # m, seen from the leader
 RATE = 20  # Hz
@@ -12,7 +14,8 @@ RATE = 20  # Hz
 
 def main():
     """Send each follower to its wing until the node is told to end."""
-    rospy.init_node("follow")
+    rospy.init_node("follow", disable_signals=True)
+    end_on_signals()
     wings = tf2_ros.StaticTransformBroadcaster()
     wings.sendTransform([wing(follower, *place) for follower, place in WINGS.items()])
     frames = tf2_ros.Buffer()

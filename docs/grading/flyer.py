@@ -7,6 +7,8 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
+from drone_sim.ros.node.signals import end_on_signals
+
 PLACES = [(1.0, 0.0), (0.0, 0.0)]  # m, one after the other
 NEAR = 0.1  # m
 GAIN, FASTEST = 0.8, 0.5  # 1/s, m/s
@@ -33,6 +35,7 @@ class Flyer:
 
 
 if __name__ == "__main__":
-    rospy.init_node("flyer")
+    rospy.init_node("flyer", disable_signals=True)
+    end_on_signals()
     Flyer()
     rospy.spin()

@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
 """Three drones behind their topics: each obeys its own, one tree of frames, and they come and go in flight."""
 
+import os
 import sys
 import unittest
+from pathlib import Path
+from xmlrpc.client import ServerProxy
 
+import rosnode
 import rosparam
 import rospy
 import rostest
@@ -83,7 +87,14 @@ class Fleet(unittest.TestCase):
             self.assertIn(f"{name}/base_link", {one.header.frame_id for one in shown.markers if one.ns == name})
         bodies.close()
 
+    def polls(self):
+        """Return how many descriptors of the simulator watch others: rospy has one for each topic."""
+        node = rosnode.get_api_uri(rospy.get_master(), "/drone_sim")
+        folder = Path(f"/proc/{ServerProxy(node).getPid(rospy.get_name())[2]}/fd")
+        return sum("eventpoll" in os.readlink(one) for one in folder.iterdir())
+
     def test_they_come_and_go_in_flight(self):
+        polls = self.polls()
         # rosparam leaves out empty entries, and lays the others over what is there.
         rosparam.set_param_raw("/drone_sim/vehicles", {**{name: {} for name in THREE}, **GUEST})
         answer = self.set_vehicles()
@@ -97,6 +108,7 @@ class Fleet(unittest.TestCase):
         connected(rospy.Publisher("/drone4/cmd_vel", Twist, queue_size=1)).unregister()
         rospy.delete_param("/drone_sim/vehicles/drone4")
         self.assertEqual(self.set_vehicles().message, "drone4 went")
+        self.assertLess(self.polls() - polls, 8, "a vehicle has some 37")
         self.assertEqual([name for name, _ in rospy.get_published_topics("/drone4")], [])
         self.assertIn("position", self.set_vehicles({"drone1": {"position": [0]}}).message)
         for name in THREE:

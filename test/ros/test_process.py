@@ -117,6 +117,24 @@ class Process(unittest.TestCase):
                 self.assertNotIn("Traceback", output)
                 self.assertEqual(len([line for line in output.splitlines() if "FATAL" in line]), 1, output)
 
+    def test_it_flies_where_no_log_can_be_written(self):
+        for said in (["__log:=/dev/full"], []):
+            with self.subTest(said):
+                node = simulator(*said, **({} if said else {"ROS_LOG_DIR": "/proc/nowhere"}))
+                printed = self.said_until(node, "flying")
+                node.send_signal(signal.SIGINT)
+                printed += node.communicate(timeout=HANGS)[0]
+                self.assertEqual(node.returncode, 0, printed)
+                self.assertEqual(printed.count("no log is written"), 1, printed)
+                self.assertNotIn("Traceback", printed)
+
+    def test_a_recorder_that_cannot_write_ends_with_one_line(self):
+        for folder, why in (("/proc", ""), ("/no/such", "no such folder")):
+            with self.subTest(folder):
+                self.assert_refused(
+                    started("rosrun", "drone_sim", "record", "--folder", folder), f"--folder {folder}: {why}"
+                )
+
     def test_parameters_that_are_none_end_it_with_one_line(self):
         for name, value, expected in (
             ("/drone_sim", 5, "parameter /drone_sim = 5: must hold parameters"),
@@ -264,6 +282,47 @@ class Process(unittest.TestCase):
 
     def test_rosnode_kill_ends_it_cleanly(self):
         self.assert_ends_cleanly(lambda _: rosnode.kill_nodes(["/drone_sim"]))
+
+    def assert_replaced(self, node, said=""):
+        said += node.communicate(timeout=HANGS)[0]
+        self.assertEqual(node.returncode, 0, said)
+        self.assertEqual(said.count("another node of this name has been started, and takes its place\n"), 1, said)
+        self.assertNotIn("Traceback", said)
+        self.assertNotIn("killed", said)
+
+    def test_of_simulators_of_one_name_the_newest_flies(self):
+        nodes = []
+
+        def more():
+            nodes.append(simulator())
+            return nodes[-1]
+
+        watchdog = threading.Timer(4 * HANGS, lambda: [node.kill() for node in nodes])
+        watchdog.start()
+        older = more()
+        said = self.said_until(older, "flying")
+        newer = more()
+        self.assert_replaced(older, said)
+        self.said_until(newer, "flying")
+        newer.kill()  # of which the master does not know
+        newer.communicate(timeout=HANGS)
+        both = more(), more()  # at once
+        while all(node.poll() is None for node in both):
+            rospy.rostime.wallsleep(0.05)
+        first, last = sorted(both, key=lambda node: node.poll() is None)
+        self.assert_replaced(first)
+        self.said_until(last, "flying")
+        said = "vehicle drone flies already, in /drone_sim: give one of the two"
+        self.assert_refused(simulator("__name:=other"), said)
+        last.send_signal(signal.SIGSTOP)
+        try:
+            self.assert_refused(simulator(), "and does not answer: end that process, or take another __name:=")
+        finally:
+            last.send_signal(signal.SIGCONT)
+        last.send_signal(signal.SIGINT)
+        last.communicate(timeout=HANGS)
+        watchdog.cancel()
+        self.assertEqual(last.returncode, 0)
 
     def test_two_processes_fly_alike_to_the_last_bit(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -61,6 +61,7 @@ SCENES: dict[str, str] = {
     "mtllib.obj": "mtllib ..\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
     "boxes.yaml": "objects:\n" + "- {shape: box, size: [0.2, 0.2, 0.2], position: [2, 0, 1], mass: 1}\n" * 60,
 }
+GUESTS = {"drone": {}, "guest": {"position": [2.0, 2.0, 1.0]}, "other": {"position": [2.0, -2.0, 1.0]}}
 _ODD = (math.nan, math.inf, -math.inf, 1e300, -1e9, 5e-324, 1e4)
 
 
@@ -98,12 +99,15 @@ def within(seconds: float, action: Callable[[], Any]) -> tuple[bool, Any]:
 def call_services(dice: random.Random, folder: Path, diary: Diary) -> None:
     """Press every button, in any order, as somebody in a hurry."""
     names = ["start"] * 3 + ["pause"] * 3 + ["snapshot", "restore", "step"] * 2 + ["stop", "load_scene", "save_scene"]
+    names += ["set_vehicles"] * 2
     while True:
         name = dice.choice(names)
         if dice.random() < 0.2:
             _choose_script(dice, folder)
         if name in ("load_scene", "save_scene"):
             rospy.set_param("/drone_sim/scene_file", _scene(dice, folder, saving=name == "save_scene"))
+        if name == "set_vehicles":
+            rospy.set_param("/drone_sim/vehicles", dice.choice([0, 0, GUESTS]))
         _call(name, dice.random() < 0.3, diary)
         time.sleep(dice.choice([0.0, 0.05, 0.5, 2.0]))
 

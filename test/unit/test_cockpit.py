@@ -22,7 +22,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit import serving, settings
+from drone_sim.ros.cockpit import settings
 from drone_sim.ros.cockpit.cockpit import Cockpit
 from drone_sim.ros.cockpit.flying.flying import Flying, read_command
 from drone_sim.ros.cockpit.found import Found, Source, find
@@ -441,12 +441,3 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
     shown._ask_master()
     assert shown._found.namespace == "/drone" and shown._panel._said.value == "the ROS master is there again"
     shown._server.stop()
-
-
-def test_a_signal_during_a_call_to_the_master_ends_the_node(monkeypatch):
-    """rospy lets one thread at a time talk to the master: a handler of signals would wait for whom it interrupts."""
-    master, ended = threading.Lock(), threading.Event()
-    monkeypatch.setattr(rospy, "signal_shutdown", lambda _: ended.set() if master.acquire(timeout=1) else None)
-    with master:
-        serving._end()
-    assert ended.wait(5)

@@ -6,6 +6,7 @@ One thread owns it. Every call names its client, so several worlds can live in o
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Callable, Mapping, Sequence
 from xml.etree import ElementTree as Xml
 
@@ -61,6 +62,8 @@ class World:
         )
         if self._client < 0:
             raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
+        # Of each file it reads PyBullet would keep the content for good, and none of ours is read twice.
+        pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
         self._sub_step, self._gravity = sub_step, gravity
         self._snapshots: set[int] = set()
         self._gui = gui
@@ -165,6 +168,7 @@ class World:
         # The merged inertia is right; what PyBullet would derive from the collision shapes' bounds is not.
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE
         number = pybullet.loadURDF(path, pose.position, pose.orientation, flags=flags, physicsClientId=self._client)
+        os.unlink(path)  # or there would be one more file for every vehicle that has come
         self._set_material(number)
         self.set_pose(number, pose)  # again, for PyBullet reads a URDF's pose in single precision
         return number

@@ -6,9 +6,7 @@ import asyncio
 import contextlib
 import io
 import secrets
-import signal
 import sys
-import threading
 from collections.abc import Callable
 
 import rospy
@@ -20,6 +18,7 @@ from drone_sim.ros.cockpit.server import notice
 from drone_sim.ros.cockpit.server.address import free_place, urls
 from drone_sim.ros.cockpit.server.gate import Gate, Handler
 from drone_sim.ros.cockpit.settings import Settings, read
+from drone_sim.ros.node.signals import end_on_signals
 from drone_sim.ros.node.starting import init_node, reported
 
 _NAME = "cockpit"
@@ -62,17 +61,8 @@ def main() -> int:
     # There may be several. Its time is the person's, who looks on while /clock stands still.
     if not init_node(_NAME, anonymous=True, disable_rostime=True, disable_signals=True):
         return 1
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _end)
+    end_on_signals()
     return reported(_NAME, _serve)
-
-
-def _end(*_: object) -> None:
-    """End the node. rospy's own handler calls the master from within whatever a signal interrupts.
-
-    Where that is a call to the master, too, it would hang for ever; a thread of its own waits for its turn.
-    """
-    threading.Thread(target=rospy.signal_shutdown, args=("signal",), name="end").start()
 
 
 def _serve() -> None:

@@ -32,6 +32,7 @@ from drone_sim.ros.grading.hearing import Hearing
 from drone_sim.ros.grading.sending import Sender, entries_of, steps_late
 from drone_sim.ros.grading.simulator import Simulator, Unfit
 from drone_sim.ros.node.paths import from_shell
+from drone_sim.ros.node.signals import end_on_signals
 from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene_parameters import find_files_beside
@@ -48,8 +49,9 @@ def main() -> int:
     options = _parser().parse_args(_arguments(rosgraph.myargv(sys.argv)[1:]))
     if options.write_config:
         return status_of(_NAME, lambda: _write_config(options.plan, options.write_config))
-    if not init_node(_NAME, anonymous=True, disable_signals=False):
+    if not init_node(_NAME, anonymous=True, disable_signals=True):
         return FAILED
+    end_on_signals()
     results: list[Result] = []
     status = reported(_NAME, lambda: results.append(_graded(options)))
     return status or (0 if results[0].passed else FAILED)

@@ -20,6 +20,7 @@ from std_msgs.msg import String
 
 from drone_sim.mechanics.frames import position, to_euler
 from drone_sim.remote import outside
+from drone_sim.ros.node import namesake
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.ending import Ending
 from drone_sim.ros.node.given import read_parameters, use_sim_time
@@ -254,7 +255,7 @@ class _ToRosout(logging.Handler):
 def main(guardian: Guardian) -> int:
     """Run the node; return its exit status: 1, after one line, for a wrong parameter, file or script."""
     # The time of messages is the simulation's; hearing its own /clock would cost the node half of its speed.
-    if not init_node(_NAME, disable_signals=True, disable_rostime=True):
+    if not init_node(_NAME, others_wait=True, disable_signals=True, disable_rostime=True):
         return 1
     ending = Ending(guardian)
     nodes = []
@@ -265,6 +266,7 @@ def main(guardian: Guardian) -> int:
         check_others([one.name for one in parameters.fleet], use_sim_time())
         nodes.append(Node(parameters))
         MasterWatch(nodes[0].descriptions).start()
+        namesake.let_others()
         nodes[0].run(ending.asked)
 
     status = reported(_NAME, run)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
+import logging
 import os
 import socket
 import sys
@@ -12,8 +14,10 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import rosgraph
+import rospkg
 import rospy
 
+from drone_sim.ros.node import namesake
 from drone_sim.scripting.errors import ScriptError
 
 MASTER_GONE = (ConnectionError, http.client.HTTPException, xmlrpc.client.Error, rosgraph.MasterException)
@@ -21,22 +25,62 @@ _EXPECTED = (ScriptError, ValueError, RuntimeError, OSError, rospy.ROSException)
 _PATIENCE = 5.0  # s, for a master's answer
 
 
-def init_node(name: str, **options: Any) -> bool:
+def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
     """Call rospy.init_node; return False, after one line on stderr, where it cannot become a node.
 
-    rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach.
+    rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach. Another node
+    of the name has ended by then; `others_wait`: who else wants it waits for namesake.let_others.
     """
     patience = socket.getdefaulttimeout()
     socket.setdefaulttimeout(_PATIENCE)
     try:
         _check_master()
         _check_own_address()
+        own = _own_name(name, bool(options.get("anonymous")))
+        if own:
+            namesake.take_name(own)
     except (ValueError, OSError) as error:
         print(f"{name}: {error}", file=sys.stderr, flush=True)
         return False
     finally:
         socket.setdefaulttimeout(patience)
-    return not reported(name, lambda: rospy.init_node(name, **options))
+    _check_log(name)
+    done = not reported(name, lambda: rospy.init_node(name, **options))
+    if not others_wait:
+        namesake.let_others()
+    return done
+
+
+def _check_log(name: str) -> None:
+    """Do without a log, and say so, where none can be written: rospy would say nothing on the terminal then, either."""
+    logging.FileHandler.handleError = _do_without_log  # type: ignore[assignment, method-assign]
+    mappings = rospy.names.get_mappings()
+    folder = os.path.dirname(os.path.abspath(mappings["__log"])) if "__log" in mappings else rospkg.get_log_dir()
+    with contextlib.suppress(OSError):
+        os.makedirs(folder, exist_ok=True)
+    if not os.access(folder, os.W_OK):
+        said = f"no log is written: {folder} must not be written to; ROS_LOG_DIR names another folder"
+        print(f"{name}: {said}", file=sys.stderr, flush=True)
+        mappings["__log"] = os.devnull
+
+
+_unwritten: set[str] = set()  # files of the log that cannot be written
+
+
+def _do_without_log(handler: logging.FileHandler, _record: logging.LogRecord) -> None:
+    """Say once that a disk is full: Python itself would print a traceback for every line of the log."""
+    if handler.baseFilename not in _unwritten:
+        _unwritten.add(handler.baseFilename)
+        why = sys.exc_info()[1]
+        said = why.strerror or why if isinstance(why, OSError) else why
+        with contextlib.suppress(OSError):
+            print(f"{handler.baseFilename}: no log is written ({said})", file=sys.stderr, flush=True)
+
+
+def _own_name(name: str, anonymous: bool) -> str:
+    """Return the name that the node will have, '' for one that nobody else has."""
+    given = rospy.names.get_mappings().get("__name", "" if anonymous else name)
+    return str(rosgraph.names.resolve_name(given, rospy.core.get_caller_id())) if given else ""
 
 
 def _check_master() -> None:

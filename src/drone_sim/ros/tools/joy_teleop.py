@@ -11,16 +11,15 @@ import contextlib
 import math
 import queue
 import select
-import signal
-import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import rospy
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Empty
 
+from drone_sim.ros.node.ending import Ending
 from drone_sim.ros.node.paths import from_shell
 from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.ros.tools import gamepad, joy_parameters
@@ -54,10 +53,10 @@ class JoyTeleop:
         self._publishers = {name: rospy.Publisher(topic, Empty, queue_size=1) for name, topic in names}
         self._topic = rospy.Subscriber("joy", Joy, self._hear, queue_size=10)
 
-    def run(self, ended: threading.Event) -> None:
-        """Fly until it has ended."""
+    def run(self, over: Callable[[], bool]) -> None:
+        """Fly until it is over."""
         rospy.loginfo(f"{_NAME}: hold button {self._parameters.dead_man} to fly; commands on {self._teleop.topic}")
-        while not ended.is_set() and not rospy.is_shutdown():
+        while not over():
             self._look_for_gamepad()
             for pad in self._states(max(0.0, self._due - time.monotonic())):
                 for name in self._pilot.see(pad):
@@ -163,19 +162,17 @@ def main() -> int:
     # Its time is the person's, who must be able to stop the drone while /clock stands still.
     if not init_node(_NAME, anonymous=True, disable_signals=True, disable_rostime=True):
         return 1
-    ended = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: ended.set())
+    ending = Ending()
     teleops = []
 
     def run() -> None:
         parameters = _parameters()
         teleops.append(Teleop())
-        JoyTeleop(parameters, teleops[0]).run(ended)
+        JoyTeleop(parameters, teleops[0]).run(ending.asked)
 
     status = reported(_NAME, run)
     for teleop in teleops:
         teleop.stop()
         rospy.loginfo(f"{_NAME}: {teleop.farewell}")
-    rospy.signal_shutdown("ended")
+    ending.complete()
     return status

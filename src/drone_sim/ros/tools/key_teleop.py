@@ -13,10 +13,10 @@ import signal
 import sys
 import termios
 import time
+from collections.abc import Callable
 from typing import Any
 
-import rospy
-
+from drone_sim.ros.node.ending import Ending
 from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.ros.tools import keys
 from drone_sim.ros.tools.keys import KeyDecoder
@@ -42,9 +42,9 @@ HELP = (
 class Screen:
     """Reads keys and shows the read-out, until somebody wants to leave or the terminal is gone."""
 
-    def __init__(self, teleop: Teleop):
-        """Take what does the work."""
-        self._teleop = teleop
+    def __init__(self, teleop: Teleop, over: Callable[[], bool]):
+        """Take what does the work, and what tells that it is over."""
+        self._teleop, self._over = teleop, over
         self._decoder = KeyDecoder()
         self._terminal = sys.stdin.fileno()
         self._unknown = False  # whether the last key was
@@ -58,7 +58,7 @@ class Screen:
             self._fly()
 
     def _fly(self) -> None:
-        while not rospy.is_shutdown():
+        while not self._over():
             self._draw()
             for key in self._read():
                 if key in _LEAVE:
@@ -68,7 +68,7 @@ class Screen:
     def _connect(self) -> None:
         """Give the topics a moment to connect, and forget what was typed meanwhile, sequences cut in two among it."""
         deadline = time.monotonic() + _CONNECTING
-        while not self._teleop.connected and time.monotonic() < deadline and not rospy.is_shutdown():
+        while not self._teleop.connected and time.monotonic() < deadline and not self._over():
             self._teleop.said = "connecting ..."
             self._draw()
             time.sleep(_PERIOD / 2)
@@ -114,20 +114,13 @@ def _ignore_control_s(terminal: int) -> None:
     termios.tcsetattr(terminal, termios.TCSANOW, settings)
 
 
-def _fly(teleop: Teleop) -> None:
+def _fly(teleop: Teleop, over: Callable[[], bool]) -> None:
     """Show the screen until it is left in any way, and stop the drone."""
     try:
-        for number in _SIGNALS:
-            signal.signal(number, signal.default_int_handler)
-        curses.wrapper(Screen(teleop).run)
-    except (KeyboardInterrupt, curses.error):  # the latter where there is no terminal any more to leave
-        pass
+        with contextlib.suppress(curses.error):  # there is no terminal any more to leave
+            curses.wrapper(Screen(teleop, over).run)
     finally:
-        for number in _SIGNALS:
-            signal.signal(number, signal.SIG_IGN)
         teleop.stop()
-        for number in _SIGNALS:
-            signal.signal(number, signal.SIG_DFL)  # where the master does not answer, another one ends it
 
 
 def main() -> int:
@@ -143,12 +136,13 @@ def main() -> int:
     # rospy's own handlers would close the topics before the last stop is sent, and its time may stand still.
     if not init_node(_NAME, anonymous=True, disable_signals=True, disable_rostime=True):
         return 1
+    ending = Ending(numbers=_SIGNALS)
     teleop = Teleop()
-    status = reported(_NAME, lambda: _fly(teleop))
+    status = reported(_NAME, lambda: _fly(teleop, ending.asked))
     rest_of_line = (curses.tigetstr("el") or b"").decode()  # what was typed before it began stands there
     try:
         print(f"\r{rest_of_line}{_NAME}: {teleop.farewell}", flush=True)
     except OSError:  # the terminal is gone
         status = 1
-    rospy.signal_shutdown("left")
+    ending.complete()
     return status

@@ -11,6 +11,7 @@ import os
 import re
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,6 +30,7 @@ _PATIENCE = 5.0  # s, for a simulator that is just being started
 _LARGE = r"sensor_msgs/(Image|PointCloud2?)|visualization_msgs/.*|dynamic_reconfigure/.*|theora_image_transport/.*"
 _IMAGES = r"sensor_msgs/(CompressedImage|CameraInfo)"  # a twentieth of the raw ones
 _OF_OTHERS = ("/rosout_agg", "/clock")  # said twice; told by `rosbag play --clock`, and in the times of all messages
+_ENOUGH = 1 << 16  # bytes, for the beginning of a bag; of a disk that fills up later rosbag itself tells
 _LAST_SERVICE = "pause"  # that the simulator advertises: its topics are there by then
 
 
@@ -68,9 +70,13 @@ def _file(folder: str) -> Path:
     where = Path(folder or rospkg.get_ros_home()).expanduser()
     if folder and not where.is_dir():
         raise OSError(f"--folder {where}: no such folder")
-    where.mkdir(parents=True, exist_ok=True)
-    if not os.access(where, os.W_OK):
-        raise OSError(f"--folder {where}: must not be written to")
+    try:
+        where.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=where) as probe:
+            probe.write(bytes(_ENOUGH))
+            probe.flush()
+    except OSError as error:
+        raise OSError(f"--folder {where}: {error.strerror}") from None
     return where / time.strftime("drone_sim_%Y-%m-%d-%H-%M-%S.bag")
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
-import signal
 import sys
-import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -19,6 +18,7 @@ import rosgraph
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
+from drone_sim.ros.node.ending import Ending
 from drone_sim.ros.node.starting import init_node, reported
 from drone_sim.ros.tools import pictures
 from drone_sim.wording import near_names
@@ -105,17 +105,17 @@ class Topic:
 
 
 class Viewer:
-    """Follows topics until somebody ends it; the thread that calls `run` owns the window."""
+    """Follows topics until somebody ends it; the thread that calls `show` owns the window."""
 
-    def __init__(self, topics: list[str]):
-        """Begin to listen."""
+    def __init__(self, topics: list[str], asked: Callable[[], bool]):
+        """Begin to listen; `asked` tells whether it is time to end."""
         self.topics = [Topic(rospy.resolve_name(topic)) for topic in topics]
-        self.ended = threading.Event()
+        self._asked_to_end, self._closed = asked, False
         self._asked = -math.inf
 
     def _wait(self) -> bool:
         """Wait a little, look for publishers now and then, and take what has come; return whether something has."""
-        self.ended.wait(_PERIOD)
+        time.sleep(_PERIOD)
         if time.monotonic() - self._asked > _ASKING:
             self._asked = time.monotonic()
             seeking = not all(topic.found for topic in self.topics)
@@ -145,7 +145,7 @@ class Viewer:
 
     def _show(self, window: Any, tkinter: ModuleType) -> None:
         window.title(" ".join([_NAME, *(topic.name for topic in self.topics)]))
-        window.protocol("WM_DELETE_WINDOW", self.ended.set)
+        window.protocol("WM_DELETE_WINDOW", self._close)
         label = tkinter.Label(window, borderwidth=0)
         label.pack()
         largest = int(_SHARE * window.winfo_screenwidth()), int(_SHARE * window.winfo_screenheight())
@@ -160,8 +160,11 @@ class Viewer:
             window.update()
         window.destroy()
 
+    def _close(self) -> None:
+        self._closed = True
+
     def _over(self) -> bool:
-        return self.ended.is_set() or rospy.is_shutdown()
+        return self._closed or self._asked_to_end()
 
 
 def _window() -> Any:
@@ -191,11 +194,10 @@ def main() -> int:
     # Its time is the person's, who looks on while /clock stands still.
     if not init_node(_NAME, anonymous=True, disable_signals=True, disable_rostime=True):
         return 1
-    viewer = Viewer(arguments.topics)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: viewer.ended.set())
+    ending = Ending()
+    viewer = Viewer(arguments.topics, ending.asked)
     window = None if arguments.png else _window()
     file = arguments.png or _FILE
     status = reported(_NAME, lambda: viewer.show(window) if window else viewer.save(file))
-    rospy.signal_shutdown("ended")
+    ending.complete()
     return status

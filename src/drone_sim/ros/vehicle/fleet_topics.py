@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 
 import rospy
@@ -50,6 +51,8 @@ class FleetTopics:
             else:
                 self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox)
         self._transforms.tell_fixed(vehicles.values(), self._stamp)
+        # rospy's topics hold on to themselves, and each has a descriptor (epoll) open until the collector comes by.
+        gc.collect()
 
     def command_logs(self) -> dict[str, CommandLog]:
         """Return what has come in, by vehicle."""

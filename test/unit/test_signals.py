@@ -1,0 +1,85 @@
+"""A signal that comes while rospy holds a lock that ending needs, too: the node ends all the same."""
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+PACKAGE = Path(__file__).parents[2]
+HANGS = 30.0  # s; nothing here takes nearly as long unless it hangs
+
+# A node without a master. It holds a lock, as rospy does while a message goes into the queue of a connection, and the
+# signal comes just then; ending takes the same lock, as rospy does to close the connection.
+NODE = """
+import signal, sys, threading
+import rospy
+from drone_sim.run.guardian import Guardian
+class Lock:
+    def __init__(self):
+        self.lock, self.armed = threading.Lock(), True
+        self.acquire, self.release = self.lock.acquire, self.lock.release
+    def __enter__(self):
+        self.acquire()
+        if self.armed:
+            self.armed = False
+            signal.raise_signal(signal.{signal})
+    def __exit__(self, *_):
+        self.release()
+lock = Lock()
+def shut(reason):
+    with lock:
+        pass
+guardian = Guardian("node") if {guarded} else None
+from drone_sim.ros.node.ending import Ending
+from drone_sim.ros.node.signals import end_on_signals
+rospy.core.add_shutdown_hook(shut)
+{install}
+with lock:
+    pass
+while not {over}:
+    rospy.rostime.wallsleep(0.01)
+{last}
+print("ended")
+"""
+WAYS = {
+    "shut down": ("end_on_signals()", "rospy.is_shutdown()", "", False),
+    "asked": ("ending = Ending()", "ending.asked()", "ending.complete()", False),
+    "guarded": ("ending = Ending(guardian)", "ending.asked()", "ending.complete()", True),
+}
+
+
+def run(number, install, over, last, guarded):
+    program = NODE.format(signal=number.name, install=install, over=over, last=last, guarded=guarded)
+    return subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=HANGS, check=False, cwd=PACKAGE / "src"
+    )
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("way", WAYS)
+def test_a_signal_within_a_write_ends_the_node(way, number):
+    done = run(number, *WAYS[way])
+    assert (done.returncode, done.stdout, done.stderr) == (0, "ended\n", "")
+
+
+def test_what_nohup_has_ignored_stays_ignored():
+    install = "signal.signal(signal.SIGHUP, signal.SIG_IGN); end_on_signals()"
+    done = run(signal.SIGHUP, install, "signal.raise_signal(signal.SIGTERM) is None and rospy.is_shutdown()", "", False)
+    assert (done.returncode, done.stdout) == (0, "ended\n")
+
+
+def test_no_node_of_ours_has_the_handlers_of_rospy():
+    files = [one for folder in ("src", "docs", "scripts") for one in (PACKAGE / folder).rglob("*") if one.is_file()]
+    calls = {
+        f"{one.name}: {call}"
+        for one in files
+        if one.suffix in ("", ".py")
+        for call in re.findall(r"\binit_node\([^\n]+", one.read_text(encoding="utf-8"))
+        if "disable_signals=True" not in call and "**options" not in call
+    }
+    assert not calls
