@@ -11,6 +11,8 @@ import genpy
 import roslib.message
 import rospkg
 
+from drone_sim.wording import encodable
+
 
 def message_class(kind: str) -> type[genpy.Message]:
     """Return the class of a message type such as sensor_msgs/Imu; raises ValueError where it is not installed."""
@@ -67,4 +69,4 @@ def _value(kind: str, value: Any, path: str) -> Any:
         return fill(message_class(kind)(), value, path)
     if kind.startswith(("int", "uint")) and isinstance(value, float) and value.is_integer():
         return int(value)  # Lua 5.1 has no integers
-    return value
+    return encodable(value) if kind == "string" and isinstance(value, str) else value
