@@ -28,6 +28,11 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
+def encodable(text: str) -> str:
+    r"""Return a text that every file and topic takes: half a surrogate pair, which UTF-8 has not, becomes `\ud800`."""
+    return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def near_names(name: str, known: Iterable[str]) -> str:
     """Return 'near names are a, b' for an error message, or what is known where nothing is near."""
     known = sorted(known)

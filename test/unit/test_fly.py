@@ -340,6 +340,24 @@ def test_a_signal_ends_the_flight_whatever_a_script_does(script, does, number, s
     assert "Traceback" not in errors
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_what_a_script_says_is_shown_whatever_it_is(script, encoding):
+    """Half a surrogate pair, which UTF-8 has not, and what the terminal cannot show."""
+    said = "\n    ".join(
+        f"{say}('\\ud800 \u00e4')" for say in ("print", "self.x =", "sim.addStatusbarMessage", "raise ValueError")
+    )
+    path = script(f"def sysCall_actuation():\n    {said}\n")
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / "fly"), "--script", path, "--duration", "0.1"],
+        env={**environment(), "PYTHONIOENCODING": encoding},
+        capture_output=True,
+        check=False,
+    )
+    shown = "\\ud800 \u00e4".encode(encoding, "backslashreplace")
+    assert done.stdout.splitlines()[:2] == [shown, shown]
+    assert done.stderr.splitlines() == [f"fly: [actuation] {path}:5: ValueError: ".encode() + shown]
+
+
 def test_it_needs_no_ros(tmp_path):
     program = (
         "import sys\n"

@@ -111,3 +111,14 @@ def test_a_seed_may_have_a_fraction(run, dialect):
     assert run(dialect + two + "math.randomseed()\nprint(math.random(1000))") == run(
         dialect + two + "math.randomseed(1)\nprint(math.random(1000))"
     )
+
+
+@pytest.mark.parametrize("before", [b"\xef\xbb\xbf", b"#!/usr/bin/lua\r\n", b"\xef\xbb\xbf#!lua\n", b"-- \xe4\n", b""])
+@pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r"])
+def test_a_file_may_be_of_any_editor(tmp_path, caplog, before, end):
+    caplog.set_level(logging.INFO)
+    (tmp_path / "helper.lua").write_bytes(before + b"return 7" + end)
+    path = tmp_path / "bytes.lua"
+    path.write_bytes(before + b"print(require 'helper', dofile 'helper.lua')" + end + b"x = 1" + end)
+    load.load(str(path), {}, TimeLimit(2.0)).close()
+    assert "7\t7" in caplog.messages

@@ -160,3 +160,40 @@ def test_a_script_that_keeps_itself_has_snapshots(tmp_path):
     me = simulation.drone.script._globals["self"]
     assert (me.me is me, me.too[0] is me, me.count, len(me.list)) == (True, True, 2, 2)
     simulation.close()
+
+
+@pytest.mark.parametrize("phase", ["init", "actuation", "sensing"])
+def test_a_script_that_has_lost_its_globals_has_snapshots(tmp_path, phase):
+    path = tmp_path / "script.py"
+    path.write_text(
+        "def sysCall_init(): self.count = 0\ndef sysCall_actuation(): self.count += 1\ndef sysCall_sensing(): pass\n"
+        f"before = sysCall_{phase}\ndef sysCall_{phase}(before=before):\n    before()\n    globals().clear()\n",
+        encoding="utf-8",
+    )
+    simulation = Simulation(parameters.load(), script=str(path))
+    first = simulation.snapshot()
+    for _ in range(2):
+        simulation.step()
+    simulation.restore(simulation.snapshot())
+    simulation.step()
+    simulation.restore(first)
+    simulation.step()
+    simulation.close()
+
+
+@pytest.mark.parametrize(
+    ("has", "said"),
+    [
+        ("class A:\n    def __deepcopy__(self, _): raise KeyboardInterrupt\nx = A()", "script.py:2: KeyboardInterrupt"),
+        ("class A:\n    def __deepcopy__(self, _):\n        while True: pass\nx = A()", "script.py:3: stopped after"),
+        ("class A(str):\n    def __eq__(self, _): return 1 / 0\n    __hash__ = str.__hash__\n"
+         "def sysCall_init(): globals()[A('x')] = 1", "script.py:2: ZeroDivisionError"),
+    ],
+)  # fmt: skip
+def test_what_a_script_does_while_it_is_copied_is_its_own_error(tmp_path, has, said):
+    path = tmp_path / "script.py"
+    path.write_text(f"{has}\ndef sysCall_sensing(): pass\n", encoding="utf-8")
+    simulation = Simulation(parameters.load({"script_time_limit": 0.2}), script=str(path))
+    with pytest.raises(ScriptError, match=rf"^\[snapshot\] .*{said}"):
+        simulation.snapshot()
+    simulation.close()

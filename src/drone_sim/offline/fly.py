@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 import itertools
 import logging
 import math
@@ -178,7 +179,9 @@ def _film(path: str | None, simulation: Simulation, vehicle: str, camera: str) -
 
 @contextlib.contextmanager
 def _shown_on_stdout(log: logging.Logger) -> Iterator[None]:
-    """Let what a script prints be seen."""
+    """Let what a script prints be seen, whatever a terminal cannot show."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     handler = logging.StreamHandler(sys.stdout)
     log.addHandler(handler)
     try:

@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Iterable
 from typing import Any
 
+from drone_sim.wording import encodable
+
 LONGEST_MESSAGE = 600  # characters
 
 
@@ -18,7 +20,7 @@ class ScriptError(Exception):
         words = " ".join(message[: 2 * LONGEST_MESSAGE].split())
         if len(words) > LONGEST_MESSAGE:
             words = words[:LONGEST_MESSAGE] + "…"
-        super().__init__(f"[{phase}] {place}: {words}")
+        super().__init__(encodable(f"[{phase}] {place}: {words}"))
         self.phase = phase
         self.path = path
         self.line = line

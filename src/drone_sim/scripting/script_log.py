@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from typing import Any
 
+from drone_sim.wording import encodable
+
 LOG = logging.getLogger("drone_sim.script")
 LOG.setLevel(logging.INFO)  # a script's print is wanted, whatever the level of the rest
 
@@ -21,7 +23,7 @@ class _Lines:
         self.count += 1
         if self.count <= MOST:
             shortened = text if len(text) <= LONGEST else text[:LONGEST] + "… (the rest of the line is left out)"
-            LOG.log(level, "%s", shortened)
+            LOG.log(level, "%s", encodable(shortened))
 
     def end(self) -> None:
         left_out, self.count = self.count - MOST, 0

@@ -12,6 +12,7 @@ import roslib.message
 import rospkg
 
 from drone_sim.ros.vehicle.messages import ros_time
+from drone_sim.wording import encodable
 
 
 def message_class(kind: str) -> type[genpy.Message]:
@@ -69,4 +70,4 @@ def _value(kind: str, value: Any, path: str) -> Any:
         return fill(message_class(kind)(), value, path)
     if kind.startswith(("int", "uint")) and isinstance(value, float) and value.is_integer():
         return int(value)  # Lua 5.1 has no integers
-    return value
+    return encodable(value) if kind == "string" and isinstance(value, str) else value

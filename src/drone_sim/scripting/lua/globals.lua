@@ -13,6 +13,7 @@ local load, loadstring, setfenv = load, loadstring, setfenv
 local create, resume, close = coroutine.create, sandbox.resume, coroutine.close
 local getmeta = sandbox.debug.getmetatable
 local log, caught, protected, limit = bridge.log, sandbox.caught, sandbox.protected, sandbox.limit
+local check, checked, tonumber = sandbox.check, sandbox.checked, tonumber
 local env, modules = sandbox.globals, sandbox.modules
 local newer = _VERSION ~= 'Lua 5.1'
 
@@ -66,7 +67,10 @@ function coroutine.resume(thread, ...)
 end
 
 if close then
-  function coroutine.close(thread) return caught(close(thread)) end
+  function coroutine.close(thread)
+    check() -- one that the hook has ended closes its variables without hooks
+    return caught(close(thread))
+  end
 end
 
 local function unwrapped(ok, ...)
@@ -133,9 +137,14 @@ for _, name in pairs{'insert', 'remove', 'concat'} do
   end
 end
 local rep = string.rep
-function string.rep(text, count, separator)
+string.rep = checked(function(text, count, separator)
   if text == '' and (separator or '') == '' then return '' end -- which would be joined one by one
   return rep(text, count, separator)
+end, function(text, count)
+  return (type(text) == 'string' and #text or 0) * (tonumber(count) or 0)
+end)
+for _, name in pairs{'upper', 'lower', 'reverse'} do
+  string[name] = checked(string[name], function(text) return type(text) == 'string' and #text or 0 end)
 end
 if bridge.direct then -- see source.py
   for _, name in pairs{'find', 'match', 'gmatch', 'gfind', 'gsub'} do string[name] = nil end

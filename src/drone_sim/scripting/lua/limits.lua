@@ -1,7 +1,8 @@
 -- The limits of time and memory, and the errors that nothing in a script may catch.
 local bridge, sandbox, source = ...
 
-local pcall, error, type, tostring = pcall, error, type, tostring
+local pcall, error, type, tostring, setmetatable = pcall, error, type, tostring, setmetatable
+local current, resume = coroutine.running, coroutine.resume
 local sub = string.sub
 local getinfo, sethook = debug.getinfo, debug.sethook
 local look = bridge.look
@@ -9,6 +10,8 @@ local look = bridge.look
 -- A script's C code may take long between two looks at the clock and the memory: comparing or joining strings of
 -- 100 MB, say. In the simulation's own thread it may do so only a few times; 1000 instructions are some 10 us.
 local INSTRUCTIONS = bridge.direct and 200 or 2000
+local FEW = 20 -- of a script that uses much memory: each of them may take long
+local LONG = 1000000 -- bytes of a string that takes long
 local running, stopped, stopped_at, stopped_in = false, false, 0, ''
 
 sandbox.debug = debug
@@ -35,29 +38,86 @@ local function stop(why)
 end
 sandbox.stop = stop
 
-local function hook()
+-- Stop the script where it is time to, or return whether to look again soon.
+local function check()
   if not running then return end
   if stopped then error('stopped', 0) end
   local why = look()
   if why > 0 then stop(why) end
+  return why < 0
+end
+sandbox.check = check
+
+local counts = setmetatable({}, {__mode = 'k'}) -- after how many instructions a hook comes, unless INSTRUCTIONS
+local is_careful = false -- whether there are any in it
+local hook
+
+-- Let the hook of the coroutine that runs come after so many instructions; to set one looks at the whole stack.
+local function come_after(count)
+  local here = current() or hook -- 5.1 has none for the first one
+  if (counts[here] or INSTRUCTIONS) ~= count then
+    is_careful, counts[here] = true, count
+    sethook(hook, '', count)
+  end
+end
+
+function hook()
+  if not running or (stopped and getinfo(2, 'f').func == sandbox.within_limits) then return end
+  if stopped then come_after(1) end -- or what closes its variables on the way out begins anew, again and again
+  local much = check()
+  if much or is_careful then come_after(much and FEW or INSTRUCTIONS) end
 end
 sethook(hook, '', INSTRUCTIONS)
 
--- Every coroutine has a hook of its own.
+-- Every coroutine has a hook of its own, which many short ones never come to: to make one counts, too.
 function sandbox.limit(thread)
+  check()
   sethook(thread, hook, '', INSTRUCTIONS)
 end
 
+-- Look at the clock and the memory before and after a function of Lua's on a string that is long.
+function sandbox.checked(f, length_of)
+  return function(text, ...)
+    if length_of(text, ...) < LONG then return f(text, ...) end
+    check()
+    local result = f(text, ...)
+    if check() then come_after(FEW) end
+    return result
+  end
+end
+
 -- Hand on the results of a pcall or a resume, unless they are what a script may not catch: that it was stopped, or an
--- exception of Python's.
+-- exception of Python's. Where the C stack is used up the hook itself fails, and the script gets that error.
 local function caught(ok, ...)
-  if not ok and (stopped or type((...)) == 'userdata') then error((...), 0) end
+  if not ok then
+    if stopped or type((...)) == 'userdata' then error((...), 0) end
+    check()
+  end
   return ok, ...
 end
 sandbox.caught = caught
 
+-- Lua itself bounds a pcall within a pcall at some 200, apart from those of a newer Lua's coroutines: there each error
+-- takes the longer the more there are. Below that bound the hook has room for itself.
+local MOST_PCALLS = 150
+local depth = 0
+local TOO_DEEP = 'stack overflow: more than ' .. MOST_PCALLS .. ' pcall within each other'
+
+local function left(before, ...)
+  depth = before
+  return ...
+end
+
 function sandbox.protected(f, ...)
-  return caught(pcall(f, ...))
+  if depth >= MOST_PCALLS then error(TOO_DEEP, 0) end
+  local before = depth
+  depth = before + 1
+  return caught(left(before, pcall(f, ...)))
+end
+
+-- Resume a coroutine, which may be left within a pcall.
+function sandbox.resume(...)
+  return left(depth, resume(...))
 end
 
 local function message_of(value)
@@ -69,7 +129,8 @@ end
 -- Call f within the limits. Return nothing where it returned nothing; or true and what it returned; or the number of
 -- the limit, the line and the name of the file; or false and a message, which may begin with file and line.
 function sandbox.within_limits(f, ...)
-  running, stopped = true, false
+  if stopped then come_after(INSTRUCTIONS) end
+  running, stopped, depth = true, false, 0
   local ok, value = pcall(f, ...)
   running = false
   if stopped then return stopped, stopped_at, stopped_in end

@@ -46,13 +46,13 @@ class LuaScript:
         """Compile the file's text; run its top level unless it is to run in every phase. Raises ScriptError."""
         self._path = path
         self._limit = limit
-        self.is_empty = not source.strip()
+        text = LuaSource(source)
+        self.is_empty = not text.text.strip()
         self._modules = modules
         self._end = ""  # why nothing can be called any more
         self._phases = 0
         self.idle = ""  # why nothing of it is ever called
         self._helpers = LuaHelpers(path)
-        text = LuaSource(source)
         self._check_call_types(text)
         if text.loops_in_c and left_behind() >= MOST_LEFT:
             raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")

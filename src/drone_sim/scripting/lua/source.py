@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 
 _COMMENT = re.compile(rb"--(?:\[(=*)\[)?")
@@ -50,7 +51,8 @@ class LuaSource:
     """
 
     def __init__(self, text: bytes):
-        """Take the file's contents, which may begin with a #! line."""
+        """Take the file's contents, which may begin with UTF-8's byte order mark and a #! line."""
+        text = text.removeprefix(codecs.BOM_UTF8)
         self.text = b"--" + text if text.startswith(b"#") else text
         bare = _without_comments(self.text)
         self.form = _form(bare)

@@ -42,7 +42,8 @@ _FILES = (
 _CAP = MEMORY + 256 * MIB  # where Lua gets no more: what lupa itself allocates in between must never fail
 
 Reader = Callable[[bytes], tuple[bool, bytes, bytes]]  # of a name: whether there is one, text, name of the chunk
-TIME, OVER_MEMORY = 1, 2  # why Lua stops a script (limits.lua)
+TIME, OVER_MEMORY, MUCH_MEMORY = 1, 2, -1  # why Lua stops a script, or looks at it more often (limits.lua)
+_MUCH = 32 * MIB
 
 
 def newest() -> str:
@@ -101,12 +102,15 @@ def _texts() -> dict[str, bytes]:
 
 
 def _look(door: Door, limit: TimeLimit, values: Values) -> Callable[[], int]:
-    """Return what Lua's hook asks whether the script is to be stopped, and for what."""
+    """Return what Lua's hook asks: whether the script is to be stopped, or to be looked at more often, and for what."""
 
     def look() -> int:
-        if values.used() > MEMORY and values.too_much():
+        used = values.used()
+        if used > MEMORY and values.too_much():
             return OVER_MEMORY
-        return TIME if door.closed or limit.exceeded() else 0
+        if door.closed or limit.exceeded():
+            return TIME
+        return MUCH_MEMORY if used > _MUCH else 0
 
     return look
 

@@ -3,7 +3,7 @@
 local bridge, sandbox = ...
 
 local error, type, next = error, type, next
-local create, resume, yield, status = coroutine.create, coroutine.resume, coroutine.yield, coroutine.status
+local create, resume, yield, status = coroutine.create, sandbox.resume, coroutine.yield, coroutine.status
 local running, isyieldable = coroutine.running, coroutine.isyieldable
 local upper = string.upper
 local limit, caught = sandbox.limit, sandbox.caught

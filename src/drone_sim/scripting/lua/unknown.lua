@@ -4,21 +4,24 @@
 -- stay: whether a plugin is there (`if simROS2 then`), and whether a global that the script itself sets has been set.
 local _, sandbox = ...
 
-local error, type, next, setmetatable, find = error, type, next, setmetatable, string.find
+local error, type, setmetatable = error, type, setmetatable
+local find, gmatch = string.find, string.gmatch
 local env, texts, place_in_script = sandbox.globals, sandbox.texts, sandbox.place_in_script
-local own = {} -- names of globals that the script sets
+local own, read = {}, 0 -- names of globals that the script sets; how many of its texts have been read for them
 
 -- Tell whether the script, or a file that it requires, gives a global of that name a value.
 local function is_own(name)
-  if own[name] then return true end
-  for _, text in next, texts do
-    if find(text, '%f[%w_]' .. name .. '%s*=[^=]') or find(text, '%f[%w_]' .. name .. '%s*,[%w_%.,%s]*=[^=]')
-        or find(text, '%f[%w_]function%s+' .. name .. '%f[^%w_]') then
-      own[name] = true
-      return true
+  while read < #texts do
+    read = read + 1
+    -- Each piece of the text is read once, whatever stands there: no hook ends a search.
+    for names, equals in gmatch(texts[read], '([%w_][%w_%.,%s]*)(=?=?)') do
+      if equals == '=' then
+        for one in gmatch(names .. ',', '%f[%w_](sim[A-Z_][%w_]*)%s*,') do own[one] = true end
+      end
     end
+    for one in gmatch(texts[read], '%f[%w_]function%s+(sim[A-Z_][%w_]*)') do own[one] = true end
   end
-  return false
+  return own[name]
 end
 
 -- Let a table refuse what it does not have; `message` returns why, or nil for a name that may be nil.

@@ -51,7 +51,8 @@ class Helpers:
 
     def modules(self) -> dict[str, ModuleType]:
         """Return the modules that were imported, by their names in sys.modules."""
-        return {name: one for name, one in list(sys.modules.items()) if name.startswith(self.package + ".")}
+        found = list(sys.modules.items())
+        return {name: one for name, one in found if name.startswith(self.package + ".") and isinstance(one, ModuleType)}
 
     def forget(self, name: str) -> None:
         """Let a module be read anew by the next import."""

@@ -86,7 +86,7 @@ class PythonScript:
 
     def _check_names(self) -> None:
         """Raise ScriptError for a function that was meant to be a phase, but would not be called as one."""
-        functions = {name: one for name, one in self._globals.items() if callable(one) and not name.startswith("__")}
+        functions = {name: one for name, one in self._named() if callable(one) and not name.startswith("__")}
         for name, meant in phase_names.misspelt(functions):
             raise self._error_at(functions[name], phase_names.never_called(name, meant))
         for name in (*FUNCTIONS.values(), *THREADS):
@@ -95,6 +95,10 @@ class PythonScript:
                 raise self._error_at(one, f"{name} would not run: it has a `yield` or is `async`")
         phase_names.warn(self._path, functions)
         self.idle = phase_names.idle(functions)
+
+    def _named(self) -> list[tuple[str, Any]]:
+        """Return its global variables; `globals()` takes any key."""
+        return [(name, one) for name, one in self._globals.items() if isinstance(name, str)]
 
     def _error_at(self, function: Any, message: str) -> ScriptError:
         code = getattr(function, "__code__", None)
@@ -145,30 +149,44 @@ class PythonScript:
     def check(self, callback: Callback) -> None:
         """Raise ScriptError where there is no function to call back."""
         if not callable(callback) and not callable(self._globals.get(callback)):
-            known = [name for name, one in self._globals.items() if inspect.isfunction(one)]
+            known = [name for name, one in self._named() if inspect.isfunction(one)]
             raise ScriptError(str(callback), self._path, 0, no_function(callback, known))
 
     def remember(self) -> Callable[[], None]:
         """Return a function that gives `self` and the global variables the values that they have now.
 
         So it does for those of the modules beside the script. Values that cannot be copied (open files, modules, API
-        objects) stay as they are.
+        objects) stay as they are. Both raise ScriptError.
         """
-        modules = self._helpers.modules()
-        kept, recalls = _copied(self._globals, *map(vars, modules.values())), remember(self._modules.values())
+        recalls = remember(self._modules.values())
+        recall_variables = self._run("snapshot", self._remember_variables)
 
         def recall() -> None:
             if self.threaded:
                 script_log.say(THREAD_GOES_ON.format(self._path))
+            self._run("restore", recall_variables)
+            for one in recalls:
+                one()
+
+        return recall
+
+    def _remember_variables(self) -> Callable[[], None]:
+        modules = self._helpers.modules()
+        builtins = self._helpers.builtins  # where its modules find `self`, and it, too, if it has lost its own
+        namespaces = (self._globals, *map(vars, modules.values()))
+        own, *kept = _copied({"self": builtins["self"]}, *namespaces)
+        as_they_are = [{name: one[name] for name in _NOT_COPIED if name in one} for one in namespaces]
+
+        def recall() -> None:
             for name in set(self._helpers.modules()) - set(modules):
                 self._helpers.forget(name)
-            for variables, fresh in zip((self._globals, *map(vars, modules.values())), _copied(*kept)):
+            found, *copies = _copied(own, *kept)
+            builtins.update(found)
+            for variables, fresh, others in zip(namespaces, copies, as_they_are):
                 for name in set(variables) - set(fresh) - set(_NOT_COPIED):
                     del variables[name]
                 variables.update(fresh)
-            self._helpers.builtins["self"] = self._globals["self"]  # which its modules find there
-            for one in recalls:
-                one()
+                variables.update(others)
 
         return recall
 
