@@ -43,6 +43,7 @@ def ros() -> Iterator[Line]:
         yield Line(WRONG, "ROS", f"no {', '.join(missing)} on the PATH: {cure}, or install ROS with `./dev.sh setup`")
         return
     yield _package(cure)
+    yield _rviz()
     yield _log_folder()
 
 
@@ -56,6 +57,16 @@ def _package(cure: str) -> Line:
     if found.resolve() != package_path().resolve():
         return Line(WRONG, "ROS", f"roslaunch would start the drone_sim in {found}, not this one: {cure}")
     return Line(OK, "ROS", f"{os.environ.get('ROS_DISTRO', 'ROS 1')}, drone_sim in {found}")
+
+
+def _rviz() -> Line:
+    import roslib.packages
+
+    found = roslib.packages.find_node("rviz", "rviz")
+    if not found:
+        instead = "`roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
+        return Line(HINT, "rviz", f"is not installed, and Debian testing has none: {instead}")
+    return Line(OK, "rviz", found[0])
 
 
 def _log_folder() -> Line:
