@@ -249,7 +249,7 @@ command=${1:-help}
 shift || true
 case "$command" in
   setup) setup; say "ready: source $root/devel/setup.bash" ;;
-  run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; exec roslaunch drone_sim drone.launch "$@" ;;
+  run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; PYTHONUNBUFFERED=1 exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   test-web)
     install_packages chromium

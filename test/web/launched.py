@@ -63,7 +63,11 @@ def launched(*arguments):
             yield Launched(_address(process, log), Path(folder) / "drone_scripts", log)
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait(_PATIENCE)
+            try:
+                process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                raise
 
 
 def _address(process, log):
