@@ -36,6 +36,6 @@ def connected(publisher, listeners=1):
     """Wait until so many listen, and return the publisher."""
     patience, end = threading.Event(), time.monotonic() + 60.0
     while publisher.get_num_connections() < listeners:
-        assert not rospy.is_shutdown() and time.monotonic() < end, f"{publisher.resolved_name} has no {listeners} listeners"
+        assert not rospy.is_shutdown() and time.monotonic() < end, f"nobody hears {publisher.resolved_name}"
         patience.wait(0.02)
     return publisher

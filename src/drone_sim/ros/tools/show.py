@@ -41,7 +41,7 @@ _TITLES = re.compile(rf"^ *Name: (.*\b{_FIRST})$", re.MULTILINE)
 def main() -> int:
     """Become rviz; return 1, after a line on stderr, where that cannot be.
 
-    Where there is no rviz, a launch goes on without it: for roslaunch the status is 0 then, not that of a process that died.
+    Where there is no rviz, a launch goes on without it: roslaunch gets 0, and reports no process that has died.
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is to be put in order
     parser = Parser(prog=_NAME, description=(__doc__ or "").partition("\n")[0])
