@@ -26,7 +26,7 @@ def init_node(name: str, **options: Any) -> bool:
     """Call rospy.init_node; return False, after one line on stderr, where it cannot become a node.
 
     rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach. What is logged
-    goes to stdout line by line: where that is no terminal, Python and rospy would keep it until 8 KiB have come together.
+    goes to stdout line by line: where that is no terminal, Python would keep it until 8 KiB have come together.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
