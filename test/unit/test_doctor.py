@@ -188,9 +188,7 @@ def test_a_shell_without_ros(monkeypatch):
 
 @pytest.mark.ros
 def test_a_machine_without_rviz(monkeypatch):
-    import roslib.packages
-
-    monkeypatch.setattr(roslib.packages, "find_node", lambda *_: [])
+    monkeypatch.setattr("drone_sim.ros.tools.viewer._PACKAGE", "no_such_package")
     (line,) = (one for one in environment.ros() if one.what == "rviz")
     assert line.mark == HINT
     assert "is not installed" in line.said and "web:=true" in line.said

@@ -56,9 +56,8 @@ def test_one_with_another_name_has_its_topics():
 
 @pytest.mark.parametrize(("launched", "status"), [((), 1), (("__name:=rviz", "__log:=/tmp/rviz.log"), 0)])
 def test_without_rviz_one_line_says_what_to_do_and_a_launch_goes_on(monkeypatch, capsys, launched, status):
-    monkeypatch.setattr(show.roslib.packages, "find_node", lambda *_: [])
+    monkeypatch.setattr(show.viewer, "_PACKAGE", "no_such_package")
     monkeypatch.setattr(show.sys, "argv", ["show", "--config", "none", *launched])
     monkeypatch.setattr(show.signal, "signal", lambda *_: None)
     assert show.main() == status
-    instead = "`roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
-    assert capsys.readouterr() == ("", f"show: rviz is not installed: {instead}\n")
+    assert capsys.readouterr() == ("", f"show: rviz is not installed: {show.viewer.INSTEAD}\n")

@@ -60,13 +60,12 @@ def _package(cure: str) -> Line:
 
 
 def _rviz() -> Line:
-    import roslib.packages
+    from drone_sim.ros.tools import viewer
 
-    found = roslib.packages.find_node("rviz", "rviz")
-    if not found:
-        instead = "`roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
-        return Line(HINT, "rviz", f"is not installed, and Debian testing has none: {instead}")
-    return Line(OK, "rviz", found[0])
+    found = viewer.rviz()
+    if found is None:
+        return Line(HINT, "rviz", f"is not installed, and Debian testing has none: {viewer.INSTEAD}")
+    return Line(OK, "rviz", found)
 
 
 def _log_folder() -> Line:

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import NoReturn
 
 import rosgraph
-import roslib.packages
 import rospy
 from tf2_msgs.msg import TFMessage
 
@@ -26,12 +25,12 @@ from drone_sim.files import writing
 from drone_sim.files.resources import package_path
 from drone_sim.offline.command_line import FAILED, Parser, status_of
 from drone_sim.ros.node.paths import from_shell
+from drone_sim.ros.tools import viewer
 from drone_sim.ros.vehicle.messages import FIRST_FRAME
 
 _NAME = "show"
 _PERIOD = 0.1  # s, between two questions to the master
 _PATIENCE = 5.0  # s, after which it says that it waits
-_INSTEAD = "`roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
 _TOPIC = "/view/state"  # that the simulator advertises for rviz: the last one
 _ALONE, _FIRST, _SIMULATOR = "drone", "drone1", "drone_sim"  # as the files of the package name them
 _NAMES = re.compile(rf"\b{_FIRST}\b|(?<=/)(?:{_ALONE}|{_SIMULATOR})(?=/)")
@@ -49,11 +48,11 @@ def main() -> int:
     parser.add_argument("--simulator", metavar="NODE", default=_SIMULATOR, help="(default: %(default)s)")
     options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
     remappings = [one for one in sys.argv[1:] if ":=" in one]
-    found = roslib.packages.find_node("rviz", "rviz")
-    if not found:
-        print(f"{_NAME}: rviz is not installed: {_INSTEAD}", file=sys.stderr, flush=True)
+    rviz = viewer.rviz()
+    if rviz is None:
+        print(f"{_NAME}: rviz is not installed: {viewer.INSTEAD}", file=sys.stderr, flush=True)
         return 0 if any(one.startswith("__log:=") for one in remappings) else FAILED
-    return status_of(_NAME, lambda: _show(found[0], options, remappings))
+    return status_of(_NAME, lambda: _show(rviz, options, remappings))
 
 
 def _show(rviz: str, options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:
