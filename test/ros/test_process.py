@@ -178,11 +178,14 @@ class Process(unittest.TestCase):
 
     @contextlib.contextmanager
     def killed_if_it_hangs(self, node):
-        """Do not wait longer than that for what it says."""
+        """Do not wait for ever for what it says, and leave nothing to the next test where this one fails."""
         watchdog = threading.Timer(2 * HANGS, node.kill)
         watchdog.start()
         try:
             yield
+        except BaseException:
+            node.kill()
+            raise
         finally:
             watchdog.cancel()
 
