@@ -84,7 +84,7 @@ def _cluster(workers: int) -> Iterator[str]:
         finally:
             for one in running:
                 one.terminate()
-                one.wait()
+                one.wait(60)
 
 
 def measure() -> list[Row]:

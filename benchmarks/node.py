@@ -39,7 +39,7 @@ def master() -> Iterator[None]:
         yield
     finally:
         process.terminate()
-        process.wait()
+        process.wait(30)
 
 
 def node(*arguments: str, program: str = "") -> AbstractContextManager[list[str]]:
@@ -80,7 +80,7 @@ def _running(*command: str) -> Iterator[list[str]]:
         yield lines
     finally:
         process.send_signal(signal.SIGINT)
-        process.wait()
+        process.wait(30)
         reader.join()
 
 
@@ -234,7 +234,7 @@ def _recorded(argument: str, folder: str, seconds: float) -> "re.Match[str]":
         time.sleep(seconds)
         subscriber.unregister()
         recorder.send_signal(signal.SIGINT)
-        recorder.wait()
+        recorder.wait(30)
     return flew(lines)
 
 
@@ -255,7 +255,7 @@ def screen() -> Iterator[None]:
         yield
     finally:
         server.terminate()
-        server.wait()
+        server.wait(30)
         del os.environ["DISPLAY"]
         if before is not None:
             os.environ["DISPLAY"] = before

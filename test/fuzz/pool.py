@@ -100,7 +100,7 @@ class Trier:
         """Say how the worker ended."""
         assert self._process is not None
         if not fault:
-            self._process.wait()
+            self._process.wait(_FIRST)
             self._log.seek(0)
             lines = self._log.read().decode("utf-8", "replace").splitlines()
             said = [line for line in lines if "drone_sim/" in line] + lines[-20:]  # faulthandler names our own line

@@ -1,6 +1,7 @@
 """Follow topics and wait for what they say; used by the tests with a master."""
 
 import threading
+import time
 
 import rospy
 
@@ -33,8 +34,8 @@ class Listener:
 
 def connected(publisher, listeners=1):
     """Wait until so many listen, and return the publisher."""
-    patience = threading.Event()
+    patience, end = threading.Event(), time.monotonic() + 60.0
     while publisher.get_num_connections() < listeners:
-        assert not rospy.is_shutdown()
+        assert not rospy.is_shutdown() and time.monotonic() < end, f"nobody hears {publisher.resolved_name}"
         patience.wait(0.02)
     return publisher

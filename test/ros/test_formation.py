@@ -46,8 +46,10 @@ class Formation(unittest.TestCase):
                     lambda o, wing=wing: off(o, odometry["drone1"].messages[-1], wing) < 0.05, timeout=40
                 )
         finally:
-            node.terminate()
-            node.wait()
+            # Not SIGTERM: rospy's own handler closes topics, and waits for ever where it interrupts `publish` (see
+            # ros/node/ending.py). How a user's script ends is not what this test is about.
+            node.kill()
+            node.wait(30)
 
 
 if __name__ == "__main__":

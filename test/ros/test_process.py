@@ -61,9 +61,11 @@ print(rospy.ServiceProxy("/drone_sim/stop", Trigger)().message, rospy.get_param(
 
 
 def started(*command, **environment):
+    """Begin a process; what it prints goes into a pipe, which no surroundings make unbuffered."""
+    surroundings = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     return subprocess.Popen(
         command,
-        env={**os.environ, "PYTHONUNBUFFERED": "1", **environment},
+        env={**surroundings, **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -83,7 +85,7 @@ def master(port):
     """Run a master of our own; it is killed, so that it says goodbye to nobody."""
     process = subprocess.Popen(["rosmaster", "--core", "-p", port], stdout=subprocess.DEVNULL)
     try:
-        while True:
+        while process.poll() is None:
             with contextlib.suppress(OSError), socket.create_connection(("localhost", int(port)), timeout=HANGS):
                 break
         yield
@@ -183,13 +185,27 @@ class Process(unittest.TestCase):
         self.assertIn("ZeroDivisionError", fatal[0])
 
     def said_until(self, node, what):
-        """Return what it says up to a line."""
+        """Return what it says up to a line, as soon as it says it."""
         said = ""
-        for line in node.stdout:
-            said += line
-            if what in line:
-                break
-        return said
+        with self.killed_if_it_hangs(node):
+            for line in node.stdout:
+                said += line
+                if what in line:
+                    return said
+        self.fail(f"it ended, or was killed, without a line with {what!r}: {said}")
+
+    @contextlib.contextmanager
+    def killed_if_it_hangs(self, node):
+        """Do not wait for ever for what it says, and leave nothing to the next test where this one fails."""
+        watchdog = threading.Timer(2 * HANGS, node.kill)
+        watchdog.start()
+        try:
+            yield
+        except BaseException:
+            node.kill()
+            raise
+        finally:
+            watchdog.cancel()
 
     def test_it_ends_whatever_it_does(self):
         for function, number in (("advance", signal.SIGINT), ("__init__", signal.SIGTERM)):
@@ -217,8 +233,6 @@ class Process(unittest.TestCase):
         surroundings = {"ROS_MASTER_URI": f"http://localhost:{port}"}
         with master(port):
             node = simulator("_real_time_factor:=5", **surroundings)
-            watchdog = threading.Timer(4 * HANGS, node.kill)
-            watchdog.start()
             self.said_until(node, "flying")
         with master(port):
             self.assertIn("a new ROS master", self.said_until(node, "registered again"))
@@ -227,7 +241,6 @@ class Process(unittest.TestCase):
             self.assertEqual(said, "stopped 5\n")
             node.send_signal(signal.SIGINT)
             node.communicate(timeout=HANGS)
-        watchdog.cancel()
         self.assertEqual(node.returncode, 0)
 
     def test_the_cockpit_waits_for_a_new_master_and_is_found_by_it(self):
@@ -261,16 +274,14 @@ class Process(unittest.TestCase):
     def assert_ends_cleanly(self, end):
         """Let it fly as fast as it can, with somebody listening, and end it by `end(process)`."""
         node = simulator("_real_time_factor:=0")
-        watchdog = threading.Timer(HANGS, node.kill)
-        watchdog.start()
         odometry, lines = Listener("/drone/odom", Odometry), []
-        for line in node.stdout:
-            lines.append(line)
-            if "flying" in line:
-                odometry.wait_for()
-                end(node)
-        self.assertEqual(node.wait(), 0, "".join(lines))
-        watchdog.cancel()
+        with self.killed_if_it_hangs(node):
+            for line in node.stdout:
+                lines.append(line)
+                if "flying" in line:
+                    odometry.wait_for()
+                    end(node)
+        self.assertEqual(node.wait(HANGS), 0, "".join(lines))
         odometry.close()
         self.assertNotIn("Traceback", "".join(lines))
         self.assertNotIn("/drone_sim", rosnode.get_node_names())

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import rospy
 import rostest
+from ending import end
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from listening import Listener, connected
 from nav_msgs.msg import Odometry
@@ -123,11 +124,10 @@ class States(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        for process in cls.processes:
-            process.terminate()
-        for process in cls.processes:
-            process.wait()
-        cls.folder.cleanup()
+        try:
+            end(*cls.processes)
+        finally:
+            cls.folder.cleanup()
 
     def test_1_quick(self):
         for name in QUICK:
@@ -179,8 +179,7 @@ class States(unittest.TestCase):
         self.odometry["real"].wait_for(lambda m: m.pose.pose.position.z < 0.02)
 
     def test_4_a_bag_played_into_a_fresh_simulation(self):
-        self.recorder.send_signal(signal.SIGINT)
-        self.recorder.wait(20)
+        end(self.recorder, number=signal.SIGINT)
         (bag,) = Path(self.folder.name).iterdir()
         heard = (self.odometry[RECORDED], self.commands)
         flown, changes = path([one.messages[:] for one in heard])

@@ -41,7 +41,7 @@ class Attacker:
 
     def close(self):
         self._process.stdin.close()
-        self._process.wait()
+        self._process.wait(HANGS)
 
 
 def flight(path, limit, snapshots=3):

@@ -186,6 +186,14 @@ def test_a_shell_without_ros(monkeypatch):
     assert "ROS 2 is sourced" in line.said
 
 
+@pytest.mark.ros
+def test_a_machine_without_rviz(monkeypatch):
+    monkeypatch.setattr("drone_sim.ros.tools.viewer._PACKAGE", "no_such_package")
+    (line,) = (one for one in environment.ros() if one.what == "rviz")
+    assert line.mark == HINT
+    assert "is not installed" in line.said and "web:=true" in line.said
+
+
 def test_a_module_that_is_missing_and_one_that_kills(tmp_path, monkeypatch):
     (tmp_path / "kills.py").write_text("import os\nprint('loud')\nos.abort()\n")
     (tmp_path / "fails.py").write_text("raise RuntimeError('compiled for\\nanother numpy')\n")

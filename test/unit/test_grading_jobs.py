@@ -354,7 +354,7 @@ def two_workers():
         finally:
             for one in workers:
                 one.terminate()
-                one.wait()
+                one.wait(60)
 
 
 def test_a_worker_that_is_killed_loses_no_flight_and_results_are_the_same_everywhere(plan, warm):

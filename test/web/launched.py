@@ -52,8 +52,8 @@ def launched(*arguments):
             "ROS_MASTER_URI": f"http://localhost:{port}",
             "ROS_HOSTNAME": "localhost",
             "HOME": folder,
-            "PYTHONUNBUFFERED": "1",
         }
+        environment.pop("PYTHONUNBUFFERED", None)  # the address has to be in the log at once without it, too
         command = ["roslaunch", "-p", str(port), "drone_sim", "drone.launch", "rviz:=false", "web:=true"]
         options = [f"web_port:={_free_port()}", *arguments]
         with log.open("w") as output:
@@ -63,7 +63,11 @@ def launched(*arguments):
             yield Launched(_address(process, log), Path(folder) / "drone_scripts", log)
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait(_PATIENCE)
+            try:
+                process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                raise
 
 
 def _address(process, log):

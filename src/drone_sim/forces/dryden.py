@@ -79,7 +79,7 @@ class Gusts:
 
 def _normal(random: Generator) -> Iterator[float]:
     while True:
-        yield from random.standard_normal(_AT_ONCE).tolist()
+        yield from map(float, random.standard_normal(_AT_ONCE))
 
 
 def _along(random: Generator) -> Iterator[float]:

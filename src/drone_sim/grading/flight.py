@@ -7,7 +7,7 @@ import hashlib
 import random
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -122,7 +122,7 @@ def write(rows: np.ndarray, path: str | Path) -> None:
     """Write a table (N, 22) as `fly --csv` does. Raises OSError."""
     with writing.replacing(str(path)) as file:
         recording = Recording(file)
-        for row in rows.tolist():
+        for row in cast("list[list[float]]", rows.tolist()):
             recording.write_row(row)
 
 

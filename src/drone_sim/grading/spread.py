@@ -66,8 +66,8 @@ def _scene(scene: SceneParameters, spread: Spread, seed: int) -> SceneParameters
 
 
 def _vehicle(own: VehicleParameters, spread: Spread, seed: int) -> VehicleParameters:
-    x, y, z = _about(own.position, spread.position, seed, f"position/{own.name}").tolist()
-    (yaw,) = _about((own.yaw,), (spread.yaw,), seed, f"yaw/{own.name}").tolist()
+    x, y, z = map(float, _about(own.position, spread.position, seed, f"position/{own.name}"))
+    (yaw,) = map(float, _about((own.yaw,), (spread.yaw,), seed, f"yaw/{own.name}"))
     faults = own.faults.model_copy(update={"seed": _seed(seed, f"faults/{own.name}", own.faults.seed)})
     sensors = {
         name: one.model_copy(update={"seed": _seed(seed, f"sensors/{own.name}/{name}", one.seed)})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -74,8 +75,8 @@ def _obj(surfaces: Sequence[Surface], materials: dict[Rgba, str]) -> str:
             lines.append(f"usemtl {material}")
         for mesh, matrix in (one for one in surfaces if one[0].color == rgba):
             vertices = moved(mesh.vertices, matrix)
-            lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices.tolist()]
-            lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + first).tolist()]
+            lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in cast("list[list[float]]", vertices.tolist())]
+            lines += [f"f {a} {b} {c}" for a, b, c in cast("list[list[int]]", (mesh.faces + first).tolist())]
             first += len(vertices)
     return "\n".join([*lines, ""])
 

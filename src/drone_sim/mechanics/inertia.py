@@ -28,7 +28,7 @@ class Inertial(NamedTuple):
     def seen_from(self, frame: Matrix) -> Inertia:
         """Return it in another frame, and along that one's axes."""
         turn = np.reshape(frame, (3, 4))[:, :3]
-        x, y, z = frames.transform(frames.invert(frame), self.centre.tolist())
+        x, y, z = frames.transform(frames.invert(frame), list(map(float, self.centre)))
         tensor = (turn.T @ self.inertia @ turn).ravel()
         return Inertia(tuple(map(float, tensor)), (1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z))
 

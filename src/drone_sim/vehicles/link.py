@@ -57,7 +57,7 @@ class Link(Generic[_What]):
     def send(self, now: float, what: _What) -> None:
         """Send a message at `now` (s)."""
         own = self.parameters
-        luck, late = self._random.random(2).tolist()  # always both: what is lost changes nothing of the others
+        luck, late = map(float, self._random.random(2))  # always both: what is lost changes nothing of the others
         if luck >= own.loss:
             delay = max(0.0, own.latency + own.jitter * (2 * late - 1))
             self._under_way.append(_Sent(now, now + delay, what))

@@ -43,6 +43,7 @@ def ros() -> Iterator[Line]:
         yield Line(WRONG, "ROS", f"no {', '.join(missing)} on the PATH: {cure}, or install ROS with `./dev.sh setup`")
         return
     yield _package(cure)
+    yield _rviz()
     yield _log_folder()
 
 
@@ -56,6 +57,15 @@ def _package(cure: str) -> Line:
     if found.resolve() != package_path().resolve():
         return Line(WRONG, "ROS", f"roslaunch would start the drone_sim in {found}, not this one: {cure}")
     return Line(OK, "ROS", f"{os.environ.get('ROS_DISTRO', 'ROS 1')}, drone_sim in {found}")
+
+
+def _rviz() -> Line:
+    from drone_sim.ros.tools import viewer
+
+    found = viewer.rviz()
+    if found is None:
+        return Line(HINT, "rviz", f"is not installed, and Debian testing has none: {viewer.INSTEAD}")
+    return Line(OK, "rviz", found)
 
 
 def _log_folder() -> Line:

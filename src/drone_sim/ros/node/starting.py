@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import http.client
+import io
 import logging
 import os
 import socket
@@ -29,8 +30,11 @@ def init_node(name: str, others_wait: bool = False, **options: Any) -> bool:
     """Call rospy.init_node; return False, after one line on stderr, where it cannot become a node.
 
     rospy itself would wait for the master, or fail with a traceback, or be a node that nobody can reach. Another node
-    of the name has ended by then; `others_wait`: who else wants it waits for namesake.let_others.
+    of the name has ended by then; `others_wait`: who else wants it waits for namesake.let_others. What is logged goes
+    to stdout line by line: where that is no terminal, Python would keep it until 8 KiB have come together.
     """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
     patience = socket.getdefaulttimeout()
     socket.setdefaulttimeout(_PATIENCE)
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -55,7 +55,7 @@ class BagFlight:
         recording.clock = "time by the stamps"
         table = np.hstack(columns)
         table[~(np.abs(table) < LARGEST)] = math.nan
-        recording.rows = [tuple(row) for row in table.tolist()]
+        recording.rows = [tuple(row) for row in cast("list[list[float]]", table.tolist())]
         return recording
 
     def _commands(self) -> np.ndarray:

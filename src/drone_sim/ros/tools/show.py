@@ -18,14 +18,14 @@ from pathlib import Path
 from typing import NoReturn
 
 import rosgraph
-import roslib.packages
 import rospy
 from tf2_msgs.msg import TFMessage
 
 from drone_sim.files import writing
 from drone_sim.files.resources import package_path
-from drone_sim.offline.command_line import Parser, status_of
+from drone_sim.offline.command_line import FAILED, Parser, status_of
 from drone_sim.ros.node.paths import from_shell
+from drone_sim.ros.tools import viewer
 from drone_sim.ros.vehicle import frame_names
 
 _NAME = "show"
@@ -38,27 +38,31 @@ _TITLES = re.compile(rf"^ *Name: (.*\b{_FIRST})$", re.MULTILINE)
 
 
 def main() -> int:
-    """Become rviz; return 1, after a line on stderr, where that cannot be."""
+    """Become rviz; return 1, after a line on stderr, where that cannot be.
+
+    Where there is no rviz, a launch goes on without it: roslaunch gets 0, and reports no process that has died.
+    """
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is to be put in order
     parser = Parser(prog=_NAME, description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--config", metavar="FILE", default="", help="what rviz shows instead, as that file says it")
     parser.add_argument("--simulator", metavar="NODE", default=_SIMULATOR, help="(default: %(default)s)")
     options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
     remappings = [one for one in sys.argv[1:] if ":=" in one]
-    return status_of(_NAME, lambda: _show(options, remappings))
+    rviz = viewer.rviz()
+    if rviz is None:
+        print(f"{_NAME}: rviz is not installed: {viewer.INSTEAD}", file=sys.stderr, flush=True)
+        return 0 if any(one.startswith("__log:=") for one in remappings) else FAILED
+    return status_of(_NAME, lambda: _show(rviz, options, remappings))
 
 
-def _show(options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:
+def _show(rviz: str, options: argparse.Namespace, remappings: Sequence[str]) -> NoReturn:
     """Raises OSError and ValueError."""
-    rviz = roslib.packages.find_node("rviz", "rviz")
-    if not rviz:
-        raise OSError("rviz is not installed (on Debian: rviz)")
     config = from_shell(options.config)
     if config and not Path(config).is_file():
         raise OSError(f"--config {config}: no such file")
     simulator = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), options.simulator)
     config = config or str(_fitting(simulator.strip("/")))
-    os.execv(rviz[0], [rviz[0], "-d", config, *remappings])
+    os.execv(rviz, [rviz, "-d", config, *remappings])
 
 
 def _fitting(simulator: str) -> Path:

@@ -68,7 +68,8 @@ class Dynamics:
         place = frames.multiply(self._objects[handle].matrix(), inertia.frame)
         if transform is not None:
             place = frames.multiply(frames.invert(numbers(transform, 12)), place)
-        return self.getShapeMass(handle), turned(inertia, place).ravel().tolist(), list(frames.position(place))
+        tensor = list(map(float, turned(inertia, place).ravel()))
+        return self.getShapeMass(handle), tensor, list(frames.position(place))
 
     def getShapeInertia(self, handle: Handle) -> tuple[Numbers, TwelveNumbers]:
         """Return the inertia of a shape about its centre of mass (kg m², 9 numbers), and in which frame that is (4.x).

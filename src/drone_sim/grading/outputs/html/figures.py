@@ -39,7 +39,7 @@ def figures_of(table: Path) -> Figures:
         return Figures({}, "nothing was flown")
     every = -(-len(rows) // _MOST)
     thinned = columns_of(rows[::every])
-    columns = {name: np.round(thinned[name], _DIGITS).tolist() for name in _COLUMNS}
+    columns = {name: list(map(float, np.round(thinned[name], _DIGITS))) for name in _COLUMNS}
     first = f" of the first {len(rows)}" if len(rows) == tables.MAX_ROWS else ""
     return Figures(columns, f"one row in {every}{first} is shown" if every > 1 else "")
 

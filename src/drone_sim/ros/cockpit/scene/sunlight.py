@@ -23,7 +23,7 @@ class Sunlight:
         self._on = True
         self._floors: dict[str, Any] = {}
         scene.configure_default_lights(enabled=False)
-        place = tuple((_AWAY * np.array(TO_SUN)).tolist())
+        place = tuple(map(float, _AWAY * np.array(TO_SUN)))
         self._sun = scene.add_light_directional("/sun", intensity=_BRIGHT, cast_shadow=True, position=place)
 
     def shine_on(self, marker: Marker, handle: Any) -> None:

@@ -1,0 +1,57 @@
+"""`./dev.sh setup` installs what is missing, and goes on where there is no rviz to install."""
+
+import os
+import subprocess
+
+import pytest
+
+from drone_sim.files.resources import package_path
+
+FAKES = {
+    "dpkg-query": 'grep -qx "${@: -1}" "$FOLDER/installed" && echo installed',
+    "apt-cache": 'grep -qx "$2" "$FOLDER/known" && printf "%s:\\n  Candidate: 1.2\\n" "$2" || true',
+    "apt-get": 'echo "$1 ${@:6}"',
+    "sudo": '"$@"',
+}
+
+
+@pytest.fixture(name="installed")
+def _installed(tmp_path):
+    """Return what tells what is done where some packages are installed, and apt knows some."""
+    for name, does in FAKES.items():
+        (tmp_path / name).write_text(f"#!/bin/bash\n{does}\n")
+        (tmp_path / name).chmod(0o755)
+    surroundings = {"PATH": f"{tmp_path}:/usr/bin:/bin", "FOLDER": str(tmp_path), "HOME": os.environ["HOME"]}
+
+    def run(installed, known):
+        (tmp_path / "installed").write_text("\n".join(installed))
+        (tmp_path / "known").write_text("\n".join(known))
+        program = "source ./dev.sh help >/dev/null; install_packages catkin rviz"
+        done = subprocess.run(
+            ["bash", "-c", program, "./dev.sh"],
+            cwd=package_path(),
+            env=surroundings,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stderr
+
+    return run
+
+
+def test_what_is_missing_is_installed(installed):
+    said = installed([], ["catkin", "rviz"])
+    assert "catkin rviz\nupdate \ninstall catkin rviz\n" in said and "no rviz" not in said
+
+
+def test_without_an_rviz_to_install_setup_goes_on(installed):
+    said = installed([], ["catkin"])
+    assert "this Debian has no rviz" in said and "./dev.sh run web:=true" in said
+    assert said.endswith("install catkin\n")
+
+
+def test_once_all_else_is_there_nothing_is_done(installed):
+    assert installed(["catkin"], ["catkin"]) == ""
+    assert installed(["catkin", "rviz"], []) == ""
