@@ -225,7 +225,18 @@ def test_no_class_is_made_from_what_a_bag_says(tmp_path):
 @pytest.mark.parametrize(("program", "out"), [(plot_flight, "o.png"), (bag_commands, "o.yaml"), (bag_video, "o.mp4")])
 def test_topics_of_another_kind_are_left_out(tmp_path, capsys, program, out):
     path = str(tmp_path / "other.bag")
-    kinds = ("cmd_vel", "command", "propellers", "set_pose", "initialpose", "push", "goto", "takeoff", "weather", "state")
+    kinds = (
+        "cmd_vel",
+        "command",
+        "propellers",
+        "set_pose",
+        "initialpose",
+        "push",
+        "goto",
+        "takeoff",
+        "weather",
+        "state",
+    )
     drone = Odometry()
     drone.pose.pose.orientation.w = 1.0
     with rosbag.Bag(path, "w") as bag:

@@ -205,9 +205,7 @@ SIGNATURE = b"\xff" + bytes(8) + b"\x7f"
 GREETING = SIGNATURE + b"\3\1NULL" + bytes(16 + 1 + 31)
 READY = b"\4\x26\5READY\x0bSocket-Type\0\0\0\3REQ\x08Identity\0\0\0\0"
 CONVERSATION = GREETING + READY + b"\1\0" + bytes([0, len(START)]) + START
-BROWSER = (
-    b"Host: 127.0.0.1:23000\r\nUser-Agent: Mozilla/5.0 (X11; Linux x86_64; rv:128.0) Firefox/128.0\r\n"
-)
+BROWSER = b"Host: 127.0.0.1:23000\r\nUser-Agent: Mozilla/5.0 (X11; Linux x86_64; rv:128.0) Firefox/128.0\r\n"
 
 
 def closed(peer):
