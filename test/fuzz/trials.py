@@ -12,6 +12,7 @@ import logging
 import math
 import socket
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -227,7 +228,8 @@ def _bags(case: Case, folder: Path) -> str:
     program = importlib.import_module(f"drone_sim.ros.tools.{case.data}")  # ROS is there for this alone
     out = folder / {"bag_commands": "out.yaml", "plot_flight": "out.png", "bag_video": "out.mp4"}[case.data]
     errors = io.StringIO()
-    with contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stderr(errors), contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # libraries' own, of how this machine is set up
         status = program.main([str(folder / "flight.bag"), str(out)])
     said = errors.getvalue().rstrip("\n")
     if (status == 0) != (said == "") or (status == 0) != out.exists():

@@ -118,8 +118,15 @@ def _lengths(draw: st.DrawFn, content: bytes) -> bytes:
     )
 
 
+_FLIGHT = [
+    (topic, None, False, 1e8 * tenth, [])
+    for tenth in (1, 2, 3)
+    for topic in ("/drone/odom", "/drone/cmd_vel", "/drone/front/compressed")
+]
 _BAG = st.builds(
-    _bag, st.lists(_WRITTEN, max_size=12), st.sampled_from([rosbag.Compression.NONE, rosbag.Compression.BZ2, "lz4"])
+    _bag,
+    st.lists(_WRITTEN, max_size=12).map(lambda more: _FLIGHT + more),
+    st.sampled_from([rosbag.Compression.NONE, rosbag.Compression.BZ2, "lz4"]),
 )
 CASES = st.builds(
     lambda content, program: Case("bags", {"flight.bag": content}, program),

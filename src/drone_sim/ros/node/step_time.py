@@ -50,7 +50,8 @@ class StepTime:
             parameters = self._simulation.parameters
             # After a late step the next ones come faster: then too no stamp is before those of the step before.
             elapsed = (self._began - before).to_sec() / parameters.time_step
-            self._pace = min(elapsed, 1 / (parameters.real_time_factor or 1.0))
+            steady = 1 / (parameters.real_time_factor or 1.0)
+            self._pace = min(elapsed, steady) if elapsed >= 0 else steady  # or the machine's clock was set back
 
     def stamp(self, ago: float = 0.0) -> rospy.Time:
         """Return the stamp of what is sent now, and was the case `ago` seconds of simulated time before."""
