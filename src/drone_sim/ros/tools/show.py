@@ -69,7 +69,7 @@ def _fitting(simulator: str) -> Path:
     """Return a file for what flies: one of the package's, or one made of it."""
     above = _topics_of(simulator)
     alone = above != simulator
-    names = {_SIMULATOR: simulator, **({_ALONE: above} if alone else {_FIRST: _first_vehicle(simulator)})}
+    names = {_SIMULATOR: simulator, **({_ALONE: above} if alone else {_FIRST: _first_vehicle(simulator) or _FIRST})}
     template = package_path() / "rviz" / ("drone.rviz" if alone else "fleet.rviz")
     if all(name == given for name, given in names.items()):
         return template
@@ -116,7 +116,7 @@ def _topics_of(simulator: str) -> str:
 
 
 def _first_vehicle(simulator: str) -> str:
-    """Return the name of the vehicle, one of several, that the view follows. Raises OSError."""
+    """Return the name of the vehicle, one of several, that the view follows, '' for none. Raises OSError."""
     first = frame_names.first(simulator)
     found: list[str] = []
     come = threading.Event()
