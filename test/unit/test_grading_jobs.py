@@ -244,6 +244,16 @@ def test_the_table_is_that_of_fly(warm, plan):
     assert lines[0].startswith("t [s],x [m]") and len(lines) == 1 + 5
 
 
+def test_a_plan_that_is_replaced_is_flown_as_it_is_by_then(warm, folder, tmp_path):
+    path = tmp_path / "changed.yaml"
+    for duration, steps in (("0.2", 5), ("0.4", 9)):
+        (tmp_path / "new.yaml").write_text(PLAN.replace("0.2\n", f"{duration}\nscene: room{duration}.yaml\n", 1))
+        (tmp_path / f"room{duration}.yaml").write_text("objects: []\n")
+        os.replace(tmp_path / "new.yaml", path)
+        flight = warm.fly(job_of(plans.read(path), "", 0), table=True)
+        assert flight.result.error is None and len(flight.table.splitlines()) == 1 + steps
+
+
 # ---- what cannot be read
 
 ODD = {  # what is handed in, and what is said of it

@@ -51,6 +51,9 @@ _PASSED = (
 _THE_SAME = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
+_Version = tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class Flight:
     """A job that was flown: its result, and its table as `fly --csv` writes it, b'' where there is none."""
@@ -81,7 +84,7 @@ class Warm:
         self._sandboxed = sandboxed
         self._process: subprocess.Popen[bytes] | None = None
         self._folder: str | None = None
-        self._plans: dict[str, plans.Plan] = {}
+        self._plans: dict[str, tuple[plans.Plan, list[_Version]]] = {}
         self._files: dict[str, list[Path]] = {}  # of the last plan, with changes
         self._shown: dict[Path, _Version] = {}  # what a sandbox was made to show
         self._is_stopped = False
@@ -138,9 +141,13 @@ class Warm:
             self._folder = None
 
     def _plan(self, path: str) -> plans.Plan:
-        if path not in self._plans:
-            self._plans[path] = plans.read(path)
-        return self._plans[path]
+        """Return a plan, read anew where one of its files is another."""
+        known = self._plans.get(path)
+        if known is None or known[1] != [_version(one) for one in known[0].files]:
+            plan = plans.read(path)
+            self._plans[path] = plan, [_version(one) for one in plan.files]
+            self._files.clear()
+        return self._plans[path][0]
 
     def _request(self, job: Job, duration: float, table: bool, handed_in: Mapping[str, bytes]) -> dict[str, Any]:
         own = self._limits
@@ -210,9 +217,6 @@ class Warm:
             self._files.clear()
             self._files[known] = files.of_plan(plan, changes)
         return self._files[known]
-
-
-_Version = tuple[int, ...]
 
 
 def _version(path: Path) -> _Version:

@@ -20,6 +20,7 @@ HANDED_IN = "/handed_in"  # below which the files of a script are laid, each und
 _TRIED = 20.0  # s, on a busy machine; it takes some 10 ms
 _DEVICES = Path("/dev/dri")  # of the graphics card, which cameras may draw with
 _ABOUT_DEVICES = ("/sys/dev/char", "/sys/devices")
+_TASKS = "tasks"
 _MIB = 2**20
 _ROOT = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")  # links, on most systems
 # Not what else is below /usr: whoever manages the system may keep a course there.
@@ -82,7 +83,8 @@ def _wrapped(program: str, files: int, paths: Iterable[Path] = ()) -> list[str]:
         *("--size", str(files * _MIB), "--tmpfs", TEMPORARY, "--size", str(2 * LARGEST), "--tmpfs", HANDED_IN),
         *(word for path in paths for word in ("--ro-bind", str(path), str(path))),
         *(word for name in ("/tmp", "/run", here) for word in ("--dir", name)),  # which are empty
-        *("--remount-ro", "/dev", "--remount-ro", "/", "--chdir", here, "--"),
+        *(word for name in ("/dev", package_path() / _TASKS, "/") for word in ("--remount-ro", str(name))),
+        *("--chdir", here, "--"),
     ]
 
 
@@ -100,10 +102,8 @@ def _shown_system() -> tuple[str, ...]:
         if path.exists() and not any(path.is_relative_to(one) for one in shown):
             shown.append(path)
             said += "--ro-bind", str(path), str(path)
-    hidden = package_path() / "tasks"  # with their solutions; what a plan needs of them is shown all the same
-    if any(hidden.is_relative_to(one) for one in shown):
-        said += "--tmpfs", str(hidden), "--remount-ro", str(hidden)
-    return tuple(said)
+    # The tasks have their solutions beside them; what a plan needs is shown all the same.
+    return (*said, "--tmpfs", str(package_path() / _TASKS))
 
 
 def _of_python() -> Iterator[str]:
