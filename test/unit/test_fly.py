@@ -340,6 +340,25 @@ def test_a_signal_ends_the_flight_whatever_a_script_does(script, does, number, s
     assert "Traceback" not in errors
 
 
+@pytest.mark.parametrize(
+    "left", ["threading.Thread(target=time.sleep, args=(1000,)).start()", "atexit.register(time.sleep, 1000)"]
+)
+def test_what_a_script_leaves_behind_does_not_keep_it(script, left):
+    path = script(f"import atexit, threading, time\n\ndef sysCall_init():\n    {left}\n")
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / "fly"), "--script", path, "--duration", "0.1"],
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stdout.startswith("flew 0.10 s in")
+    assert (
+        done.stderr == "fly: ended without what a script left: a thread, or a function of atexit, that does not end\n"
+    )
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_what_a_script_says_is_shown_whatever_it_is(script, encoding):
     """Half a surrogate pair, which UTF-8 has not, and what the terminal cannot show."""

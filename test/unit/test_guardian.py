@@ -19,6 +19,18 @@ guardian = Guardian("it")
 
 # What runs after BEGIN, and the signal that it gets then. All run at once: most of their time is patience.
 SPIN, LOOKS = "sum(range(10**13))", "while not guardian.asked: time.sleep(0.01)\n"
+SCRIPT = """
+from drone_sim.scripting.time_limit import Labels, TimeLimit
+def hide():
+    import _signal
+    _signal.pthread_sigmask(_signal.SIG_BLOCK, {{_signal.SIGALRM}})
+    time.sleep(1000)
+def pause():
+    limit.outside(lambda: time.sleep(7))
+limit = TimeLimit(0.5)
+limit.label = Labels("some.py", limit)["init"]
+limit.run({})
+"""
 READY = "guardian.ready()\nprint('begun')\n"
 PROGRAMS = {
     "in a call that holds Python's lock": (READY + SPIN, signal.SIGINT),
@@ -37,6 +49,15 @@ PROGRAMS = {
         READY + LOOKS + "guardian.stand_down()\nprint('in hand')\ntime.sleep(3)\nos.kill(os.getpid(), signal.SIGINT)",
         signal.SIGINT,
     ),
+    "a script in a call that holds Python's lock": (READY + SCRIPT.format("lambda: " + SPIN), None),
+    "a script that hides from the alarm": (READY + SCRIPT.format("hide"), None),
+    "a script that pauses": (READY + SCRIPT.format("pause") + "time.sleep(7)\nsys.exit(4)", None),
+    "ends beside a thread": (
+        READY + "threading.Thread(target=time.sleep, args=(1000,)).start()\nguardian.end(3)",
+        None,
+    ),
+    "ends with atexit": (READY + "import atexit\natexit.register(time.sleep, 1000)\nguardian.end(3)", None),
+    "ends": (READY + "import atexit\natexit.register(print, 'saved')\nguardian.end(3)", None),
     "killed": (READY + SPIN, signal.SIGKILL),
     "a fork": (
         "guardian.ready()\nchild = os.fork()\nif child == 0:\n    time.sleep(1000)\n"
@@ -89,6 +110,29 @@ def test_what_does_not_look_is_killed_after_one_line(ended, where):
     assert errors.splitlines() == [
         "it: killed: a script, a file or the ROS master kept it busy for 2.5 s when it had to end"
     ]
+
+
+@pytest.mark.parametrize("which", ["a script in a call that holds Python's lock", "a script that hides from the alarm"])
+def test_a_script_that_nothing_can_stop_is_killed_after_one_line(ended, which):
+    status, errors = ended(which)
+    assert status == -signal.SIGKILL
+    assert errors.splitlines() == [
+        "it: killed: [init] some.py: did not return after 0.5 s (script_time_limit), nor could it be stopped"
+    ]
+
+
+def test_the_simulators_own_time_and_that_after_a_script_are_not_the_scripts(ended):
+    assert ended("a script that pauses") == (4, "")
+
+
+@pytest.mark.parametrize("which", ["ends beside a thread", "ends with atexit"])
+def test_what_a_script_leaves_behind_does_not_keep_the_process(ended, which):
+    left = "it: ended without what a script left: a thread, or a function of atexit, that does not end\n"
+    assert ended(which) == (3, left)
+
+
+def test_what_ends_in_time_is_waited_for(ended):
+    assert ended("ends") == (3, "")
 
 
 def test_more_signals_give_no_more_time(ended):

@@ -139,6 +139,10 @@ def test_lua_stays_in_hand(attack, tmp_path, dialect, source, words):
     attack(tmp_path / "script.lua", PROLOGUE[dialect] + source, words)
 
 
+MASKED = "import signal\nsignal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())\n"
+TRACED = "import sys\ndef t(*_):\n    while True: pass\n"
+STUBBORN = "import sys\ndef t(*_):\n    while True:\n        try: x = [0 for _ in iter(int, 1)]\n        except: pass\n"
+GENERATOR = "def g():\n    try: yield\n    finally:\n        while True: pass\nx = g()\nnext(x)\n"
 DEEP = "import sys\nsys.setrecursionlimit(10000)\n"
 IN_PYTHON = [
     ("raise KeyboardInterrupt", "KeyboardInterrupt"),
@@ -163,6 +167,21 @@ IN_PYTHON = [
     ("import contextlib\nwhile True:\n    with contextlib.suppress(BaseException):\n        while True: pass", STOPPED),
     ("import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nimport time\ntime.sleep(100)", STOPPED),
     ("import sys\nsys.settrace(lambda *_: None)\nwhile True: pass", STOPPED),
+    # the alarm is kept from scripts, and what traces does so within the script's time
+    ("import signal\nsignal.signal(signal.SIGALRM, signal.SIG_IGN)", "the alarm is the time limit's"),
+    ("import signal\nsignal.setitimer(signal.ITIMER_REAL, 0)", "the alarm is the time limit's"),
+    ("import signal\nsignal.alarm(0)", "the alarm is the time limit's"),
+    (f"{MASKED}while True: pass", STOPPED),
+    (f"{MASKED}import time\ntime.sleep(1000)", STOPPED),
+    (f"{TRACED}sys.settrace(t)\n(lambda: 0)()", STOPPED),
+    (f"{TRACED}sys.settrace(t)", ""),
+    (f"{TRACED}def sysCall_sensing(): sys.settrace(t)", ""),
+    (f"{TRACED}def sysCall_sensing(): sys.setprofile(t)", STOPPED),
+    (f"{STUBBORN}sys.settrace(t)\n(lambda: 0)()", STOPPED),
+    ("exec('while True:\\n try:\\n  while True: pass\\n except: pass')", STOPPED),
+    ("class A:\n    def __del__(self):\n        while True: pass\nwhile True: A()", STOPPED),
+    (f"{GENERATOR}x.close()", STOPPED),
+    (f"{GENERATOR}del x\nwhile True: pass", STOPPED),
     ("input()", "EOFError"),
     ("def f(): f()\nf()", "RecursionError"),
     ("import sys\nsys.setrecursionlimit(10 ** 9)", "recursion limit is 10000 at most, not 1000000000"),

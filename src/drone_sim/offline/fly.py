@@ -295,4 +295,5 @@ def _seconds(text: str) -> float:
 
 
 if __name__ == "__main__":
-    sys.exit(main(guardian=Guardian("fly")))
+    asked_to_end = Guardian("fly")
+    asked_to_end.end(main(guardian=asked_to_end))

@@ -3,19 +3,31 @@
 PyBullet's calls, and some of a script's, hold Python's lock: while one of them does not return, no Python code runs,
 neither a signal's handler nor a watchdog thread. So a process of its own waits. CPython's handler in C writes the
 number of the signal into a pipe, whoever holds the lock; the pipe's end tells that the process has ended.
+Memory that both have tells when the child script that runs has to return: one that nothing could stop ends the process.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
+import mmap
 import os
 import select
 import signal
+import sys
+import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
+from typing import NoReturn
+
+from drone_sim.scripting import time_limit
 
 PATIENCE = 2.5  # s, for the orderly end
+_SCRIPTS_PATIENCE = 5.0  # s, for a script to be stopped after its time
+_EARLIER = 0.5  # s, than the guardian, by which a process ends itself, with its status
+_LOOK = 0.5  # s between two looks at scripts
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _NOTICED = 0  # written where the process has seen the signal, and needs time for what is known to end
 
@@ -33,12 +45,14 @@ class Guardian:
         `name` begins the line on stderr. Call it in the main thread.
         """
         self.asked = 0
+        self._name = name
         self._call: Callable[[], None] = lambda: None
         read, self._write = os.pipe()
-        process = os.getpid()
+        process, scripts = os.getpid(), mmap.mmap(-1, time_limit.WATCHED)
         if os.fork() == 0:
-            _be_the_guardian(read, self._write, process, name)
+            _be_the_guardian(read, self._write, process, name, scripts)
         os.close(read)
+        time_limit.watched_by(scripts)
         os.set_blocking(self._write, False)
         # What nohup has the process ignore, it goes on to ignore.
         self._signals = [one for one in _SIGNALS if one != signal.SIGHUP or signal.getsignal(one) != signal.SIG_IGN]
@@ -60,6 +74,21 @@ class Guardian:
         signal.set_wakeup_fd(-1)
         self._handle(signal.SIG_DFL)
         self._tell(_NOTICED)
+
+    def end(self, status: int) -> NoReturn:
+        """Exit with a status, in PATIENCE at most: a script may have left threads, or functions of `atexit`."""
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                stream.flush()
+        self.count()
+        timer = threading.Timer(PATIENCE - _EARLIER, self._give_up, (status,))
+        timer.daemon = True
+        timer.start()
+        sys.exit(status)
+
+    def _give_up(self, status: int) -> None:
+        _say(f"{self._name}: ended without what a script left: a thread, or a function of atexit, that does not end")
+        os._exit(status)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self.asked = self.asked or number
@@ -90,7 +119,7 @@ class Guardian:
         self._release()
 
 
-def _be_the_guardian(read: int, write: int, process: int, name: str) -> None:
+def _be_the_guardian(read: int, write: int, process: int, name: str, scripts: mmap.mmap) -> None:
     """Guard in the forked process, and end with the guarded one."""
     try:
         os.setsid()  # the terminal's Ctrl-C is not for the guardian
@@ -99,29 +128,60 @@ def _be_the_guardian(read: int, write: int, process: int, name: str) -> None:
         for unused in (write, 0, 1):
             with contextlib.suppress(OSError):
                 os.close(unused)
-        if _outlasts_its_time(read):
-            _say(
-                f"{name}: killed: a script, a file or the ROS master kept it busy for {PATIENCE:g} s when it had to end"
-            )
+        why = _outlasts_its_time(read, _Scripts(scripts, process))
+        if why:
+            _say(f"{name}: killed: {why}")
             os.kill(process, signal.SIGKILL)
     finally:
         os._exit(0)
 
 
-def _outlasts_its_time(pipe: int) -> bool:
-    """Wait for a signal's number, then for the end of the process; return whether it has not come in time."""
-    deadline: float | None = None
-    while True:
-        left = None if deadline is None else max(0.0, deadline - time.monotonic())
-        if not select.select([pipe], [], [], left)[0]:
-            return True
-        numbers = os.read(pipe, 64)
-        if not numbers:  # the last end that could be written to is closed
+class _Scripts:
+    """Looks whether a script goes on and on."""
+
+    def __init__(self, memory: mmap.mmap, process: int):
+        """Take the memory that the process writes into."""
+        self._memory = memory
+        self._state = Path(f"/proc/{process}/stat")
+        self._late, self._since = 0.0, 0.0  # the last deadline that had passed, and since when that is seen
+
+    def overdue(self) -> str:
+        """Return what to say of a script that has had its time and more, or ''."""
+        now = time.monotonic()
+        deadline, number = time_limit.overdue(self._memory)
+        if not deadline or now < deadline or self._is_halted():
+            self._late = 0.0
+        elif deadline != self._late:
+            self._late, self._since = deadline, now
+        elif now > self._since + _SCRIPTS_PATIENCE and time_limit.overdue(self._memory)[0] == deadline:
+            return f"{time_limit.text_of(self._memory, number)}, nor could it be stopped"
+        return ""
+
+    def _is_halted(self) -> bool:
+        """Tell whether somebody has stopped the process (SIGSTOP, a debugger)."""
+        try:
+            return self._state.read_text().rpartition(")")[2].split()[0] in "Tt"
+        except (OSError, IndexError):
             return False
-        if _NOTICED in numbers:
-            deadline = None
-        elif deadline is None and any(number in _SIGNALS for number in numbers):
-            deadline = time.monotonic() + PATIENCE
+
+
+def _outlasts_its_time(pipe: int, scripts: _Scripts) -> str:
+    """Wait for a signal's number, then for the end of the process; return why it has to be ended, or ''."""
+    deadline = math.inf
+    while True:
+        left = max(0.0, min(_LOOK, deadline - time.monotonic()))
+        if select.select([pipe], [], [], left)[0]:
+            numbers = os.read(pipe, 64)
+            if not numbers:  # the last end that could be written to is closed
+                return ""
+            if _NOTICED in numbers:
+                deadline = math.inf
+            elif deadline == math.inf and any(number in _SIGNALS for number in numbers):
+                deadline = time.monotonic() + PATIENCE
+        if time.monotonic() >= deadline:
+            return f"a script, a file or the ROS master kept it busy for {PATIENCE:g} s when it had to end"
+        if overdue := scripts.overdue():
+            return overdue
 
 
 def _say(line: str) -> None:

@@ -8,6 +8,7 @@ a watchdog, whose exception Python raises between two of its instructions.
 
 from __future__ import annotations
 
+import array
 import atexit
 import contextlib
 import ctypes
@@ -31,6 +32,17 @@ _LATER = 0.001  # s, so that the time is used up when the timer goes off
 _LONGEST = 1e6  # s
 _SOONEST = 1e-4  # s; 0 would switch the timer off
 
+# What a process outside may see (see watched_by): when the script that runs has to return (monotonic clock), or 0;
+# and which one it is.
+_seen: Any = array.array("d", (0.0, 0.0))
+_texts: Any = None
+_numbers: dict[str, int] = {}  # of what such a process would say of a script
+_LONGEST_TEXT = 512  # bytes
+_MOST_TEXTS = 2048
+WATCHED = 16 + _MOST_TEXTS * _LONGEST_TEXT  # bytes of memory
+
+_signal, _setitimer = signal.signal, signal.setitimer
+_set_trace, _set_profile = sys.settrace, sys.setprofile
 _ROOM = 50  # levels of recursion that the signal handler has beyond what the script may use
 
 _set_recursion_limit = sys.setrecursionlimit
@@ -49,17 +61,62 @@ class Stopped(BaseException):
     """Raised in a script that ran for too long; no Exception, so that `except Exception` lets it pass."""
 
 
+class Labels(dict[str, int]):
+    """Numbers of a script's phases, by which a process outside knows what runs."""
+
+    def __init__(self, path: str, limit: TimeLimit):
+        """Take the script's path, and its limit."""
+        super().__init__()
+        self._path, self._limit = path, limit
+
+    def __missing__(self, phase: str) -> int:
+        """Write down what is to be said where the phase never returns."""
+        text = f"[{phase}] {self._path}: did not return after {self._limit.seconds:g} s (script_time_limit)"
+        number = self[phase] = _numbers.setdefault(text, len(_numbers))
+        _write_text(number, text)
+        return number
+
+
+def watched_by(memory: Any) -> None:
+    """Let a process outside see which script runs: take WATCHED bytes of writable memory, shared with it."""
+    global _seen, _texts
+    view = memoryview(memory)
+    _seen, _texts = view[:16].cast("d"), view[16:]
+    for text, number in _numbers.items():
+        _write_text(number, text)
+
+
+def overdue(memory: Any) -> tuple[float, int]:
+    """Return, in the process outside, when the script that runs had to return (0: none runs), and which it is."""
+    numbers = memoryview(memory)[:16].cast("d")
+    return numbers[0], int(numbers[1])
+
+
+def text_of(memory: Any, number: int) -> str:
+    """Return, in the process outside, what is to be said of that script."""
+    text = bytes(memoryview(memory)[16 + number * _LONGEST_TEXT :][:_LONGEST_TEXT]).rstrip(b"\0")
+    return text.decode("utf-8", "ignore") or "a script did not return in its time (script_time_limit)"
+
+
+def _write_text(number: int, text: str) -> None:
+    if _texts is not None and number < _MOST_TEXTS:
+        line = " ".join(text.encode("utf-8", "backslashreplace").decode().split()).encode()[-_LONGEST_TEXT:]
+        _texts[number * _LONGEST_TEXT :][: len(line)] = line
+
+
 class TimeLimit:
     """How long a script may run before it has to return; one script at a time."""
 
     def __init__(self, seconds: float):
         """Take the limit in seconds of real time; 0 means none."""
         self.seconds = seconds
+        self.label = _MOST_TEXTS - 1  # of Labels
         self.struck = False  # whether the last script that `run` called was stopped
         self._deadline = 0.0
         self._expired = False
         self._carry: Callable[[Callable[[], Any]], Any] | None = None
         self._traced_by: Any = None  # a debugger's trace function, which comes back afterwards
+        self.traces: tuple[Any, Any] | None = None  # before the script set one: it may trace itself, nobody else
         self._thread = 0
         # The script's thread writes `armed` (a script runs) and then reads `fired`, the watchdog the other way round:
         # so one of the two sees the other, without a lock in every call.
@@ -75,6 +132,15 @@ class TimeLimit:
         """Begin to count."""
         self._expired = False
         self._deadline = monotonic() + self.seconds
+
+    def show(self) -> None:
+        """Let a process outside see when the script has to return."""
+        if self.seconds:
+            _seen[1], _seen[0] = self.label, self._deadline
+
+    def hide(self) -> None:
+        """Let it see that none runs."""
+        _seen[0] = 0.0
 
     def exceeded(self) -> bool:
         """Tell whether the time since `start` is used up."""
@@ -92,13 +158,16 @@ class TimeLimit:
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
         """Do not count what happens inside: it is the simulator's time, not the script's."""
-        began, armed = monotonic(), self.armed
+        began, armed, is_seen = monotonic(), self.armed, _seen[0] != 0.0
         self.armed = False
+        self.hide()
         try:
             yield
         finally:
             self._deadline += monotonic() - began
             self.armed = armed
+            if is_seen:
+                self.show()
 
     def carry_with(self, carry: Callable[[Callable[[], Any]], Any]) -> None:
         """Take what calls a function in the simulation's thread, for a script that runs in another one."""
@@ -118,6 +187,8 @@ class TimeLimit:
             return self.outside(function)
         finally:
             self._deadline = deadline
+            if _seen[0]:
+                self.show()
             if self.armed and self.seconds and get_ident() == _MAIN:  # the timer was the other one's
                 _timer.limit = self
                 _timer.set(max(0.0, self.left()) + _LATER)
@@ -128,6 +199,8 @@ class TimeLimit:
         self._deadline = now + self.seconds
         self.struck = False
         self._thread = get_ident()
+        if self.seconds:
+            _seen[1], _seen[0] = self.label, self._deadline
         if self._thread != _MAIN:
             _watch(self)
         elif self.seconds:
@@ -139,19 +212,25 @@ class TimeLimit:
                 self.armed = True
                 return function(*arguments)
             finally:
+                if self.traces:  # now, and without a call of a function in Python: what traces may not return
+                    _set_trace(self.traces[0])
+                    _set_profile(self.traces[1])
+                    self.traces = None
                 self.armed = False
+                _seen[0] = 0.0
                 if self.struck or self._fired:
                     self._end_strike()
         except Stopped:
             # It may have struck between the end of the function and the beginning of `finally`.
             self.armed = False
+            self.hide()
             self._end_strike()
             raise
 
     def _end_strike(self) -> None:
-        """Drop an exception that is still on its way."""
+        """Drop an exception that is still on its way, and what the script traces with."""
         if sys.gettrace() is _let_pass:
-            sys.settrace(self._traced_by)
+            _set_trace(self._traced_by)
         with contextlib.suppress(Stopped):
             _let_it_come()
         while self._fired:
@@ -186,7 +265,7 @@ class TimeLimit:
         _timer.set(_AGAIN)
         if not self.struck:
             self.struck, self._traced_by = True, sys.gettrace()
-        sys.settrace(_let_pass)
+        _set_trace(_let_pass)
         insist = functools.partial(_insist, self._thread, Stopped)
         while frame is not None and frame.f_code is not TimeLimit.run.__code__:
             frame.f_trace = insist
@@ -203,18 +282,18 @@ class _Timer:
         self._is_ready = False
 
     def set(self, seconds: float) -> None:
-        signal.signal(signal.SIGALRM, _go_off)
+        _signal(signal.SIGALRM, _go_off)
         if not self._is_ready:
-            atexit.register(signal.setitimer, signal.ITIMER_REAL, 0)  # nobody catches it while Python ends
+            atexit.register(_setitimer, signal.ITIMER_REAL, 0)  # nobody catches it while Python ends
             self._is_ready = True
         self.next = monotonic() + seconds
         # Where the process had to wait for its turn, what was left of the time has passed by now.
-        signal.setitimer(signal.ITIMER_REAL, min(max(seconds, _SOONEST), _LONGEST), _UNTIL_HEARD)
+        _setitimer(signal.ITIMER_REAL, min(max(seconds, _SOONEST), _LONGEST), _UNTIL_HEARD)
 
     def rest(self) -> None:
         """Do not go off any more."""
         self.next = math.inf
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        _setitimer(signal.ITIMER_REAL, 0)
 
 
 _MAIN = threading.main_thread().ident
@@ -222,6 +301,12 @@ _timer = _Timer()
 _watched: weakref.WeakSet[TimeLimit] = weakref.WeakSet()
 _watching = threading.Lock()
 _watchdog: threading.Thread | None = None
+
+
+def running() -> TimeLimit | None:
+    """Return the limit of the Python script that runs in this thread, the main one; None outside of scripts."""
+    limit = _timer.limit
+    return limit if limit is not None and limit.armed and limit.seconds and get_ident() == _MAIN else None
 
 
 def _let_it_come() -> None:
@@ -232,7 +317,7 @@ def _go_off(_number: int, frame: FrameType | None) -> None:
     limit = sys.getrecursionlimit()
     _set_recursion_limit(limit + _ROOM)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0)  # heard
+        _setitimer(signal.ITIMER_REAL, 0)  # heard
         if _timer.limit is None or not _timer.limit.armed:
             _timer.rest()
         else:

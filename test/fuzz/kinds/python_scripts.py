@@ -40,6 +40,13 @@ _LOOPS = st.sampled_from(
         "while True: print('x')",
         "while True: simROS.advertise('/x', 'std_msgs/Float64')",
         "import time\nwhile True: time.sleep(0.01)",
+        "import signal\nsignal.signal(signal.SIGALRM, signal.SIG_IGN)\nwhile True: pass",
+        "import signal\nsignal.setitimer(signal.ITIMER_REAL, 0)\nwhile True: pass",
+        "import signal\nsignal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())\nwhile True: pass",
+        "import sys\ndef t(*_):\n    while True: pass\nsys.settrace(t)",
+        "import sys\ndef t(*_):\n    while True: pass\nsys.setprofile(t)",
+        "exec('while True:\\n try:\\n  while True: pass\\n except: pass')",
+        "def g():\n    try: yield\n    finally:\n        while True: pass\nx = g()\nnext(x)\nx.close()",
     ]
 )
 _HOGS = st.sampled_from(
@@ -91,6 +98,10 @@ _ERRORS = st.sampled_from(
 _META = st.sampled_from(
     [
         "globals().clear()",
+        "globals()[Angry] = 1",
+        "class D:\n    def __deepcopy__(self, memo): raise KeyboardInterrupt\nself.d = D()",
+        "print('\\ud800')",
+        "simROS.publish(simROS.advertise('a', 'std_msgs/String'), {'data': '\\ud800'})",
         "del sim, simROS",
         "self = None",
         "print = None",

@@ -26,7 +26,7 @@ from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.source import LuaSource
 from drone_sim.scripting.lua.thread import MOST_LEFT, Door, LeftBehind, LuaThread, SameThread, left_behind
 from drone_sim.scripting.lua.values import MEMORY, MIB, Values
-from drone_sim.scripting.time_limit import TimeLimit
+from drone_sim.scripting.time_limit import Labels, TimeLimit
 from drone_sim.wording import near_names
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
@@ -45,7 +45,7 @@ class LuaScript:
     def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
         """Compile the file's text; run its top level unless it is to run in every phase. Raises ScriptError."""
         self._path = path
-        self._limit = limit
+        self._limit, self._labels = limit, Labels(path, limit)
         text = LuaSource(source)
         self.is_empty = not text.text.strip()
         self._modules = modules
@@ -176,6 +176,7 @@ class LuaScript:
         """Call a function in Lua's thread (`near`: see there); return what it returns."""
         if self._end:
             raise self._error(phase, self._end)
+        self._limit.label = self._labels[phase]
         try:
             outcome = self._thread.run(function, *arguments, near=near)
         except LeftBehind:

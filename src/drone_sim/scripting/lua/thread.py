@@ -51,7 +51,11 @@ class SameThread:
     def run(self, function: Callable[..., Any], *arguments: Any, near: bool = False) -> Any:
         """Call a function; raises what it raises."""
         self._limit.start()
-        return function(*arguments)
+        self._limit.show()
+        try:
+            return function(*arguments)
+        finally:
+            self._limit.hide()
 
     def close(self) -> None:
         """Close the API."""

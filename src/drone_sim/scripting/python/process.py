@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
-from typing import NoReturn
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NoReturn
 
-from drone_sim.scripting import script_log
+from drone_sim.scripting import script_log, time_limit
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _STREAMS = ("stdin", "stdout", "stderr")
@@ -48,6 +49,8 @@ def end_copy(path: str) -> NoReturn:
 def process_kept() -> Iterator[None]:
     """Give signal handlers and standard streams back to the process afterwards."""
     sys.setrecursionlimit = _guarded
+    for module, name, function in _GUARDED:
+        setattr(module, name, function)
     streams = [getattr(sys, name) for name in _STREAMS]
     handlers = [(number, signal.getsignal(number)) for number in _SIGNALS]
     try:
@@ -66,3 +69,50 @@ def _guarded(limit: int) -> None:
     if limit > _DEEPEST:
         raise ValueError(f"a child script's recursion limit is {_DEEPEST} at most, not {limit}")
     _set_recursion_limit(limit)
+
+
+# ---- what the time limit needs of the process, while a script runs
+
+
+def _kept_from_scripts(name: str, takes: Callable[..., bool]) -> Any:
+    function = getattr(signal, name)
+
+    @functools.wraps(function)
+    def call(*arguments: Any) -> Any:
+        if time_limit.running() is not None and takes(*arguments):
+            raise ValueError(f"signal.{name}: the alarm is the time limit's (script_time_limit)")
+        return function(*arguments)
+
+    return call
+
+
+@functools.wraps(signal.pthread_sigmask)
+def _mask(how: int, mask: Iterable[int]) -> Any:
+    """Block what a script asks for, apart from the alarm."""
+    if time_limit.running() is not None and how != signal.SIG_UNBLOCK:
+        mask = set(mask) - {signal.SIGALRM}
+    return _pthread_sigmask(how, mask)
+
+
+def _tracing(function: Callable[[Any], None]) -> Any:
+    """Return one that has the trace function taken back when the script has returned: it traces the script alone."""
+
+    @functools.wraps(function)
+    def call(trace: Any) -> None:
+        limit = time_limit.running()
+        if limit is not None and limit.traces is None:
+            limit.traces = sys.gettrace(), sys.getprofile()
+        function(trace)
+
+    return call
+
+
+_pthread_sigmask = signal.pthread_sigmask
+_GUARDED: tuple[tuple[Any, str, Any], ...] = (
+    (signal, "signal", _kept_from_scripts("signal", lambda number, *_: number == signal.SIGALRM)),
+    (signal, "setitimer", _kept_from_scripts("setitimer", lambda which, *_: which == signal.ITIMER_REAL)),
+    (signal, "alarm", _kept_from_scripts("alarm", lambda *_: True)),
+    (signal, "pthread_sigmask", _mask),
+    (sys, "settrace", _tracing(sys.settrace)),
+    (sys, "setprofile", _tracing(sys.setprofile)),
+)

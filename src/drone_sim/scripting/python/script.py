@@ -22,7 +22,7 @@ from drone_sim.scripting.phase_names import FUNCTIONS, THREADS
 from drone_sim.scripting.python.helpers import Helpers
 from drone_sim.scripting.python.process import Forks, end_copy, process_kept
 from drone_sim.scripting.script_log import THREAD_GOES_ON, say, shown
-from drone_sim.scripting.time_limit import Stopped, TimeLimit
+from drone_sim.scripting.time_limit import Labels, Stopped, TimeLimit
 from drone_sim.wording import near_names
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class PythonScript:
     def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns):
         """Run the file's top level; its thread has those turns. Raises ScriptError."""
         self._path = path
-        self._limit = limit
+        self._limit, self._labels = limit, Labels(path, limit)
         self.is_empty = not source.strip()
         self._modules = modules
         self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
@@ -201,6 +201,7 @@ class PythonScript:
     def _run(self, phase: str, function: Any, *arguments: Any) -> Any:
         failed = result = None
         forks = Forks.count
+        self._limit.label = self._labels[phase]
         try:
             result = self._limit.run(function, *arguments)
         except BaseException as error:  # KeyboardInterrupt, too: whose it is cannot be told
