@@ -8,6 +8,7 @@ from typing import NamedTuple
 from geometry_msgs.msg import Point
 from visualization_msgs.msg import InteractiveMarkerFeedback, Marker
 
+from drone_sim.mechanics.state import Pose
 from drone_sim.ros.node.inbox import Inbox
 from drone_sim.ros.rviz.held import Held
 from drone_sim.ros.rviz.marker_server import MarkerServer, level, new_handle, pose_message
@@ -87,7 +88,12 @@ class Handles:
             pose = checked_pose(feedback.header.frame_id, feedback.pose, vehicle.parameters)
         except checks.Refused:
             return  # dragged below the floor, or to the horizon: it stays where it was
-        self._inbox.put(lambda: vehicle.move_target(pose) if handle.is_target else vehicle.move(pose))
+        self._inbox.put(lambda: self._carry_out(handle, pose))
+
+    def _carry_out(self, handle: _Handle, pose: Pose) -> None:
+        vehicle = self._simulation.vehicles.get(handle.vehicle)  # it may have gone, or be another one, meanwhile
+        if vehicle is not None:
+            vehicle.move_target(pose) if handle.is_target else vehicle.move(pose)
 
 
 def _ball() -> Marker:
