@@ -1,0 +1,98 @@
+"""The commands of README.md and docs/*.md, as they stand there, and which of them are not run, and why."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+
+_BLOCK = re.compile(r"^```(?:console)?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_PROMPT = "$ "
+
+KEYBOARD = "needs a keyboard: test/ros/key_teleop.test"
+GAMEPAD = "needs a gamepad: test/unit/test_joy.py"
+DISPLAY = "needs a display, and a package that setup does not install"
+WORKSPACE = "needs a catkin workspace and the network"
+INSTALLS = "installs packages"
+ANOTHER = "needs another package, or another machine"
+EXTENDING = "test/unit/test_docs_extending.py follows the page"
+
+NOT_RUN = {  # with the reason
+    "rosrun drone_sim key_teleop": KEYBOARD,
+    "rosrun demo_teleop key_teleop.py cmd_vel:=/drone/cmd_vel": ANOTHER,
+    "rosrun demo_teleop key_teleop.py cmd_vel:=/drone1/cmd_vel": ANOTHER,
+    "rosrun image_view image_view image:=/drone/front": DISPLAY,
+    "rosrun image_view image_view image:=/drone/floor/image __name:=view2": DISPLAY,
+    "cd my_ros_ws/src": WORKSPACE,
+    "vcs import < drone_sim/drone_sim.rosinstall": WORKSPACE,
+    "drone_sim/dev.sh setup": WORKSPACE,
+    "cd ..": WORKSPACE,
+    "catkin_make": WORKSPACE,
+    "./dev.sh deb": "takes minutes: packaging is tried in bare chroots",
+    "sudo apt install ./build/deb/ros-drone-sim_*.deb": INSTALLS,
+    "pip install coppeliasim-zmqremoteapi-client": INSTALLS,
+    "python3": "test/unit/test_docs_remote.py types what comes after it",
+    "ssh -L 8080:localhost:8080 you@the-machine": ANOTHER,
+    "rosrun my_package flyer.py": ANOTHER,
+    "rosrun drone_sim grade_live course.yaml --node flyer": "test/ros/grade_live.test grades that node",
+    "rosrun drone_sim joy_teleop": GAMEPAD,
+    "rosrun drone_sim joy_teleop _device:=/dev/input/js1 _drone:=drone2 _axes/vx/scale:=2": GAMEPAD,
+    "rosrun drone_sim joy_teleop _config:=$PWD/my_pad.yaml": GAMEPAD,
+    "python3 try_cone.py": EXTENDING,
+    "python3 try_temperature.py": EXTENDING,
+    "python3 try_leash.py": EXTENDING,
+}
+SLOW = {  # run with --all only
+    "rosrun drone_sim doctor",
+    "rosrun drone_sim sweep steps --param Kzref=1:10:10 --param Dzref=1:5:5 --plot map.png",
+    "rosrun drone_sim sweep steps.yaml --param Kzref=1:10:10 --param Dyaw=0.1,0.5,1 --smallest rise_time --plot heat.png"
+    " --csv all.csv",
+    "rosrun drone_sim sweep steps.yaml --param Kzref=1:10:2 --param Dyaw=0.1:2:2 --smallest rise_time --optimize",
+}
+SHOWN_OTHERWISE = {  # with the reason
+    "rosrun drone_sim import_scene Drone.ttt": "the page's is V-REP's own file, of which there is no copy",
+    "cat flight.yaml": "the file is made of what the page shows",
+}
+
+
+class Command(NamedTuple):
+    """A command without its comment, and the lines that the page shows after it."""
+
+    page: Path
+    line: int
+    text: str
+    shown: tuple[str, ...]
+
+    @property
+    def begins_a_simulator(self) -> bool:
+        """Whether what follows on the page is for the simulator that this starts."""
+        return self.text.startswith(("roslaunch ", "./dev.sh run"))
+
+
+def commands(page: Path) -> list[Command]:
+    """Return the commands of a page, from its code blocks with `$ `."""
+    text = page.read_text(encoding="utf-8")
+    found = []
+    for block in _BLOCK.finditer(text):
+        first = text.count("\n", 0, block.start(1)) + 1
+        lines = block[1].splitlines()
+        starts = [number for number, line in enumerate(lines) if line.startswith(_PROMPT)]
+        for start, end in zip(starts, [*starts[1:], len(lines)]):
+            last = start
+            while lines[last].endswith("\\"):
+                last += 1
+            command = "\n".join((lines[start].removeprefix(_PROMPT), *lines[start + 1 : last + 1]))
+            found.append(Command(page, first + start, _without_comment(command), tuple(lines[last + 1 : end])))
+    return found
+
+
+def _without_comment(text: str) -> str:
+    return re.sub(r"\s+# .*$", "", text).rstrip()
+
+
+def everything() -> list[Command]:
+    """Return the commands of all pages."""
+    return [one for page in PAGES for one in commands(page)]
