@@ -1,5 +1,7 @@
 """Flights out of bags: what was flown comes back to the last digit, and a file that is none gets one line."""
 
+import zlib
+
 import cv2
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from std_msgs.msg import String
 from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.recording import Recording
-from drone_sim.ros.tools import bag_commands, bag_video, plot_flight, record
+from drone_sim.ros.tools import bag_commands, bag_video, bags, plot_flight, record
 from drone_sim.ros.tools.bag_flights import BagFlight
 from drone_sim.ros.tools.bags import Bag, BagRefused
 from drone_sim.ros.tools.record import chosen
@@ -252,6 +254,21 @@ def test_topics_of_another_kind_are_left_out(tmp_path, capsys, program, out):
     said = capsys.readouterr().err
     refusal = "nothing was commanded in it on /drone/cmd_vel and the like" if program is bag_commands else ""
     assert (status, said.partition(".bag: ")[2].strip()) == (1 if refusal else 0, refusal)
+
+
+def test_what_unpacks_to_too_much_is_refused(flown, tmp_path, monkeypatch, capsys):
+    path, out = str(tmp_path / "large.bag"), str(tmp_path / "out.mp4")
+    monkeypatch.setattr(bags, "MAX_CHUNK", 1000)
+    assert plot_flight.main([flown[0], str(tmp_path / "out.png")]) == 1
+    assert "bytes; at most 1000 are unpacked" in capsys.readouterr().err
+    monkeypatch.undo()
+    size = np.array([5000, 5000], ">u4").tobytes()  # of a PNG, in its header
+    header = b"IHDR" + size + b"\x08\x02\0\0\0"
+    data = b"\x89PNG\r\n\x1a\n\0\0\0\x0d" + header + zlib.crc32(header).to_bytes(4, "big") + bytes(4) + b"IDAT"
+    with rosbag.Bag(path, "w") as bag:
+        bag.write("/camera/image/compressed", CompressedImage(format="png", data=data), rospy.Time(1))
+    assert bag_video.main([path, out]) == 1
+    assert "/camera/image/compressed: 5000 x 5000 px: at most 4096 x 4096 px are allowed" in capsys.readouterr().err
 
 
 def test_pictures_are_recorded_by_choice_and_never_raw():

@@ -91,22 +91,24 @@ _WRITTEN = st.tuples(
 
 def _bag(written: list, compression: str) -> bytes:
     """Return the bytes of a bag."""
-    file = tempfile.NamedTemporaryFile(suffix=".bag")
-    with file, rosbag.Bag(file.name, "w", compression=compression, chunk_threshold=2000) as bag:
-        for topic, other, made_up, at, changes in written:
-            kind = other if other is not None else _KINDS[topic]
-            known = None if kind in _OTHERS or made_up else roslib.message.get_message_class(kind)
-            message = (known or _made_up("nav_msgs/Odometry"))()
-            _defaults(message, at)
-            for path, value in changes:
-                _set(message, path, value)
-            buffer = io.BytesIO()
-            message.serialize(buffer)
-            name = kind if known is None else message._type
-            raw = (name, buffer.getvalue(), message._md5sum, None, type(message))
-            bag.write(topic, raw, rospy.Time.from_sec(min(at * 1e-9, 4e9)), raw=True)
-        bag.close()
-        return Path(file.name).read_bytes()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "one.bag"
+        with rosbag.Bag(str(path), "w", compression=compression, chunk_threshold=2000) as bag:
+            for topic, other, made_up, at, changes in written:
+                _write(bag, topic, _KINDS[topic] if other is None else other, made_up, at, changes)
+        return path.read_bytes()
+
+
+def _write(bag: rosbag.Bag, topic: str, kind: str, made_up: bool, at: float, changes: list) -> None:
+    known = None if kind in _OTHERS or made_up else roslib.message.get_message_class(kind)
+    message = (known or _made_up("nav_msgs/Odometry"))()
+    _defaults(message, at)
+    for path, value in changes:
+        _set(message, path, value)
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    raw = (kind if known is None else message._type, buffer.getvalue(), message._md5sum, None, type(message))
+    bag.write(topic, raw, rospy.Time.from_sec(min(at * 1e-9, 4e9)), raw=True)
 
 
 @st.composite

@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 import rosbag
 import rosbag.bag
 
+from drone_sim.files.resources import MEBIBYTE
 from drone_sim.ros.vehicle.filling import message_class
 from drone_sim.wording import near_names
 
 MAX_MESSAGES = 500_000  # of one topic
+MAX_CHUNK = 256 * MEBIBYTE  # of messages that are unpacked together; rosbag record makes chunks of 768 KiB
 
 
 class BagRefused(ValueError):
@@ -41,6 +43,9 @@ class Bag:
         with self._reading():
             self._bag = rosbag.Bag(path)
             topics = self._bag.get_type_and_topic_info().topics
+            largest = max((one.uncompressed_size for one in self._bag._chunk_headers.values()), default=0)
+        if largest > MAX_CHUNK:
+            raise BagRefused(f"{path}: a chunk of {largest} bytes; at most {MAX_CHUNK} are unpacked")
         self.kinds: dict[str, str] = {name: one.msg_type for name, one in topics.items()}
         self._counts = {name: one.message_count for name, one in topics.items()}
 

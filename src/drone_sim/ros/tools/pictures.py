@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 
 import cv2
@@ -9,6 +10,7 @@ import numpy as np
 from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 
+from drone_sim.files import images
 from drone_sim.offline.video import depth_to_grey
 
 _GREY, _WHITE = (60, 60, 60), (255, 255, 255)
@@ -29,6 +31,9 @@ def decode(message: Image | CompressedImage) -> np.ndarray:
         return _decode_raw(message)
     if "compressedDepth" in message.format:
         raise ValueError("compressedDepth is not shown")
+    if message.data:
+        with contextlib.suppress(OSError):  # of no kind that is known there
+            images.check(message.data)
     picture = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR) if message.data else None
     if picture is None:
         raise ValueError(f"not a picture: format '{message.format}'")
