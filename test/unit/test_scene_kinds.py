@@ -235,6 +235,10 @@ ONE = "kind: dummy, position: [0, 0, 0]"
             "line 2: parameter objects/0/parent = 'B': 'A' would be its own ancestor",
         ),
         (
+            "\n  - ".join(f"{{name: o{i}, parent: {f'o{i - 1}' if i else ''!r}, {ONE}}}" for i in range(999)),
+            "line 203: parameter objects/201/parent = 'o200': more than 200 objects above 'o201'",
+        ),
+        (
             f"{{name: A, parent: Quadricopter_bas, {ONE}}}",
             "line 2: no object is named 'Quadricopter_bas', the parent of 'A'; near names are Quadricopter_base",
         ),

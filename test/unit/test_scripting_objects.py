@@ -111,6 +111,18 @@ def test_no_object_hangs_on_itself(objects):
         objects.set_parent(objects.handle("Track_base"), objects.handle("TrackCam"), True)
 
 
+@pytest.mark.parametrize("upwards", [False, True])
+def test_no_object_hangs_too_deep(objects, upwards):
+    """However a script puts a chain together."""
+    made = [objects.add(f"o{number}") for number in range(999)]
+    pairs = list(zip(made[1:], made))
+    with pytest.raises(ValueError, match=r"'o\d+' cannot hang there: more than 200 objects above each other"):
+        for below, above in reversed(pairs) if upwards else pairs:
+            objects.set_parent(below, above, True)
+    assert len(objects.matrix(made[-1])) == 12
+    objects.remove(made)
+
+
 @pytest.mark.parametrize("name, toward", [("FrontVision", (1, 0, 0)), ("Quadricopter_floorCamera", (0, 0, -1))])
 def test_cameras_look_along_z_with_x_to_the_left(objects, name, toward):
     m = objects.matrix(objects.handle(name), objects.handle("Drone"))

@@ -19,6 +19,17 @@ WORLD, PARENT = -1, -11
 
 __all__ = ["PARENT", "WORLD", "Body", "ObjectTree", "SceneObject"]
 
+DEEPEST = 200  # objects above one; what asks for places goes up from each to the next
+
+
+def levels(one: SceneObject, top: SceneObject | None = None) -> int:
+    """Return how many objects one hangs on, by way of others, too, up to `top`."""
+    count, above = 0, one.parent
+    while above is not None and one is not top:
+        count += 1
+        above = None if above is top else above.parent
+    return count
+
 
 class ObjectTree:
     """All objects, by handle (a small integer that no other object of the run has had) and by name."""
@@ -194,12 +205,15 @@ class ObjectTree:
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Hang an object on another (WORLD for none): it stays where it is, or keeps its local transform.
 
-        Raises ValueError where that would make a loop.
+        Raises ValueError where that would make a loop, or more than DEEPEST objects above one.
         """
         moved = self[handle]
         new = None if parent == WORLD else self[parent]
         if new is moved or (new is not None and new.hangs_on(moved)):
             raise ValueError(f"'{moved.name}' cannot be its own ancestor")
+        below = max(levels(one, moved) for one in self._objects.values() if one is moved or one.hangs_on(moved))
+        if new is not None and levels(new) + 1 + below > DEEPEST:
+            raise ValueError(f"'{moved.name}' cannot hang there: more than {DEEPEST} objects above each other")
         matrix = moved.matrix()
         moved.parent = new
         if moved.body is not None:

@@ -23,6 +23,7 @@ from drone_sim.config.types import (
     readable_key,
 )
 from drone_sim.files.resources import resolve
+from drone_sim.mechanics.object_tree import DEEPEST
 from drone_sim.scene import attached_scripts
 from drone_sim.scene.attached_scripts import AttachedScripts
 from drone_sim.scene.entry import EntryParameters
@@ -66,8 +67,11 @@ class SceneParameters(Checked):
                 raise _refused(index, "name", one.name, "comes twice")
             entries[one.name] = index, one
         for index, one in enumerate(self.objects):
-            if _is_above_itself(one, entries):
+            above = _above(one, entries)
+            if one.name in above:
                 raise _refused(index, "parent", one.parent, f"'{one.name}' would be its own ancestor")
+            if len(above) > DEEPEST:
+                raise _refused(index, "parent", one.parent, f"more than {DEEPEST} objects above '{one.name}'")
         attached_scripts.check(self.scripts)
 
 
@@ -75,14 +79,14 @@ def _refused(index: int, key: str, value: str, why: str) -> ParameterError:
     return ParameterError(f"parameter scene/objects/{index}/{key} = '{value}': {why}", ("scene", "objects", index, key))
 
 
-def _is_above_itself(one: EntryParameters, entries: Mapping[str, tuple[int, EntryParameters]]) -> bool:
-    above, passed = one.parent, set()
-    while above and above in entries and above not in passed:
-        if above == one.name:
-            return True
-        passed.add(above)
-        above = entries[above][1].parent
-    return False
+def _above(one: EntryParameters, entries: Mapping[str, tuple[int, EntryParameters]]) -> dict[str, None]:
+    """Return the names of the entries that one hangs on, by way of others, too; its own where it does."""
+    above: dict[str, None] = {}
+    name = one.parent
+    while name and name in entries and name not in above:
+        above[name] = None
+        name = entries[name][1].parent
+    return above
 
 
 def read(file: str) -> dict[str, Any]:
