@@ -2,7 +2,7 @@
 """Run the commands of README.md and docs/*.md as they stand there: ./dev.sh docs-commands [--all] [PAGE...].
 
 Each page in a folder of its own, with a master of its own; some pages at a time. A `roslaunch` ends with the next one.
-Its commands must end well, show what the page shows after them (whatever numbers are in it), and nothing may be refused.
+Its commands must end well and show what the page shows after them (whatever numbers are in it); nothing may be refused.
 Without --all a simulator is started only where a command needs it, and what takes minutes is left out.
 """
 
