@@ -60,6 +60,7 @@ class Background:
             text=True,
             errors="replace",
             start_new_session=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in what runs in the background
         )
         threading.Thread(target=self._read, daemon=True).start()
 
