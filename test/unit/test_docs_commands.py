@@ -8,7 +8,7 @@ import pytest
 from drone_sim.files.resources import package_path
 
 FOLDER = package_path() / "test/docs"
-PAGES = ("fleet", "import", "recording", "states", "time", "tuning", "weather")
+PAGES = ("fleet", "import", "states", "time", "tuning", "weather")
 
 
 def loaded(name):
