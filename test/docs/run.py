@@ -36,6 +36,7 @@ NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim doctor")
 WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|\bERROR:")
 REFUSED = re.compile(rf"{WRONG.pattern}|refused")  # by the simulator, whatever the command has said
 FLYING = "commands on "
+FLOWN = ("rostopic", "pub", "-1", "/drone/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.5}}")  # into a bag
 USUAL = "roslaunch drone_sim drone.launch"  # where a page does not say what runs
 
 
@@ -165,7 +166,7 @@ class Page:
         if simulator is None:
             return
         if "record_to:=." in simulator.command.text:
-            time.sleep(2)  # of flight
+            subprocess.run(FLOWN, env=self.environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
         simulator.end()
         shown = [line for one in self.run_commands for line in one.shown]
         wrong = [
