@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | test-web | lint | bench [NAME...] |
-#   fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | tasks [TASK...] | pythons [VERSION...] | deb
+#   docs-commands [--all] [PAGE...] | fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | tasks [TASK...] | pythons [VERSION...] | deb
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
 # build/ and devel/. What is there already is left alone, so a second run takes seconds. Where another ROS 1 has
@@ -297,6 +297,13 @@ case "$command" in
   lint) install_packages git; setup; lint ;;
   bench) setup; make_venv requirements-dev.txt; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
+  docs-commands)
+    setup
+    make_venv requirements-dev.txt
+    # shellcheck disable=SC1091 # built by setup
+    source devel/setup.bash
+    PYTHONPATH=$root/test/unit:$PYTHONPATH exec .venv/bin/python test/docs/run.py "$@"
+    ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
   soak-web) setup; exec .venv/bin/python test/soak/web.py "$@" ;;
   two-hosts) setup; exec .venv/bin/python test/two_hosts/run.py "$@" ;;

@@ -9,7 +9,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
-_BLOCK = re.compile(r"^```(?:console)?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _PROMPT = "$ "
 
 KEYBOARD = "needs a keyboard: test/ros/key_teleop.test"
@@ -48,8 +48,8 @@ NOT_RUN = {  # with the reason
 SLOW = {  # run with --all only
     "rosrun drone_sim doctor",
     "rosrun drone_sim sweep steps --param Kzref=1:10:10 --param Dzref=1:5:5 --plot map.png",
-    "rosrun drone_sim sweep steps.yaml --param Kzref=1:10:10 --param Dyaw=0.1,0.5,1 --smallest rise_time --plot heat.png"
-    " --csv all.csv",
+    "rosrun drone_sim sweep steps.yaml --param Kzref=1:10:10 --param Dyaw=0.1,0.5,1 --smallest rise_time"
+    " --plot heat.png --csv all.csv",
     "rosrun drone_sim sweep steps.yaml --param Kzref=1:10:2 --param Dyaw=0.1:2:2 --smallest rise_time --optimize",
 }
 SHOWN_OTHERWISE = {  # with the reason
@@ -77,8 +77,8 @@ def commands(page: Path) -> list[Command]:
     text = page.read_text(encoding="utf-8")
     found = []
     for block in _BLOCK.finditer(text):
-        first = text.count("\n", 0, block.start(1)) + 1
-        lines = block[1].splitlines()
+        first = text.count("\n", 0, block.start(2)) + 1
+        lines = block[2].splitlines() if block[1] in ("", "console") else []
         starts = [number for number, line in enumerate(lines) if line.startswith(_PROMPT)]
         for start, end in zip(starts, [*starts[1:], len(lines)]):
             last = start

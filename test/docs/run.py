@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Run the commands of README.md and docs/*.md as they stand there: ./dev.sh docs-commands [--all] [PAGE...].
 
-Each page in a folder of its own, with a master of its own; two pages at a time. A `roslaunch` ends with the next one. Its
-commands must end well, show what the page shows after them (whatever numbers are in it), and nothing may be refused.
+Each page in a folder of its own, with a master of its own; some pages at a time. A `roslaunch` ends with the next one.
+Its commands must end well and show what the page shows after them (whatever numbers are in it); nothing may be refused.
 Without --all a simulator is started only where a command needs it, and what takes minutes is left out.
 """
 
@@ -24,9 +24,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import matplotlib
-
-sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "unit")]
-
 import vrep_encoder
 import vrep_quadricopter
 from commands import NOT_RUN, PAGES, ROOT, SHOWN_OTHERWISE, SLOW, Command, commands
@@ -36,8 +33,10 @@ AT_ONCE = 4
 ENDLESS = ("rostopic echo ", "rosrun drone_sim view", "python3 $(rospack find drone_sim)/docs/fleet/follow.py")
 NEEDS_NONE = ("rosrun drone_sim ", "cat ", "source ", "rosbag info")  # a simulator
 NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim doctor")
-WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|refused|\bERROR:")
+WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|\bERROR:")
+REFUSED = re.compile(rf"{WRONG.pattern}|refused")  # by the simulator, whatever the command has said
 FLYING = "commands on "
+FLOWN = ("rostopic", "pub", "-1", "/drone/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.5}}")  # into a bag
 USUAL = "roslaunch drone_sim drone.launch"  # where a page does not say what runs
 
 
@@ -62,6 +61,7 @@ class Background:
             text=True,
             errors="replace",
             start_new_session=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in what runs in the background
         )
         threading.Thread(target=self._read, daemon=True).start()
 
@@ -166,11 +166,11 @@ class Page:
         if simulator is None:
             return
         if "record_to:=." in simulator.command.text:
-            time.sleep(2)  # of flight
+            subprocess.run(FLOWN, env=self.environment, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
         simulator.end()
         shown = [line for one in self.run_commands for line in one.shown]
         wrong = [
-            one for one in simulator.said.splitlines() if WRONG.search(one) and not any(like(s, one) for s in shown)
+            one for one in simulator.said.splitlines() if REFUSED.search(one) and not any(like(s, one) for s in shown)
         ]
         if wrong:
             raise failed(simulator.command, "the simulator complains", "\n".join(wrong))
@@ -178,6 +178,8 @@ class Page:
             bag.rename(self._folder / "flight.bag")
 
     def _run(self, command: Command) -> None:
+        if self._simulator is not None and "record_to:=." in self._simulator.command.text:
+            self._end()  # then the bag is whole
         self.run_commands.append(command)
         if command.text.startswith(ENDLESS):
             running = Background(command, self._folder, self.environment)

@@ -118,7 +118,6 @@ def one_line(capsys, *arguments):
 
 def test_mistakes_get_a_line(tmp_path, capsys):
     path, out = tmp_path / "flight.bag", tmp_path / "out.yaml"
-    drone = parameters.load().fleet[0]
     with rosbag.Bag(str(path), "w") as bag:
         for at, stamp in ((5, 5), (6, 6)):
             message = messages.odometry(rospy.Time(stamp), STILL, "base_link")
