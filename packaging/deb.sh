@@ -71,4 +71,6 @@ set -e
 find /usr/lib/drone_sim /usr/lib/python3/dist-packages/drone_sim -name __pycache__ -prune -exec rm -rf {} +
 PRERM
 chmod 755 "$stage/DEBIAN/postinst" "$stage/DEBIAN/prerm"
-dpkg-deb --root-owner-group --build "$stage" "build/deb/ros-drone-sim_${version}_$architecture.deb" >&2
+package=ros-drone-sim_${version}_$architecture.deb
+dpkg-deb --root-owner-group --build "$stage" "$out/$package" >&2
+mv "$out/$package" build/deb # whole, or not at all
