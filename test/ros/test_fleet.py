@@ -7,7 +7,7 @@ import unittest
 from pathlib import Path
 from xmlrpc.client import ServerProxy
 
-import rosnode
+import rosgraph
 import rosparam
 import rospy
 import rostest
@@ -89,7 +89,7 @@ class Fleet(unittest.TestCase):
 
     def polls(self):
         """Return how many descriptors of the simulator watch others: rospy has one for each topic."""
-        node = rosnode.get_api_uri(rospy.get_master(), "/drone_sim")
+        node = rosgraph.Master(rospy.get_name()).lookupNode("/drone_sim")
         folder = Path(f"/proc/{ServerProxy(node).getPid(rospy.get_name())[2]}/fd")
         return sum("eventpoll" in os.readlink(one) for one in folder.iterdir())
 

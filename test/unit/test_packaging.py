@@ -26,6 +26,7 @@ KEYS = {
     "distributed": "python3-distributed-pip",
     "greenlet": "python3-greenlet-pip",
     "moderngl": "python3-moderngl-pip",
+    "msgspec": "python3-viser-pip",
     "pybullet": "python3-pybullet-pip",
     "pydantic": "python3-pydantic-pip",
     "tkinter": "python3-tk",
