@@ -297,13 +297,7 @@ case "$command" in
   lint) install_packages git; setup; lint ;;
   bench) setup; make_venv requirements-dev.txt; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
-  docs-commands)
-    setup
-    make_venv requirements-dev.txt
-    # shellcheck disable=SC1091 # built by setup
-    source devel/setup.bash
-    PYTHONPATH=$root/test/unit:$PYTHONPATH exec .venv/bin/python test/docs/run.py "$@"
-    ;;
+  docs-commands) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/docs/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
   soak-web) setup; exec .venv/bin/python test/soak/web.py "$@" ;;
   two-hosts) setup; exec .venv/bin/python test/two_hosts/run.py "$@" ;;

@@ -24,9 +24,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import matplotlib
+from commands import NOT_RUN, PAGES, ROOT, SHOWN_OTHERWISE, SLOW, Command, commands
+
+sys.path.append(str(ROOT / "test" / "unit"))
 import vrep_encoder
 import vrep_quadricopter
-from commands import NOT_RUN, PAGES, ROOT, SHOWN_OTHERWISE, SLOW, Command, commands
 
 PATIENCE = 120.0  # s, for whatever does not end
 AT_ONCE = 4

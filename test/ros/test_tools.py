@@ -72,7 +72,7 @@ class Tools(unittest.TestCase):
         told = len(sent.messages)
         sent.wait_for(goes(1.0), after=told + 2)  # again and again
         joy.publish(stands(LB, Y, forward=0.55))
-        takeoffs.wait_for()
+        takeoffs.wait_for(after=0)
         sent.wait_for(lambda message: abs(message.linear.x - 0.5) < 1e-6)
         joy.publish(stands(Y, forward=0.55))
         sent.wait_for(goes(0.0), after=told)

@@ -1,25 +1,13 @@
 """The commands in README.md and docs do what the pages say; `./dev.sh docs-commands --all` runs the others, too."""
 
-import importlib.util
-import sys
-
 import pytest
 
-from drone_sim.files.resources import package_path
+pytest.importorskip("roslaunch", reason="needs ROS")
 
-FOLDER = package_path() / "test/docs"
+import commands
+import run
+
 PAGES = ("fleet", "import", "states", "time", "tuning", "weather")
-
-
-def loaded(name):
-    spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-commands = loaded("commands")
 
 
 def test_what_is_left_out_is_in_the_docs():
@@ -35,9 +23,6 @@ def test_the_commands_of_a_page_are_found_with_what_it_shows(tmp_path):
     assert found == [(6, "a b \\\n  c", ("said",)), (9, "d", ())]
 
 
-@pytest.mark.ros
-@pytest.mark.parametrize("page", PAGES)
-def test_the_commands_of_a_page_do_what_it_says(page):
-    pytest.importorskip("roslaunch", reason="needs ROS")
-    wrong = loaded("run").run([package_path() / "docs" / f"{page}.md"], everything=False)
-    assert not wrong, wrong[0]
+def test_the_commands_of_the_pages_do_what_they_say():
+    wrong = run.run([commands.ROOT / "docs" / f"{page}.md" for page in PAGES], everything=False)
+    assert not wrong, "\n".join(wrong)
