@@ -240,7 +240,7 @@ hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
 
 run_tests() {
   make_venv requirements-dev.txt
-  say "left out: the tests in a browser (./dev.sh test-web runs them)"
+  say "left out: the tests in a browser (./dev.sh test-web), the commands of README and docs (./dev.sh docs-commands)"
   # Every core tests; tests with a master, each with its own, wait a third of their time: one more of them than cores.
   PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$(($(nproc) + 1))"
 }

@@ -39,6 +39,7 @@ WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|\bERROR:")
 REFUSED = re.compile(rf"{WRONG.pattern}|refused")  # by the simulator, whatever the command has said
 FLYING = "commands on "
 FLOWN = ("rostopic", "pub", "-1", "/drone/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.5}}")  # into a bag
+FLIGHT = ("rosrun", "drone_sim", "fly", "--duration", "1", "--csv", "flight.csv")
 USUAL = "roslaunch drone_sim drone.launch"  # where a page does not say what runs
 
 
@@ -235,6 +236,10 @@ def prepare(page: Path, folder: Path) -> None:
     for name in ("my.py", "submissions/alice.py", "submissions/bob.py"):
         (folder / name).parent.mkdir(exist_ok=True)
         shutil.copy(built_in, folder / name)
+    if "grade hover my.py" in text:  # in which one has to hold against the wind
+        shutil.copy(ROOT / "tasks/hover/solution.py", folder / "my.py")
+    if "plot_flight flight.csv" in text:
+        subprocess.run(FLIGHT, cwd=folder, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
     (folder / "Drone.ttt").write_bytes(vrep_encoder.file(*vrep_quadricopter.quadricopter()))
 
 

@@ -183,12 +183,14 @@ class Interface(unittest.TestCase):
         listener = Listener("/diagnostics", DiagnosticArray)
         own = rospy.get_name()
 
-        def told(what, level, words):
+        def told(what, level, words, command=""):
             """Wait for a message; the level None is any: a busy machine is slow."""
             name = f"{own[1:]}: {what}"
 
             def fits(status):
-                return status.name == name and level in (None, status.level) and words in status.message
+                heard = {pair.key: pair.value for pair in status.values}.get("command", "")
+                said = level in (None, status.level) and words in status.message
+                return status.name == name and said and heard.startswith(command)
 
             array = listener.wait_for(lambda m: any(map(fits, m.status)))
             status = next(filter(fits, array.status))
@@ -199,7 +201,7 @@ class Interface(unittest.TestCase):
         command = Twist()
         command.linear.x = 0.5
         commands.publish(command)
-        values = told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands")
+        values = told("vehicle drone", DiagnosticStatus.OK, f"as {own} commands", "0.50")  # not another test's
         self.assertEqual(values["command"], "0.50 0.00 0.00 m/s, 0.00 0.00 0.00 rad/s")
         self.assertEqual(values["connected commanders"], own)
         command.linear.x = 50.0
