@@ -405,7 +405,7 @@ class Toolbar(unittest.TestCase):
         self.assertAlmostEqual(self.simulation.drone.state.linear_velocity[0], 0.4, places=4)
         wrench.wrench.force.x = float("nan")
         push.publish(wrench)
-        self.log.wait_for(lambda m: "push refused: force.x = nan" in m.msg)
+        self.log.wait_for(lambda m: "push refused: force.x = nan" in m.msg, after=0)
 
 
 if __name__ == "__main__":
