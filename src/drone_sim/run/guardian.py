@@ -77,14 +77,18 @@ class Guardian:
 
     def end(self, status: int) -> NoReturn:
         """Exit with a status, in PATIENCE at most: a script may have left threads, or functions of `atexit`."""
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, ValueError, AttributeError):
-                stream.flush()
+        _flush()
         self.count()
         timer = threading.Timer(PATIENCE - _EARLIER, self._give_up, (status,))
         timer.daemon = True
         timer.start()
         sys.exit(status)
+
+    @staticmethod
+    def end_at_once(status: int) -> NoReturn:
+        """Exit with a status where all is in order: Python, taking down so many modules, needs a second and more."""
+        _flush()
+        os._exit(status)
 
     def _give_up(self, status: int) -> None:
         _say(f"{self._name}: ended without what a script left: a thread, or a function of atexit, that does not end")
@@ -117,6 +121,12 @@ class Guardian:
             os.close(self._write)
             self._write = -1
         self._release()
+
+
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
 
 
 def _be_the_guardian(read: int, write: int, process: int, name: str, scripts: mmap.mmap) -> None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import logging
-import sys
 import time
 from collections.abc import Callable
 
@@ -277,4 +276,5 @@ def main(guardian: Guardian) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Guardian(_NAME)))
+    its_guardian = Guardian(_NAME)
+    its_guardian.end_at_once(main(its_guardian))
