@@ -8,6 +8,7 @@ Memory that both have tells when the child script that runs has to return: one t
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import math
 import mmap
@@ -82,7 +83,11 @@ class Guardian:
         timer = threading.Timer(PATIENCE - _EARLIER, self._give_up, (status,))
         timer.daemon = True
         timer.start()
-        sys.exit(status)
+        # What sys.exit does first. While Python takes itself down after that, no thread runs, not even the timer's.
+        for wait_for_the_rest in (threading._shutdown, atexit._run_exitfuncs):  # type: ignore[attr-defined]
+            with contextlib.suppress(Exception):
+                wait_for_the_rest()
+        self.end_at_once(status)
 
     @staticmethod
     def end_at_once(status: int) -> NoReturn:
