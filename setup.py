@@ -9,7 +9,7 @@ setup(
         package_dir={"": "src"},
         package_data={
             "drone_sim.grading.outputs.html": ["templates/*", "files/*"],
-            "drone_sim.ros.cockpit.page": ["*.html", "*.css", "*.js"],
+            "drone_sim.ros.cockpit": ["page/*.html", "page/*.css", "page/*.js"],
             "drone_sim.scripting.lua": ["*.lua"],
         },
     )

@@ -19,7 +19,7 @@ from xmlrpc.client import ServerProxy
 from benchmarks import node
 
 Row = dict[str, Any]
-SIZE = {"width": 1280, "height": 760}  # px
+SIZE: Any = {"width": 1280, "height": 760}  # px
 PATIENCE = 60.0  # s
 SETTLED = 10.0  # s, after which the browser has compiled what it needs
 NODES = {"cockpit": "/cockpit", "simulation": "/drone_sim"}

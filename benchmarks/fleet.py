@@ -19,7 +19,7 @@ def _simulation(number: int, cameras: bool = False) -> Simulation:
     """Return so many drones, spread out; with `cameras`, somebody looks at what every front camera sees."""
     simulation = Simulation(parameters.load({"vehicles": number}))
     for vehicle in simulation.vehicles.values():
-        vehicle.cameras["front"].watched = lambda: cameras
+        vehicle.cameras["front"].viewers.add(lambda: cameras)
     return simulation
 
 

@@ -15,7 +15,7 @@ from typing import Any
 from drone_sim.grading import plan as plans
 from drone_sim.grading.jobs import pool, sandbox, settings
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
-from drone_sim.grading.jobs.pool import Fly, Orders
+from drone_sim.grading.jobs.pool import FlightOptions, Fly
 
 Row = dict[str, Any]
 FLIGHTS = 1000
@@ -34,14 +34,14 @@ criteria:
 """
 
 
-def _orders() -> Orders:
+def _flight_options() -> FlightOptions:
     numbers = settings.load()
     try:
         sandbox.command(1)
-        return Orders(numbers.limits, numbers.batches)
+        return FlightOptions(numbers.limits, numbers.batches)
     except sandbox.NoSandbox as why:
         print(f"  without a sandbox: {why}", file=sys.stderr, flush=True)
-        return Orders(numbers.limits, numbers.batches, sandboxed=False)
+        return FlightOptions(numbers.limits, numbers.batches, sandboxed=False)
 
 
 def _jobs(folder: str) -> list[Job]:
@@ -89,17 +89,17 @@ def _cluster(workers: int) -> Iterator[str]:
 
 def measure() -> list[Row]:
     """Return all rows; `seconds` are from nothing running to the last result."""
-    orders = _orders()
+    options = _flight_options()
     cores = len(os.sched_getaffinity(0))
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         jobs = _jobs(folder)
         for workers in dict.fromkeys((1, 2, cores)):
             began = time.perf_counter()
-            with pool.opened(orders, workers) as fly:
+            with pool.opened(options, workers) as fly:
                 rows.append(_fly(f"{workers} at a time", jobs, fly, began))
         with _cluster(2) as address:
             began = time.perf_counter()
-            with pool.opened(orders, scheduler=address) as fly:
+            with pool.opened(options, scheduler=address) as fly:
                 rows.append(_fly("2 Dask workers", jobs, fly, began))
     return rows

@@ -13,7 +13,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.rotors import PROPELLERS
+from drone_sim.vehicles.types.quadricopter import Quadricopter
 from drone_sim.world import World
 
 Row = dict[str, Any]
@@ -60,14 +60,16 @@ def bare() -> Callable[[], None]:
     world.add_floor(settings.scene.floor.size, settings.scene.floor.texture)
     simulation = Simulation(settings)
     body = world.add_rigid_body(simulation.drone.body.rigid, Pose(settings.drone.position))
-    places = [frames.position(simulation.drone.body.rigid.links[f"propeller_{place}"]) for place, _ in PROPELLERS]
+    places = [
+        frames.position(simulation.drone.body.rigid.links[f"propeller_{place}"]) for place, _ in Quadricopter.rotors
+    ]
     simulation.close()
     client = world._client  # the bare loop is the one thing that goes behind the world's back
     thrust = [0.0, 0.0, 0.52 * 9.81 / 4]
 
     def step() -> None:
         for _ in range(SUB_STEPS):
-            for place, (_, turn) in zip(places, PROPELLERS):
+            for place, (_, turn) in zip(places, Quadricopter.rotors):
                 pybullet.applyExternalForce(body, -1, thrust, place, pybullet.LINK_FRAME, client)
                 pybullet.applyExternalTorque(body, -1, [0, 0, turn * 0.01], pybullet.LINK_FRAME, client)
             pybullet.stepSimulation(client)
@@ -79,7 +81,7 @@ def ours(*cameras: str) -> Callable[[], None]:
     """Return a step of the whole loop: script, propellers, dynamics, sensing, and the pictures of the cameras named."""
     simulation = Simulation(parameters.load())
     for camera in cameras:
-        simulation.drone.cameras[camera].watched = lambda: True
+        simulation.drone.cameras[camera].viewers.add(lambda: True)
     return simulation.step
 
 

@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import cv2
 import numpy as np
@@ -21,9 +21,8 @@ from drone_sim.render.renderer import Renderer
 from drone_sim.shapes.box import Box
 from drone_sim.shapes.cylinder import Cylinder
 from drone_sim.shapes.mesh import Mesh
-from drone_sim.shapes.shape import DrawnShape
+from drone_sim.shapes.shape import DrawnShape, Files, Rgba
 from drone_sim.shapes.sphere import Sphere
-from drone_sim.shapes.triangles import Rgba
 from drone_sim.shapes.visual import Visual
 
 Row = dict[str, Any]
@@ -116,7 +115,8 @@ class _GivenFiles:
 def populate(client: int, scene: Drawn) -> None:
     """The same things as PyBullet bodies that only look."""
     for visual, matrix in zip(*scene):
-        told = visual.shape.for_bullet(_GivenFiles(), moves=False)
+        assert isinstance(visual.shape, (Box, Cylinder, Mesh, Sphere)), "what `build` makes"
+        told = visual.shape.for_bullet(cast(Files, _GivenFiles()), moves=False)
         kind = getattr(pybullet, told.type)
         shape = pybullet.createVisualShape(kind, rgbaColor=visual.rgba, physicsClientId=client, **told.visual)
         yaw = np.arctan2(matrix[1, 0], matrix[0, 0])

@@ -6,6 +6,7 @@
 import math
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,7 +16,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.rotors import PROPELLERS
+from drone_sim.vehicles.types.quadricopter import Quadricopter
 
 DOCS = Path(__file__).resolve().parent
 BLUE, ORANGE, GREEN, RED, GREY = "#1f5fa8", "#d9730d", "#2c8a57", "#a8325e", "#707070"
@@ -83,7 +84,7 @@ def _flown_in_gusts(steps):
     for _ in range(steps):
         simulation.step()
         winds.append(simulation.drone.instruments.by_name["wind"].readings[-1].value)
-        speeds.append(simulation.drone.state.linear_velocity[0])
+        speeds.append(simulation.drone.body.state.linear_velocity[0])
     simulation.close()
     return np.arange(1, steps + 1) * STEP, np.array(winds), np.array(speeds), simulation.drone
 
@@ -112,13 +113,13 @@ def _speed_in(wind, drone):
 
 
 def _draw_spectra(axes):
-    clock = [0.0]
-    weather = Weather(parameters.load({"weather": GUSTY}).weather, lambda: clock[0])
+    clock = SimpleNamespace(time=0.0)
+    weather = Weather(parameters.load({"weather": GUSTY}).weather, clock)
     count, parts = 2**13, 70
     blown = np.empty((parts, count, 3))
     for place in np.ndindex(parts, count):
         blown[place] = weather.at((0.0, 0.0, 0.8))
-        clock[0] += STEP
+        clock.time += STEP
     blown -= (4.0, 0.0, 0.0)
     window = np.hanning(count)[:, None]
     power = (np.abs(np.fft.rfft(blown * window, axis=1)) ** 2).mean(axis=0) * 2 * STEP / (window**2).sum()
@@ -166,13 +167,13 @@ def propeller(figure, grid):
 def _with_propeller(share, steps):
     """Return times, states, and the angular acceleration that theory expects when the front left one has a share."""
     simulation = Simulation(parameters.load({"drone": {"position": [0, 0, 5]}}))
-    drone, states = simulation.drone, [simulation.drone.state]
+    drone, states = simulation.drone, [simulation.drone.body.state]
     expected = np.zeros(3)
     for step in range(steps):
         if step == 20:
             drone.change_faults({"propellers": [share, 1, 1, 1]})
         simulation.step()
-        states.append(drone.state)
+        states.append(drone.body.state)
         if step == 20:
             expected = np.linalg.solve(drone.body.rigid.inertia, _torque(drone))
     simulation.close()
@@ -182,8 +183,8 @@ def _with_propeller(share, steps):
 def _torque(drone):
     """Return the torque (N m, body) of the propellers: r × f of each, and its reaction."""
     torque = np.zeros(3)
-    blown = zip(_points(drone), drone.propulsion.thrusts, drone.faults.now.propellers, drone.particle_velocities)
-    for (_, sense), (point, thrust, share, velocity) in zip(PROPELLERS, blown):
+    blown = zip(_points(drone), drone.body.thrusts, drone.faults.now.propellers, drone.propulsion.particle_velocities)
+    for (_, sense), (point, thrust, share, velocity) in zip(Quadricopter.rotors, blown):
         torque += np.cross(point, (0, 0, thrust))
         torque[2] += sense * 0.002 * share * velocity
     return torque
@@ -247,11 +248,11 @@ def _swing(period, seconds, faults):
     for step in range(round(seconds / STEP)):
         if step % 2 == 0:
             sent = 0.4 * math.sin(2 * math.pi * step * STEP / period) + 1e-6 * step  # no two of them are the same
-            drone.receive(Twist(Vector3(sent)))
+            drone.commands.receive(Twist(Vector3(sent)))
             times[sent] = step
         simulation.step()
-        obeyed = drone.command.linear.x
-        rows.append((sent, obeyed, (step - times[obeyed]) * STEP, drone.state.linear_velocity[0]))
+        obeyed = drone.commands.now.linear.x
+        rows.append((sent, obeyed, (step - times[obeyed]) * STEP, drone.body.state.linear_velocity[0]))
     simulation.close()
     return np.array(rows).T
 

@@ -12,7 +12,7 @@ from PIL import Image
 
 from drone_sim.mechanics import frames
 from drone_sim.offline import hud
-from drone_sim.offline.hud import Flight
+from drone_sim.offline.hud import HudState
 from drone_sim.offline.video import to_color
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -59,7 +59,7 @@ def filmed():
     look = {"width": width, "height": height, "fov": 0.95, "position": EYE, "rpy": looking(EYE, AIM)}
     scene = {"objects": [{"name": "Eye", "kind": "vision_sensor", **look}]}
     simulation = Simulation(parameters.load({"scene": scene, "drone": {"position": START}}))
-    drone, (eye,) = simulation.drone, simulation.scene.objects_now().values()
+    drone, (eye,) = simulation.drone, simulation.scene.objects.values()
     for step in range(1, round(LAST / STEP) + 1):
         simulation.step()
         if step == round(STOPS / STEP):
@@ -77,7 +77,7 @@ def shown(eye, simulation):
     if simulation.time > STOPS and state == "flying":
         state = "front left stopped"
     picture = to_color(eye.picture("color"))
-    hud.draw(picture, Flight.of((simulation.time, *itertools.chain(*drone.state)), state))
+    hud.draw(picture, HudState.of((simulation.time, *itertools.chain(*drone.body.state)), state))
     return picture[:, :, ::-1]
 
 

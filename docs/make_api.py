@@ -1,27 +1,26 @@
 """Write docs/api.md, the functions of the script API, from the code: PYTHONPATH=src python docs/make_api.py.
 
-api_names.txt says which names each generation of V-REP has: 3 for 3.x, 4 for 4.0 to 4.2, 5 for 4.3 and later, as its
-manuals and headers list them.
+A function's declaration says which generations of V-REP have it; api_names.txt says what else they have, as their
+manuals and headers list it.
 """
 
 from __future__ import annotations
 
-import importlib
 import inspect
-from collections.abc import Iterator, Mapping
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.clock import Clock
 from drone_sim.scripting.api import ignored, unknown
-from drone_sim.scripting.api.calls import Api, contents
+from drone_sim.scripting.api.calls import Api, Declaration, contents, declaration_of, flat_name
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import ScriptContext, Surroundings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
 from drone_sim.scripting.api.registry import Scripts
-from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.api.windows import Windows
 
 HERE = Path(__file__).resolve().parent
@@ -54,24 +53,24 @@ def apis() -> dict[str, Api]:
     scripts = Scripts()
     scripts.add("Drone", {})
     host: Any = SimpleNamespace(
-        objects=ObjectTree(),
+        context=ScriptContext(
+            clock=Clock(0.05), gravity=-9.81, drawings=Drawings(shown=False), windows=Windows(), scripts=scripts
+        ),
         sensors={},
-        scripts=scripts,
-        signals=Signals(),
         own_script="Drone",
-        drawings=Drawings(shown=False),
-        windows=Windows(),
     )
-    sim = make_sim(host, Surroundings(lambda: 0.0, 0.05))
-    return {"sim": sim, "simROS": make_sim_ros(MessageBus("drone")), **make_plugins(host)}
+    sim = make_sim(host, Surroundings())
+    return {"sim": sim, "simROS": make_sim_ros(MessageBus("drone"), host.context.clock), **make_plugins(host)}
 
 
-def same(functions: Mapping[str, Any]) -> list[tuple[Any, list[str]]]:
-    """Return each function once, with all its names."""
-    names: dict[Any, list[str]] = {}
-    for name, function in functions.items():
-        names.setdefault(getattr(function, "__func__", function), []).append(name)
-    return list(names.items())
+def declared(api: Api) -> Iterator[tuple[Declaration, Any]]:
+    """Yield each function of a module once, with its declaration."""
+    seen: set[int] = set()
+    for function in contents(api)[1].values():
+        declaration = declaration_of(function)
+        if declaration is not None and id(declaration) not in seen:
+            seen.add(id(declaration))
+            yield declaration, function
 
 
 def is_ignored(function: Any) -> bool:
@@ -85,18 +84,22 @@ def text() -> str:
 
 
 def _implemented() -> Iterator[str]:
-    """Yield the sections of what does something, one for each file of scripting/api."""
+    """Yield the sections of what does something, one for each class of scripting/api."""
     for module, api in apis().items():
         sections: dict[str, list[str]] = {}
-        for function, names in same(contents(api)[1]):
-            if is_ignored(function):
-                continue
-            what = _first_sentences(inspect.getdoc(function) or "")
-            sections.setdefault(function.__module__, []).append(_row(module, names, what))
-        for file, rows in sections.items():
-            about = (importlib.import_module(file).__doc__ or "").split("\n")[0]
-            title = about.split(": ", 1)[-1].rstrip(".")
+        for declaration, function in declared(api):
+            if not is_ignored(function):
+                what = _first_sentences(inspect.getdoc(function) or "")
+                sections.setdefault(_section(function), []).append(_row(declaration, what))
+        for title, rows in sections.items():
             yield f"## {module}: {title}\n\n{_HEAD}{''.join(sorted(rows, key=str.lower))}"
+
+
+def _section(function: Any) -> str:
+    """Return the title of the section of a function: the first line on its class."""
+    of = getattr(sys.modules[function.__module__], function.__qualname__.partition(".")[0])
+    title = (inspect.getdoc(of) or "").split("\n")[0].rstrip(".")
+    return title[:1].lower() + title[1:]
 
 
 def _first_sentences(doc: str) -> str:
@@ -104,10 +107,10 @@ def _first_sentences(doc: str) -> str:
     return " ".join(doc.split("\n\n")[0].split()).replace("|", "\\|")
 
 
-def _row(module: str, names: list[str], what: str) -> str:
-    known = {name: _GENERATIONS.get(name, "") if module == "sim" else "345" for name in sorted(names)}
+def _row(declaration: Declaration, what: str) -> str:
+    module, known = declaration.module, dict(sorted(declaration.names.items()))
     if not any(known.values()):
-        own = f"`{module}.{names[0]}`"
+        own = f"`{module}.{next(iter(declaration.names))}`"
         return f"| | | {own} (drone_sim's own) | {what} |\n"
     flat = [flat_name(module, name) for name, generations in known.items() if "3" in generations]
     fourth = [f"{module}.{name}" for name, generations in known.items() if "4" in generations]
@@ -120,21 +123,15 @@ def _listed(names: list[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-def flat_name(module: str, name: str) -> str:
-    """Return the name of a function in 3.x."""
-    if module == "sim":
-        return f"sim{name[0].upper()}{name[1:]}"
-    return {"simROS": "simExtRosInterface_", "simUI": "simExtCustomUI_"}.get(module, f"{module}.") + name
-
-
 def _ignored() -> Iterator[str]:
     """Yield the section of what is accepted and ignored."""
     yield "## Accepted and ignored\n\nThe log says so once for each function of a script.\n"
-    for module, groups in {"sim": ignored.SIM, **ignored.MODULES}.items():
-        found = contents(apis()[module])[1]
+    for module, groups in ignored.MODULES.items():
         for group in groups:
-            idle = {name: gives for name, gives in group.functions.items() if is_ignored(found[name])}
-            rows = [_row(module, [name], _returned(gives)) for name, gives in idle.items()]
+            rows = [
+                _row(Declaration(module, {name: generations}), _returned(returned))
+                for name, (generations, returned) in group.functions.items()
+            ]
             yield f"### {module}: {group.why}\n\n{_IGNORED_HEAD}{''.join(sorted(rows, key=str.lower))}"
 
 
@@ -156,7 +153,7 @@ def _by_reason() -> dict[str, str]:
     """Return the functions of CoppeliaSim that are refused with a reason, those of one reason together."""
     known = contents(apis()["sim"])[1]
     missing: dict[str, list[str]] = {}
-    for name in _GENERATIONS:
+    for name in _OTHERS:
         why = unknown.why_absent(f"sim.{name}") if name not in known else ""
         if why:
             missing.setdefault(why, []).append(f"sim.{name}")
@@ -164,7 +161,7 @@ def _by_reason() -> dict[str, str]:
 
 
 _LINES = (HERE / "api_names.txt").read_text(encoding="utf-8").splitlines()
-_GENERATIONS = dict(line.split() for line in _LINES if line and not line.startswith("#"))
+_OTHERS = [line.split()[0] for line in _LINES if line and not line.startswith("#")]
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from matplotlib import image
 
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline import hud
-from drone_sim.offline.hud import Flight
+from drone_sim.offline.hud import HudState
 from drone_sim.offline.video import to_color
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -45,7 +45,7 @@ def leaning(overrides):
     """Return what the tracking camera sees when the drone sets off forward and to the left."""
     simulation = Simulation(parameters.load(overrides))
     command, seconds = LEANING
-    simulation.drone.receive(command)
+    simulation.drone.commands.receive(command)
     fly(simulation, seconds)
     return take(simulation, "track")
 
@@ -87,7 +87,7 @@ def published():
 def cameras():
     """Return what front, track and depth camera see at one moment, side by side; the farther, the darker."""
     simulation = Simulation(parameters.load({"scene_file": "package://drone_sim/config/scenes/gates.yaml"}))
-    simulation.drone.receive(Twist(Vector3(0.6, 0, 0)))
+    simulation.drone.commands.receive(Twist(Vector3(0.6, 0, 0)))
     fly(simulation, 1.5)
     simulation.drone.propulsion.blades.show()
     front, track, depth = (simulation.drone.cameras[name].take() for name in ("front", "track", "depth"))
@@ -99,9 +99,9 @@ def cameras():
 def display():
     """Return a picture of the video that `fly --video` makes: the tracking camera's, with the head-up display."""
     simulation = Simulation(parameters.load({"scene_file": "package://drone_sim/config/scenes/gates.yaml"}))
-    simulation.drone.receive(Twist(Vector3(1, 0.6, 0.2)))
+    simulation.drone.commands.receive(Twist(Vector3(1, 0.6, 0.2)))
     fly(simulation, 0.6)
-    flight = Flight.of((simulation.time, *itertools.chain(*simulation.drone.state)), "flying")
+    flight = HudState.of((simulation.time, *itertools.chain(*simulation.drone.body.state)), "flying")
     picture = to_color(take(simulation, "track"))
     hud.draw(picture, flight)
     return picture[:, :, ::-1]

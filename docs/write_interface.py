@@ -7,10 +7,10 @@ PYTHONPATH=src python docs/write_interface.py
 import re
 from pathlib import Path
 
-from drone_sim.config.comments import CONFIG, rows
+from drone_sim.config.fields import CONFIG, rows
+from drone_sim.hosting.tunable import tunables
 from drone_sim.run import parameters
-from drone_sim.run.pace import FACTOR
-from drone_sim.vehicles.tunable import tunables
+from drone_sim.run.pacing import FACTOR
 
 PAGE = Path(__file__).resolve().parents[1] / "docs/interface.md"
 BEGIN, END = "<!-- parameters: begin -->\n", "<!-- parameters: end -->\n"

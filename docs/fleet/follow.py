@@ -5,7 +5,7 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseStamped, TransformStamped
 
-from drone_sim.ros.node.signals import end_on_signals
+from drone_sim.ros.core.shutdown import end_on_signals
 
 LEADER = "drone1/Track_base"  # level, so that the wings do not tilt with the leader
 WINGS = {"drone2": (-1.0, 1.0, 0.0), "drone3": (-1.0, -1.0, 0.0)}  # m, seen from the leader

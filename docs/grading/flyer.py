@@ -7,7 +7,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
-from drone_sim.ros.node.signals import end_on_signals
+from drone_sim.ros.core.shutdown import end_on_signals
 
 PLACES = [(1.0, 0.0), (0.0, 0.0)]  # m, one after the other
 NEAR = 0.1  # m

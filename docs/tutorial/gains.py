@@ -45,14 +45,14 @@ def _fly(values, options):
     for step in range(round(END / values.time_step)):
         time = step * values.time_step
         if BEGIN <= time < BEGIN + values.time_step:
-            simulation.drone.receive(command)
+            simulation.drone.commands.receive(command)
         elif STOP <= time < STOP + values.time_step:
-            simulation.drone.receive(Twist())
+            simulation.drone.commands.receive(Twist())
         simulation.step()
-        state, lean = simulation.drone.state, to_euler(simulation.drone.matrix)
+        state, lean = simulation.drone.body.state, to_euler(simulation.drone.body.matrix)
         along = state.linear_velocity[1 if options.left else 0]
         towards = -lean[0] if options.left else lean[1]
-        flown.append((time, along, towards, state.position[2], simulation.drone.particle_velocities))
+        flown.append((time, along, towards, state.position[2], simulation.drone.propulsion.particle_velocities))
     simulation.close()
     return flown
 

@@ -21,12 +21,12 @@ from websockets.sync.client import connect
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "unit"))
 from cockpit_asked import Asked
 
-from drone_sim.ros.cockpit.flying.flying import Flying
-from drone_sim.ros.cockpit.page import Page
-from drone_sim.ros.cockpit.panel.windows import Windows
-from drone_sim.ros.cockpit.scripts.shelf import Shelf
-from drone_sim.ros.cockpit.server.gate import WIRE, Gate
-from drone_sim.ros.cockpit.server.wire import Wire
+from drone_sim.ros.cockpit.editor.script_store import ScriptStore
+from drone_sim.ros.cockpit.panel.cameras import ScriptWindows
+from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
+from drone_sim.ros.cockpit.server.page_server import page_files
+from drone_sim.ros.cockpit.server.page_socket import PageSocket
+from drone_sim.ros.cockpit.teleop import HeldCommands
 
 _TOKEN = "fuzz-token"
 _PATIENCE = 10.0  # s
@@ -55,8 +55,12 @@ class Cockpit:
 
     def __init__(self) -> None:
         """Serve."""
-        self.wire = Wire(Flying(lambda _: None), {})
-        with Gate(_TOKEN, Page(), self.wire.serve).before_viser(), contextlib.redirect_stdout(io.StringIO()):
+        self._answers: dict[str, Any] = {}
+        self.socket = PageSocket(HeldCommands(lambda _: None), self._answers)
+        with (
+            AccessControl(_TOKEN, page_files().get, self.socket.serve).before_viser(),
+            contextlib.redirect_stdout(io.StringIO()),
+        ):
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self._field = self._server.gui.add_slider("Speed", min=0.0, max=1.0, step=0.1, initial_value=0.5)
         self._port = self._server.get_port()
@@ -87,9 +91,9 @@ class Cockpit:
         os.mkfifo(own / "fifo.py")
         (own / "d.py").mkdir()
         self._outside = folder / "outside.py"
-        windows = Windows("/drone_sim", _Cameras(), self.wire)  # type: ignore[arg-type]
+        windows = ScriptWindows("/drone_sim", _Cameras(), self.socket)  # type: ignore[arg-type]
         windows.listen(True)
-        self.wire.answer_also({**Asked(Shelf(own)).answers, **windows.answers})
+        self._answers.update({**Asked(ScriptStore(own)).answers, **windows.answers})
 
     def _filled(self, content: bytes) -> bytes:
         known = {b"PORT": str(self._port), b"TOKEN": _TOKEN, b"FIELD": self._field._impl.uuid}
@@ -120,7 +124,7 @@ class Cockpit:
 
     def _ask(self, messages: list[bytes]) -> Iterator[str]:
         try:
-            with self._open(WIRE) as page:
+            with self._open(SUBPROTOCOL) as page:
                 for one in messages:
                     page.send(one.decode("utf-8", "replace"))
                 page.send(json.dumps({"id": _LAST, "ask": "look"}))

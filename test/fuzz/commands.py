@@ -9,8 +9,8 @@ import rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, WrenchStamped
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from drone_sim.ros.node.inbox import Inbox
-from drone_sim.ros.rviz.handles import Handles
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.rviz.vehicle_handles import VehicleHandles
 from drone_sim.ros.vehicle.inputs import VehicleInputs
 from drone_sim.run.simulation import Simulation
 
@@ -44,7 +44,7 @@ def send(simulation: Simulation, messages: list[tuple[str, dict[str, Any]]]) -> 
     """Call what the node has subscribed, and do what that left to be done."""
     inbox = Inbox()
     VehicleInputs(simulation, simulation.drone.parameters, inbox)
-    Handles(simulation, inbox)
+    VehicleHandles(simulation, inbox)
     for topic, fields in messages:
         message = _KINDS[topic]()
         _fill(message, fields)

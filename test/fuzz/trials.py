@@ -26,7 +26,7 @@ from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.mechanics.urdf import UrdfError
 from drone_sim.offline import fly
 from drone_sim.offline.timeline import TimelineError
-from drone_sim.remote.server import Server
+from drone_sim.remote.server import RemoteApiServer
 from drone_sim.render.renderer import Renderer
 from drone_sim.run import parameters
 from drone_sim.run.player import Player
@@ -87,7 +87,7 @@ def one_line(text: str, folder: Path) -> str:
 
 def _fly_a_little(simulation: Simulation, steps: int = 3) -> None:
     """Step, look, snapshot, restore, save; the drone must be somewhere after that."""
-    simulation.drone.receive(Twist(Vector3(0.5, 0.0, 0.1), Vector3(0.0, 0.0, 0.3)))
+    simulation.drone.commands.receive(Twist(Vector3(0.5, 0.0, 0.1), Vector3(0.0, 0.0, 0.3)))
     simulation.step()
     snapshot = simulation.snapshot()
     for _ in range(steps):
@@ -96,7 +96,7 @@ def _fly_a_little(simulation: Simulation, steps: int = 3) -> None:
     for camera in simulation.drone.cameras.values():
         camera.take()
     simulation.step()
-    state = simulation.drone.state
+    state = simulation.drone.body.state
     if not all(map(math.isfinite, (*state.position, *state.orientation, *state.linear_velocity))):
         raise Fault(f"the drone is at {state.position}")
 
@@ -181,7 +181,7 @@ def _script(case: Case, folder: Path) -> str:
 
     def whole() -> None:
         simulation.start()
-        simulation.drone.receive(Twist(Vector3(0.5, 0.0, 0.1), Vector3(0.0, 0.0, 0.3)))
+        simulation.drone.commands.receive(Twist(Vector3(0.5, 0.0, 0.1), Vector3(0.0, 0.0, 0.3)))
         simulation.step()
         snapshot = simulation.snapshot()
         simulation.step()
@@ -262,7 +262,7 @@ def _requests(case: Case, folder: Path) -> str:
     """Let a client send its messages, one after the other, while the simulation steps; each must be answered."""
     simulation = Simulation(parameters.load(_with_small_pictures({"script_time_limit": _SCRIPT_LIMIT})), started=False)
     player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
-    server = Server(player, "127.0.0.1", 0)
+    server = RemoteApiServer(player, "127.0.0.1", 0)
     with zmq.Context() as context, context.socket(zmq.DEALER) as client:
         client.setsockopt(zmq.LINGER, 0)
         client.connect(f"tcp://127.0.0.1:{server.port}")
@@ -274,7 +274,7 @@ def _requests(case: Case, folder: Path) -> str:
     return next((one_line(one, folder) for one in said if one), "")
 
 
-def _asked(client: zmq.Socket[bytes], message: bytes, player: Player, server: Server) -> str:
+def _asked(client: zmq.Socket[bytes], message: bytes, player: Player, server: RemoteApiServer) -> str:
     """Return the error in the answer, '' where there is none; a step or a signal may be waited for without an end."""
     client.send_multipart([b"", message])
     for _ in range(20):
@@ -293,7 +293,7 @@ def _connections(case: Case, folder: Path) -> str:
     """Let peers send what they like; each must be let go, none may start the simulation, and a client is answered."""
     simulation = Simulation(parameters.load(_with_small_pictures({})), started=False)
     player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
-    server = Server(player, "127.0.0.1", 0)
+    server = RemoteApiServer(player, "127.0.0.1", 0)
     with zmq.Context() as context, context.socket(zmq.DEALER) as client:
         client.setsockopt(zmq.LINGER, 0)
         client.connect(f"tcp://127.0.0.1:{server.port}")
@@ -313,7 +313,7 @@ def _connections(case: Case, folder: Path) -> str:
             simulation.close()
 
 
-def _send_all(server: Server, pieces: list[bytes]) -> None:
+def _send_all(server: RemoteApiServer, pieces: list[bytes]) -> None:
     with socket.create_connection(("127.0.0.1", server.port), timeout=5) as peer:
         try:
             for piece in pieces:

@@ -20,8 +20,8 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image
 
+from drone_sim.ros.core.validation import read_changes
 from drone_sim.ros.node.node import Node
-from drone_sim.ros.vehicle.conditions import read_changes
 from drone_sim.run import parameters
 from drone_sim.vehicles.checks import Refused
 
@@ -81,8 +81,7 @@ class Conditions(unittest.TestCase):
         self.faults.publish("images", "{latency: 0.5}")
         now = self.odometry.wait_for
         image.wait_for(lambda said: 0.45 < (now(after=-1).header.stamp - said.header.stamp).to_sec() < 1.5)
-        stamps = {said.header.stamp for said in image.messages[-3:]}
-        info.wait_for(lambda said: said.header.stamp in stamps, after=0)
+        info.wait_for(lambda said: any(said.header.stamp == one.header.stamp for one in [*image.messages]), after=0)
         twist = Twist()
         twist.linear.y = 0.25
         publisher = connected(rospy.Publisher("/drone/cmd_vel", Twist, queue_size=1))
@@ -129,7 +128,7 @@ class Conditions(unittest.TestCase):
 
     def test_a_fault_that_there_is_not(self):
         self.faults.publish("sensors/frnt", "ok")
-        said = "faults refused: faults/sensors/'frnt': no such sensor or camera; near names are front"
+        said = "faults refused: faults/sensors/frnt: no such sensor or camera; near names are front"
         self.log.wait_for(lambda line: line.msg == said, after=0)
 
     def test_what_is_refused_says_why(self):

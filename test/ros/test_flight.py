@@ -18,7 +18,7 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Float32MultiArray
 
 from drone_sim.run import parameters
-from drone_sim.sensors.together import RESERVED_TOPICS
+from drone_sim.sensors.validation import RESERVED_TOPICS
 
 CUBE = {"size": 0.4, "position": (2.5, 0.25, 1.1), "yaw": 0.6}  # as in cube.yaml
 

@@ -47,7 +47,7 @@ class Formation(unittest.TestCase):
                 )
         finally:
             # Not SIGTERM: rospy's own handler closes topics, and waits for ever where it interrupts `publish` (see
-            # ros/node/ending.py). How a user's script ends is not what this test is about.
+            # ros/core/shutdown.py). How a user's script ends is not what this test is about.
             node.kill()
             node.wait(30)
 

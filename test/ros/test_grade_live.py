@@ -15,7 +15,7 @@ from drone_sim.files.resources import package_path
 from drone_sim.grading import flight
 from drone_sim.grading import plan as plans
 from drone_sim.ros.grading.grade_live import grade
-from drone_sim.ros.grading.simulator import Unfit
+from drone_sim.ros.grading.simulator import Mismatch
 
 PLAN = """
 duration: 4.5
@@ -93,11 +93,11 @@ class GradeLive(unittest.TestCase):
                     "objects: [{name: Ball, shape: sphere, size: [0.1], position: [3, 3, 1]}]\n"
                 )
                 text = text.replace("yaw: 0.2", "yaw: 0.2, objects: {Ball: [1, 1, 0]}")
-            with self.subTest(change), self.assertRaisesRegex(Unfit, why):
+            with self.subTest(change), self.assertRaisesRegex(Mismatch, why):
                 grade(self.read(text), 1, "", "drone_sim", PATIENCE)
 
     def test_3_a_node_that_never_comes_is_not_waited_for_for_ever(self):
-        with self.assertRaisesRegex(Unfit, r"no node student \(waited for 2 s\)"):
+        with self.assertRaisesRegex(Mismatch, r"no node student \(waited for 2 s\)"):
             grade(self.read(PLAN), 0, "student", "drone_sim", 2)
 
 

@@ -22,8 +22,8 @@ from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import Marker
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.doctor.doctor import examined
-from drone_sim.ros.doctor.line import HINT, OK, WRONG
+from drone_sim.ros.doctor import HINT, OK, WRONG
+from drone_sim.ros.doctor.doctor import run_checks
 from drone_sim.ros.node import diagnostics
 from drone_sim.ros.node.node import Node
 from drone_sim.run import parameters
@@ -254,7 +254,7 @@ class Interface(unittest.TestCase):
         self.call("restart")
         Listener("~state", String).wait_for(lambda m: m.data == "stopped", after=0)
         rospy.Publisher("/cmd_vel", Twist, queue_size=1)
-        lines = list(examined(thorough=False))
+        lines = list(run_checks(thorough=False))
         marks = {line.what: line.mark for line in lines}
         self.assertEqual(marks["master"], OK, lines)
         self.assertEqual(marks["clock"], OK, lines)

@@ -12,12 +12,15 @@ import threading
 import unittest
 from pathlib import Path
 from unittest import mock
+from xmlrpc.client import ServerProxy
 
+import rosgraph
 import rosnode
 import rospy
 import rostest
 from listening import Listener
 from nav_msgs.msg import Odometry
+from std_srvs.srv import Trigger
 
 HANGS = 30.0  # s; nothing here takes nearly as long unless it hangs
 
@@ -225,6 +228,22 @@ class Process(unittest.TestCase):
         self.assertEqual(node.returncode, -signal.SIGKILL, said)
         self.assertNotIn("Traceback", said)
         self.assertEqual(len([line for line in said.splitlines() if line.startswith("drone_sim: killed: ")]), 1, said)
+
+    def test_who_connects_and_says_nothing_keeps_nobody_out(self):
+        node = simulator()
+        with self.killed_if_it_hangs(node), contextlib.ExitStack() as silent:
+            self.said_until(node, "flying")
+            uri = rosgraph.Master("/test").lookupNode("/drone_sim")
+            _, _, (_, host, port) = ServerProxy(uri).requestTopic("/test", "/drone/odom", [["TCPROS"]])
+            for _ in range(20):
+                silent.enter_context(socket.create_connection((host, port), timeout=HANGS))
+            odometry = Listener("/drone/odom", Odometry)
+            odometry.wait_for(timeout=HANGS)
+            odometry.close()
+            self.assertEqual(rospy.ServiceProxy("/drone_sim/stop", Trigger)().message, "stopped")
+            node.send_signal(signal.SIGINT)
+            node.communicate(timeout=HANGS)
+        self.assertEqual(node.returncode, 0)
 
     def test_a_new_master_finds_it(self):
         with socket.socket() as probe:

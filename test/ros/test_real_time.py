@@ -55,9 +55,9 @@ class RealTime(unittest.TestCase):
 
     def test_simulators_in_namespaces_of_their_own_make_one_tree(self):
         parents, senders = {}, {}
-        for topic, last in (("/tf", "blades_front_left"), ("/tf_static", "first")):
+        for topic, some in (("/tf", ("blades_front_left", "base_link")), ("/tf_static", ("first",))):
             listener = Listener(topic, TFMessage)
-            for frame in (f"{prefix}{last}" for prefix in SIMULATORS[topic]):
+            for frame in (f"{prefix}{one}" for prefix in SIMULATORS[topic] for one in some):  # each of another node
                 listener.wait_for(lambda m, one=frame: one in [t.child_frame_id for t in m.transforms], after=0)
             for message in list(listener.messages):
                 for one in message.transforms:

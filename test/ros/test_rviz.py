@@ -176,7 +176,7 @@ class Rviz(unittest.TestCase):
         self.assertAlmostEqual(-line.points[1].z, 5, delta=0.2)
         self.assertEqual(line.points[0].z, 0)
         q = line.pose.orientation
-        tilt = self.node.simulation.drone.state.orientation
+        tilt = self.node.simulation.drone.body.state.orientation
         turn = frames.multiply_quaternions(tilt, (q.x, q.y, q.z, q.w))
         self.assertGreater(frames.turned(turn, (0, 0, 1))[2], 0.98)
 

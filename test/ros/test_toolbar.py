@@ -121,9 +121,9 @@ class Toolbar(unittest.TestCase):
         self.odometry.wait_for(lambda o: o.pose.pose.position.z < 899)  # this script lets it fall
         self.assertEqual(self.call("stop"), "stopped")
         self.assertEqual(self.simulation.time, 0.0)
-        self.assertAlmostEqual(self.simulation.drone.state.position[2], 900)
+        self.assertAlmostEqual(self.simulation.drone.body.state.position[2], 900)
         self.log.wait_for(lambda m: m.msg == "cleaned up", after=0)
-        self.assertEqual(self.call("stop"), "is stopped already")
+        self.assertEqual(self.call("stop"), "already stopped")
         self.assertEqual(self.call("start"), "started")
         self.odometry.wait_for(lambda o: o.pose.pose.position.z < 899)
 
@@ -248,7 +248,7 @@ class Toolbar(unittest.TestCase):
         self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
         self.scene.write_text("object: []\n")
         said = self.call("load_scene", expected=False)
-        self.assertIn("unknown key object; known are datum, drone, floor, gravity, magnetic_field, objects, ", said)
+        self.assertIn("parameter object: unknown key; known are datum, drone, floor, gravity, magnetic_field", said)
 
     def test_rviz_sees_the_objects_and_where_they_go(self):
         trimesh.creation.box().export(str(self.scene.parent / "one.stl"))
@@ -295,9 +295,9 @@ class Toolbar(unittest.TestCase):
         self.pause(True)
         self.call("step")
         self.call("snapshot")
-        first = [self.call("step") and self.simulation.drone.state for _ in range(5)]
-        self.assertIn("back at", self.call("restore"))
-        again = [self.call("step") and self.simulation.drone.state for _ in range(5)]
+        first = [self.call("step") and self.simulation.drone.body.state for _ in range(5)]
+        self.assertIn("restored t =", self.call("restore"))
+        again = [self.call("step") and self.simulation.drone.body.state for _ in range(5)]
         self.assertEqual(first, again)
         self.call("stop")
         self.assertIn("earlier run", self.call("restore", expected=False))
@@ -326,7 +326,7 @@ class Toolbar(unittest.TestCase):
         rospy.set_param("~scene_file", str(self.scene))
         self.call("load_scene")
         handles = Listener("/drone/objects/update", InteractiveMarkerUpdate)
-        handles.wait_for(lambda m: {"Ball", "objects/1"} <= {one.name for one in m.markers}, after=0)
+        handles.wait_for(lambda m: {"Ball", "Cuboid"} <= {one.name for one in m.markers}, after=0)
         feedback = connected(rospy.Publisher("/drone/objects/feedback", InteractiveMarkerFeedback, queue_size=10))
 
         def drag(*where):
@@ -351,7 +351,7 @@ class Toolbar(unittest.TestCase):
 
     def place_of(self, name):
         """Return where an object is: the node has been paused."""
-        objects = self.simulation.drone.objects
+        objects = self.simulation.context.objects
         return tuple(round(value, 9) for value in frames.position(objects.matrix(objects.handle(name))))
 
     def wait_until(self, condition):
@@ -380,7 +380,7 @@ class Toolbar(unittest.TestCase):
         message = InteractiveMarkerFeedback(client_id="rviz", marker_name="Drone")
         message.event_type = InteractiveMarkerFeedback.MOUSE_DOWN
         feedback.publish(message)
-        held = self.node._handles[0]._held
+        held = self.node._rviz[0]._held
         for expected in ({"Drone"}, set()):
             self.wait_until(lambda expected=expected: held.names() == expected)
         handles.wait_for(lambda m: any(pose.name == "Drone" for pose in m.poses))
@@ -398,11 +398,11 @@ class Toolbar(unittest.TestCase):
         connected(target)
         connected(push)
         self.wait_until(lambda: self.place_of("DronePosition") == (1.5, 0.0, 2.0))
-        self.wait_until(lambda: self.simulation.drone._pushes.lasting)
+        self.wait_until(lambda: self.simulation.drone.pushes.lasting)
         for _ in range(8):
             self.call("step")
         # 1.04 N on 0.52 kg for the 0.2 s that a push lasts
-        self.assertAlmostEqual(self.simulation.drone.state.linear_velocity[0], 0.4, places=4)
+        self.assertAlmostEqual(self.simulation.drone.body.state.linear_velocity[0], 0.4, places=4)
         wrench.wrench.force.x = float("nan")
         push.publish(wrench)
         self.log.wait_for(lambda m: "push refused: force.x = nan" in m.msg, after=0)

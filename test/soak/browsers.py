@@ -33,7 +33,7 @@ PING = 100.0  # s; who is deaf does not hear the answers to its own, either
 MINE = "mine/soak.py"
 TEXTS = ("# a line\n", "1 / 0\n", "")
 SCENES = ("", *(f"package://drone_sim/config/scenes/{name}.yaml" for name in ("gates", "room")))
-BUTTONS = ("start", "stop", "restart", "pause", "go on", "step", "snapshot", "restore")
+BUTTONS = ("start", "stop", "restart", "pause", "resume", "step", "snapshot", "restore")
 
 
 class Door:
@@ -168,12 +168,12 @@ async def fly(browser: Browser) -> None:
 
 async def press(browser: Browser) -> None:
     """Press buttons, in any order."""
-    labels = ("Run", "Stand still", "Remember")
+    labels = ("Simulation", "Pause", "Snapshot")
     for _ in range(browser.dice.randrange(1, 8)):
         await browser.set(browser.dice.choice(labels), browser.dice.choice(BUTTONS))
         await browser.stay(browser.dice.uniform(0.0, 2.0))
     await browser.set("Scene", browser.dice.choice(SCENES))
-    await browser.set("Run", "restart")
+    await browser.set("Simulation", "restart")
     await browser.set("Frames", browser.dice.random() < 0.3)
 
 

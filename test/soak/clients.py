@@ -5,17 +5,22 @@ What a role saw goes to FOLDER/ROLE-SEED.jsonl, a line each: what, how long (s),
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 import random
+import socket
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
+import rosgraph
 import rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, WrenchStamped
 from nav_msgs.msg import Odometry
@@ -243,7 +248,25 @@ def sleep(_dice: random.Random, _folder: Path, _diary: Diary) -> None:
         time.sleep(1.0)
 
 
-ROLES = {"services": call_services, "commands": send_commands, "looker": look, "odometry": listen, "sleeper": sleep}
+def be_silent(_dice: random.Random, _folder: Path, _diary: Diary) -> None:
+    """Connect and say nothing, as a client that is stopped just then."""
+    held: deque[socket.socket] = deque(maxlen=20)
+    while True:
+        with contextlib.suppress(OSError, rosgraph.MasterException):
+            uri = rosgraph.Master("/silent").lookupNode("/drone_sim")
+            _, _, (_, host, port) = ServerProxy(uri).requestTopic("/silent", "/rosout", [["TCPROS"]])  # type: ignore
+            held.append(socket.create_connection((host, port)))
+        time.sleep(0.5)
+
+
+ROLES = {
+    "services": call_services,
+    "commands": send_commands,
+    "looker": look,
+    "odometry": listen,
+    "sleeper": sleep,
+    "silent": be_silent,
+}
 
 
 def main() -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-MOST_MEMORY = 1.0  # MB a minute after warming up, and
+MOST_MEMORY = 1.0  # MB a minute over the last half, and
 LEAST_MEMORY = 15.0  # MB in all, below which nothing is said of a slope
-JUDGED = 90.0  # s, after warming up, before anything is said of growth
+JUDGED = 90.0  # s of a run's last half, below which growth is not judged
 MOST_MORE = 8  # threads, descriptors
+_Sampled = TypeVar("_Sampled")
 _TIDY = re.compile(r"\d[\d.e+-]*|'[^']*'|/\S+")
 
 
@@ -24,7 +26,7 @@ class Sample(NamedTuple):
     descriptors: int
 
 
-def slope(samples: list[Sample]) -> float:
+def slope(samples: Sequence[Sample]) -> float:
     """Return by how many MB a minute the memory grew: the median of the slopes between any two (Theil and Sen)."""
     at, memory = np.array([[s.at, s.memory] for s in samples]).T
     first, second = np.triu_indices(len(at), 1)
@@ -33,15 +35,14 @@ def slope(samples: list[Sample]) -> float:
     return float(np.median(slopes) * 60.0) if len(slopes) else 0.0
 
 
-def settled(samples: list[Sample]) -> list[Sample]:
-    """Return the samples after the warm-up: a third of the run, at most two minutes."""
-    warm = samples[0].at + min(120.0, (samples[-1].at - samples[0].at) / 3)
-    return [sample for sample in samples if sample.at >= warm]
+def last_half(samples: Sequence[_Sampled]) -> Sequence[_Sampled]:
+    """Return the later half: in the first one, dozens of threads fill what the allocator keeps for each of them."""
+    return samples[len(samples) // 2 :]
 
 
 def growth(samples: list[Sample]) -> list[str]:
-    """Name what grew after the warm-up, if that was long enough ago."""
-    rest = settled(samples)
+    """Name what grew over the last half, if that was long enough."""
+    rest = last_half(samples)
     if rest[-1].at - rest[0].at < JUDGED:
         return []
     found = []
@@ -93,7 +94,7 @@ def report(samples: list[Sample], lines: list[str], diary: list[Any], began: flo
     refused = sum(not well for _, _, well, _ in calls)
     slowest = max((seconds for _, seconds, _, _ in calls), default=0.0)
     return (
-        f"{now.at - began:6.0f} s  {now.memory:6.1f} MB {slope(settled(samples)):+6.2f} MB/min  "
+        f"{now.at - began:6.0f} s  {now.memory:6.1f} MB {slope(last_half(samples)):+6.2f} MB/min  "
         f"{now.threads:3d} threads {now.descriptors:4d} descriptors  {late_steps(lines):4d} late  "
         f"{len(calls):5d} calls {refused:4d} refused, slowest {slowest:.1f} s  "
         f"{np.mean(odometry) if odometry else 0:5.1f} odom/s"

@@ -2,9 +2,9 @@
 """`./dev.sh soak [MINUTES] [--seed N] [roslaunch args]`: fly the launch file in a crowd that means no good.
 
 Several clients call every service at once, in any order, with scripts and scenes that are broken, hang or are well;
-commands stream, good ones and nonsense; cameras come and go; a listener sleeps; a bag records. Every 10 s a line on
-the node's process. Exit status 1 where the node died, a service hung, memory, threads or descriptors grew, a
-traceback was printed, or the node did not fly again and end when it was told to.
+commands stream, good ones and nonsense; cameras come and go; a listener sleeps, another never says what it wants; a
+bag records. Every 10 s a line on the node's process. Exit status 1 where the node died, a service hung, memory, threads
+or descriptors grew, a traceback was printed, or the node did not fly again and end when it was told to.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Crowd:
         """Start them."""
         self._folder = folder
         self._dice = random.Random(f"crowd {seed}")
-        roles = ["services"] * 3 + ["commands"] * 2 + ["looker"] * 2 + ["odometry", "sleeper"]
+        roles = ["services"] * 3 + ["commands"] * 2 + ["looker"] * 2 + ["odometry", "silent", "sleeper"]
         self._processes = [self._start(role, seed * 100 + number) for number, role in enumerate(roles)]
         self._sleeper = self._processes[-1]
         if shutil.which("rosbag"):

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xmlrpc.client import ServerProxy
 
-from measure import Sample, late_steps, slope
+from measure import Sample, last_half, late_steps, slope
 from run import ENDS, STARTS, Launch
 
 OFTEN, EVERY = 10.0, 60.0  # s between two samples, two lines
@@ -136,11 +136,6 @@ def line(seen: dict[str, list[State]], launch: Launch, visits: list[Any], time_:
             f"{registered:3d} registrations"
         )
     return "   ".join([*parts, f"{late_steps(launch.lines)} late   {len(visits)} visits"])
-
-
-def last_half(states: list[State]) -> list[State]:
-    """Return the later half."""
-    return states[len(states) // 2 :]
 
 
 def growth(node: str, states: list[State]) -> list[str]:

@@ -18,6 +18,7 @@ STRING = "'\\1\\0\\0\\0\\2\\0\\0\\0'"
 NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
 CALLED = "it waits for this call to end"
 ANY = object()  # whatever comes
+NO_SCENE_FILE = "a model lies beside the scene file, and there is no scene file"
 
 
 class Example(NamedTuple):
@@ -34,6 +35,9 @@ def near(*values: float) -> Any:
 
 
 ALONG_X = near(8e-6, 0, 0, 0, 9.04e-4, 0, 0, 0, 9.04e-4)  # kg m², of a drone without its propellers
+
+
+BOX = [near(1, 1, 1), near(0.5, 0.5, 0.5, 0, 0, 0, 1)]
 
 
 def _packed(count: int, size: int, name: str) -> list[Example]:
@@ -75,12 +79,12 @@ SIM: dict[str, list[Example]] = {
     "createDummy": [Example("sim.getObjectType(NAME(0.01)) == sim.object_dummy_type", [True])],
     "removeObject": [
         Example("NAME(sim.createDummy(0.01))", [1]),
-        Example("REFUSED(NAME, BASE)", ["only those can be removed"]),
+        Example("REFUSED(NAME, BASE)", ["only objects of the scene can be changed"]),
     ],
     "removeObjects": [Example("NAME({sim.createDummy(0.01, {1, 0, 0}), sim.createDummy(0.02)})", [1])],
     "removeModel": [
         Example("NAME(sim.createDummy(0.01))", [1]),
-        Example("REFUSED(NAME, BASE)", ["only those can be removed"]),
+        Example("REFUSED(NAME, BASE)", ["only objects of the scene can be changed"]),
     ],
     "checkDistance": [
         Example("NAME(FLOOR, DRONE, 0.5)", [0, near(0, 0, 0, 0, 0, 0, 0), [-1, -1]]),
@@ -120,8 +124,7 @@ SIM: dict[str, list[Example]] = {
     "getJointTargetVelocity": [Example("NAME(HINGE)", [0.1])],
     "setJointTargetForce": [Example("NAME(HINGE, 2)", []), Example("NAME(JOINT, 1)", [])],
     "getJointTargetForce": [Example("NAME(HINGE)", [2])],
-    "setJointForce": [Example("NAME(HINGE, 4)", [])],
-    "setJointMaxForce": [Example("NAME(HINGE, 5)", [])],
+    "setJointForce": [Example("NAME(HINGE, 5)", [])],
     "getJointMaxForce": [Example("NAME(HINGE)", [5])],
     "getJointForce": [Example("NAME(HINGE)", [0])],
     "getJointVelocity": [Example("NAME(HINGE)", [0])],
@@ -143,8 +146,14 @@ SIM: dict[str, list[Example]] = {
     ],
     "getShapeInertia": [Example("NAME(DRONE)", [ALONG_X, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]])],
     "getObjectInt32Param": [Example("NAME(DRONE, sim.shapeintparam_static)", [0])],
+    "getObjectInt32Parameter": [Example("NAME(DRONE, sim.shapeintparam_static)", [1, 0])],
     "setObjectInt32Param": [Example("NAME(DRONE, sim.shapeintparam_respondable, 1)", [1])],
     "getObjectFloatParam": [Example("NAME(DRONE, sim.shapefloatparam_mass)", [approx(0.12)])],
+    "getObjectFloatParameter": [
+        Example("NAME(DRONE, sim.shapefloatparam_mass)", [1, approx(0.12)]),
+        Example("NAME(sim.createPureShape(0, 8, {1,2,3}, 1), sim.objfloatparam_objbbox_min_z)", [1, approx(-1.5)]),
+        Example("NAME(DRONE, sim.jointfloatparam_screw_pitch)", [0, 0.0]),
+    ],
     "setObjectFloatParam": [Example("NAME(DRONE, sim.shapefloatparam_mass, 2)", [1])],
     # ---- matrices and poses
     "multiplyVector": [
@@ -227,14 +236,11 @@ SIM: dict[str, list[Example]] = {
     "setThreadSwitchTiming": [Example("NAME(2)", [])],
     "setThreadAutomaticSwitch": [Example("NAME(true)", [0])],
     "getThreadAutomaticSwitch": [Example("NAME()", [True])],
-    "setAutoYield": [Example("NAME(true)", [0])],
-    "getAutoYield": [Example("NAME()", [True])],
     "setStepping": [Example("NAME(false)", [0])],
     "acquireLock": [Example("NAME()", []), Example("sim.getAutoYield()", [False])],
     "releaseLock": [Example("NAME()", []), Example("sim.getAutoYield()", [True])],
     "getThreadId": [Example("NAME()", [1])],
     "getThreadExitRequest": [Example("NAME()", [False])],
-    "getThreadExistRequest": [Example("NAME()", [False])],
     "setThreadResumeLocation": [Example("NAME(0, 0)", [1])],
     "delegateChildScriptExecution": [Example("NAME()", [1])],
     # ---- the simulation
@@ -323,4 +329,39 @@ SIM: dict[str, list[Example]] = {
     "resetProximitySensor": [Example("NAME(FEELER)", [])],
     "readForceSensor": [Example("NAME(GAUGE)", [1, [0, 0, 0], [0, 0, 0]])],
     "readSensor": [Example("NAME(RANGE)", [])],
+    # ---- objects that are made; last, for they stand at the origin
+    "createPureShape": [Example("sim.getShapeMass(NAME(0, 8, {0.1,0.1,0.1}, 2))", [2])],
+    "createPrimitiveShape": [Example("sim.getShapeMass(NAME(sim.primitiveshape_cuboid, {1,1,1}))", [approx(1000)])],
+    "createMeshShape": [
+        Example("sim.getShapeBB(NAME(0, 0, {0,0,0, 1,0,0, 0,1,0, 0,0,1}, {0,2,1, 0,1,3, 0,3,2, 1,2,3}))", BOX),
+    ],
+    "createJoint": [Example("sim.getJointType(NAME(11, 0, 0)) == sim.joint_prismatic_subtype", [True])],
+    "createForceSensor": [Example("sim.getObjectType(NAME(0, {0,0,0,0,0}, {0,0,0,0,0}))", [12])],
+    "createProximitySensor": [
+        Example("sim.getObjectType(NAME(34, 16, 0, {0,0,0,0,0,0,0,0}, {0,2,0,0,0,0,0,0,0,0,0,0,0,0,0}))", [5]),
+    ],
+    "createVisionSensor": [
+        Example("sim.getObjectType(NAME(2, {16,16,0,0}, {0.1,10,1,0,0,0,0,0,0,0,0}))", [9]),
+    ],
+    "copyPasteObjects": [Example("sim.getObjectType(NAME({HINGE}, 0) [FIRST])", [1])],
+    "setObjectName": [Example("NAME(HINGE, 'Hinge')", [1])],
+    "setObjectAlias": [Example("NAME(HINGE, 'Hinge')", [])],
+    "loadModel": [Example("REFUSED(NAME, 'none.yaml')", [NO_SCENE_FILE])],
+    "saveModel": [Example("REFUSED(NAME, HINGE, 'none.yaml')", [NO_SCENE_FILE])],
+    "setShapeColor": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 0), '', 0, {1,0,0})", [1])],
+    "getShapeColor": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 0), '', 0)", [1, near(0.7, 0.7, 0.7)])],
+    "setShapeMass": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), 2)", [])],
+    "getShapeBB": [
+        Example("NAME(sim.createPureShape(0, 0, {1,2,3}, 1))", [near(1, 2, 3), near(0, 0, 0, 0, 0, 0, 1)]),
+    ],
+    "setShapeBB": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), {1,2,3})", [1])],
+    "scaleObject": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), 1, 2, 3)", [])],
+    "scaleObjects": [Example("NAME({HINGE}, 1, false)", [])],
+    "groupShapes": [
+        Example(
+            "sim.getShapeMass(NAME({sim.createPureShape(0, 0, {1,1,1}, 1), sim.createPureShape(0, 0, {1,1,1}, 1)}))",
+            [2],
+        ),
+    ],
+    "ungroupShape": [Example("REFUSED(NAME, FLOOR)", ["only objects of the scene can be changed"])],
 }

@@ -55,7 +55,7 @@ def flight(path, limit, snapshots=3):
     simulation = None
     try:
         simulation = Simulation(parameters.load({"script_time_limit": limit}), script=path)
-        simulation.drone.receive(Twist())
+        simulation.drone.commands.receive(Twist())
         simulation.step()
         for _ in range(snapshots):
             simulation.restore(simulation.snapshot())

@@ -2,7 +2,7 @@
 
 import math
 
-from drone_sim.config.place import DatumParameters
+from drone_sim.config.types import DatumParameters
 from drone_sim.files.resources import package_path
 from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.frames import IDENTITY
@@ -94,11 +94,11 @@ class Flown(Carried):
         self.names[self.world.add_object(shape, Pose(position))] = name
 
     def ray(self, start, end):
-        hit = self.world.ray(start, end, self.body)
+        hit = self.world.queries.ray(start, end, self.body)
         return hit and Hit(hit.distance, self.names[hit.body], hit.normal)
 
     def contacts(self):
-        return [Contact(self.names[one.body], *one[1:]) for one in self.world.contacts(self.body)]
+        return [Contact(self.names[one.body], *one[1:]) for one in self.world.queries.contacts(self.body)]
 
     def move(self, pose):
         self.jumps += 1

@@ -1,7 +1,7 @@
 """What the tests of the cockpit's scripts ask, and the simulator that they ask it of."""
 
-from drone_sim.ros.cockpit.scripts.editing import Editing
-from drone_sim.ros.cockpit.scripts.lessons import Lessons
+from drone_sim.ros.cockpit.editor.backend import EditorBackend
+from drone_sim.ros.cockpit.editor.lessons import Lessons
 
 LESSONS = Lessons()
 
@@ -23,7 +23,7 @@ class Node:
         self.parameters[name] = value
 
 
-class Happenings:
+class TimelinePlayer:
     """Remembers whose timeline was sent."""
 
     def __init__(self):
@@ -42,10 +42,10 @@ class Happenings:
 class Asked:
     """What a browser asks."""
 
-    def __init__(self, shelf):
+    def __init__(self, store):
         self.node = Node()
-        self.happenings = Happenings()
-        self.answers = Editing(shelf, LESSONS, self.node, self.happenings).answers
+        self.player = TimelinePlayer()
+        self.answers = EditorBackend(store, LESSONS, self.node, self.player).answers
 
     def __call__(self, ask, **message):
         return self.answers[ask](message)

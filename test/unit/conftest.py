@@ -1,5 +1,6 @@
 """One renderer for all tests that draw: compiling its shaders takes longer than most of them. What needs ROS."""
 
+import signal
 from importlib.util import find_spec
 
 import pytest
@@ -10,6 +11,12 @@ from drone_sim.render.renderer import Renderer
 # The same examples every time, however slow the machine.
 settings.register_profile("same", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("same")
+
+# A shell's background job ignores Ctrl-C, what nohup starts ignores SIGHUP, and so would every process that a test
+# starts to interrupt it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)  # which no other program inherits
 
 
 @pytest.fixture(name="shared_renderer", scope="session")

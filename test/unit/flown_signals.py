@@ -8,7 +8,7 @@ import numpy as np
 
 from drone_sim.grading.criteria import KINDS
 from drone_sim.grading.criteria.criterion import Criterion
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.flight_record import FlightRecord
 from drone_sim.grading.result import Outcome
 from drone_sim.offline.recording import COLUMNS
 
@@ -19,13 +19,13 @@ def times(seconds: float = 10.0, step: float = 0.01) -> np.ndarray:
     return np.arange(0, seconds + step / 2, step)
 
 
-def flown(at: np.ndarray, is_whole: bool = True, more: dict[str, Any] | None = None, **columns: Any) -> Flown:
+def flown(at: np.ndarray, is_whole: bool = True, more: dict[str, Any] | None = None, **columns: Any) -> FlightRecord:
     """Return a level flight with these columns of the table; `vx` is that of the world."""
     rows = np.zeros((len(at), len(COLUMNS)))
     rows[:, 0], rows[:, INDEX["qw"]] = at, 1.0
     for name, values in columns.items():
         rows[:, INDEX[name]] = values
-    return Flown(rows, is_whole, **(more or {}))
+    return FlightRecord(rows, is_whole, **(more or {}))
 
 
 def criterion(kind: str, **values: Any) -> Criterion:
@@ -33,7 +33,7 @@ def criterion(kind: str, **values: Any) -> Criterion:
     return model.model_validate({"kind": kind, **values})
 
 
-def judged(flight: Flown, kind: str, **values: Any) -> Outcome:
+def judged(flight: FlightRecord, kind: str, **values: Any) -> Outcome:
     return criterion(kind, **values).judge(flight)
 
 

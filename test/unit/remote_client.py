@@ -1,11 +1,21 @@
-"""A client of the remote API that does what the test says, message by message, in the test's own thread."""
+"""Clients of the remote API: CoppeliaSim's own, and one that does what the test says, message by message."""
 
 import itertools
 
 import cbor2
+import pytest
 import zmq
 
+PATIENCE = 60_000  # ms, after which a test fails whose server has ended
 _numbers = itertools.count(1)
+
+
+def official_client(port):
+    """Return CoppeliaSim's own client, which by itself would wait for ever for a server that has ended."""
+    client = pytest.importorskip("coppeliasim_zmqremoteapi_client").RemoteAPIClient(port=port)
+    client.socket.setsockopt(zmq.RCVTIMEO, PATIENCE)
+    client.socket.setsockopt(zmq.LINGER, 0)
+    return client
 
 
 class Refusal(Exception):

@@ -3,27 +3,23 @@
 from typing import ClassVar
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.clock import Clock
 from drone_sim.scripting import load
 from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import ScriptContext, Surroundings
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_sim, make_sim_ros
-from drone_sim.scripting.api.registry import Scripts
-from drone_sim.scripting.api.signals import Signals
 from drone_sim.scripting.api.windows import Windows
 from drone_sim.scripting.time_limit import TimeLimit
 
 PARTS = ("Drone", "Quadricopter_base", "Quadricopter_propeller1", "Quadricopter_propeller_respondable1")
 
 
-class Scene:
+class Scene(ScriptContext):
     """What drones share."""
 
     def __init__(self, shown=True):
-        self.objects, self.signals, self.drawings = ObjectTree(), Signals(), Drawings(shown)
-        self.scripts = Scripts()
-        self.windows = Windows()
+        super().__init__(clock=Clock(0.05), gravity=-9.81, drawings=Drawings(shown), windows=Windows())
         self.objects.add("Floor", also=("ResizableFloor_5_25",))
 
 
@@ -33,10 +29,9 @@ class Drone:
     sensors: ClassVar[dict] = {}
 
     def __init__(self, scene, suffix="", own=None, also=()):
-        self.objects, self.signals, self.drawings = scene.objects, scene.signals, scene.drawings
-        self.windows = scene.windows
+        self.context = scene
         self.own_script, base, propeller, respondable, *others = (f"{name}{suffix}" for name in (*PARTS, *also))
-        add = self.objects.add
+        add = scene.objects.add
         self.handles = [
             add(self.own_script, alias="Quadcopter", also=(f"Quadricopter{suffix}",)),
             add(base, self.own_script, frames.from_rpy((0, 0, -0.01), (0, 0, 0)), alias="base"),
@@ -48,9 +43,8 @@ class Drone:
             self.own_script: {"gain": 2.0, **(own or {})},
             respondable: {"particleVelocity": 0.0},
         }
-        self.scripts = scene.scripts
         for name, parameters in self.script_parameters.items():
-            self.scripts.add(name, parameters, is_law=name != self.own_script)
+            scene.scripts.add(name, parameters, is_law=name != self.own_script)
         self.forces = []
         self.bus = MessageBus(self.own_script)
 
@@ -71,7 +65,9 @@ class Drone:
         return 0.0
 
     def sim(self):
-        return make_sim(self, Surroundings(lambda: 0.0, 0.05))
+        return make_sim(self, Surroundings())
 
     def load(self, path):
-        return load.load(str(path), {"sim": self.sim(), "simROS": make_sim_ros(self.bus)}, TimeLimit(20))
+        return load.load(
+            str(path), {"sim": self.sim(), "simROS": make_sim_ros(self.bus, self.context.clock)}, TimeLimit(20)
+        )

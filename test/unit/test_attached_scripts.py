@@ -61,8 +61,8 @@ def _build(tmp_path):
 
 
 def order(simulation):
-    found = simulation.drone.signals.getStringSignal("order").split()
-    simulation.drone.signals.clearStringSignal("order")
+    found = simulation.context.signals.get(str, "order").split()
+    simulation.context.signals.forget(str, "order")
     return found
 
 
@@ -78,7 +78,7 @@ def test_they_are_called_from_the_root_to_the_leaves(build):
     assert order(simulation) == [f"{name}:init" for name in expected]
     simulation.step()
     assert order(simulation) == [f"{name}:{phase}" for phase in ("actuation", "sensing") for name in expected]
-    objects = simulation.drone.objects
+    objects = simulation.context.objects
     objects.set_parent(objects.handle(target), objects.handle("Floor"), True)
     simulation.step()
     assert order(simulation)[:4] == [f"{name}:actuation" for name in (target, "Drone", first, last)]
@@ -101,8 +101,8 @@ def test_each_has_parameters_names_and_a_state_of_its_own(build):
     )
     for _ in range(3):
         simulation.step()
-    assert simulation.drone.signals.getFloatSignal("DronePosition#0") == 4
-    handle = next(one for one in simulation.drone.scripts if one.name == "DronePosition#0")
+    assert simulation.context.signals.get(float, "DronePosition#0") == 4
+    handle = next(one for one in simulation.context.scripts if one.name == "DronePosition#0")
     assert handle.parameters == {"step": 2.0}
 
 
@@ -113,7 +113,7 @@ def test_each_requires_what_lies_beside_it(build, tmp_path):
     simulation = build(
         {"Floor": lua, "DronePosition": "import more\ndef sysCall_init(): sim.setFloatSignal('kd', more.kd)"}
     )
-    assert [simulation.drone.signals.getFloatSignal(name) for name in ("kp", "kd")] == [3, 4]
+    assert [simulation.context.signals.get(float, name) for name in ("kp", "kd")] == [3, 4]
 
 
 def test_a_script_that_fails_is_told_once_with_file_line_and_phase_and_the_others_go_on(build, tmp_path, caplog):
@@ -124,7 +124,7 @@ def test_a_script_that_fails_is_told_once_with_file_line_and_phase_and_the_other
     for _ in range(2):
         for _ in range(3):
             simulation.step()
-        assert simulation.drone.signals.getFloatSignal("n") == 3
+        assert simulation.context.signals.get(float, "n") == 3
         assert simulation.failed_scripts == ["Floor"]
         (said,) = [one.getMessage() for one in caplog.records if one.levelname == "ERROR"]
         assert said.startswith(f"[sensing] {tmp_path}/0.lua:2: sim.getObject: no object '/Nobody'")
@@ -180,7 +180,7 @@ def test_they_take_part_in_restarts_snapshots_and_saving(build, tmp_path):
     )
 
     def signals():
-        return [simulation.drone.signals.getFloatSignal(name) for name in "nx"]
+        return [simulation.context.signals.get(float, name) for name in "nx"]
 
     simulation.step()
     snapshot = simulation.snapshot()
@@ -217,9 +217,9 @@ def test_a_command_reaches_the_scripts_on_a_vehicles_parts(build):
     function heard(m) sim.setFloatSignal('x', m.linear.x) end
     """
     simulation = build({"Quadricopter_base": text})
-    simulation.drone.receive(Twist(Vector3(0.5)))
+    simulation.drone.commands.receive(Twist(Vector3(0.5)))
     simulation.step()
-    assert simulation.drone.signals.getFloatSignal("x") == 0.5
+    assert simulation.context.signals.get(float, "x") == 0.5
 
 
 # ---- from one script to another
@@ -268,7 +268,7 @@ def add(a, b, more): return a + b, {"sum": [a, b]}, "x"
 def test_scripts_call_each_other_by_value(build, asking, answering):
     simulation = build({"Floor": ASKS[asking], "DronePosition": ANSWERS[answering]})
     simulation.step()
-    assert simulation.drone.signals.getFloatSignal("done") == 1
+    assert simulation.context.signals.get(float, "done") == 1
 
 
 @pytest.mark.parametrize(
@@ -298,9 +298,9 @@ def flown(simulation, steps=200):
     path = []
     for step in range(steps):
         if step == 5:
-            simulation.drone.receive(Twist(Vector3(1, -0.5, 0.2), Vector3(0, 0, 0.7)))
+            simulation.drone.commands.receive(Twist(Vector3(1, -0.5, 0.2), Vector3(0, 0, 0.7)))
         simulation.step()
-        path.append(simulation.drone.state.position)
+        path.append(simulation.drone.body.state.position)
     return path
 
 
@@ -315,8 +315,8 @@ def test_a_propellers_script_takes_the_laws_place(build):
     simulation = build(dict.fromkeys(PROPELLERS, still))
     for _ in range(10):
         simulation.step()
-    assert simulation.drone.state.position[2] < 0.1
-    assert min(simulation.drone.particle_velocities) > 3, "the drone's script wants to fly"
+    assert simulation.drone.body.state.position[2] < 0.1
+    assert min(simulation.drone.propulsion.particle_velocities) > 3, "the drone's script wants to fly"
 
 
 def test_without_scripts_nothing_is_otherwise(build):

@@ -13,8 +13,8 @@ from std_msgs.msg import Empty, String
 
 from drone_sim.mechanics.state import Pose, State, Twist, Vector3
 from drone_sim.offline import timeline
+from drone_sim.ros.core import message_conversion as messages
 from drone_sim.ros.tools import bag_commands
-from drone_sim.ros.vehicle import messages
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -61,11 +61,11 @@ TOLD = {  # by step: topic, message, and how many steps late the recorder heard 
 def obey(simulation, topic, message):
     drone = simulation.drone
     if topic == "cmd_vel" and message.linear.x == message.linear.x:
-        drone.receive(Twist(Vector3(message.linear.x, 0, 0), Vector3(0, 0, message.angular.z)))
+        drone.commands.receive(Twist(Vector3(message.linear.x, 0, 0), Vector3(0, 0, message.angular.z)))
     elif topic == "goto" and message.header.frame_id == "world":
         drone.ask(topic, Pose((message.pose.position.x, 0, message.pose.position.z)))
     elif topic == "set_wind":
-        drone.change_weather({"wind": [message.vector.x, 0, 0]})
+        drone.context.change_weather({"wind": [message.vector.x, 0, 0]})
     elif topic == "faults":
         drone.change_faults({"propellers": [1, 0.97, 1, 1]})
     elif topic in ("takeoff", "land"):
@@ -84,12 +84,12 @@ def record(path, began):
             simulation.step()
             at = rospy.Time.from_sec(began + simulation.time)
             drone = simulation.drone
-            bag.write("/drone/odom", messages.odometry(at, drone.state, "base_link"), at)
-            bag.write("/drone/command", messages.command(at, drone.command, "Track_base"), at)
+            bag.write("/drone/odom", messages.odometry(at, drone.body.state, "base_link"), at)
+            bag.write("/drone/command", messages.command(at, drone.commands.now, "Track_base"), at)
             if state != str(drone.flight_state):
                 state = str(drone.flight_state)
                 bag.write("/drone/state", String(state), at)
-            states.append(drone.state)
+            states.append(drone.body.state)
     simulation.close()
     return states
 
@@ -106,7 +106,7 @@ def test_the_same_flight_to_the_bit(tmp_path, capsys, began):
     for step, state in enumerate(states):
         found.apply(step, simulation.vehicles)
         simulation.step()
-        assert simulation.drone.state == state, f"step {step}"
+        assert simulation.drone.body.state == state, f"step {step}"
     simulation.close()
 
 

@@ -1,5 +1,6 @@
 """Flights out of bags: what was flown comes back to the last digit, and a file that is none gets one line."""
 
+import io
 import zlib
 
 import cv2
@@ -21,11 +22,10 @@ from std_msgs.msg import String
 from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.recording import Recording
+from drone_sim.ros.core import message_conversion as messages
 from drone_sim.ros.tools import bag_commands, bag_video, bags, plot_flight, record
-from drone_sim.ros.tools.bag_flights import BagFlight
-from drone_sim.ros.tools.bags import Bag, BagRefused
+from drone_sim.ros.tools.bags import Bag, BagError, BagFlight
 from drone_sim.ros.tools.record import chosen
-from drone_sim.ros.vehicle import messages
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -51,13 +51,13 @@ def _flown(tmp_path_factory):
         write("/drone_sim/state", String("flying"))
         for step in range(STEPS):
             if step == 10:
-                simulation.drone.receive(Twist(Vector3(1, 0, 0.2), Vector3(0, 0, 0.5)))
+                simulation.drone.commands.receive(Twist(Vector3(1, 0, 0.2), Vector3(0, 0, 0.5)))
             simulation.step()
             drone, stamp = simulation.drone, rospy.Time()
             recording.add(simulation)
-            write("/drone/odom", messages.odometry(stamp, drone.state, "base_link"), 0.001)
-            write("/drone/propellers", messages.propellers(drone.particle_velocities))
-            write("/drone/command", messages.command(stamp, drone.command, "Track_base"))
+            write("/drone/odom", messages.odometry(stamp, drone.body.state, "base_link"), 0.001)
+            write("/drone/propellers", messages.propellers(drone.propulsion.particle_velocities))
+            write("/drone/command", messages.command(stamp, drone.commands.now, "Track_base"))
             write("/drone/range", Range(range=step))
             write("/drone/imu/data", Imu())
             write("/drone/imu/data_raw", Imu())
@@ -168,6 +168,19 @@ def test_a_picture_that_is_none_is_told(tmp_path, capsys):
     assert not out.exists()
 
 
+def test_a_damaged_picture_among_others_is_left_out(tmp_path, capsys):
+    path, out = str(tmp_path / "damaged.bag"), tmp_path / "out.mp4"
+    with rosbag.Bag(path, "w") as bag:
+        for at in range(5):
+            data = b"none" if at == 2 else cv2.imencode(".jpg", RED)[1].tobytes()
+            message = CompressedImage(format="jpeg", data=data)
+            message.header.stamp = rospy.Time.from_sec(1 + at / 10)
+            bag.write("/camera/image/compressed", message, message.header.stamp)
+    assert bag_video.main([path, str(out)]) == 0
+    assert "1 are left out: not a picture: format 'jpeg'" in capsys.readouterr().out
+    assert cv2.VideoCapture(str(out)).get(cv2.CAP_PROP_FRAME_COUNT) == 5, "the one before is seen longer"
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
@@ -220,8 +233,20 @@ def test_no_class_is_made_from_what_a_bag_says(tmp_path):
     other = genpy.dynamic.generate_dynamic("nav_msgs/Odometry", "string data\n")["nav_msgs/Odometry"]
     with rosbag.Bag(path, "w") as bag:
         bag.write("/drone/odom", other(data="x"), rospy.Time(1))
-    with pytest.raises(BagRefused, match="no message on /drone/odom that can be read"):
+    with pytest.raises(BagError, match="no message on /drone/odom that can be read"):
         BagFlight(Bag(path))
+
+
+def test_a_name_that_is_no_text_is_not_told_besides(tmp_path, caplog, monkeypatch):
+    monkeypatch.setattr(genpy.message, "_warned_decoding_error", set())
+    path, odometry = str(tmp_path / "flight.bag"), io.BytesIO()
+    Odometry(child_frame_id="base_link").serialize(odometry)
+    content = odometry.getvalue().replace(b"base_link", b"\x9ease_link")
+    with rosbag.Bag(path, "w") as bag:
+        bag.write("/drone/odom", (Odometry._type, content, Odometry._md5sum, Odometry), rospy.Time(1), raw=True)
+    (found,) = Bag(path).read("/drone/odom", "nav_msgs/Odometry")
+    assert found.message.child_frame_id == "\ufffdase_link"
+    assert not caplog.records
 
 
 @pytest.mark.parametrize(("program", "out"), [(plot_flight, "o.png"), (bag_commands, "o.yaml"), (bag_video, "o.mp4")])

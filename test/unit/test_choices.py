@@ -51,4 +51,4 @@ def test_a_wrong_choice_gets_one_line(given, told):
     with pytest.raises(ValidationError) as refused:
         Sensors.model_validate(given)
     (problem,) = problems(refused.value, Sensors)
-    assert problem.text == f"parameter {told}"
+    assert problem.sentence == f"parameter {told}"

@@ -8,7 +8,7 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
 
-from drone_sim.ros.node.step_time import StepTime
+from drone_sim.ros.core.publishing import StepTime
 
 STEP = 0.05  # s
 NOW = 1.7e9  # s

@@ -22,18 +22,16 @@ from visualization_msgs.msg import Marker, MarkerArray
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit import settings
 from drone_sim.ros.cockpit.cockpit import Cockpit
-from drone_sim.ros.cockpit.flying.flying import Flying, read_command
-from drone_sim.ros.cockpit.found import Found, Source, find
-from drone_sim.ros.cockpit.page import Page
 from drone_sim.ros.cockpit.scene import looks
-from drone_sim.ros.cockpit.scene.frames import Frames
-from drone_sim.ros.cockpit.scene.markers import Markers
-from drone_sim.ros.cockpit.server.gate import WIRE, Gate
-from drone_sim.ros.cockpit.server.wire import Wire
-from drone_sim.ros.cockpit.serving import Serving
-from drone_sim.ros.cockpit.simulator import script_failure
+from drone_sim.ros.cockpit.scene.frames import FrameTree
+from drone_sim.ros.cockpit.scene.markers import MarkerNodes
+from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
+from drone_sim.ros.cockpit.server.page_server import PageServer, page_files
+from drone_sim.ros.cockpit.server.page_socket import PageSocket
+from drone_sim.ros.cockpit.teleop import HeldCommands, read_command
+from drone_sim.ros.cockpit.topics import FoundTopics, ImageTopic, find_topics
+from drone_sim.ros.core.simulator import script_failure
 from drone_sim.ros.tools.commands import Command
 
 TOKEN = "secret-token"
@@ -45,9 +43,9 @@ TOKEN = "secret-token"
 class Served:
     def __init__(self):
         self.sent = []
-        self.flying = Flying(self.sent.append, lambda: 0.0)
-        self.wire = Wire(self.flying, {"double": lambda message: {"twice": 2 * message["number"]}})
-        with Gate(TOKEN, Page(), self.wire.serve).before_viser():
+        self.flying = HeldCommands(self.sent.append, lambda: 0.0)
+        self.socket = PageSocket(self.flying, {"double": lambda message: {"twice": 2 * message["number"]}})
+        with AccessControl(TOKEN, page_files().get, self.socket.serve).before_viser():
             self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self.host = f"127.0.0.1:{self.server.get_port()}"
 
@@ -61,9 +59,9 @@ class Served:
     def cookie(self):
         return f"drone_sim_{self.host.rpartition(':')[2]}={TOKEN}"
 
-    def connect(self, cookie=None, origin=None, path="/wire"):
+    def connect(self, cookie=None, origin=None, path="/socket"):
         headers = {"Cookie": self.cookie if cookie is None else cookie}
-        return connect(f"ws://{self.host}{path}", subprotocols=[WIRE], additional_headers=headers, origin=origin)
+        return connect(f"ws://{self.host}{path}", subprotocols=[SUBPROTOCOL], additional_headers=headers, origin=origin)
 
 
 @pytest.fixture(name="served", scope="module")
@@ -74,7 +72,7 @@ def _served():
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/scene/", "/cockpit.js", "/?token=", "/?token=wrong", "/../../etc/passwd", "/wire"]
+    "path", ["/", "/scene/", "/cockpit.js", "/?token=", "/?token=wrong", "/../../etc/passwd", "/socket"]
 )
 def test_without_the_token_nothing_is_served(served, path):
     status, _, body = served.get(path)
@@ -133,7 +131,7 @@ def raw(served, *lines):
         ("/", ["Host: a", 'Cookie: "; =[; drone_sim_a'], 403, "?token="),
         ("//[", ["Host: a"], 403, "?token="),
         ("http://[/?token=x", ["Host: a"], 403, "?token="),
-        ("/wire", ["Host: a", "Upgrade: websocket", "Origin: http://["], 403, "?token="),
+        ("/socket", ["Host: a", "Upgrade: websocket", "Origin: http://["], 403, "?token="),
         ("/", [], 403, "?token="),
     ],
 )
@@ -156,11 +154,11 @@ def test_what_is_no_browser_is_hung_up_on(served, caplog, junk):
 
 def test_the_page_that_is_served_is_the_one_in_the_source():
     source = Path(__file__).parents[2] / "web" / "src"
-    for name in ("index.html", "cockpit.css", "script.css"):  # the script is built of it: web/package.json
-        assert Page().find(f"/{name}")[1] == (source / name).read_bytes(), "cd web && npm ci && npm run build"
+    for name in ("index.html", "cockpit.css"):  # the script is built of it: web/package.json
+        assert page_files().get(f"/{name}")[1] == (source / name).read_bytes(), "cd web && npm ci && npm run build"
 
 
-@pytest.mark.parametrize("path", ["/wire", "/scene"])
+@pytest.mark.parametrize("path", ["/socket", "/scene"])
 def test_sockets_want_the_token_and_our_origin(served, path):
     for cookie, origin in (("", None), ("drone_sim=1", None), (None, "http://evil.example"), (None, "null")):
         with pytest.raises(InvalidStatus, match="403"):
@@ -217,22 +215,22 @@ def test_what_a_browser_says_is_checked(served, text, words):
 
 def test_held_keys_fly_while_they_are_held_and_said():
     sent, now = [], [0.0]
-    flying = Flying(sent.append, lambda: now[0])
+    flying = HeldCommands(sent.append, lambda: now[0])
     ahead, left = Command(vx=1.0), Command(vy=1.0)
     flying.hold(1, ahead)
-    flying.look()
+    flying.repeat()
     assert sent == [ahead, ahead], "repeated"
     flying.hold(2, left)
     flying.hold(1, ahead)
     assert sent[2:] == [left], "the one that changed last counts, and is not thrown over by a repetition"
-    flying.gone(2)
+    flying.release(2)
     assert sent[-1] == ahead
     now[0] = 10.0
-    flying.look()
+    flying.repeat()
     assert sent[-1] == Command(), "silence"
     count = len(sent)
-    flying.look()
-    flying.gone(1)
+    flying.repeat()
+    flying.release(1)
     assert len(sent) == count, "nobody flies, and nobody is disturbed"
 
 
@@ -259,9 +257,9 @@ def test_what_the_master_knows():
         ("/drone/push", "geometry_msgs/WrenchStamped"),
         ("/other/range", "sensor_msgs/Range"),
     ]
-    cameras = (Source("/drone/front", "/drone/front/compressed"),)
-    assert find(topics) == Found("/drone", ("drone",), cameras, {"/drone/imu/data": "sensor_msgs/Imu"})
-    assert find(topics[1:]) == Found()
+    cameras = (ImageTopic("/drone/front", "/drone/front/compressed"),)
+    assert find_topics(topics) == FoundTopics("/drone", ("drone",), cameras, {"/drone/imu/data": "sensor_msgs/Imu"})
+    assert find_topics(topics[1:]) == FoundTopics()
 
 
 # ---- what is shown
@@ -272,22 +270,22 @@ LINE = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)]
 
 def test_markers_come_move_and_go():
     scene = Scene()
-    markers = Markers(scene, "scene", Frames(scene))
-    markers.hear(MarkerArray([marker(0), marker(1)]))
+    markers = MarkerNodes(scene, "scene", FrameTree(scene))
+    markers.on_markers(MarkerArray([marker(0), marker(1)]))
     markers.show()
     assert sorted(scene.nodes) == ["/scene/a/0", "/scene/a/1"]
     moved = marker(0)
     moved.pose.position.x = 3.0
-    markers.hear(MarkerArray([moved, Marker(ns="a", id=1, action=Marker.DELETE)]))
+    markers.on_markers(MarkerArray([moved, Marker(ns="a", id=1, action=Marker.DELETE)]))
     markers.show()
     assert list(scene.nodes) == ["/scene/a/0"] and scene.nodes["/scene/a/0"].position == (3.0, 0.0, 0.0)
     assert scene.added.count("/scene/a/0") == 1, "moved, not made anew"
     hanging = marker(5)
     hanging.header.frame_id = "nowhere"
-    markers.hear(MarkerArray([hanging]))
+    markers.on_markers(MarkerArray([hanging]))
     markers.show()
     assert list(scene.nodes) == ["/scene/a/0"], "it waits for its frame"
-    markers.hear(MarkerArray([Marker(action=Marker.DELETEALL)]))
+    markers.on_markers(MarkerArray([Marker(action=Marker.DELETEALL)]))
     markers.show()
     assert not scene.nodes
 
@@ -302,15 +300,15 @@ def test_markers_come_move_and_go():
 )
 def test_words_and_lines_change_in_place(before, after, seen):
     scene = Scene()
-    markers = Markers(scene, "scene", Frames(scene))
+    markers = MarkerNodes(scene, "scene", FrameTree(scene))
     for number, values in enumerate((before, {**before, **after})):
         message = Marker(ns="a", **values)
         message.header.frame_id, message.pose.position.x = "world", number
-        markers.hear(MarkerArray([message]))
+        markers.on_markers(MarkerArray([message]))
         markers.show()
     (node,) = scene.nodes.values()
     assert scene.added == ["/scene/a/0"] and seen(node) and node.position[0] == 1.0
-    markers.hear(MarkerArray([Marker(ns="a", type=before["type"], header=message.header)]))
+    markers.on_markers(MarkerArray([Marker(ns="a", type=before["type"], header=message.header)]))
     markers.show()
     assert len(scene.nodes) == (before["type"] == Marker.TEXT_VIEW_FACING), "lines of no points are nothing"
 
@@ -323,17 +321,17 @@ def transform(parent, child, x=0.0):
 
 def test_a_frame_waits_for_its_parents():
     scene = Scene()
-    frames = Frames(scene)
+    frames = FrameTree(scene)
     loop = [transform("a", "b"), transform("b", "a"), transform("c", "c")]
     for message, shown in (
         ([transform("propeller", "blades"), *loop], []),
         ([transform("body", "propeller", 0.1)], []),
         ([transform("world", "body")], ["/body", "/body/propeller", "/body/propeller/blades"]),
     ):
-        frames.hear(TFMessage(message))
+        frames.on_transforms(TFMessage(message))
         frames.show()
         assert sorted(scene.nodes) == [f"/frames{name}" for name in shown]
-    frames.hear(TFMessage([transform("world", "body", 2.0)]))
+    frames.on_transforms(TFMessage([transform("world", "body", 2.0)]))
     frames.show()
     assert scene.nodes["/frames/body"].position == (2.0, 0.0, 0.0) and len(scene.added) == 3
     frames.forget()
@@ -342,11 +340,11 @@ def test_a_frame_waits_for_its_parents():
 
 def test_lines_of_another_colour_are_made_anew():
     scene = Scene()
-    markers = Markers(scene, "scene", Frames(scene))
+    markers = MarkerNodes(scene, "scene", FrameTree(scene))
     painted = marker(0, Marker.LINE_STRIP, points=LINE)
     painted.color = ColorRGBA(0, 1, 0, 1)
     for message in (marker(0, Marker.LINE_STRIP, points=LINE[:2]), painted):
-        markers.hear(MarkerArray([message]))
+        markers.on_markers(MarkerArray([message]))
         markers.show()
     assert scene.added == ["/scene/a/0"] * 2
 
@@ -394,19 +392,19 @@ def test_a_mesh_has_no_metal(tmp_path):
     assert [one["pbrMetallicRoughness"]["metallicFactor"] for one in tree["materials"]] == [0.0]
 
 
-def test_a_page_that_is_opened_early_is_answered_when_all_is_there(tmp_path):
-    serving = Serving(settings.read({"port": 0, "scripts": str(tmp_path)}))
+def test_a_page_that_is_opened_early_is_answered_when_all_is_there():
+    serving = PageServer("127.0.0.1", 0)
     host, token = serving.address.removeprefix("http://").split("/?token=")
     cookie = {"Cookie": f"drone_sim_{host.rpartition(':')[2]}={token}"}
 
-    async def wire(connection):
+    async def socket(connection):
         await connection.send(f"heard {await connection.recv()}")
 
-    with connect(f"ws://{host}/wire", subprotocols=[WIRE], additional_headers=cookie) as early:
+    with connect(f"ws://{host}/socket", subprotocols=[SUBPROTOCOL], additional_headers=cookie) as early:
         early.send("this")
         with pytest.raises(TimeoutError):
             early.recv(timeout=0.1)
-        serving.begin(wire, lambda path: ("image/png", path.encode()))
+        serving.begin(socket, lambda path: ("image/png", path.encode()))
         assert early.recv(timeout=5) == "heard this"
     connection = http.client.HTTPConnection(host, timeout=5)
     connection.request("GET", "/a.png", headers=cookie)
@@ -420,24 +418,24 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
     def refuse(*_):
         raise ConnectionRefusedError(111, "Connection refused")
 
-    given = settings.read({"port": 0, "scripts": str(tmp_path)})
-    shown = Cockpit(given, Serving(given))
+    shown = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path)
     monkeypatch.setattr(
         rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
     )
     monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
     shown._ask_master()
-    assert shown._found.namespace == "/drone"
+    assert shown._topics.namespace == "/drone"
     for gone in ("get_param", "get_published_topics"):  # it may go between the two
         monkeypatch.setattr(rospy, gone, refuse)
         shown._ask_master()
-        assert shown._found == Found()
-        assert shown._panel._state.value == "no simulation"
-        assert shown._panel._said.value == "no ROS master answers: waiting for one"
+        assert shown._topics == FoundTopics()
+        assert shown._panel._status.value == "no simulation"
+        assert shown._panel._message.content.endswith(">no ROS master answers: waiting for one</div>")
     monkeypatch.setattr(
         rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
     )
     monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
     shown._ask_master()
-    assert shown._found.namespace == "/drone" and shown._panel._said.value == "the ROS master is there again"
+    assert shown._topics.namespace == "/drone"
+    assert shown._panel._message.content.endswith(">the ROS master is there again</div>")
     shown._server.stop()

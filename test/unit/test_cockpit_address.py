@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from drone_sim.ros.cockpit import settings
+pytest.importorskip("rospy", reason="needs ROS")
+
+from drone_sim.ros.cockpit.main import read_parameters
 from drone_sim.ros.cockpit.server import address
 
 
@@ -78,13 +80,13 @@ def test_without_a_network_the_machine_goes_by_its_name(monkeypatch):
 
 
 def test_settings_have_defaults():
-    assert settings.read({}) == ("127.0.0.1", 8080, Path.home() / "drone_scripts", "drone_sim")
-    assert settings.read({"port": 8081, "scripts": "/a/b", "simulator": "/x"})[1:] == (8081, Path("/a/b"), "/x")
+    assert read_parameters({}) == ("127.0.0.1", 8080, Path.home() / "drone_scripts", "drone_sim")
+    assert read_parameters({"port": 8081, "scripts": "/a/b", "simulator": "/x"})[1:] == (8081, Path("/a/b"), "/x")
 
 
 def test_scripts_are_relative_to_the_shell(monkeypatch):
     monkeypatch.setenv("PWD", "/somewhere")
-    assert settings.read({"scripts": "mine"}).scripts == Path("/somewhere/mine")
+    assert read_parameters({"scripts": "mine"}).scripts == Path("/somewhere/mine")
 
 
 @pytest.mark.parametrize(
@@ -101,5 +103,5 @@ def test_scripts_are_relative_to_the_shell(monkeypatch):
 )
 def test_wrong_settings_are_told_in_a_line(given, words):
     with pytest.raises((ValueError, OSError)) as raised:
-        settings.read(given)
+        read_parameters(given)
     assert str(raised.value) == words

@@ -22,11 +22,10 @@ from visualization_msgs.msg import (
 from visualization_msgs.msg import InteractiveMarkerFeedback as Feedback
 
 from drone_sim.ros.cockpit.scene import looks
-from drone_sim.ros.cockpit.scene.choice import Choice
-from drone_sim.ros.cockpit.scene.frames import Frames
-from drone_sim.ros.cockpit.scene.handles import Handles
-from drone_sim.ros.cockpit.scene.markers import Markers
-from drone_sim.ros.cockpit.scene.sunlight import Sunlight
+from drone_sim.ros.cockpit.scene.frames import FrameTree
+from drone_sim.ros.cockpit.scene.handles import DragControls, Selection
+from drone_sim.ros.cockpit.scene.markers import MarkerNodes
+from drone_sim.ros.cockpit.scene.scene_view import Sunlight
 
 
 class Dragged:
@@ -34,12 +33,12 @@ class Dragged:
 
     def __init__(self, **options):
         self.scene, self.said, self.now = Scene(), [], 0.0
-        self.handles = Handles(self.scene, self.said.append, clock=lambda: self.now, **options)
+        self.handles = DragControls(self.scene, self.said.append, clock=lambda: self.now, **options)
         self.hear(x=1.0)
 
     def hear(self, **position):
         pose = Pose(Point(**position), Quaternion(0, 0, 0.5**0.5, 0.5**0.5))
-        self.handles.hear_all(InteractiveMarkerInit(markers=[InteractiveMarker(name="a", pose=pose)]))
+        self.handles.on_init(InteractiveMarkerInit(markers=[InteractiveMarker(name="a", pose=pose)]))
         self.handles.show((1, 2))
 
     @property
@@ -99,7 +98,7 @@ def test_a_browser_that_is_gone_lets_go(dragged):
 def test_a_marker_that_goes_while_it_is_held_takes_its_handle_along(dragged):
     arrows = dragged.scene.nodes["/handles/a"]
     arrows.drag("start")
-    dragged.handles.hear(InteractiveMarkerUpdate(erases=["a"]))
+    dragged.handles.on_update(InteractiveMarkerUpdate(erases=["a"]))
     dragged.handles.show((1,))
     assert not dragged.scene.nodes and dragged.kinds[-1] == Feedback.MOUSE_UP
     arrows.drag("update")
@@ -107,7 +106,7 @@ def test_a_marker_that_goes_while_it_is_held_takes_its_handle_along(dragged):
 
 
 def test_only_the_object_that_is_chosen_has_arrows():
-    choice = Choice()
+    choice = Selection()
     dragged = Dragged(is_offered=lambda name: name == choice.name)
     assert not dragged.scene.nodes and dragged.handles.names == ("a",)
     choice.toggle("a")
@@ -140,10 +139,10 @@ def test_solid_objects_throw_shadows_on_the_floor_if_they_are_wanted():
 
 def test_an_object_called_sky_is_shown():
     scene = Scene()
-    markers = Markers(scene, "scene", Frames(scene))
+    markers = MarkerNodes(scene, "scene", FrameTree(scene))
     sky = marker(0)
     sky.ns = "sky"
-    markers.hear(MarkerArray([sky]))
+    markers.on_markers(MarkerArray([sky]))
     markers.show()
     assert scene.nodes
 
@@ -167,8 +166,8 @@ def test_what_changes_too_little_to_be_seen_or_is_only_rvizs_light_is_not_made_a
 
     for casts, alphas, made in ((False, (0.5, 0.501), 1), (False, (0.5, 0.7), 2), (True, (0.5, 0.7), 1)):
         scene = Scene()
-        markers = Markers(scene, "scene", Frames(scene), casts=casts)
+        markers = MarkerNodes(scene, "scene", FrameTree(scene), casts=casts)
         for alpha, size in zip(alphas, (1.0, 1.001)):
-            markers.hear(MarkerArray([shown(alpha, size)]))
+            markers.on_markers(MarkerArray([shown(alpha, size)]))
             markers.show()
         assert len(scene.added) == made, (casts, alphas)

@@ -15,10 +15,9 @@ from std_msgs.msg import Header, String
 from drone_sim.files.resources import package_path
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit.scripts import grader, task_scenes
-from drone_sim.ros.cockpit.scripts.happenings import Happenings
-from drone_sim.ros.cockpit.scripts.script_files import ShelfError
-from drone_sim.ros.cockpit.scripts.shelf import Shelf
+from drone_sim.ros.cockpit.editor import scene_files, task_flights
+from drone_sim.ros.cockpit.editor.script_store import ScriptStore, ScriptStoreError
+from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -26,7 +25,7 @@ from drone_sim.run.simulation import Simulation
 @pytest.fixture(name="ask")
 def _ask(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
-    return Asked(Shelf(tmp_path / "mine"))
+    return Asked(ScriptStore(tmp_path / "mine"))
 
 
 # ---- where they fly
@@ -35,13 +34,13 @@ def _ask(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", tasks.names())
 def test_a_tasks_scene_is_what_its_plan_says(name, tmp_path):
     plan = plans.read(tasks.find(name))
-    wanted, file = plan.parameters(), task_scenes.scene_of(plan, tmp_path)
+    wanted, file = plan.parameters(), scene_files.scene_of(plan, tmp_path)
     found = parameters.load({"scene_file": file})
     assert found.model_dump(exclude={"vehicles", "scene_file"} | _carried(found)) == wanted.model_dump(
         exclude={"vehicles", "scene_file"} | _carried(found)
     )
     assert [one.model_dump() for one in found.fleet] == [one.model_dump() for one in wanted.fleet]
-    said = task_scenes.told(plan)
+    said = scene_files.describe_scene_of(plan)
     assert plan.name in said and not any(one.startswith("=") for one in said.split(", "))
 
 
@@ -53,7 +52,7 @@ def _carried(found):
 @pytest.mark.parametrize("name", tasks.names())
 def test_what_a_task_begins_with_flies(name, tmp_path):
     plan = plans.read(tasks.find(name))
-    start = Shelf(tmp_path).find(f"tasks/{name}.py")
+    start = ScriptStore(tmp_path).find(f"tasks/{name}.py")
     simulation = Simulation(plan.parameters(script=str(start.path)))
     for _ in range(3):
         simulation.step()
@@ -78,7 +77,7 @@ def test_a_task_brings_its_scene_and_leaving_it_brings_back_the_users(ask, tmp_p
     assert node.parameters["scene_file"] == "mine.yaml"
     node.asked.clear()
     assert ask("run", script="tutorial/2_elevation.py", lesson="")["said"] == "restart"
-    assert node.asked == ["restart"] and ask.happenings.prepared is None
+    assert node.asked == ["restart"] and ask.player.prepared is None
 
 
 def test_a_scene_that_the_user_has_chosen_meanwhile_stays(ask):
@@ -91,7 +90,7 @@ def test_a_scene_that_the_user_has_chosen_meanwhile_stays(ask):
 def test_a_script_that_fails_in_a_tasks_scene_is_shown_at_its_line_and_one_that_has_no_scene_leaves_all_as_it_was(ask):
     ask.node.fails = {"load_scene": f"[init] {_start('gates')}:7: NameError: x"}
     failed = ask("run", script="tasks/gates.py", lesson="tasks/gates")
-    assert not failed["done"] and failed["line"] == 7 and "gates.yaml" in ask.node.parameters["scene_file"]
+    assert not failed["done"] and failed["failure"]["line"] == 7 and "gates.yaml" in ask.node.parameters["scene_file"]
     ask.node.parameters["scene_file"] = "mine.yaml"
     ask.node.fails = {"load_scene": "gates.yaml: no such file"}
     assert ask("run", script="tasks/gates.py", lesson="tasks/gates")["said"] == "gates.yaml: no such file"
@@ -100,22 +99,22 @@ def test_a_script_that_fails_in_a_tasks_scene_is_shown_at_its_line_and_one_that_
 
 def test_a_script_is_graded_in_a_process_of_its_own(ask):
     begun = ask("grade", script="tasks/hover.py", lesson="tasks/hover")
-    with pytest.raises(ShelfError, match="another script is being graded"):
+    with pytest.raises(ScriptStoreError, match="another script is being graded"):
         ask("grade", script="tasks/hover.py", lesson="tasks/hover")
     while not (result := ask("graded", number=begun["number"])):
         time.sleep(0.02)
     assert (result["error"], result["points"], result["of"]) == ("", 3.0, 6.0)
     assert [(one["name"], one["passed"]) for one in result["rows"]][:2] == [("place", False), ("height", True)]
     for message, words in (({"lesson": "stage-3-yaw"}, "needs a task"), ({"lesson": None}, "needs a task")):
-        with pytest.raises(ShelfError, match=words):
+        with pytest.raises(ScriptStoreError, match=words):
             ask("grade", script="tasks/hover.py", **message)
-    with pytest.raises(ShelfError, match="graded since"):
+    with pytest.raises(ScriptStoreError, match="graded since"):
         ask("graded", number=-1)
 
 
 def test_a_grading_that_does_not_end_is_ended(monkeypatch, tmp_path):
-    monkeypatch.setattr(grader, "_MOST", 0.0)
-    one = grader.Grader()
+    monkeypatch.setattr(task_flights, "_MOST", 0.0)
+    one = task_flights.Grader()
     number = one.start("hover", tmp_path / "x.py")
     while not (result := one.result(number)):
         time.sleep(0.01)
@@ -166,10 +165,10 @@ def _topics(monkeypatch):
 
 
 def test_what_happens_in_a_task_is_sent_by_the_count_of_steps(topics):
-    happenings = Happenings("/drone_sim")
-    happenings.prepare(plans.read(tasks.find("steps")))
+    player = TimelinePlayer("/drone_sim")
+    player.prepare(plans.read(tasks.find("steps")))
     assert not topics.hears, "nothing is listened to before it flies"
-    happenings.begin()
+    player.begin()
     stamps = [100 + 0.06 * step for step in range(25) for _ in range(2)]  # twice each: it stood still in between
     for stamp in stamps:
         topics.hears["/drone/odom"](Odometry(header=Header(stamp=rospy.Time.from_sec(stamp))))
@@ -178,6 +177,6 @@ def test_what_happens_in_a_task_is_sent_by_the_count_of_steps(topics):
     assert topics.sent == [("/drone/cmd_vel", 1.0)] and stamp == 100 + 0.06 * 19, "after 20 steps of 0.05 s"
     topics.hears["/drone_sim/state"](String("stopped"))
     assert not topics.hears
-    happenings.prepare(plans.read(tasks.find("gates")))
-    happenings.begin()
+    player.prepare(plans.read(tasks.find("gates")))
+    player.begin()
     assert not topics.hears, "nothing happens in this one"

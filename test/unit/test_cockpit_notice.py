@@ -11,8 +11,8 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
 
-from drone_sim.ros.cockpit import cockpit, serving
-from drone_sim.ros.cockpit.server import notice
+from drone_sim.ros.cockpit import cockpit, main
+from drone_sim.ros.cockpit.server.address import address_file, print_to_terminal
 
 ADDRESS = "http://127.0.0.1:8080/?token=secret"
 
@@ -40,7 +40,7 @@ def test_the_token_is_on_the_terminal_and_in_a_file_and_in_no_log(home, logged, 
     seen = []
 
     class Looked:
-        def __init__(self, _settings, served):
+        def __init__(self, served, *_):
             self.served = served
 
         def run(self):
@@ -52,7 +52,7 @@ def test_the_token_is_on_the_terminal_and_in_a_file_and_in_no_log(home, logged, 
     monkeypatch.setattr(rospy, "get_param", lambda *_: {"port": 0})
     before = os.umask(0)
     try:
-        serving._serve()
+        main._serve()
     finally:
         os.umask(before)
     ((file, address, mode),) = seen
@@ -65,10 +65,10 @@ def test_the_token_is_on_the_terminal_and_in_a_file_and_in_no_log(home, logged, 
 
 def test_the_file_of_one_that_was_killed_is_made_anew_and_another_ones_is_left(home):
     file = home / "drone_sim" / "cockpit_8080.txt"
-    with notice.kept(ADDRESS, 8080):
+    with address_file(ADDRESS, 8080):
         file.unlink()
         file.symlink_to(home / "elsewhere")
-        with notice.kept(f"{ADDRESS}2", 8080):
+        with address_file(f"{ADDRESS}2", 8080):
             assert file.read_text() == f"{ADDRESS}2\n" and not file.is_symlink()
         file.write_text("of another one")
     assert file.read_text() == "of another one" and not (home / "elsewhere").exists()
@@ -76,7 +76,7 @@ def test_the_file_of_one_that_was_killed_is_made_anew_and_another_ones_is_left(h
 
 def test_a_home_that_holds_no_file_is_told_in_one_line(home):
     home.write_text("no folder")
-    with notice.kept(ADDRESS, 8080) as where:
+    with address_file(ADDRESS, 8080) as where:
         assert re.fullmatch(r"the token that opens it is on the terminal alone: .*cockpit_8080.txt: .+", where)
 
 
@@ -86,7 +86,7 @@ def test_the_log_that_roslaunch_makes_of_a_node_is_left_without(home, monkeypatc
     log.parent.mkdir(parents=True)
     with log.open("w") as stdout:
         monkeypatch.setattr("sys.stdout", stdout)
-        notice.tell(f"the cockpit is at {ADDRESS}")
+        print_to_terminal(f"the cockpit is at {ADDRESS}")
     assert ("secret" in log.read_text()) is not inside
 
 
@@ -95,6 +95,6 @@ def test_a_terminal_that_is_gone_ends_nothing(home, monkeypatch):
     os.close(reading)
     with os.fdopen(writing, "w", closefd=False) as stdout:
         monkeypatch.setattr("sys.stdout", stdout)
-        notice.tell("a line")
+        print_to_terminal("a line")
         os.dup2(os.open(os.devnull, os.O_WRONLY), writing)  # or to close it would fail, too
     os.close(writing)

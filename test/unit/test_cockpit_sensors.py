@@ -11,9 +11,8 @@ pytest.importorskip("rospy", reason="needs ROS")
 import rospy
 from sensor_msgs.msg import Imu, Range
 
-from drone_sim.ros.cockpit.panel import sensor_plot
-from drone_sim.ros.cockpit.panel.chart import EVERY
-from drone_sim.ros.cockpit.panel.readings import READINGS
+from drone_sim.ros.cockpit.panel.plots import EVERY, SensorPlot
+from drone_sim.ros.cockpit.topics import PLOTTED
 
 RANGE, IMU = "/drone/range", "/drone/imu/data"
 KINDS = {RANGE: "sensor_msgs/Range", IMU: "sensor_msgs/Imu"}
@@ -65,7 +64,7 @@ def _heard(monkeypatch):
 @pytest.fixture(name="plot")
 def _plot(heard):
     gui = Gui()
-    plot = sensor_plot.SensorPlot(gui)
+    plot = SensorPlot(gui)
     plot.offer(KINDS)
     return plot, gui
 
@@ -126,5 +125,5 @@ def test_a_sensor_that_goes_is_chosen_no_more(plot, heard):
 
 
 def test_every_reading_has_a_name_for_each_number():
-    for reading in READINGS.values():
+    for reading in PLOTTED.values():
         assert len(reading.numbers(reading.message())) == len(reading.names)

@@ -16,10 +16,10 @@ import viser
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit.flying.flying import Flying
-from drone_sim.ros.cockpit.page import Page
-from drone_sim.ros.cockpit.server.gate import WIRE, Gate
-from drone_sim.ros.cockpit.server.wire import Wire
+from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
+from drone_sim.ros.cockpit.server.page_server import page_files
+from drone_sim.ros.cockpit.server.page_socket import PageSocket
+from drone_sim.ros.cockpit.teleop import HeldCommands
 
 TOKEN = "secret-token"
 VISER = f"viser-v{viser.__version__}"
@@ -28,8 +28,10 @@ GIGABYTE = 1 << 30
 
 class Served:
     def __init__(self):
-        wire = Wire(Flying(lambda _: None, lambda: 0.0), {"twice": lambda message: {"twice": 2 * message["number"]}})
-        with Gate(TOKEN, Page(), wire.serve).before_viser():
+        socket = PageSocket(
+            HeldCommands(lambda _: None, lambda: 0.0), {"twice": lambda message: {"twice": 2 * message["number"]}}
+        )
+        with AccessControl(TOKEN, page_files().get, socket.serve).before_viser():
             self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self.port = self.server.get_port()
         self.asked = []
@@ -108,7 +110,7 @@ def test_what_viser_cannot_do_with_a_message_is_one_line_and_nothing_else(served
     field.remove()
 
 
-@pytest.mark.parametrize("protocol", [WIRE, VISER])
+@pytest.mark.parametrize("protocol", [SUBPROTOCOL, VISER])
 @pytest.mark.parametrize("parts", [1, 1000])
 def test_a_gigabyte_is_refused_before_it_is_taken(served, said, protocol, parts):
     """In one frame, of which the head alone is believed, or in many."""

@@ -16,14 +16,12 @@ from dynamic_reconfigure.encoding import encode_config
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
-from drone_sim.ros.cockpit.found import Source, find
 from drone_sim.ros.cockpit.panel import cameras as cameras_module
-from drone_sim.ros.cockpit.panel.cameras import Cameras
-from drone_sim.ros.cockpit.panel.pace import Pace
-from drone_sim.ros.cockpit.panel.pictures import packed
-from drone_sim.ros.cockpit.panel.windows import Windows
-from drone_sim.ros.cockpit.panel.words import Words
-from drone_sim.ros.cockpit.server.outbox import Outbox
+from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, packed
+from drone_sim.ros.cockpit.panel.panel import TextLog
+from drone_sim.ros.cockpit.panel.tuning import SpeedControl
+from drone_sim.ros.cockpit.server.page_socket import SendQueue
+from drone_sim.ros.cockpit.topics import ImageTopic, find_topics
 
 
 async def taken(box):
@@ -40,7 +38,7 @@ async def taken(box):
 
 def test_a_browser_that_shows_nothing_gets_one_picture_and_later_the_latest():
     async def talk():
-        box = Outbox()
+        box = SendQueue()
         for number in range(1000):
             box.put_picture("front", b"%d" % number)
         assert await taken(box) == [b"999"] and not box.wants("front")
@@ -58,7 +56,7 @@ def test_a_browser_that_shows_nothing_gets_one_picture_and_later_the_latest():
 
 def test_messages_to_a_browser_that_takes_none_are_bounded():
     async def talk():
-        box = Outbox()
+        box = SendQueue()
         for number in range(1000):
             box.put(str(number))
         assert await taken(box) == [str(number) for number in range(968, 1000)]
@@ -130,10 +128,10 @@ def test_every_topic_of_pictures_is_offered_once():
         ("/drone/depth/image/compressedDepth", "sensor_msgs/CompressedImage"),
         ("/robot/eye/compressed", "sensor_msgs/CompressedImage"),
     ]
-    assert find(topics).cameras == (
-        Source("/drone/depth/image"),
-        Source("/drone/front", "/drone/front/compressed"),
-        Source("/robot/eye", "/robot/eye/compressed"),
+    assert find_topics(topics).cameras == (
+        ImageTopic("/drone/depth/image"),
+        ImageTopic("/drone/front", "/drone/front/compressed"),
+        ImageTopic("/robot/eye", "/robot/eye/compressed"),
     )
 
 
@@ -234,8 +232,8 @@ def _sent():
 def _cameras(monkeypatch, sent):
     monkeypatch.setattr(cameras_module.rospy, "Subscriber", Subscriber)
     Subscriber.there.clear()
-    found = Cameras(Gui(), sent)
-    found.offer((Source("/drone/front", "/drone/front/compressed"), Source("/drone/depth/image")))
+    found = CameraSwitches(Gui(), sent)
+    found.offer((ImageTopic("/drone/front", "/drone/front/compressed"), ImageTopic("/drone/depth/image")))
     return found
 
 
@@ -266,7 +264,7 @@ def test_a_view_of_a_script_switches_its_camera(cameras):
     cameras.rest(False)
     cameras.follow_views(frozenset({"/drone/depth/image", "/later"}))
     assert cameras.shown == ["/drone/depth/image"]
-    cameras.offer((Source("/drone/depth/image"), Source("/later")))
+    cameras.offer((ImageTopic("/drone/depth/image"), ImageTopic("/later")))
     assert cameras.shown == ["/drone/depth/image", "/later"]
     cameras.turn("/drone/depth/image", False)
     cameras.follow_views(frozenset({"/drone/depth/image", "/later"}))
@@ -280,10 +278,10 @@ def test_a_view_of_a_script_switches_its_camera(cameras):
 
 @pytest.mark.parametrize("wrong", ["nonsense", "[" * 100_000, "3", '{"views": 3}', '{"views": [], "dialogs": []}'])
 def test_what_is_no_state_of_windows_changes_nothing(cameras, sent, wrong):
-    windows = Windows("/drone_sim", cameras, sent)
+    windows = ScriptWindows("/drone_sim", cameras, sent)
     view = {"handle": 1, "topic": "/drone/front", "label": "x"}
-    windows._hear(String(json.dumps({"views": [view, 7], "dialogs": [], "consoles": []})))
-    windows._hear(String(wrong))
+    windows._on_message(String(json.dumps({"views": [view, 7], "dialogs": [], "consoles": []})))
+    windows._on_message(String(wrong))
     assert cameras.shown == ["/drone/front"]
     assert windows.answers["windows"]({}) == {
         "windows": {"views": [view], "dialogs": [], "consoles": []},
@@ -295,20 +293,20 @@ def test_what_is_no_state_of_windows_changes_nothing(cameras, sent, wrong):
 
 def test_the_speed_follows_what_others_set():
     gui = Gui()
-    pace = Pace(gui, "/drone_sim", print)
+    speed = SpeedControl(gui, "/drone_sim", print)
     for factor, words in ((2.0, "2 times real time"), (0.0, "as fast as it can"), (3.7, "3.7 times real time")):
-        pace.hear(encode_config({"real_time_factor": factor}))
+        speed.show_set(encode_config({"real_time_factor": factor}))
         assert gui.boxes["Speed"].value == words and words in gui.boxes["Speed"].options
-    pace.hear(encode_config({"real_time_factor": 1.0}))
-    pace.hear(encode_config({"Kzref": 3.0}))
+    speed.show_set(encode_config({"real_time_factor": 1.0}))
+    speed.show_set(encode_config({"Kzref": 3.0}))
     assert gui.boxes["Speed"].value == "real time"
     for said, words in (("1.98", "1.98 times real time"), ("not known", ""), ("", "")):
-        pace.show_reached(said)
-        assert gui.boxes["Reached"].value == words
+        speed.show_actual(said)
+        assert gui.boxes["Actual speed"].value == words
 
 
 def test_words_are_text():
-    words = Words(Gui(), "<i>Log</i>")
+    words = TextLog(Gui(), "<i>Log</i>")
     words.show(["<script>alert(1)</script>", "x" * 10_000])
     assert "<script>" not in words._drawn.content and "&lt;script&gt;" in words._drawn.content
     assert len(words._drawn.content) < 2000

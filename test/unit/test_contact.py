@@ -25,18 +25,18 @@ class Flight:
 
     def fly(self, command, seconds):
         """Fly a command (vx, vy, vz, wz) whose vx and vy are along the world's axes as the drone is turned now."""
-        (vx, vy, vz, wz), yaw = command, frames.to_euler(self.simulation.drone.track)[2]
+        (vx, vy, vz, wz), yaw = command, frames.to_euler(self.simulation.drone.track.matrix())[2]
         ahead, left = vx * math.cos(yaw) + vy * math.sin(yaw), vy * math.cos(yaw) - vx * math.sin(yaw)
-        self.simulation.drone.receive(Twist(Vector3(ahead, left, vz), Vector3(0, 0, wz)))
+        self.simulation.drone.commands.receive(Twist(Vector3(ahead, left, vz), Vector3(0, 0, wz)))
         for _ in range(round(seconds / 0.05)):
             self.simulation.step()
             drone = self.simulation.drone
-            self.fastest_turn = max(self.fastest_turn, math.hypot(*drone.state.angular_velocity))
-            self.most_tilt = max(self.most_tilt, math.acos(min(1.0, drone.matrix[10])))
-        return self.simulation.drone.state
+            self.fastest_turn = max(self.fastest_turn, math.hypot(*drone.body.state.angular_velocity))
+            self.most_tilt = max(self.most_tilt, math.acos(min(1.0, drone.body.matrix[10])))
+        return self.simulation.drone.body.state
 
     def assert_comes_free(self):
-        x = self.simulation.drone.state.position[0]
+        x = self.simulation.drone.body.state.position[0]
         for _ in range(6):  # a wall that one leans on turns the drone, and a pilot aims again
             away = self.fly((-1, 0, 0, 0), 1)
         assert away.position[0] < x - 1.5

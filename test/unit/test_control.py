@@ -27,10 +27,10 @@ def _fly():
 
 def velocities_after(simulation, twist):
     simulation.step()
-    simulation.drone.receive(twist)
+    simulation.drone.commands.receive(twist)
     simulation.step()  # its sensing uses the command,
     simulation.step()  # and this actuation what it computed
-    return simulation.drone.particle_velocities
+    return simulation.drone.propulsion.particle_velocities
 
 
 @pytest.mark.parametrize(
@@ -58,19 +58,19 @@ def test_vertical_command_speeds_all_alike(fly):
 @pytest.mark.parametrize("limits, expected", [([3, 8], 8.0), ("none", 5.33 + 5 * 2)])
 def test_thrust_limits(fly, limits, expected):
     simulation = fly(control={"thrust_limits": limits}, drone={"position": [0, 0, 5]})
-    simulation.drone.move(Pose((0, 0, 3)))
+    simulation.drone.body.move(Pose((0, 0, 3)))
     simulation.step()
     simulation.step()
-    assert sum(simulation.drone.particle_velocities) / 4 == pytest.approx(expected, abs=0.2)
+    assert sum(simulation.drone.propulsion.particle_velocities) / 4 == pytest.approx(expected, abs=0.2)
 
 
 @pytest.mark.parametrize("roll, pitch, yaw", [(0.3, 0, 0), (0, 0.3, 0), (0.2, -0.3, 2.5)])
 def test_track_frame_is_level_and_follows_the_yaw(fly, roll, pitch, yaw):
     simulation = fly()
-    simulation.drone.move(Pose((1, 2, 3), frames.to_quaternion(frames.from_rpy((0, 0, 0), (roll, pitch, yaw)))))
+    simulation.drone.body.move(Pose((1, 2, 3), frames.to_quaternion(frames.from_rpy((0, 0, 0), (roll, pitch, yaw)))))
     simulation.step()
-    track, drone = simulation.drone.track, simulation.drone.matrix
-    base = simulation.drone.objects.matrix(simulation.drone.objects.handle("Quadricopter_base"))
+    track, drone = simulation.drone.track.matrix(), simulation.drone.body.matrix
+    base = simulation.context.objects.matrix(simulation.context.objects.handle("Quadricopter_base"))
     assert frames.position(track) == pytest.approx(frames.position(base))
     assert frames.rotate(track, (0, 0, 1)) == pytest.approx((0, 0, 1))
     assert frames.to_euler(track)[2] == pytest.approx(frames.to_euler(drone)[2])
@@ -79,27 +79,27 @@ def test_track_frame_is_level_and_follows_the_yaw(fly, roll, pitch, yaw):
 def test_vx_is_along_the_track_frame(fly):
     simulation = fly(drone={"yaw": math.pi / 2})
     simulation.step()
-    simulation.drone.receive(Twist(Vector3(1, 0, 0)))
+    simulation.drone.commands.receive(Twist(Vector3(1, 0, 0)))
     for _ in range(40):
         simulation.step()
-    vx, vy, _ = simulation.drone.state.linear_velocity
+    vx, vy, _ = simulation.drone.body.state.linear_velocity
     assert vy > 0.5
     assert abs(vx) < 0.05
 
 
 def test_the_last_command_holds_for_ever(fly):
     simulation = fly()
-    simulation.drone.receive(Twist(Vector3(0, 0, 0.5)))
+    simulation.drone.commands.receive(Twist(Vector3(0, 0, 0.5)))
     for _ in range(400):
         simulation.step()
-    assert simulation.drone.state.linear_velocity[2] == pytest.approx(0.5, rel=0.05)
+    assert simulation.drone.body.state.linear_velocity[2] == pytest.approx(0.5, rel=0.05)
 
 
 def test_a_timeout_zeroes_the_command(fly):
     simulation = fly(cmd_vel_timeout=1.0)
-    simulation.drone.receive(Twist(Vector3(0, 0, 0.5)))
+    simulation.drone.commands.receive(Twist(Vector3(0, 0, 0.5)))
     for _ in range(20):
         simulation.step()
-        assert simulation.drone.command.linear.z == 0.5
+        assert simulation.drone.commands.now.linear.z == 0.5
     simulation.step()
-    assert simulation.drone.command == Twist()
+    assert simulation.drone.commands.now == Twist()

@@ -50,7 +50,7 @@ class Looked:
 
     def command(self, twist=FORWARD, sender="/pilot"):
         self.log.take("cmd_vel", sender)
-        self.drone.receive(twist)
+        self.drone.commands.receive(twist)
 
     def fly(self, steps, step=0.05):
         """Fly so many steps, each in `step` s of real time."""
@@ -171,7 +171,7 @@ def test_a_script_error_is_told_until_the_next_start(looked):
 
 
 def test_propellers_at_their_limit_are_counted(looked):
-    looked.drone.move(Pose((0, 0, 900), UPRIGHT))
+    looked.drone.body.move(Pose((0, 0, 900), UPRIGHT))
     full = "\n".join(
         f"    sim.setScriptSimulationParameter(sim.getScriptHandle('{name}'), 'particleVelocity', 100)"
         for name in (f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4))
@@ -184,7 +184,7 @@ def test_propellers_at_their_limit_are_counted(looked):
 
 
 def test_what_it_touches_holds_it_up(looked):
-    looked.drone.move(Pose((0.7, 0, 1), UPRIGHT))
+    looked.drone.body.move(Pose((0.7, 0, 1), UPRIGHT))
     looked.command()
     looked.fly(60)
     looked.look()
@@ -196,7 +196,7 @@ def test_what_it_touches_holds_it_up(looked):
 
 def test_lying_on_its_back_is_told(looked):
     upside_down = to_quaternion(from_rpy((0, 0, 0), (3.1, 0, 0)))
-    looked.drone.move(Pose((0, 0, 0.1), upside_down))
+    looked.drone.body.move(Pose((0, 0, 0.1), upside_down))
     looked.fly(20)
     found = looked.look()
     assert found.level == WARN
@@ -207,7 +207,7 @@ def test_lying_on_its_back_is_told(looked):
 def test_cameras_tell_their_rate_and_what_draws(looked):
     camera = looked.drone.cameras["front"]
     assert looked.look("cameras").message == "nobody looks"
-    camera.watched = lambda: True
+    camera.viewers.add(lambda: True)
     try:
         looked.fly(1)
         looked.look()
@@ -222,7 +222,7 @@ def test_cameras_tell_their_rate_and_what_draws(looked):
         assert found.level == WARN
         assert "drone/front comes at 5.0 of 20.0 Hz" in found.message
     finally:
-        camera.watched = lambda: False
+        camera.viewers.clear()
 
 
 def test_the_worst_comes_first():

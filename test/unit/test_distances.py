@@ -4,13 +4,13 @@ import math
 
 import pytest
 
+from drone_sim.hosting.child_scripts import surroundings
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.modules import make_sim
-from drone_sim.scripting.api.turns import Turns
 from drone_sim.scripting.time_limit import TimeLimit
-from drone_sim.vehicles.child_script import surroundings
 
 SCENE = {
     "objects": [
@@ -40,9 +40,11 @@ def _simulation(tmp_path_factory):
 
 @pytest.fixture(name="sim")
 def _sim(simulation):
-    drone = simulation.drone
-    drone.move(Pose((0.0, 0.0, 1.0)))
-    return make_sim(drone, surroundings([drone], simulation.shared, TimeLimit(0.0), Turns()))
+    simulation.drone.body.move(Pose((0.0, 0.0, 1.0)))
+    own = simulation.child_scripts["drone"]
+    return make_sim(
+        own, surroundings([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
+    )
 
 
 def between(sim, one, other, *threshold):
@@ -68,14 +70,14 @@ def test_a_drone_is_one_solid_and_whatever_of_it_is_named(simulation, sim):
     assert whole[6] == pytest.approx(3 - 0.1 - 0.2, abs=0.15)
     for part in ("/Quadcopter/base", "/Quadcopter/propeller[0]/respondable", "/Quadcopter/propeller[0]"):
         assert between(sim, part, "/Ball")[1] == whole
-    simulation.drone.move(Pose((0.0, 0.0, 3.0)))
+    simulation.drone.body.move(Pose((0.0, 0.0, 3.0)))
     assert between(sim, "/Quadcopter", "/Ball")[1][6] > whole[6] + 0.1
 
 
 def test_the_nearest_of_all(simulation, sim):
     result, way, pair = between(sim, "/Quadcopter", "all")
     assert result == 1 and pair == [sim.getObject("/Quadcopter"), sim.getObject("/Quadcopter[1]")]
-    simulation.drone.move(Pose((2.0, -5.0, 0.5)))
+    simulation.drone.body.move(Pose((2.0, -5.0, 0.5)))
     result, way, pair = between(sim, "/Quadcopter", "all")
     assert pair[1] == sim.getObject("/Floor") and way[5] == pytest.approx(0.0, abs=1e-6) and way[6] < 0.5
 
@@ -122,11 +124,11 @@ def test_a_shape_that_a_joint_holds(sim):
 def test_collisions(simulation, sim):
     drone, wall = sim.getObject("/Quadcopter"), sim.getObject("/Wall")
     assert sim.checkCollision(drone, wall) == sim.checkCollision(drone, sim.handle_all) == (0, [-1, -1])
-    simulation.drone.move(Pose((2.95, 0.0, 2.0)))
+    simulation.drone.body.move(Pose((2.95, 0.0, 2.0)))
     assert sim.checkCollision(drone, wall) == sim.checkCollision(drone, sim.handle_all) == (1, [drone, wall])
     assert between(sim, "/Quadcopter", "/Wall")[1][6] == 0.0
-    simulation.drone.move(Pose((9.0, 9.0, 1.0)))
-    assert sim.checkCollision(drone) == (1, [drone, -1]), "what has no name"
+    simulation.drone.body.move(Pose((9.0, 9.0, 1.0)))
+    assert sim.checkCollision(drone) == (1, [drone, sim.getObject("/Cuboid")]), "what has no name in the scene file"
 
 
 @pytest.mark.parametrize(

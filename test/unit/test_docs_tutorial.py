@@ -14,7 +14,7 @@ from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.fly import main as fly_main
-from drone_sim.vehicles.rotors import PROPELLERS
+from drone_sim.vehicles.types.quadricopter import Quadricopter
 
 FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
 RIPPLE = 0.01  # m/s, of vz: particles come whole
@@ -52,13 +52,13 @@ def test_constant_thrust_sinks_slowly_slides_on_and_does_not_turn():
 def test_the_track_frame_follows_level_and_turned():
     with flying("1_thrust") as simulation:
         drone = simulation.drone
-        drone.move(Pose((1, 2, 3), (0.0998334, 0, 0.4794255, 0.8)))
+        drone.body.move(Pose((1, 2, 3), (0.0998334, 0, 0.4794255, 0.8)))
         simulation.step()
-        base = drone.objects.matrix(drone.objects.handle("Quadricopter_base"))
-        assert drone.track[3::4] == pytest.approx(base[3::4])
-        assert drone.track[8:11] == pytest.approx((0, 0, 1))
+        base = simulation.context.objects.matrix(simulation.context.objects.handle("Quadricopter_base"))
+        assert drone.track.matrix()[3::4] == pytest.approx(base[3::4])
+        assert drone.track.matrix()[8:11] == pytest.approx((0, 0, 1))
         assert base[10] < 0.99
-        assert math.atan2(drone.track[4], drone.track[0]) > 0.5
+        assert math.atan2(drone.track.matrix()[4], drone.track.matrix()[0]) > 0.5
 
 
 def test_elevation_climbs_holds_and_returns():
@@ -116,9 +116,9 @@ def test_the_bare_law_falls_where_the_limits_hold():
 @pytest.mark.parametrize("stage", ["2_elevation", "3_yaw", "4_pitch", "5_roll"])
 def test_a_stage_before_ros_hears_no_commands(stage):
     with flying(stage) as simulation:
-        simulation.drone.receive(FORWARD_TURNING)
+        simulation.drone.commands.receive(FORWARD_TURNING)
         fly(simulation, 0.9)
-        assert simulation.drone.state.position == pytest.approx((0, 0, 0.8), abs=2e-3)
+        assert simulation.drone.body.state.position == pytest.approx((0, 0, 0.8), abs=2e-3)
 
 
 @pytest.mark.parametrize("stage", ["6_ros", "7_camera"])
@@ -167,7 +167,7 @@ def test_the_propellers_are_drawn_as_they_are():
     source = (DOCS / "draw_diagrams.py").read_text()
     drawn = ast.literal_eval(re.search(r"^PROPELLERS = (\(.*?^\))", source, re.MULTILINE | re.DOTALL).group(1))
     script = STAGES["1_thrust"].read_text()
-    for (_, name, _, _, clockwise, signs), (known, rotation) in zip(drawn, PROPELLERS):
+    for (_, name, _, _, clockwise, signs), (known, rotation) in zip(drawn, Quadricopter.rotors):
         assert name == known.replace("_", " ")
         assert clockwise == (rotation > 0)  # the blades turn against the torque that they leave
         mixing = " ".join(f"{sign} self.{what}_corr" for sign, what in zip(signs, ("pitch", "roll", "yaw")))

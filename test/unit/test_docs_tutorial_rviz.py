@@ -36,7 +36,7 @@ def test_pushed_constant_thrust_slides_on_level():
 def test_elevation_comes_back_from_half_a_metre_and_slides_after_a_push():
     with flying("2_elevation") as simulation:
         fly(simulation, 8)
-        simulation.drone.move(Pose((0, 0, 0.5)))
+        simulation.drone.body.move(Pose((0, 0, 0.5)))
         flight = fly(simulation, 2)
         assert flight.z[0] == pytest.approx(0.5, abs=0.02)
         assert flight.z[-1] == pytest.approx(1.521, abs=0.01)

@@ -13,9 +13,9 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 import pytest
 
 from drone_sim.files.resources import package_path
-from drone_sim.ros.doctor import environment, network, packages
-from drone_sim.ros.doctor import master as master_module
-from drone_sim.ros.doctor.line import HINT, OK, WRONG, Line, lines
+from drone_sim.ros.core import network
+from drone_sim.ros.doctor import HINT, OK, WRONG, Line, environment, packages
+from drone_sim.ros.doctor.doctor import run_check
 from drone_sim.ros.doctor.master import Master
 
 HANGS = 60.0  # s; nothing here takes nearly as long unless it hangs
@@ -101,12 +101,12 @@ def test_without_a_master_it_ends_with_a_line_for_each_check(closed):
 def test_a_master_s_address_that_is_none(monkeypatch, uri):
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     (line,) = Master().found()
-    assert line == Line(WRONG, "master", f"ROS_MASTER_URI = '{uri}' must be like http://localhost:11311")
+    assert line == Line(WRONG, "master", f"ROS_MASTER_URI = '{uri}': must be like http://localhost:11311")
 
 
 def test_a_port_that_does_not_answer(monkeypatch, port):
     monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{port}")
-    monkeypatch.setattr(master_module, "PATIENCE", 0.1)
+    monkeypatch.setattr(network, "PATIENCE", 0.1)
     (line,) = Master().found()
     assert line.mark == WRONG
     assert f"port {port} of http://localhost:{port} does not answer as a master (timed out)" in line.said
@@ -169,9 +169,9 @@ def test_nodes_that_have_gone(known, closed):
 def test_a_node_s_address_that_others_cannot_use(monkeypatch):
     monkeypatch.delenv("ROS_IP", raising=False)
     monkeypatch.setenv("ROS_HOSTNAME", "localhost")
-    assert [line.mark for line in network.names()] == [OK]
+    assert [line.mark for line in environment.host_names()] == [OK]
     monkeypatch.setenv("ROS_HOSTNAME", "no.such.host.invalid")
-    (line,) = network.names()
+    (line,) = environment.host_names()
     assert line.mark == WRONG
     assert "ROS_HOSTNAME = 'no.such.host.invalid' is not known here" in line.said
 
@@ -188,7 +188,7 @@ def test_a_shell_without_ros(monkeypatch):
 
 @pytest.mark.ros
 def test_a_machine_without_rviz(monkeypatch):
-    monkeypatch.setattr("drone_sim.ros.tools.viewer._PACKAGE", "no_such_package")
+    monkeypatch.setattr("drone_sim.ros.tools.show._RVIZ", "no_such_package")
     (line,) = (one for one in environment.ros() if one.what == "rviz")
     assert line.mark == HINT
     assert "is not installed" in line.said and "web:=true" in line.said
@@ -210,9 +210,9 @@ def test_a_module_that_is_missing_and_one_that_kills(tmp_path, monkeypatch):
 
 
 def test_a_check_neither_hangs_nor_raises():
-    (line,) = lines("slow", lambda: time.sleep(HANGS), 0.05)
+    (line,) = run_check("slow", lambda: time.sleep(HANGS), 0.05)
     assert line == Line(WRONG, "slow", "no answer within 0.05 s")
-    (line,) = lines("broken", lambda: 1 / 0, 1.0)
+    (line,) = run_check("broken", lambda: 1 / 0, 1.0)
     assert line == Line(WRONG, "broken", "cannot be checked: ZeroDivisionError: division by zero")
     assert "\n" not in str(Line(OK, "x", "two\nlines"))
 
@@ -222,7 +222,7 @@ def test_a_check_leaves_the_timer_of_others_as_it_was():
     before = signal.signal(signal.SIGALRM, lambda *_: rang.append(True))
     timer = signal.setitimer(signal.ITIMER_REAL, 0.05, 0.02)
     try:
-        assert lines("nothing", lambda: [], 10.0) == []
+        assert run_check("nothing", lambda: [], 10.0) == []
         assert signal.getitimer(signal.ITIMER_REAL)[1] == pytest.approx(0.02, abs=0.005)
         while not rang:
             signal.pause()

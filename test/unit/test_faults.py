@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from drone_sim.forces.pushes import Push
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline import timeline
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.rotors import PROPELLERS
+from drone_sim.vehicles.types.quadricopter import Quadricopter
 
 FORWARD = Twist(Vector3(0.5, 0.0, 0.0))
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "depth")}
@@ -42,7 +43,7 @@ def fly(simulation, steps, each=lambda: None):
     flown = []
     for _ in range(steps):
         simulation.step()
-        flown.append((simulation.drone.state, each()))
+        flown.append((simulation.drone.body.state, each()))
     return flown
 
 
@@ -56,18 +57,18 @@ def test_a_weak_propeller_turns_the_drone_as_its_lever_and_inertia_say(simulate,
     simulation = simulate()
     fly(simulation, 20)
     drone = simulation.drone
-    before = np.array(drone.state.angular_velocity)
+    before = np.array(drone.body.state.angular_velocity)
     shares = [share if index == number else 1.0 for index in range(4)]
     drone.change_faults({"propellers": shares})
     fly(simulation, 1)
     torque = np.zeros(3)
-    for one, (_, sense), link in zip(range(4), PROPELLERS, drone.propulsion.rotors.links):
-        velocity = shares[one] * drone.particle_velocities[one]
-        thrust = drone.propulsion.thrusts[one]
+    for one, (_, sense), link in zip(range(4), Quadricopter.rotors, drone.propulsion.rotors.links):
+        velocity = shares[one] * drone.propulsion.particle_velocities[one]
+        thrust = drone.body.thrusts[one]
         point = frames.position(frames.multiply(drone.body.inertial_from_root, link))
         torque += np.cross(point, (0, 0, thrust))
         torque[2] += sense * 0.002 * velocity
-    gained = (np.array(drone.state.angular_velocity) - before) / 0.05
+    gained = (np.array(drone.body.state.angular_velocity) - before) / 0.05
     expected = np.linalg.solve(drone.body.rigid.inertia, torque)
     assert gained[:2] == pytest.approx(expected[:2], rel=5e-3)
     assert gained[2] == pytest.approx(expected[2], rel=0.1)  # the least of them, and gyroscopic torque adds to it
@@ -78,19 +79,19 @@ def test_a_tenth_less_of_one_propeller_leaves_a_turn_and_a_drift(simulate):
     simulation = simulate(faults={"propellers": [0.9, 1, 1, 1]})
     state = fly(simulation, 300)[-1][0]
     correction = -0.1 / 3.7
-    track = frames.rotate(frames.invert(simulation.drone.track), state.linear_velocity)
+    track = frames.rotate(frames.invert(simulation.drone.track.matrix()), state.linear_velocity)
     assert state.angular_velocity[2] == pytest.approx(-correction, rel=1e-3)  # Dyaw = 1
     # Level: Pangle (Kvcorr (0 - v)) = d, forwards; the same to the side.
     assert track[0] == pytest.approx(-correction / 0.3 / 0.5, rel=0.05)
     assert math.hypot(*state.angular_velocity[:2]) < 1e-3
-    thrusts = simulation.drone.propulsion.thrusts
+    thrusts = simulation.drone.body.thrusts
     assert thrusts == pytest.approx([thrusts[0]] * 4, rel=1e-3)
 
 
 def test_limits_are_of_what_is_commanded(simulate):
     simulation = simulate(propellers={"velocity_limits": [4, 5]}, faults={"propellers": [0.5, 0, 1, 1]})
     fly(simulation, 1)
-    weak, stopped, *sound = simulation.drone.propulsion.thrusts
+    weak, stopped, *sound = simulation.drone.body.thrusts
     assert stopped == 0
     assert sound == [2 * weak] * 2
 
@@ -118,8 +119,8 @@ def test_a_propeller_comes_back_at_the_next_start_and_with_a_snapshot(simulate):
 
 def test_a_command_takes_effect_when_it_comes(simulate):
     simulation = simulate(faults={"commands": {"latency": 0.2}}, cmd_vel_timeout=0.5)
-    simulation.drone.receive(FORWARD)
-    commands = [command for _, command in fly(simulation, 20, lambda: simulation.drone.command)]
+    simulation.drone.commands.receive(FORWARD)
+    commands = [command for _, command in fly(simulation, 20, lambda: simulation.drone.commands.now)]
     assert commands == [Twist()] * 4 + [FORWARD] * 10 + [Twist()] * 6
 
 
@@ -129,8 +130,8 @@ def test_a_bad_link_loses_the_same_commands_in_every_flight(simulate):
     def flight():
         commands = []
         for step in range(60):
-            simulation.drone.receive(Twist(Vector3(0.01 * step)))
-            commands += fly(simulation, 1, lambda: simulation.drone.command)
+            simulation.drone.commands.receive(Twist(Vector3(0.01 * step)))
+            commands += fly(simulation, 1, lambda: simulation.drone.commands.now)
         return commands
 
     first = flight()
@@ -143,20 +144,20 @@ def test_a_bad_link_loses_the_same_commands_in_every_flight(simulate):
 def test_a_snapshot_brings_back_what_is_under_way(simulate):
     simulation = simulate()
     simulation.drone.change_faults({"commands": {"latency": 0.3, "jitter": 0.3}})
-    simulation.drone.receive(FORWARD)
+    simulation.drone.commands.receive(FORWARD)
     snapshot = simulation.snapshot()
-    first = fly(simulation, 20, lambda: simulation.drone.command)
+    first = fly(simulation, 20, lambda: simulation.drone.commands.now)
     simulation.drone.change_faults({"commands": {"latency": 0, "jitter": 0}})
     simulation.restore(snapshot)
-    assert fly(simulation, 20, lambda: simulation.drone.command) == first
+    assert fly(simulation, 20, lambda: simulation.drone.commands.now) == first
     assert FORWARD in [command for _, command in first]
 
 
 def test_pictures_come_late_and_know_how_old_they_are(simulate):
     simulation = simulate(faults={"images": {"latency": 0.1}})
     camera = simulation.drone.cameras["front"]
-    camera.watched = lambda: True
-    simulation.drone.receive(FORWARD)
+    camera.viewers.add(lambda: True)
+    simulation.drone.commands.receive(FORWARD)
     taken, came = [], []
     look = camera.look
     camera.look = lambda: taken.append(look()) or taken[-1]
@@ -201,11 +202,11 @@ def test_sensors_fall_silent_freeze_and_come_back_as_if_nothing_had_been(simulat
 def test_cameras_fail_too(simulate):
     simulation = simulate(cameras={"front": {**SMALL["front"], "mount": None}})
     camera = simulation.drone.cameras["front"]
-    camera.watched = lambda: True
+    camera.viewers.add(lambda: True)
     fly(simulation, 1)
     first = camera.image
     simulation.drone.change_faults({"sensors": {"front": "frozen"}})
-    simulation.drone.push((3, 0, 0), (0, 0, 0.1), 0.3)
+    simulation.drone.pushes.add(Push((3, 0, 0), (0, 0, 0.1), 0.3))
     fly(simulation, 8)
     assert camera.image is first
     simulation.drone.change_faults({"sensors": {"front": "silent"}})
@@ -228,10 +229,10 @@ def test_parameter_timeline_and_call_fly_alike(simulate, tmp_path):
     by_parameter, by_timeline, by_call = simulate(faults=faults, weather=weather), simulate(), simulate()
     timeline.read(str(file), by_timeline.parameters).apply(0, by_timeline.vehicles)
     by_call.drone.change_faults(faults)
-    by_call.drone.change_weather(weather)
+    by_call.drone.context.change_weather(weather)
     flights = []
     for one in (by_parameter, by_timeline, by_call):
-        one.drone.receive(FORWARD)
+        one.drone.commands.receive(FORWARD)
         flights.append(fly(one, 40))
     assert flights[0] == flights[1] == flights[2]
 
@@ -252,7 +253,7 @@ def test_the_pages_example_is_allowed(tmp_path):
         ({"commands": {"latancy": 1}}, "faults/commands/latancy: unknown key; known are latency"),
         ({"images": {"latency": 3}}, "faults/images/latency = 3: input should be less than or equal to 2"),
         ({"sensors": {"front": "mad"}}, "faults/sensors/front = 'mad': input should be 'ok', 'silent' or 'frozen'"),
-        ({"sensors": {"frnt": "ok"}}, "faults/sensors/'frnt': no such sensor or camera; near names are front"),
+        ({"sensors": {"frnt": "ok"}}, "faults/sensors/frnt: no such sensor or camera; near names are front"),
         (5, "faults = 5: must hold `key: value` lines with propellers, commands, images, sensors, seed"),
     ],
 )

@@ -36,7 +36,7 @@ def path(simulation, name, steps):
     states = []
     for _ in range(steps):
         simulation.step()
-        states.append(simulation.vehicles[name].state)
+        states.append(simulation.vehicles[name].body.state)
     return states
 
 
@@ -46,17 +46,17 @@ def forward(speed):
 
 def test_a_number_of_vehicles_stands_in_a_row(fly):
     simulation = fly(vehicles=3)
-    places = {name: vehicle.state.position for name, vehicle in simulation.vehicles.items()}
+    places = {name: vehicle.body.state.position for name, vehicle in simulation.vehicles.items()}
     assert places == {"drone1": (0, 1, 0.8), "drone2": (0, 0, 0.8), "drone3": (0, -1, 0.8)}
 
 
 def test_each_obeys_its_own_commands(fly):
     simulation = fly(vehicles=THREE)
-    simulation.vehicles["drone1"].receive(forward(1.0))
-    simulation.vehicles["drone3"].receive(Twist(Vector3(0.0, 0.0, 0.5)))
+    simulation.vehicles["drone1"].commands.receive(forward(1.0))
+    simulation.vehicles["drone3"].commands.receive(Twist(Vector3(0.0, 0.0, 0.5)))
     for _ in range(100):
         simulation.step()
-    one, two, three = (vehicle.state.position for vehicle in simulation.vehicles.values())
+    one, two, three = (vehicle.body.state.position for vehicle in simulation.vehicles.values())
     assert one[0] > 3 and one[1:] == pytest.approx((0, 0.8), abs=0.05)
     assert two == pytest.approx((0, 3, 1.2), abs=0.005)
     assert three[2] > 3.5 and three[:2] == pytest.approx((2, -3), abs=0.01)
@@ -65,7 +65,7 @@ def test_each_obeys_its_own_commands(fly):
 def test_who_flies_in_company_flies_as_alone(fly):
     company, alone = fly(vehicles=THREE), fly(drone={"position": [0, 3, 1.2]})
     for simulation, name in ((company, "drone2"), (alone, "drone")):
-        simulation.vehicles[name].receive(Twist(Vector3(0.7, -0.2, 0.1), Vector3(0.0, 0.0, 0.4)))
+        simulation.vehicles[name].commands.receive(Twist(Vector3(0.7, -0.2, 0.1), Vector3(0.0, 0.0, 0.4)))
     assert path(company, "drone2", 200) == path(alone, "drone", 200)
 
 
@@ -74,10 +74,10 @@ def test_entries_change_what_they_name_alone(fly):
         vehicles={"slow": {"control": {"angle_max": 0.1}, "script_parameters": {"MyGain": 3}}, "fast": {"yaw": 1.0}},
         control={"angle_max": 0.4},
     )
-    slow, fast = simulation.vehicles.values()
-    assert slow.script_parameters["Drone"]["angle_max"] == 0.1 and slow.script_parameters["Drone"]["Kzref"] == 5.0
-    assert fast.script_parameters["Drone#0"]["angle_max"] == 0.4
-    assert slow.script_parameters["Drone"]["MyGain"] == 3.0 and "MyGain" not in fast.script_parameters["Drone#0"]
+    slow, fast = (one.parameters for one in simulation.child_scripts.values())
+    assert slow["angle_max"] == 0.1 and slow["Kzref"] == 5.0
+    assert fast["angle_max"] == 0.4
+    assert slow["MyGain"] == 3.0 and "MyGain" not in fast
 
 
 @pytest.mark.parametrize(
@@ -115,17 +115,17 @@ def test_they_collide_and_come_free(fly):
     simulation = fly(vehicles={"left": {"position": [0, 0, 1]}, "right": {"position": [1.5, 0, 1], "yaw": math.pi}})
     vehicles = simulation.vehicles.values()
     for vehicle in vehicles:
-        vehicle.receive(forward(0.6))
+        vehicle.commands.receive(forward(0.6))
     apart = []
     for _ in range(36):
         simulation.step()
-        apart.append(math.dist(*(vehicle.state.position for vehicle in vehicles)))
+        apart.append(math.dist(*(vehicle.body.state.position for vehicle in vehicles)))
     assert 0.3 < min(apart) < 0.4, "wing tip to wing tip: each is some 0.17 m long from its middle"
     for vehicle in vehicles:
-        vehicle.receive(forward(-0.6))
+        vehicle.commands.receive(forward(-0.6))
     for _ in range(80):
         simulation.step()
-    left, right = (vehicle.state.position for vehicle in vehicles)
+    left, right = (vehicle.body.state.position for vehicle in vehicles)
     assert right[0] - left[0] > 2 and left[2] == pytest.approx(right[2], abs=0.05) and left[2] > 0.5
 
 
@@ -133,7 +133,7 @@ def test_they_see_one_another(fly):
     simulation = fly(vehicles={"one": {}, "two": {"position": [1.5, 0, 0.9]}})
     camera = simulation.drone.cameras["front"]
     with_two = camera.take().astype(int)
-    simulation.vehicles["two"].move(Pose((-3.0, 0.0, 0.9)))
+    simulation.vehicles["two"].body.move(Pose((-3.0, 0.0, 0.9)))
     without = camera.take().astype(int)
     changed = np.abs(with_two - without).max(axis=2) > 20
     rows, columns = np.nonzero(changed)
@@ -155,20 +155,20 @@ def test_scripts_share_signals_and_find_their_own(fly, tmp_path):
     )
     simulation = fly(vehicles=3, script=str(script))
     simulation.step()
-    signals = simulation.drone.signals
-    assert signals.getInt32Signal("seen") == 3
-    assert [signals.getFloatSignal(f"y{number}") for number in (1, 2, 3)] == pytest.approx([1, 0, -1], abs=1e-6)
+    signals = simulation.context.signals
+    assert signals.get(int, "seen") == 3
+    assert [signals.get(float, f"y{number}") for number in (1, 2, 3)] == pytest.approx([1, 0, -1], abs=1e-6)
 
 
 def test_who_comes_and_goes_disturbs_nobody(fly):
     quiet, busy = fly(vehicles=THREE), fly(vehicles=THREE)
     for simulation in (quiet, busy):
-        simulation.vehicles["drone2"].receive(Twist(Vector3(0.5, 0.1, 0.0), Vector3(0.0, 0.0, 0.3)))
+        simulation.vehicles["drone2"].commands.receive(Twist(Vector3(0.5, 0.1, 0.0), Vector3(0.0, 0.0, 0.3)))
     expected = path(quiet, "drone2", 90)
     flown = path(busy, "drone2", 30)
     assert busy.set_vehicles({**THREE, "guest": {"position": [-2, 0, 1]}}) == (["guest"], [])
     flown += path(busy, "drone2", 30)
-    assert busy.vehicles["guest"].state.position == pytest.approx((-2, 0, 1), abs=0.02), "it hovers"
+    assert busy.vehicles["guest"].body.state.position == pytest.approx((-2, 0, 1), abs=0.02), "it hovers"
     assert busy.set_vehicles({name: THREE[name] for name in ("drone2", "drone3")}) == ([], ["drone1", "guest"])
     flown += path(busy, "drone2", 30)
     assert flown == expected
@@ -177,17 +177,17 @@ def test_who_comes_and_goes_disturbs_nobody(fly):
 
 def test_fifty_times_leave_nothing_behind(fly):
     simulation = fly(vehicles=2)
-    files, names, visuals = open_files(), set(simulation.drone.objects.names), len(simulation.world.visuals())
+    files, names, visuals = open_files(), set(simulation.context.objects.names), len(simulation.world.visuals())
     for _ in range(50):
         simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {"position": [-2, 0, 1]}})
         simulation.step()
         simulation.set_vehicles({"drone1": {}, "drone2": {}})
         simulation.step()
     assert open_files() == files
-    assert set(simulation.drone.objects.names) == names
+    assert set(simulation.context.objects.names) == names
     assert len(simulation.world.visuals()) == visuals
     simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {}})
-    assert simulation.vehicles["guest"].own_script == "Drone#1", "the suffix that is free"
+    assert simulation.vehicles["guest"].object_name == "Drone#1", "the suffix that is free"
 
 
 def test_what_they_took_is_given_back(fly):
@@ -239,11 +239,11 @@ def test_a_new_one_whose_script_fails_goes_again(fly, tmp_path):
 
 def test_one_that_cannot_be_built_leaves_nothing(fly):
     simulation = fly(vehicles=1)
-    names, bodies = set(simulation.drone.objects.names), len(simulation.world.visuals())
+    names, bodies = set(simulation.context.objects.names), len(simulation.world.visuals())
     wrong = {"guest": {"cameras": {"front": {"frame": "nowhere"}}, "position": [2, 0, 1]}}
     with pytest.raises(parameters.ParameterError, match="nowhere"):
         simulation.set_vehicles({"drone1": {}, **wrong})
-    assert set(simulation.drone.objects.names) == names and len(simulation.world.visuals()) == bodies
+    assert set(simulation.context.objects.names) == names and len(simulation.world.visuals()) == bodies
     simulation.step()
 
 
@@ -252,20 +252,20 @@ def test_start_brings_back_those_that_were_set(fly):
     simulation.set_vehicles({"drone1": {"position": [1, 1, 1]}})
     assert list(simulation.vehicles) == ["drone1"]
     simulation.start()
-    assert simulation.drone.state.position == (1, 1, 1)
+    assert simulation.drone.body.state.position == (1, 1, 1)
 
 
 def test_snapshots_bring_all_back_until_one_comes(fly):
     simulation = fly(vehicles=3)
     for vehicle in simulation.vehicles.values():
-        vehicle.receive(forward(0.3))
+        vehicle.commands.receive(forward(0.3))
     path(simulation, "drone1", 20)
     snapshot = simulation.snapshot()
-    flown = [path(simulation, "drone1", 20), [vehicle.state for vehicle in simulation.vehicles.values()]]
+    flown = [path(simulation, "drone1", 20), [vehicle.body.state for vehicle in simulation.vehicles.values()]]
     simulation.restore(snapshot)
-    assert [path(simulation, "drone1", 20), [vehicle.state for vehicle in simulation.vehicles.values()]] == flown
+    assert [path(simulation, "drone1", 20), [vehicle.body.state for vehicle in simulation.vehicles.values()]] == flown
     simulation.set_vehicles(4)
-    with pytest.raises(ValueError, match="a vehicle that comes or goes"):
+    with pytest.raises(ValueError, match="a vehicle or shape that comes or goes"):
         simulation.restore(snapshot)
 
 
@@ -276,12 +276,12 @@ def test_a_scene_says_who_flies_and_is_saved(fly, tmp_path):
     )
     simulation = fly(scene_file=str(scene), vehicles=7)
     assert list(simulation.vehicles) == ["red", "blue"]
-    simulation.vehicles["blue"].move(Pose((-1.5, 2.0, 1.0)))
+    simulation.vehicles["blue"].body.move(Pose((-1.5, 2.0, 1.0)))
     simulation.save_scene(tmp_path / "saved.yaml")
     saved = yaml.safe_load((tmp_path / "saved.yaml").read_text())["vehicles"]
     assert saved["red"]["script"] == "target" and saved["blue"]["position"] == [-1.5, 2.0, 1.0]
     again = fly(scene_file=str(tmp_path / "saved.yaml"))
-    assert again.vehicles["blue"].state.position == (-1.5, 2.0, 1.0)
+    assert again.vehicles["blue"].body.state.position == (-1.5, 2.0, 1.0)
 
 
 def test_a_wrong_vehicle_of_a_scene_is_named_with_its_line(tmp_path):

@@ -65,11 +65,15 @@ def test_csv_holds_the_flight_to_the_last_bit(tmp_path, commands):
 
     simulation = Simulation(parameters.load())
     for step, row in enumerate(rows):
-        drone, state = simulation.drone, simulation.drone.state
+        drone, state = simulation.drone, simulation.drone.body.state
         assert row[:14] == [simulation.time, *(number for part in state for number in part)]
-        assert row[14:] == [*drone.command.linear, drone.command.angular.z, *drone.particle_velocities]
+        assert row[14:] == [
+            *drone.commands.now.linear,
+            drone.commands.now.angular.z,
+            *drone.propulsion.particle_velocities,
+        ]
         if step == 3:
-            drone.receive(Twist(Vector3(1, 0, 0.2), Vector3(0, 0, 0.5)))
+            drone.commands.receive(Twist(Vector3(1, 0, 0.2), Vector3(0, 0, 0.5)))
         simulation.step()
     simulation.close()
 

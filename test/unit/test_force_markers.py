@@ -9,9 +9,10 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.world import World
+from drone_sim.world.queries import Queries
 
 force_markers = pytest.importorskip("drone_sim.ros.rviz.force_markers")
+marker_topics = pytest.importorskip("drone_sim.ros.rviz.marker_topics")
 pytestmark = pytest.mark.ros
 
 SOUND = (1.0, 1.0, 1.0, 1.0)
@@ -36,7 +37,7 @@ class Topic:
 
 @pytest.fixture(name="shown")
 def _shown(monkeypatch):
-    monkeypatch.setattr(force_markers, "MarkerTopic", Topic)
+    monkeypatch.setattr(marker_topics, "MarkerTopic", Topic)
     made = []
 
     def shown(steps=0, **overrides):
@@ -66,7 +67,7 @@ def in_world(marker, vehicle):
     """Return where the points of a marker on base_link are in the world, (n, 3)."""
     place, turn = marker.pose.position, marker.pose.orientation
     pose = Pose((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
-    matrix = frames.multiply(vehicle.matrix, pose.matrix)
+    matrix = frames.multiply(vehicle.body.matrix, pose.matrix)
     return np.array([frames.transform(matrix, (one.x, one.y, one.z)) for one in marker.points])
 
 
@@ -87,7 +88,7 @@ def test_at_hover_the_thrusts_hold_the_weight_where_the_propellers_are(shown):
         thrust, *others = markers._topic.messages[-1]
         assert others == [None] * 4, "neither wind nor contacts"
         found = arrows(thrust)
-        for (start, way), link, newtons in zip(found, drone.propulsion.rotors.links, drone.propulsion.thrusts):
+        for (start, way), link, newtons in zip(found, drone.propulsion.rotors.links, drone.body.thrusts):
             assert start == pytest.approx(frames.position(link))
             assert way == pytest.approx(np.array((link[2], link[6], link[10])) * newtons * scale_of(drone), abs=5e-5)
         sums.append(sum(np.linalg.norm(way) for _, way in found))
@@ -115,8 +116,8 @@ def test_the_wind_is_an_arrow_as_long_as_it_is_fast_however_the_drone_leans(show
     _, arrow, text, *_ = markers._topic.messages[-1]
     start, tip = in_world(arrow, drone)[:2]
     assert tip - start == pytest.approx(force_markers.WIND * np.array(drone.body.wind))
-    assert start[:2] == pytest.approx(drone.state.position[:2])
-    assert abs(frames.to_euler(drone.matrix)[0]) > 0.01, "it leans"
+    assert start[:2] == pytest.approx(drone.body.state.position[:2])
+    assert abs(frames.to_euler(drone.body.matrix)[0]) > 0.01, "it leans"
     assert text.text == f"wind {np.linalg.norm(drone.body.wind):.1f} m/s"
     assert (arrow.ns, text.ns) == ("wind", "wind")
     assert gusts or text.text == "wind 5.0 m/s"
@@ -124,7 +125,7 @@ def test_the_wind_is_an_arrow_as_long_as_it_is_fast_however_the_drone_leans(show
 
 def test_where_the_wind_has_dropped_there_is_no_arrow_and_its_speed_is_0(shown):
     simulation, markers = shown()
-    simulation.drone.change_weather({"wind": [0, 0, 0]})
+    simulation.drone.context.change_weather({"wind": [0, 0, 0]})
     simulation.step()
     markers.update()
     _, arrow, text, *_ = markers._topic.messages[-1]
@@ -150,7 +151,7 @@ def test_a_crash_is_drawn_no_longer_than_it_fits():
 
 def test_what_was_put_elsewhere_touches_nothing_before_the_next_step(shown):
     simulation, markers = shown(**STANDING, steps=5)
-    simulation.drone.move(Pose((3.0, 0.0, 2.0)))
+    simulation.drone.body.move(Pose((3.0, 0.0, 2.0)))
     markers.update()
     assert markers._topic.messages[-1][3:] == [None, None]
     simulation.stop()
@@ -159,7 +160,7 @@ def test_what_was_put_elsewhere_touches_nothing_before_the_next_step(shown):
 
 
 def test_what_has_not_changed_is_not_sent_again_and_each_vehicle_has_its_place(shown, monkeypatch):
-    monkeypatch.setattr(force_markers, "namespace", lambda _simulation: "drone_sim")
+    monkeypatch.setattr(marker_topics, "namespace", lambda _simulation: "drone_sim")
     simulation, markers = shown(vehicles={"a": {}, "b": {"position": [0, 2, 0.8]}}, steps=2)
     markers.update()
     (message,) = markers._topic.messages
@@ -172,20 +173,20 @@ def test_what_has_not_changed_is_not_sent_again_and_each_vehicle_has_its_place(s
 
 def crashed(simulation, markers):
     """Let it fall against a wall, and lie; return all its states."""
-    simulation.drone.receive(Twist(Vector3(1.0, 0, 0)))
+    simulation.drone.commands.receive(Twist(Vector3(1.0, 0, 0)))
     simulation.drone.change_faults({"propellers": [0, 1, 1, 1]})
     states = []
     for _ in range(80):
         simulation.step()
         markers.update()
-        states.append(simulation.drone.state)
+        states.append(simulation.drone.body.state)
     return states
 
 
 def test_whoever_looks_changes_nothing_and_nothing_is_read_for_nobody(shown, monkeypatch):
     asked = itertools.count()
-    read = World.contacts
-    monkeypatch.setattr(World, "contacts", lambda *of: (next(asked), read(*of))[1])
+    read = Queries.contacts
+    monkeypatch.setattr(Queries, "contacts", lambda *of: (next(asked), read(*of))[1])
     wall = {"scene": {"objects": [WALL]}}
     monkeypatch.setattr(Topic, "watched", False)
     states = crashed(*shown(**wall))

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from drone_sim.files.resources import package_path
 from drone_sim.grading.criteria import KINDS
-from drone_sim.grading.flown import UNITS, Said, Touch
+from drone_sim.grading.flight_record import UNITS, ContactEvent, ValueChange
 
 T = times()
 STEP = {"of": "vx", "after": 0.0, "from": 0.0, "to": 1.0}
@@ -162,7 +162,7 @@ def test_who_waits_at_the_beginning_of_a_path_has_not_flown_it():
 def test_formation_turns_with_the_leader_where_it_is_to():
     left = math.sqrt(0.5)
     leader = np.column_stack((T, 0 * T, 0 * T, 0 * T, 0 * T, left + 0 * T, left + 0 * T))
-    behind = {"more": {"others": {"lead": leader}}}
+    behind = {"more": {"other_poses": {"lead": leader}}}
     assert judged(flown(T, x=T - 1, **behind), "formation", to="lead", offset=[-1, 0, 0], at_most=1e-9).passed
     turned = judged(flown(T, x=T, y=-1, **behind), "formation", to="lead", offset=[-1, 0, 0], turns=True, at_most=1e-9)
     assert turned.passed
@@ -178,9 +178,9 @@ def test_formation_turns_with_the_leader_where_it_is_to():
 
 def _landing(speed=0.5, until=10.0, x=0.0, first=4.0, **more):
     """Come down at 4 s and stand."""
-    touches = [Touch(at, "Floor") for at in T if first <= at <= until]
+    touches = [ContactEvent(at, "Floor") for at in T if first <= at <= until]
     return flown(
-        T, x=x, z=np.maximum(2 - speed * T, 0), vz=np.where(T < 4, -speed, 0), more={"touches": touches, **more}
+        T, x=x, z=np.maximum(2 - speed * T, 0), vz=np.where(T < 4, -speed, 0), more={"contacts": touches, **more}
     )
 
 
@@ -199,9 +199,9 @@ def test_a_landing_has_a_place_and_a_speed():
     [
         (_landing(until=3.0), "is in the air at 10.00 s"),
         (_landing(first=0.0), "never took off"),
-        (_landing(states=(Said(0, "flying"), Said(5, "crashed"))), "it has crashed, as its script says"),
+        (_landing(states=(ValueChange(0, "flying"), ValueChange(5, "crashed"))), "it has crashed, as its script says"),
         (
-            flown(T, vx=1.0, more={"touches": [Touch(at, "Floor") for at in T[400:]]}),
+            flown(T, vx=1.0, more={"contacts": [ContactEvent(at, "Floor") for at in T[400:]]}),
             "still moves with 1 m/s at 10.00 s",
         ),
     ],
@@ -213,7 +213,8 @@ def test_what_is_no_landing(flight, said):
 
 
 def test_no_contact_but_with_what_is_allowed():
-    flight = flown(T, more={"touches": [Touch(1.0, "Floor"), Touch(2.5, "Pole"), Touch(2.5, "Tree")]})
+    contacts = [ContactEvent(1.0, "Floor"), ContactEvent(2.5, "Pole"), ContactEvent(2.5, "Tree")]
+    flight = flown(T, more={"contacts": contacts})
     outcome = judged(flight, "no_contact", allow=["Floor"])
     assert (outcome.passed, outcome.value, outcome.at) == (False, 2.0, 2.5)
     assert outcome.said == "touched Pole, Tree, first Pole at 2.50 s; allowed is only Floor"
@@ -236,19 +237,19 @@ def test_no_contact_but_with_what_is_allowed():
     ],
 )
 def test_a_signal_is_compared(said, equals, tolerance, passes):
-    flight = flown(T, more={"said": {"count": [Said(1.0, 0), Said(2.0, said)]}})
+    flight = flown(T, more={"values": {"count": [ValueChange(1.0, 0), ValueChange(2.0, said)]}})
     assert judged(flight, "signal", signal="count", equals=equals, tolerance=tolerance).passed == passes
 
 
 def test_a_signal_counts_as_it_was_at_the_end_of_the_part():
-    flight = flown(T, more={"said": {"count": [Said(1.0, 3), Said(6.0, None)]}})
+    flight = flown(T, more={"values": {"count": [ValueChange(1.0, 3), ValueChange(6.0, None)]}})
     assert judged(flight, "signal", signal="count", equals=3, until=5).passed
     assert judged(flight, "signal", signal="count", equals=3).said == "nothing was said by count until 10.00 s"
 
 
 def test_a_field_of_a_message():
     message = {"pose": {"position": {"x": 1.5}}}
-    flight = flown(T, more={"said": {"goal": [Said(1.0, message)]}})
+    flight = flown(T, more={"values": {"goal": [ValueChange(1.0, message)]}})
     assert judged(flight, "signal", topic="goal", field="pose.position.x", equals=1.5).passed
     assert "has no field pose.x" in judged(flight, "signal", topic="goal", field="pose.x", equals=1.5).said
 

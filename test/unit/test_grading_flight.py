@@ -8,9 +8,10 @@ import pytest
 from drone_sim.files.resources import package_path
 from drone_sim.grading import flight, plan
 from drone_sim.grading.plan import PlanError
+from drone_sim.grading.randomization import Randomization
 from drone_sim.grading.result import Result
-from drone_sim.grading.spread import Spread
 from drone_sim.offline import fly
+from drone_sim.world import connect_ahead
 
 STEP = """
 duration: 3
@@ -71,7 +72,7 @@ def said(result):
 def test_a_flight_is_the_same_to_the_bit_whatever_flew_before(written):
     steps = written()
     first = [flight.grade(steps, seed=seed) for seed in (0, 1, 2)]
-    flight.prepare()
+    connect_ahead()
     again = [flight.grade(pickle.loads(pickle.dumps(steps)), seed=seed) for seed in (2, 1, 0)]
     assert first == again[::-1]
     assert len({one.digest for one in first}) == 3
@@ -93,7 +94,7 @@ def test_seed_0_is_the_plan_as_it_stands_and_the_table_is_that_of_fly(written, t
 
 def test_what_a_seed_draws_depends_on_nothing_else(written):
     steps = written()
-    start, other = steps.parameters(1), steps.model_copy(update={"spread": Spread(position=(0.2, 0.2, 0.1))})
+    start, other = steps.parameters(1), steps.model_copy(update={"spread": Randomization(position=(0.2, 0.2, 0.1))})
     (own,) = start.fleet
     assert own.position != steps.parameters(0).fleet[0].position
     assert own.position == other.parameters(1).fleet[0].position
@@ -242,6 +243,72 @@ criteria:
     assert early.said.startswith("is in the air at 1.00 s")
 
 
+PLAYING = """
+duration: 1
+timeline:
+  - {at: 0.3, pose: {position: [0, 0, 1]}}
+  - {at: 0.6, reset: {}}
+  - {at: 0.6, push: {force: [1, 0, 0], duration: 0.1}}
+criteria:
+  - {kind: drift, at_most: 1}
+  - {kind: reach, places: [[0, 0, 0.8], [5, 0, 2]], within: 0.5, partial: true}
+"""
+CHEATS = {  # what a script does in a step, and what is said of it
+    "position.py": ("sim.setObjectPosition(self.d, -1, [5, 0, 2])", "moved"),
+    "pose.py": ("sim.setObjectPose(self.d, -1, [5, 0, 2, 0, 0, 0, 1])", "moved"),
+    "gate.py": ("sim.getSimulationTime() < 0.2 or sim.setObjectPosition(self.d, -1, [5, 0, 2])", "moved"),
+    "carrier.py": ("sim.setObjectParent(self.d, self.t, True); sim.setObjectPosition(self.t, -1, [5, 0, 2])", "moved"),
+    "torque.py": ("sim.addForceAndTorque(self.d, [0, 0, 2], [0, 0, 0])", "pushed"),
+    "force.py": ("sim.addForce(self.d, [0, 0, 0], [0, 0, 2])", "pushed"),
+    "floor.py": ("sim.createPureShape(0, 24, [1, 1, 0.1], 1)", "changed"),
+    "floor.lua": ("sim.createPureShape(0, 24, {1, 1, 0.1}, 1)", "changed"),
+    "position.lua": ("sim.setObjectPosition(d, -1, {5, 0, 2})", "moved"),
+    "torque.lua": ("sim.addForceAndTorque(d, {0, 0, 2}, {0, 0, 0})", "pushed"),
+}
+IN_PYTHON = """
+def sysCall_init():
+    self.d, self.t = sim.getObjectHandle("Quadricopter"), sim.getObjectHandle("Track_base")
+    sim.setObjectParent(self.t, -1, True)
+
+def sysCall_PHASE():
+    DOES
+"""
+IN_LUA = """
+function sysCall_init()
+    d = sim.getObjectHandle("Quadricopter")
+end
+
+function sysCall_PHASE()
+    DOES
+end
+"""
+
+
+@pytest.mark.parametrize("phase", ["actuation", "sensing"])
+@pytest.mark.parametrize("name", CHEATS)
+def test_who_moves_or_pushes_the_drone_himself_gains_nothing_by_it(written, tmp_path, name, phase):
+    does, done = CHEATS[name]
+    source = IN_LUA if name.endswith(".lua") else IN_PYTHON
+    (tmp_path / name).write_text(source.replace("PHASE", phase).replace("DOES", does))
+    action, whom = {"moved": ("move", "drone"), "pushed": ("push", "drone"), "changed": ("change", "the scene")}[done]
+    result = flight.grade(written(PLAYING), str(tmp_path / name))
+    assert result.error.startswith(f"a script {done} {whom} at 0.")
+    assert result.error.endswith(f" s; the plan does not allow that (allowed: [{action}] would)")
+    assert not result.passed
+    assert [one.points for one in result.outcomes] in ([0.0, 0.5], [0.0, 0.0])  # the place where it began, at most
+    assert result.flown < 0.3
+
+    allowed = flight.grade(written(PLAYING + f"allowed: [{action}]\n"), str(tmp_path / name))
+    assert allowed.error is None
+    assert allowed.flown == pytest.approx(1)
+
+
+def test_what_the_plan_itself_does_breaks_no_rule(written):
+    result = flight.grade(written(PLAYING))
+    assert result.error is None
+    assert result.flown == pytest.approx(1)
+
+
 WRONG = {
     "": "must hold `key: value` lines, of which one is `criteria`, not None",
     "duration: 5": "criteria: missing",
@@ -249,7 +316,7 @@ WRONG = {
     "duration: 5\ncriteria:\n- {kind: rise_tme}": "line 3: criteria/0/kind = 'rise_tme': must be one of 'rise_time', ",
     "duration: 5\ncriteria:\n- {kind: stays, of: vxx, at_most: 1}": "line 3: criteria/0/of = 'vxx': no such column of",
     "duration: 5\ncriteria:\n- {kind: stays, of: vx}": "line 3: criteria/0/at_most: missing; there must be",
-    "duration: 5\ncriteria:\n- {kind: no_contact}\n- {kind: no_contact}": "criteria/1/name = 'no_contact' comes twice",
+    "duration: 5\ncriteria:\n- {kind: no_contact}\n- {kind: no_contact}": "criteria/1/name = 'no_contact': comes twice",
     "duration: 5\ncriteria:\n- {kind: no_contact, until: 9}": "line 3: criteria/0/until = 9: the flight lasts 5 s",
     "duration: 5\ncriteria:\n- {kind: landed, at: [1, 2, 3]}": "criteria/0/at = [1, 2, 3]: must be 2 numbers",
     "duration: 5\ncriteria:\n- {kind: rise_time, of: vx, from: 1, to: 1, at_most: 1}": "criteria/0/to = 1: is where it",
@@ -263,7 +330,7 @@ BESIDE = {
     "config: 3": "line 1: config = 3: must hold keys of config/drone.yaml, or be the name of a file",
     "timeline: [{at: 1, twst: {}}]": "line 1: entry 1: twst: unknown key",
     "timeline: 3": "line 1: timeline = 3: ",
-    "spread: {objects: {Box: [1, 1, 1]}}": "line 1: spread/objects/'Box': the scene has none",
+    "spread: {objects: {Box: [1, 1, 1]}}": "line 1: spread/objects/Box: the scene has none",
     "spread: {position: [1, 1]}": "line 1: spread/position = [1, 1]: must be 3 numbers",
 }
 

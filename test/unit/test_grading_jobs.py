@@ -8,6 +8,8 @@ import resource
 import socket
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -15,9 +17,9 @@ import pytest
 from drone_sim.grading import grade, sweep, tasks
 from drone_sim.grading import plan as plans
 from drone_sim.grading.jobs import files, pool, sandbox, settings
-from drone_sim.grading.jobs.job import job_of
-from drone_sim.grading.jobs.pool import Orders, PoolError
-from drone_sim.grading.jobs.process import Warm
+from drone_sim.grading.jobs.fork_server_client import ForkServerClient
+from drone_sim.grading.jobs.job import Job, contents_of, key_of
+from drone_sim.grading.jobs.pool import FlightOptions, PoolError
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 SETTINGS = settings.load({"limits": {"seconds": 5.0, "patience": 2.0, "memory": 256}, "batches": {"largest": 1}})
@@ -66,7 +68,7 @@ LOOKS = {
     "a link out of its folder": "(HERE / 'away.csv').read_text()",
     "solutions": "[str(one) for one in Path({tasks!r}).rglob('*') if one.is_file()]",
     "the checkout": "[one for one in ('.git', 'test', 'docs', 'dev.sh') if Path({root!r}, one).exists()]",
-    "temporary files": "[one for one in Path('/tmp').rglob('*') if one.is_file() and one.name != 'hold.yaml']",
+    "temporary files": "[one for one in Path('/tmp').rglob('*') if one.is_file() and not shown(str(one))]",
     "what runs": "os.listdir('/run')",
     "homes": "[one for one in ('/root', '/home') if os.path.exists(one) and not needed(one)]",
     "passwords": "Path('/etc/passwd').read_text()",
@@ -92,6 +94,9 @@ def connected(path):
 def needed(folder):
     return any(one.startswith(folder) for one in (sys.prefix, sys.base_prefix, {root!r}, {folder!r}))
 
+def shown(file):
+    return file.endswith("/hold.yaml") or file.startswith((sys.prefix, {root!r} + "/"))
+
 def open_elsewhere(number):
     try:
         mode = os.fstat(int(number)).st_mode
@@ -108,6 +113,11 @@ def sysCall_init():
     if found or gains != "1,2":
         raise RuntimeError(found)
 """
+
+
+def job_of(plan, path, seed, changes=None):
+    changes = changes or {}
+    return Job(str(plan.path), path, seed, changes, key_of(contents_of(plan, path), seed, changes))
 
 
 def no_sandbox():
@@ -131,20 +141,20 @@ def plan(folder):
 
 
 @pytest.fixture(scope="module")
-def warm():
-    with contextlib.closing(Warm(SETTINGS.limits, sandboxed=not no_sandbox())) as made:
+def server():
+    with contextlib.closing(ForkServerClient(SETTINGS.limits, sandboxed=not no_sandbox())) as made:
         yield made
 
 
 @pytest.fixture
-def programs(warm, monkeypatch, tmp_path):
-    """The programs fly with the warm process that is there, and keep their results in a folder of their own."""
+def programs(server, monkeypatch, tmp_path):
+    """The programs fly with the fork server that is there, and keep their results in a folder of their own."""
 
     class Lent:
         def __init__(self, *_):
-            self.fly, self.close = warm.fly, lambda: None
+            self.fly, self.close = server.fly, lambda: None
 
-    monkeypatch.setattr(pool, "Warm", Lent)
+    monkeypatch.setattr(pool, "ForkServerClient", Lent)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
 
@@ -167,29 +177,29 @@ def processes():
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_what_a_script_does_costs_its_own_flight(name, warm, plan, folder):
+def test_what_a_script_does_costs_its_own_flight(name, server, plan, folder):
     body, said = HOSTILE[name]
-    flight = warm.fly(job_of(plan, script(folder, name, body), 0))
+    flight = server.fly(job_of(plan, script(folder, name, body), 0))
     assert not flight.result.passed
     assert said in flight.result.error and "\n" not in flight.result.error
-    assert warm.fly(job_of(plan, "", 0)).result.passed
+    assert server.fly(job_of(plan, "", 0)).result.passed
 
 
 @pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
 @pytest.mark.parametrize("name", IN_A_SANDBOX)
-def test_in_the_sandbox_nothing_else_is_in_reach(name, warm, plan, folder):
+def test_in_the_sandbox_nothing_else_is_in_reach(name, server, plan, folder):
     import socket
 
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        body = IN_A_SANDBOX[name].format(folder=str(folder), port=server.getsockname()[1])
-        result = warm.fly(job_of(plan, script(folder, name, body), 0)).result
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        body = IN_A_SANDBOX[name].format(folder=str(folder), port=listener.getsockname()[1])
+        result = server.fly(job_of(plan, script(folder, name, body), 0)).result
     assert (result.error is None) == (name in ("kills", "stops"))  # a signal to the first process has no effect
     assert sorted(path.suffix for path in folder.iterdir() if path.stem in ("hold", "written")) == [".yaml"]
 
 
 @pytest.mark.skipif(bool(no_sandbox()), reason=no_sandbox())
 @pytest.mark.parametrize("what", LOOKS)
-def test_in_the_sandbox_nothing_else_is_to_be_seen(what, warm, plan, tmp_path, monkeypatch):
+def test_in_the_sandbox_nothing_else_is_to_be_seen(what, server, plan, tmp_path, monkeypatch):
     (tmp_path / "other.py").write_text("def sysCall_init():\n    pass\n")
     (tmp_path / "unnamed.csv").write_text("3")
     (tmp_path / "gains.csv").write_text("1,2")
@@ -203,54 +213,54 @@ def test_in_the_sandbox_nothing_else_is_to_be_seen(what, warm, plan, tmp_path, m
         open_here.callback(os.close, os.open(tmp_path / "fifo", os.O_RDONLY | os.O_NONBLOCK))
         monkeypatch.chdir(tmp_path)  # a UNIX socket's whole path may be too long
         for address in ("socket", abstract):
-            server = open_here.enter_context(socket.socket(socket.AF_UNIX))
-            server.bind(address)
-            server.listen()
-        assert warm.fly(job_of(plan, str(looking), 0)).result.error is None
+            listener = open_here.enter_context(socket.socket(socket.AF_UNIX))
+            listener.bind(address)
+            listener.listen()
+        assert server.fly(job_of(plan, str(looking), 0)).result.error is None
 
 
-def test_a_process_that_a_script_leaves_is_ended(warm, plan, folder):
+def test_a_process_that_a_script_leaves_is_ended(server, plan, folder):
     waits = "[sys.executable, '-c', 'input()', 'left-behind'], stdin=-1, start_new_session=True"
     body = f"import subprocess, sys; subprocess.Popen({waits})"
-    assert warm.fly(job_of(plan, script(folder, "daemon", body), 0)).result.passed
+    assert server.fly(job_of(plan, script(folder, "daemon", body), 0)).result.passed
     assert not processes()
 
 
-def test_a_script_that_forks_is_graded_once(warm, plan, folder):
-    alone = warm.fly(job_of(plan, script(folder, "alone", "pass"), 0)).result
-    forked = warm.fly(job_of(plan, script(folder, "forks", "import os; os.fork()"), 0)).result
+def test_a_script_that_forks_is_graded_once(server, plan, folder):
+    alone = server.fly(job_of(plan, script(folder, "alone", "pass"), 0)).result
+    forked = server.fly(job_of(plan, script(folder, "forks", "import os; os.fork()"), 0)).result
     assert forked.passed and forked.digest == alone.digest
 
 
 def test_a_flight_has_its_time(plan, folder):
     limits = SETTINGS.limits.model_copy(update={"seconds": 2.0, "seconds_per_second": 0.0, "patience": 1.0})
-    with contextlib.closing(Warm(limits, sandboxed=False)) as warm:
+    with contextlib.closing(ForkServerClient(limits, sandboxed=False)) as server:
         job = job_of(plan, script(folder, "sleeps", "import ctypes; ctypes.CDLL(None).sleep(1000)"), 0)
-        flight = warm.fly(job)
+        flight = server.fly(job)
         assert flight.is_lost and flight.result.error == "the script did not end within 2 s of real time"
 
         # Without a sandbox a script can end whoever watches it; the next flight is another's.
-        killed = warm.fly(job_of(plan, script(folder, "kills", IN_A_SANDBOX["kills"]), 0))
+        killed = server.fly(job_of(plan, script(folder, "kills", IN_A_SANDBOX["kills"]), 0))
         assert killed.is_lost and killed.result.error == "the script ended the process that watches its flight"
-        assert warm.fly(job_of(plan, "", 0)).result.passed
-        temporary = warm._folder
+        assert server.fly(job_of(plan, "", 0)).result.passed
+        temporary = server._folder
         assert os.listdir(temporary) == []
     assert not os.path.exists(temporary)
 
 
-def test_the_table_is_that_of_fly(warm, plan):
-    flight = warm.fly(job_of(plan, "", 0), table=True)
+def test_the_table_is_that_of_fly(server, plan):
+    flight = server.fly(job_of(plan, "", 0), table=True)
     lines = flight.table.decode().splitlines()
     assert lines[0].startswith("t [s],x [m]") and len(lines) == 1 + 5
 
 
-def test_a_plan_that_is_replaced_is_flown_as_it_is_by_then(warm, folder, tmp_path):
+def test_a_plan_that_is_replaced_is_flown_as_it_is_by_then(server, folder, tmp_path):
     path = tmp_path / "changed.yaml"
     for duration, steps in (("0.2", 5), ("0.4", 9)):
         (tmp_path / "new.yaml").write_text(PLAN.replace("0.2\n", f"{duration}\nscene: room{duration}.yaml\n", 1))
         (tmp_path / f"room{duration}.yaml").write_text("objects: []\n")
         os.replace(tmp_path / "new.yaml", path)
-        flight = warm.fly(job_of(plans.read(path), "", 0), table=True)
+        flight = server.fly(job_of(plans.read(path), "", 0), table=True)
         assert flight.result.error is None and len(flight.table.splitlines()) == 1 + steps
 
 
@@ -297,7 +307,7 @@ def test_what_cannot_be_read_costs_its_own_flights(programs, folder, tmp_path, c
         assert ODD[what][1] in errors[str(path)] and str(path) in errors[str(path)] and "\n" not in errors[str(path)]
 
 
-def test_names_in_a_script_lead_to_nothing_that_hangs_or_lies_elsewhere(warm, plan, tmp_path):
+def test_names_in_a_script_lead_to_nothing_that_hangs_or_lies_elsewhere(server, plan, tmp_path):
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "away").symlink_to("/proc/self")
     (tmp_path / "huge.bin").touch()
@@ -306,7 +316,7 @@ def test_names_in_a_script_lead_to_nothing_that_hangs_or_lies_elsewhere(warm, pl
     named = Path(script(tmp_path, "named", "import helper"))
     named.write_text(f"# {' '.join(NAMED)} helper\n{named.read_text()}")
     assert files.of_script(plan, str(named)) == [named, tmp_path / "helper.py"]
-    assert warm.fly(job_of(plan, str(named), 0)).result.passed
+    assert server.fly(job_of(plan, str(named), 0)).result.passed
 
 
 def test_a_script_has_what_it_names_beside_it_but_nobody_elses(plan, tmp_path):
@@ -367,16 +377,16 @@ def two_workers():
                 one.wait(60)
 
 
-def test_a_worker_that_is_killed_loses_no_flight_and_results_are_the_same_everywhere(plan, warm):
+def test_a_worker_that_is_killed_loses_no_flight_and_results_are_the_same_everywhere(plan, server):
     from distributed import Client
 
     jobs = [job_of(plan, "", seed) for seed in range(8)]
-    alone = {job.seed: warm.fly(job).result for job in jobs}
-    orders = Orders(SETTINGS.limits, SETTINGS.batches, sandboxed=False)
+    alone = {job.seed: server.fly(job).result for job in jobs}
+    options = FlightOptions(SETTINGS.limits, SETTINGS.batches, sandboxed=False)
     with two_workers() as (address, workers):
         with Client(address) as client:
             client.wait_for_workers(2, timeout=60)
-        with pool.opened(orders, scheduler=address) as fly:
+        with pool.opened(options, scheduler=address) as fly:
             flights = []
             for flight in fly(jobs):
                 flights.append(flight)
@@ -386,16 +396,39 @@ def test_a_worker_that_is_killed_loses_no_flight_and_results_are_the_same_everyw
     assert {one.job.seed: one.result for one in flights} == alone
 
 
-def test_two_workers_here_and_files_that_are_others(plan, warm):
+def test_two_workers_here_and_files_that_are_others(plan, server):
     jobs = [job_of(plan, "", seed) for seed in range(4)]
     other = [*jobs, type(jobs[0])(jobs[0].plan, "", 9, {}, "another key")]
-    with pool.opened(Orders(SETTINGS.limits, SETTINGS.batches, not no_sandbox()), workers=2) as fly:
+    with pool.opened(FlightOptions(SETTINGS.limits, SETTINGS.batches, not no_sandbox()), workers=2) as fly:
         flights = list(fly(jobs))
         with pytest.raises(
             PoolError, match=r"worker on .*: .*hold\.yaml, the built-in script, .* not the same as here"
         ):
             list(fly(other))
-    assert {one.job: one.result for one in flights} == {job: warm.fly(job).result for job in jobs}
+    assert {one.job: one.result for one in flights} == {job: server.fly(job).result for job in jobs}
+
+
+def test_a_scheduler_that_is_lost_is_told_in_one_line(plan):
+    import dask
+    from distributed import Client, LocalCluster
+
+    job, options = job_of(plan, "", 0), FlightOptions(SETTINGS.limits, SETTINGS.batches, sandboxed=False)
+
+    def close_once_it_waits():
+        while not client.futures:
+            time.sleep(0.05)
+        cluster.close()
+
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
+        LocalCluster(n_workers=0, processes=False, dashboard_address=None, silence_logs=50) as cluster,
+        Client(cluster.scheduler_address) as client,
+    ):
+        closing = threading.Thread(target=close_once_it_waits)
+        closing.start()
+        with pytest.raises(PoolError, match="the scheduler of the flights is lost"):
+            list(pool._flown_by_dask([job], options, client))
+        closing.join()
 
 
 # ---- the programs
@@ -475,6 +508,7 @@ def test_a_full_disk_is_named_and_loses_no_result(programs, folder, tmp_path, ca
         (["{plan}", "nowhere.py"], "no such file"),
         (["{plan}", "pillot"], "near names are pilot"),
         (["{plan}", "--gradescope", "/nowhere/results.json"], "no such folder"),
+        (["{plan}", "--secret", "nowhere"], "nowhere: No such file or directory"),
         (["{plan}", "--scheduler", "tcp://127.0.0.1:1", "--fresh"], "no scheduler answers there"),
     ],
 )
@@ -483,6 +517,19 @@ def test_a_mistake_gets_one_line_and_status_2(programs, folder, capsys, monkeypa
     assert grade.main([one.format(plan=folder / "hold.yaml") for one in arguments]) == 2
     error = capsys.readouterr().err
     assert said in error.splitlines()[-1] and error.startswith("grade: ") and "Traceback" not in error
+
+
+def test_seeds_follow_from_a_secret_and_are_nobodys_guess(tmp_path):
+    for name, content in (("first", b"a" * 16), ("same", b"a" * 16), ("other", b"b" * 16), ("short", b"a" * 15)):
+        (tmp_path / name).write_bytes(content)
+    first, same, other = (grade.seeds_of(500, str(tmp_path / name)) for name in ("first", "same", "other"))
+    assert first == same
+    assert first[:20] == grade.seeds_of(20, str(tmp_path / "first"))
+    assert len(set(first) | set(other)) == 1000
+    assert min(first) > 1000 and max(first) <= 10**12
+    assert grade.seeds_of(3, None) == [0, 1, 2]
+    with pytest.raises(ValueError, match=r"--secret .*short': holds 15 bytes; it must hold 16 at least"):
+        grade.seeds_of(1, str(tmp_path / "short"))
 
 
 def test_a_sweep_has_a_row_for_every_combination(programs, folder, tmp_path, capsys):

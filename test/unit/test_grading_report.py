@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import pytest
 from graded import EVIL, SCENE, place, read_plan, result, write_table
 
-from drone_sim.grading.outputs import html
+from drone_sim.grading.outputs.html import report
 from drone_sim.offline.recording import COLUMNS
 
 
@@ -36,7 +36,7 @@ def _report(tmp_path_factory):
         result("a/my.py", 1),
         result("a/<img src=x>.py", error=EVIL, names=(EVIL, EVIL)),
     ]
-    html.write(plan, results, lambda one: table if one.seed == 0 and not one.error else None, folder / "out")
+    report.write(plan, results, lambda one: table if one.seed == 0 and not one.error else None, folder / "out")
     return folder / "out"
 
 
@@ -77,15 +77,15 @@ def test_objects_stand_as_boxes_where_the_scene_has_them(report):
 
 def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
     plan = read_plan(tmp_path)
-    html.write(plan, [result("a.py"), result("b.py")], lambda _: None, tmp_path / "out")
-    html.write(plan, [result("c.py")], lambda _: None, tmp_path / "out")
+    report.write(plan, [result("a.py"), result("b.py")], lambda _: None, tmp_path / "out")
+    report.write(plan, [result("c.py")], lambda _: None, tmp_path / "out")
     assert [one.name for one in (tmp_path / "out/scripts").iterdir()] == ["01-c.html"]
     with pytest.raises(ValueError, match="holds other files"):
-        html.check(tmp_path)
+        report.check(tmp_path)
     with pytest.raises(ValueError, match="is a file"):
-        html.check(tmp_path / "steps.yaml")
+        report.check(tmp_path / "steps.yaml")
     with pytest.raises(OSError, match="no such folder"):
-        html.check(tmp_path / "no" / "out")
+        report.check(tmp_path / "no" / "out")
 
 
 @pytest.mark.filterwarnings("error")
@@ -100,14 +100,14 @@ def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
 )
 def test_a_table_that_shows_nothing_is_told_of(tmp_path, text, said):
     (tmp_path / "t.csv").write_text(text)
-    html.write(read_plan(tmp_path), [result()], lambda _: tmp_path / "t.csv", tmp_path / "out")
+    report.write(read_plan(tmp_path), [result()], lambda _: tmp_path / "t.csv", tmp_path / "out")
     (page,) = (tmp_path / "out/scripts").iterdir()
     assert said in page.read_text()
 
 
 def test_a_long_flight_is_thinned(tmp_path):
     table = write_table(tmp_path / "t.csv", 301)
-    html.write(read_plan(tmp_path), [result()], lambda _: table, tmp_path / "out")
+    report.write(read_plan(tmp_path), [result()], lambda _: table, tmp_path / "out")
     (page,), (figures,) = (tmp_path / "out/scripts").iterdir(), (tmp_path / "out/flights").iterdir()
     assert "one row in 2 is shown" in page.read_text()
     assert json.loads(figures.read_text().partition(" = ")[2].rstrip(";\n"))["t"][:3] == [0, 0.1, 0.2]

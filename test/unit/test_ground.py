@@ -16,17 +16,17 @@ DOWN, FORWARD = Twist(Vector3(0, 0, -1)), Twist(Vector3(1, 0, 0))
 
 def simulation_at(x, **floor):
     simulation = Simulation(parameters.load({"scene": {"floor": floor}}))
-    simulation.drone.move(Pose((x, 0.0, 0.8)))
+    simulation.drone.body.move(Pose((x, 0.0, 0.8)))
     return simulation
 
 
 @pytest.mark.parametrize("x", [3.0, 5.0, 6.0, 300.0, -900.0])
 def test_the_drone_lands_on_floor_and_ground_alike(x):
     simulation = simulation_at(x)
-    simulation.drone.receive(DOWN)
+    simulation.drone.commands.receive(DOWN)
     for _ in range(200):
         simulation.step()
-    assert simulation.drone.state.position[2] == pytest.approx(0.01, abs=0.003)
+    assert simulation.drone.body.state.position[2] == pytest.approx(0.01, abs=0.003)
     simulation.close()
 
 
@@ -36,8 +36,8 @@ def test_it_slides_over_the_rim_of_the_floor():
             {"scene": {"objects": [{"shape": "sphere", "size": [0.1], "mass": 1, "position": [4, 0, 0.1]}]}}
         )
     )
-    simulation.drone.move(Pose((0.0, 3.0, 0.8)))
-    ball = simulation.scene.bodies[0]
+    simulation.drone.body.move(Pose((0.0, 3.0, 0.8)))
+    ball = simulation.scene.things()["Sphere"].body
     pybullet.resetBaseVelocity(ball.number, [2, 0, 0], [0, 20, 0], simulation.world._client)
     for _ in range(60):
         simulation.step()
@@ -49,13 +49,13 @@ def test_it_slides_over_the_rim_of_the_floor():
 def test_at_an_edge_it_falls_and_is_told_so_once(caplog):
     simulation = simulation_at(4.9, edge=True)
     with caplog.at_level(logging.WARNING):
-        simulation.drone.receive(FORWARD)
+        simulation.drone.commands.receive(FORWARD)
         for _ in range(60):
             simulation.step()
-        simulation.drone.receive(DOWN)
+        simulation.drone.commands.receive(DOWN)
         for _ in range(100):
             simulation.step()
-    assert simulation.drone.state.position[2] < -1.0
+    assert simulation.drone.body.state.position[2] < -1.0
     assert [record.getMessage() for record in caplog.records if "edge" in record.getMessage()] == [
         caplog.records[0].getMessage()
     ]

@@ -8,8 +8,8 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
-from drone_sim.ros.node.inbox import Inbox
-from drone_sim.ros.rviz import handles
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.rviz import vehicle_handles
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -17,9 +17,9 @@ from drone_sim.run.simulation import Simulation
 @pytest.fixture
 def dragged(monkeypatch):
     """Return a simulation, and the inbox in which a drag to x = 2 m waits."""
-    monkeypatch.setattr(handles, "MarkerServer", mock.MagicMock())
+    monkeypatch.setattr(vehicle_handles, "MarkerServer", mock.MagicMock())
     simulation, inbox = Simulation(parameters.load({"script": ""})), Inbox()
-    shown = handles.Handles(simulation, inbox)
+    shown = vehicle_handles.VehicleHandles(simulation, inbox)
     feedback = InteractiveMarkerFeedback(event_type=InteractiveMarkerFeedback.POSE_UPDATE, marker_name="Drone")
     feedback.pose.position.x, feedback.pose.position.z, feedback.pose.orientation.w = 2.0, 1.0, 1.0
     shown._on_feedback(feedback)
@@ -31,11 +31,11 @@ def test_it_moves_the_vehicle_that_is_there_by_then(dragged):
     simulation, inbox = dragged
     simulation.start()
     inbox.empty()
-    assert simulation.drone.state.position == pytest.approx((2, 0, 1))
+    assert simulation.drone.body.state.position == pytest.approx((2, 0, 1))
 
 
 def test_it_moves_nothing_where_the_vehicle_has_gone(dragged):
     simulation, inbox = dragged
     simulation.set_vehicles({"other": {}})
     inbox.empty()
-    assert simulation.vehicles["other"].state.position[0] == 0
+    assert simulation.vehicles["other"].body.state.position[0] == 0

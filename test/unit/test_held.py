@@ -4,7 +4,15 @@ import pytest
 
 pytest.importorskip("visualization_msgs", reason="needs ROS")
 
-from drone_sim.ros.rviz.held import PATIENCE, Held
+from visualization_msgs.msg import InteractiveMarkerFeedback
+
+from drone_sim.ros.rviz.marker_server import PATIENCE, HeldHandles
+
+TAKEN, HELD, LET_GO = (
+    InteractiveMarkerFeedback.MOUSE_DOWN,
+    InteractiveMarkerFeedback.KEEP_ALIVE,
+    InteractiveMarkerFeedback.MOUSE_UP,
+)
 
 
 class Clock:
@@ -15,26 +23,30 @@ class Clock:
         return self.now
 
 
+def told(held, kind, client):
+    held.on_feedback(InteractiveMarkerFeedback(marker_name="Drone", client_id=client, event_type=kind))
+
+
 def test_a_handle_is_held_until_it_is_let_go_of():
-    held = Held(Clock())
-    held.take("Drone", "rviz 1")
-    held.take("Drone", "rviz 2")
-    held.let_go("Drone", "rviz 1")
+    held = HeldHandles(Clock())
+    told(held, TAKEN, "rviz 1")
+    told(held, TAKEN, "rviz 2")
+    told(held, LET_GO, "rviz 1")
     assert held.names() == {"Drone"}
-    held.let_go("Drone", "rviz 2")
+    told(held, LET_GO, "rviz 2")
     assert held.names() == set()
 
 
 def test_a_hand_that_says_nothing_has_let_go():
     clock = Clock()
-    held = Held(clock)
-    held.take("Drone", "rviz")
+    held = HeldHandles(clock)
+    told(held, TAKEN, "rviz")
     for _ in range(10):
         clock.now += 0.75 * PATIENCE
         assert held.names() == {"Drone"}
-        held.keep("Drone", "rviz")
-        held.keep("Drone", "another rviz, which does not hold it")
+        told(held, HELD, "rviz")
+        told(held, HELD, "another rviz, which does not hold it")
     clock.now += PATIENCE
     assert held.names() == set()
-    held.keep("Drone", "rviz")
+    told(held, HELD, "rviz")
     assert held.names() == set(), "it comes back only when it is taken again"

@@ -99,8 +99,8 @@ def test_joints_and_what_hangs_on_them(imported):
     assert found["Door"]["parent"] == "Hinge"
     loaded = parameters.load({"scene_file": str(imported.scene)})
     simulation = Simulation(loaded, started=False)
-    door = simulation._setting.shared.objects.handle("Door")
-    place = simulation._setting.shared.objects.matrix(door)
+    door = simulation.context.objects.handle("Door")
+    place = simulation.context.objects.matrix(door)
     simulation.close()
     assert np.allclose(place[3::4], [np.cos(0.5), np.sin(0.5), 0], atol=1e-6)
 
@@ -147,7 +147,7 @@ def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(
         simulation.step()
     assert not simulation.vehicles
     assert simulation.scene.things()["Ball"].matrix()[11] == pytest.approx(0.1, abs=0.01), "on the floor"
-    assert simulation.shared.signals.getFloatSignal("height") == 2.0
+    assert simulation.context.signals.get(float, "height") == 2.0
     simulation.save_scene(tmp_path / "saved.yaml")
     simulation.restore(simulation.snapshot())
     assert simulation.set_vehicles({"guest": {"position": [1, 0, 1]}}) == (["guest"], [])
@@ -198,7 +198,7 @@ def test_a_quadricopter_is_a_vehicle_with_its_own_masses_and_flies(imported):
     simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
     for _ in range(40):
         simulation.step()
-    height = simulation.drone.state.position[2]
+    height = simulation.drone.body.state.position[2]
     simulation.close()
     assert height == pytest.approx(1.0, abs=0.02)
 
@@ -231,7 +231,7 @@ def test_a_target_in_the_world_is_the_target(imported):
         "position": [1.0, 2.0, 3.0],
     }
     simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
-    tree = simulation._setting.shared.objects
+    tree = simulation.context.objects
     place = tree.matrix(tree.handle("Quadricopter_target"))
     simulation.close()
     assert place[3::4] == (1.0, 2.0, 3.0)
@@ -253,12 +253,18 @@ def test_several_keep_their_names_whatever_they_are_called(imported):
     assert (first["suffix"], second["suffix"]) == (-1, 3)
     assert second["objects"]["Drone"] == {"name": "UAV#3"}
     simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
-    tree = simulation._setting.shared.objects
+    tree = simulation.context.objects
     found = [
         tree[tree.handle(name)] for name in ("UAV_propeller_respondable2#3", "Quadricopter_propeller_respondable2#3")
     ]
     simulation.close()
     assert found[0] is found[1] and tree.matrix(tree.handle("UAV#3"))[3] == pytest.approx(2.0)
+
+
+def test_one_may_be_called_as_objects_of_another_are_here(imported):
+    content = imported(*quadricopter(), *quadricopter(40, "", (2, 0, 1), "Drone"))
+    assert [one.get("suffix") for one in content["vehicles"].values()] == [-1, 0]
+    Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False).close()
 
 
 def test_what_hangs_on_a_quadricopter_goes_with_it(imported):
@@ -296,6 +302,13 @@ def test_a_rope_weighs_where_it_hangs_and_a_hand_is_of_one_piece(imported):
     assert body.centre_of_mass[2] == pytest.approx((4 * 0.1 * 0.002 - 0.1 * 0.5 - 0.05) / 0.67, abs=1e-4)
 
 
+def test_a_thread_that_weighs_next_to_nothing_is_no_mistake(imported):
+    ball = scene_object("JNT", 80, "Ball", 0, (0, 0, -0.5), own=integers("Jtt", 12))
+    dust = {"dynamic": True, "wrapper": weight(8e-9, (1e-4, 1e-4, 1e-4))}
+    imported(*quadricopter(), ball, shape(81, "Thread", mesh(size=(0.01, 0.01, 1)), parent=80, **dust))
+    assert urdf.read(str(next(imported.scene.parent.glob("*.urdf")))).mass == pytest.approx(0.52, abs=1e-5)
+
+
 def test_one_that_begins_tilted_and_without_a_script(imported):
     chunks = quadricopter(code="", propeller="")
     chunks[0] = shape(
@@ -328,7 +341,7 @@ def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
     base = scene_object("DMY", 1, "Quadricopter_base", 0, (0, 0, 0.1), turned=upright)
     imported(side, base, *others)
     simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False)
-    tree = simulation.shared.objects
+    tree = simulation.context.objects
     found, wanted = (tree.matrix(tree.handle(f"Quadricopter_{name}")) for name in ("target", "base"))
     simulation.close()
     assert np.allclose(found, wanted, atol=1e-5) and wanted[10] == pytest.approx(1.0, abs=1e-5)

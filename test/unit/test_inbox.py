@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.core.inbox import Inbox
 
 
 def ask(inbox, job):
@@ -76,8 +76,8 @@ def test_a_request_that_has_begun_is_said_to_be_under_way():
 
 
 def test_where_others_are_heard_meanwhile_a_job_wakes_their_sleep():
-    inbox, slept, woken = Inbox(), [], []
-    inbox.sleep_by(slept.append, lambda: woken.append(True))
+    slept, woken = [], []
+    inbox = Inbox(sleep=slept.append, wake=lambda: woken.append(True))
     inbox.wait(3.0)
     assert slept == [3.0]
     inbox.put(lambda: slept.append(0.0))

@@ -56,12 +56,12 @@ def _simulation(tmp_path):
 
 
 def found(simulation, name):
-    objects = simulation.drone.objects
+    objects = simulation.context.objects
     return objects[objects.handle(name)]
 
 
 def sim_of(simulation):
-    return make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05))
+    return make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
 
 
 def run(simulation, seconds):
@@ -93,7 +93,7 @@ def test_joints_move_as_mechanics_says(simulation):
     period = 2 * math.pi * math.sqrt((2 * 1 + 0.1) / (2 * 9.81)) * (1 + 0.1**2 / 16)
     assert (last - first) / (len(crossings) - 1) == pytest.approx(period, rel=0.002), "a physical pendulum"
     assert told["Lift"][-1] == pytest.approx(0.5, abs=1e-6), "held against gravity"
-    assert found(simulation, "Lift").drive.force() == pytest.approx(3 * 9.81, rel=1e-3)
+    assert found(simulation, "Lift").drive.state()[2] == pytest.approx(3 * 9.81, rel=1e-3)
     assert found(simulation, "Axle").velocity_along == pytest.approx(0.5 * 6 / 1.0, rel=1e-6), "0.5 N m on 1 kg m2"
     assert found(simulation, "Left").velocity_along == pytest.approx(2, abs=0.01)
     assert found(simulation, "Cart").matrix()[3] - rolling == pytest.approx(4 * 2 * 0.2, rel=0.02), "it rolls, nodding"
@@ -109,7 +109,7 @@ def test_joints_move_as_mechanics_says(simulation):
 
 
 def test_scripts_command_joints(simulation):
-    sim, handle = sim_of(simulation), simulation.drone.objects.handle
+    sim, handle = sim_of(simulation), simulation.context.objects.handle
     lift, axle, pivot = handle("Lift"), handle("Axle"), handle("Pivot")
     assert sim.getJointType(lift) == 11 and sim.getJointType(axle) == 10
     assert sim.getJointInterval(lift) == (False, [0, 2]) and sim.getJointInterval(axle)[0] is True
@@ -142,7 +142,7 @@ def test_scripts_command_joints(simulation):
 
 
 def test_parameters_of_joints_and_shapes(simulation):
-    sim, handle = sim_of(simulation), simulation.drone.objects.handle
+    sim, handle = sim_of(simulation), simulation.context.objects.handle
     left, cabin, loose = handle("Left"), handle("Cabin"), handle("Loose")
     motor, control, static = (
         sim.jointintparam_motor_enabled,
@@ -166,7 +166,7 @@ def test_parameters_of_joints_and_shapes(simulation):
 
 def test_it_goes_on_from_a_snapshot_and_begins_anew_to_the_last_bit(simulation):
     first = run(simulation, 1)
-    sim, handle = sim_of(simulation), simulation.drone.objects.handle
+    sim, handle = sim_of(simulation), simulation.context.objects.handle
     snapshot = simulation.snapshot()
     then = run(simulation, 1)
     sim.setJointTargetVelocity(handle("Left"), -5)
@@ -181,7 +181,7 @@ def test_it_goes_on_from_a_snapshot_and_begins_anew_to_the_last_bit(simulation):
 
 
 def test_moving_the_root_takes_all_along(simulation):
-    sim, handle = sim_of(simulation), simulation.drone.objects.handle
+    sim, handle = sim_of(simulation), simulation.context.objects.handle
     before = [found(simulation, name).matrix()[3::4] for name in ("Bob", "LeftWheel", "Loose")]
     for name in ("Beam", "Cart"):
         x, y, z = sim.getObjectPosition(handle(name), -1)
@@ -193,14 +193,14 @@ def test_moving_the_root_takes_all_along(simulation):
 
 def test_a_load_is_taken_up_and_let_go(simulation):
     """Static, it is carried by its new parent; dynamic again, it falls, with the mass that it had."""
-    loose, tree, drone = found(simulation, "Loose"), simulation.drone.objects, simulation.drone
+    loose, tree, drone = found(simulation, "Loose"), simulation.context.objects, simulation.drone
     loose.put(frames.from_rpy((-5, 0, 0.9), (0, 0, 0)))
     loose.set_static(True)
     tree.set_parent(tree.handle("Loose"), tree.handle("Drone"), keep_in_place=True)
-    drone.receive(Twist(Vector3(0.5, 0, 0.5)))
+    drone.commands.receive(Twist(Vector3(0.5, 0, 0.5)))
     run(simulation, 1)
     snapshot, there = simulation.snapshot(), loose.matrix()
-    assert frames.relative(drone.matrix, there)[3::4] == pytest.approx((0, 0, -0.1), abs=0.01)
+    assert frames.relative(drone.body.matrix, there)[3::4] == pytest.approx((0, 0, -0.1), abs=0.01)
     assert simulation.world.state(loose.number).position == pytest.approx(there[3::4])
     loose.set_static(False)
     tree.set_parent(tree.handle("Loose"), WORLD, keep_in_place=True)
@@ -212,3 +212,26 @@ def test_a_load_is_taken_up_and_let_go(simulation):
     assert not found(simulation, "Loose").is_static
     with pytest.raises(ValueError, match="'Beam' has no mass in the scene file: it stays static"):
         found(simulation, "Beam").set_static(False)
+
+
+def test_what_hangs_on_a_chain_that_a_vehicle_carries_goes_with_it(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("""
+objects:
+  - {name: Hinge, kind: joint, type: revolute, mode: position, parent: Drone, position: [0, 0, -0.3]}
+  - {name: Arm, shape: box, size: [0.02, 0.02, 0.02], mass: 0.001, parent: Hinge, position: [0, 0, 0]}
+  - {name: Flag, shape: box, size: [0.02, 0.02, 0.02], respondable: false, parent: Arm, position: [0, 0, -0.1]}
+  - {name: Elbow, kind: joint, type: revolute, mode: position, parent: Flag}
+  - {name: Hand, shape: box, size: [0.02, 0.02, 0.02], mass: 0.001, parent: Elbow, position: [0, 0, 0]}
+  - {name: Ring, shape: box, size: [0.02, 0.02, 0.02], respondable: false, parent: Hand, position: [0, 0, -0.1]}
+""")
+    simulation = Simulation(parameters.load({"scene_file": str(scene)}))
+    tree, world = simulation.context.objects, simulation.world
+    world.set_velocity(simulation.drone.body.number, (2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for _ in range(3):
+        simulation.step()
+        for name in ("Flag", "Ring"):
+            there = world.state(tree[tree.handle(name)].number).position
+            assert there == pytest.approx(frames.position(tree.matrix(tree.handle(name))), abs=1e-9)
+    assert there[0] > 0.2
+    simulation.close()

@@ -6,10 +6,10 @@ import struct
 import pytest
 
 from drone_sim.config.types import ParameterError
-from drone_sim.ros.tools import gamepad, joy_parameters
+from drone_sim.ros.tools import gamepad
 from drone_sim.ros.tools.commands import Command
-from drone_sim.ros.tools.gamepad import Gamepad, Pad
-from drone_sim.ros.tools.pilot import Pilot
+from drone_sim.ros.tools.gamepad import Gamepad, JoyState
+from drone_sim.ros.tools.joy_commands import JoyCommands, load_joy
 
 BUTTON, AXIS, INITIAL = 1, 2, 0x80
 LB, A, Y, BACK = 4, 0, 3, 6
@@ -37,7 +37,7 @@ def test_events_tell_how_it_stands_with_the_signs_of_the_joy_node(device, pad):
     with open(device, "wb", buffering=0) as kernel:
         assert list(pad.read()) == []
         kernel.write(event(BUTTON | INITIAL, 1, 0) + event(AXIS | INITIAL, 2, 0))
-        assert list(pad.read()) == [Pad((), (False, False)), Pad((0.0, 0.0, 0.0), (False, False))]
+        assert list(pad.read()) == [JoyState((), (False, False)), JoyState((0.0, 0.0, 0.0), (False, False))]
         kernel.write(event(AXIS, 0, -32767) + event(AXIS, 2, 32767) + event(AXIS, 1, -32768))
         assert list(pad.read())[-1].axes == (1.0, 1.0, -1.0)
         pressed = event(BUTTON, 1, 1)
@@ -66,13 +66,13 @@ def test_gamepads_are_found_in_the_order_of_their_numbers(monkeypatch):
 
 @pytest.fixture(name="pilot")
 def _pilot():
-    return Pilot(joy_parameters.load({"axes": {"vy": {"scale": -2.0}}}))
+    return JoyCommands(load_joy({"axes": {"vy": {"scale": -2.0}}}))
 
 
 def stands(*buttons, **axes):
     numbers = {"vx": 4, "vy": 3, "vz": 1, "wz": 0}
     values = {numbers[name]: value for name, value in axes.items()}
-    return Pad(tuple(values.get(number, 0.0) for number in range(6)), tuple(one in buttons for one in range(8)))
+    return JoyState(tuple(values.get(number, 0.0) for number in range(6)), tuple(one in buttons for one in range(8)))
 
 
 def test_sticks_command_while_the_dead_mans_button_is_held(pilot):
@@ -109,11 +109,11 @@ def test_buttons_ask_once_and_take_off_needs_the_dead_mans(pilot):
 
 
 def test_axes_and_buttons_that_it_does_not_have_are_nothing(pilot):
-    pilot.see(Pad((1.0,), (False,) * 4 + (True,)))
+    pilot.see(JoyState((1.0,), (False,) * 4 + (True,)))
     assert pilot.command == Command(wz=1.0)
-    assert pilot.see(Pad()) == []
+    assert pilot.see(JoyState()) == []
     assert pilot.command is None
-    less = Pilot(joy_parameters.load({"axes": {"wz": {"axis": -1}}, "buttons": {"land": -1}}))
+    less = JoyCommands(load_joy({"axes": {"wz": {"axis": -1}}, "buttons": {"land": -1}}))
     less.see(stands())
     assert less.see(stands(LB, *range(8), wz=1.0)) == ["reset", "takeoff"]
     assert less.command == Command()
@@ -124,7 +124,7 @@ def test_axes_and_buttons_that_it_does_not_have_are_nothing(pilot):
 
 def test_a_file_and_then_parameters_are_laid_over_joy_yaml(tmp_path):
     (tmp_path / "my.yaml").write_text("dead_man: 5\naxes: {vx: {scale: 3.0}}\n")
-    parameters = joy_parameters.load({"config": str(tmp_path / "my.yaml"), "axes": {"vx": {"axis": 1}}})
+    parameters = load_joy({"config": str(tmp_path / "my.yaml"), "axes": {"vx": {"axis": 1}}})
     assert (parameters.dead_man, parameters.axes.vx.axis, parameters.axes.vx.scale) == (5, 1, 3.0)
 
 
@@ -143,7 +143,7 @@ def test_a_file_and_then_parameters_are_laid_over_joy_yaml(tmp_path):
 )
 def test_a_wrong_value_is_told_in_one_line(given, said):
     with pytest.raises(ParameterError) as error:
-        joy_parameters.load(given)
+        load_joy(given)
     assert str(error.value).startswith(said)
 
 
@@ -151,4 +151,4 @@ def test_a_wrong_value_in_a_file_is_told_with_its_line(tmp_path):
     path = tmp_path / "my.yaml"
     path.write_text("dead_man: 5\nbuttons: {land: 999}\n")
     with pytest.raises(ParameterError, match=r"my\.yaml: line 2: parameter buttons/land = 999"):
-        joy_parameters.load({"config": str(path)})
+        load_joy({"config": str(path)})

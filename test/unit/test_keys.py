@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_sim.ros.tools.keys import BACKSPACE, DOWN, ESCAPE, LEFT, PATIENCE, RIGHT, UNKNOWN, UP, KeyDecoder
+from drone_sim.ros.tools.commands import BACKSPACE, DOWN, ESCAPE, KEY_PATIENCE, LEFT, RIGHT, UNKNOWN, UP, KeyDecoder
 
 
 class Clock:
@@ -52,24 +52,24 @@ def test_sequences_in_single_bytes_from_a_slow_line(decoder, clock, sent, keys):
     came = []
     for byte in sent:
         came += decoder.feed(bytes([byte]))
-        clock.now += 0.4 * PATIENCE
+        clock.now += 0.4 * KEY_PATIENCE
         came += decoder.feed(b"")
-        clock.now += 0.4 * PATIENCE
+        clock.now += 0.4 * KEY_PATIENCE
         came += decoder.feed(b"")
     assert came == keys
 
 
 def test_only_an_escape_that_nothing_follows_is_the_key(decoder, clock):
     assert decoder.feed(b"\x1b") == []
-    clock.now += 0.9 * PATIENCE
+    clock.now += 0.9 * KEY_PATIENCE
     assert decoder.feed(b"") == []
-    clock.now += 0.2 * PATIENCE
+    clock.now += 0.2 * KEY_PATIENCE
     assert decoder.feed(b"") == [ESCAPE]
     assert decoder.feed(b"[A") == ["[", "A"]
 
 
 def test_a_sequence_that_does_not_go_on_is_dropped(decoder, clock):
     assert decoder.feed(b"\x1b[1;") == []
-    clock.now += PATIENCE
+    clock.now += KEY_PATIENCE
     assert decoder.feed(b"") == [UNKNOWN]
     assert decoder.feed(b"u") == ["u"]

@@ -2,8 +2,10 @@
 
 import pytest
 
+pytest.importorskip("rospy", reason="needs ROS")
+
 from drone_sim.files.resources import package_path
-from drone_sim.ros.node.launch_arguments import check
+from drone_sim.ros.node.start_checks import check
 from drone_sim.run.parameters import ParameterError
 
 LAUNCH = package_path() / "launch"

@@ -29,9 +29,9 @@ def simulate(tmp_path, text):
 def test_a_script_makes_dummies_and_takes_them_away(tmp_path, caplog):
     caplog.set_level("INFO")
     simulation = simulate(tmp_path, MADE)
-    assert "Dummy0" in simulation.drone.objects
+    assert "Dummy0" in simulation.context.objects
     simulation.step()
-    assert "Dummy0" not in simulation.drone.objects and "Dummy" in simulation.drone.objects
+    assert "Dummy0" not in simulation.context.objects and "Dummy" in simulation.context.objects
     simulation.stop()
     simulation.start()
     assert caplog.messages == ["Dummy Dummy0 Dummy", "-1 [0.0, 0.0, 3.0]", "Dummy Dummy0 Dummy"]
@@ -41,11 +41,11 @@ def test_a_script_makes_dummies_and_takes_them_away(tmp_path, caplog):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        ("[sim.createDummy(0.01) for _ in range(2000)]", "scripts make at most 1000 dummies"),
-        ("sim.removeObject(sim.getObject('/Floor'))", "'Floor' is not a dummy that a script has made"),
+        ("[sim.createDummy(0.01) for _ in range(2000)]", "a scene has at most 1000 objects"),
+        ("sim.removeObject(sim.getObject('/Floor'))", "'Floor' is the floor"),
         ("sim.removeObjects(3)", "a table of handles is expected"),
         ("sim.createDummy('large')", "a number is expected"),
-        ("sim.createPureShape(0, 0, [1, 1, 1], 1)", "a script makes and removes dummies alone"),
+        ("sim.createPureShape(3, 0, [1, 1, 1], 1)", "primitiveType = 3: must be one of"),
     ],
 )
 def test_what_is_refused(tmp_path, call, words):

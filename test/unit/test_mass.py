@@ -13,8 +13,8 @@ from drone_sim.shapes.compound import Part
 from drone_sim.shapes.cylinder import Cylinder
 from drone_sim.shapes.mass import inertia_of
 from drone_sim.shapes.mesh import Mesh
+from drone_sim.shapes.shape import WHITE
 from drone_sim.shapes.sphere import Sphere
-from drone_sim.shapes.triangles import WHITE
 from drone_sim.shapes.urdf import Urdf
 from drone_sim.world import World
 

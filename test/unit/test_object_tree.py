@@ -116,12 +116,12 @@ def test_what_came_or_went_since_is_no_part_of_what_is_remembered(objects):
     (first, *_), second = add_model(objects), add_model(objects, "#0")
     stone = objects.add("stone", None, at(5, 0, 0))
     objects.set_parent(stone, second[0], True)
-    recall = objects.remember()
+    restore = objects.save_state()
     objects.set_parent(stone, WORLD, True)
     objects.remove(second)
     third, *_ = add_model(objects, "#0")
     for root, x in ((first, 7), (third, 8)):
         objects[root].local = at(x, 0, 0)
     objects[stone].local = at(9, 0, 0)
-    recall()
+    restore()
     assert [frames.position(objects.matrix(one))[0] for one in (first, third, stone)] == [1, 8, 9]

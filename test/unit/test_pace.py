@@ -5,8 +5,7 @@ import pytest
 from drone_sim.config.types import ParameterError
 from drone_sim.run import parameters
 from drone_sim.run.diagnosis.counts import between, count
-from drone_sim.run.pace import Pace, period
-from drone_sim.run.pacing import Pacer
+from drone_sim.run.pacing import Pace, Pacer, period
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 

@@ -12,7 +12,7 @@ import yaml
 
 from drone_sim.files import resources
 from drone_sim.files.resources import package_path, python_path
-from drone_sim.ros.cockpit.scripts.shelf import Shelf
+from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 
 ROOT = package_path()
 SOURCE = ROOT / "src"
@@ -88,7 +88,7 @@ def test_every_script_that_the_editor_offers_is_installed(tmp_path):
     listed = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
     folders = {ROOT / one for names in re.findall(r"install\(DIRECTORY ([\w/ ]+)", listed) for one in names.split()}
     folders.add(SOURCE / "drone_sim")  # by catkin_python_setup
-    offered = [book.path for book in Shelf(tmp_path).books()]
+    offered = [book.path for book in ScriptStore(tmp_path).scripts()]
     assert [path for path in offered if not folders & set(path.parents)] == [] != offered
 
 

@@ -2,7 +2,9 @@
 
 import pytest
 
-from drone_sim.ros.node.paths import from_shell
+pytest.importorskip("rospy", reason="needs ROS")
+
+from drone_sim.ros.core.startup import from_shell
 
 
 @pytest.mark.parametrize("name", ["", "target", "/a/b.py", "~/a.py", "package://drone_sim/a.yaml"])

@@ -41,11 +41,11 @@ def _simulation(tmp_path_factory):
 
 @pytest.fixture(name="sim")
 def _sim(simulation):
-    return make_sim(simulation.drone, Surroundings(lambda: 0.0, 0.05))
+    return make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
 
 
 def test_a_ray_is_exact(simulation, sim):
-    handle = simulation.drone.objects.handle
+    handle = simulation.context.objects.handle
     state, distance, point, met, normal = sim.readProximitySensor(handle("Ray"))
     assert (state, met) == (1, handle("RayBox"))
     assert distance == pytest.approx(2, abs=1e-3) and point == pytest.approx([0, 0, 2], abs=1e-3)
@@ -67,7 +67,7 @@ def nearest(x, y, z):
     ],
 )
 def test_the_nearest_point_in_a_volume(simulation, sim, name, centre, tolerance):
-    handle = simulation.drone.objects.handle
+    handle = simulation.context.objects.handle
     state, distance, point, met, _ = sim.readProximitySensor(handle(name))
     expected, there = nearest(*centre)
     assert (state, met) == (1, handle(f"{name}Ball"))
@@ -75,21 +75,21 @@ def test_the_nearest_point_in_a_volume(simulation, sim, name, centre, tolerance)
 
 
 def test_a_fan_has_no_thickness(simulation, sim):
-    state, distance, point, *_ = sim.readProximitySensor(simulation.drone.objects.handle("Disc"))
+    state, distance, point, *_ = sim.readProximitySensor(simulation.context.objects.handle("Disc"))
     radius = math.sqrt(0.2**2 - 0.1**2)  # of the ball where the fan cuts it
     assert state == 1 and point[1] == pytest.approx(0, abs=1e-6)
     assert distance == pytest.approx(math.hypot(0.3, 1.5) - radius, abs=1e-3)
 
 
 def test_what_is_thinner_than_the_gaps_between_rays(simulation, sim):
-    handle = simulation.drone.objects.handle
+    handle = simulation.context.objects.handle
     state, distance, _, met, _ = sim.readProximitySensor(handle("Thin"))
     assert (state, met) == (1, handle("Needle"))
     assert distance == pytest.approx(math.hypot(0.17, 0.13, 1.8) - 0.003, abs=1e-3)
 
 
 def test_one_object_alone_and_beyond_a_threshold(simulation, sim):
-    handle = simulation.drone.objects.handle
+    handle = simulation.context.objects.handle
     ray, box = handle("Ray"), handle("RayBox")
     assert sim.checkProximitySensor(ray, handle("Floor"))[:2] == (1, pytest.approx(3, abs=1e-3))
     assert sim.checkProximitySensor(ray, handle("Needle"))[0] == 0
@@ -103,7 +103,7 @@ def test_one_object_alone_and_beyond_a_threshold(simulation, sim):
 
 
 def test_it_does_not_see_what_carries_it(simulation, sim):
-    handle = simulation.drone.objects.handle
+    handle = simulation.context.objects.handle
     state, distance, _, met, _ = sim.readProximitySensor(handle("Under"))
     assert (state, met) == (1, handle("Floor"))
-    assert distance == pytest.approx(simulation.drone.state.position[2] - 0.01, abs=1e-3)
+    assert distance == pytest.approx(simulation.drone.body.state.position[2] - 0.01, abs=1e-3)

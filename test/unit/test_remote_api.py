@@ -10,10 +10,11 @@ import cbor2
 import numpy as np
 import pytest
 import zmq
-from remote_client import Client, Refusal
+from remote_client import Client, Refusal, official_client
 
-from drone_sim.remote.outside import Nobody, let_in
-from drone_sim.remote.server import Server
+from drone_sim.remote.conversation import RemoteApi
+from drone_sim.remote.remote_api import start_server
+from drone_sim.remote.server import RemoteApiServer
 from drone_sim.remote.standalone import play
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
@@ -56,7 +57,7 @@ class Stage:
         self.simulation = Simulation(parameters.load(values), drawings=self.drawings, backend=self.radio, started=False)
         self.player = Player(self.simulation, self.simulation.step, lambda _state: None, simulated_time=False)
         self.now = 0.0  # s
-        self.server = Server(self.player, "127.0.0.1", 0, self.radio, lambda: self.now)
+        self.server = RemoteApiServer(self.player, "127.0.0.1", 0, self.radio, lambda: self.now)
         self.clients = []
 
     def client(self, *arguments, **fields):
@@ -130,7 +131,7 @@ def test_the_objects_of_every_vehicle_are_there(stage):
     other = client.sim("getObject", "Quadricopter#0")
     assert client.sim("getObjectPosition", other) == pytest.approx([1, 1, 0.8])
     client.sim("setJointPosition", client.sim("getObject", "Quadricopter_propeller_joint1#0"), 1.5)
-    assert 1.5 in stage.simulation.vehicles["other"].blade_angles.values()
+    assert 1.5 in stage.simulation.vehicles["other"].propulsion.blades.angles.values()
 
 
 @pytest.mark.parametrize(
@@ -491,7 +492,7 @@ def test_a_function_of_the_drones_script_is_called(stage):
 
 
 def test_nobody_is_let_in_unless_told():
-    assert isinstance(let_in(parameters.load().remote_api, None), Nobody)
+    assert type(start_server(parameters.load().remote_api, None)) is RemoteApi
 
 
 @pytest.mark.parametrize(
@@ -512,11 +513,10 @@ def test_a_wrong_parameter_is_one_line(key, value, said):
 def test_a_port_that_is_taken_and_an_address_that_is_none(stage):
     for address, port in (("127.0.0.1", stage.server.port), ("nowhere.invalid", 0)):
         with pytest.raises(OSError, match=f"remote_api: cannot listen on {address}:{port}: "):
-            Server(stage.player, address, port)
+            RemoteApiServer(stage.player, address, port)
 
 
 def test_the_official_client_flies_by_its_own_calls():
-    official = pytest.importorskip("coppeliasim_zmqremoteapi_client")
     over, listening, found = threading.Event(), threading.Event(), []
 
     def serve():
@@ -527,8 +527,7 @@ def test_the_official_client_flies_by_its_own_calls():
     thread.start()
     try:
         assert listening.wait(60)
-        client = official.RemoteAPIClient(port=found[0])
-        sim = client.require("sim")
+        sim = official_client(found[0]).require("sim")
         assert sim.getSimulationState() == sim.simulation_stopped
         sim.setStepping(True)
         sim.startSimulation()
@@ -542,8 +541,22 @@ def test_the_official_client_flies_by_its_own_calls():
         assert sim.unpackFloatTable(sim.packFloatTable([1.0, 2.5])) == [1.0, 2.5]
         with pytest.raises(Exception, match="near names are /Quadcopter"):
             sim.getObject("/Quadcoptr")
+        made = sim.createPureShape(0, 8, [0.2, 0.2, 0.2], 1.0)
         sim.stopSimulation()
         assert sim.getSimulationState() == sim.simulation_stopped
+        assert not sim.isHandle(made)
+        box = sim.createPureShape(0, 8, [0.2, 0.2, 0.2], 1.0)
+        sim.setObjectPosition(box, [4.0, 0.0, 3.0])
+        sim.setShapeColor(box, "", sim.colorcomponent_ambient_diffuse, [1, 0, 0])
+        sim.setStepping(True)
+        sim.startSimulation()
+        assert sim.getObjectPosition(box) == pytest.approx([4, 0, 3])
+        (copy,) = sim.copyPasteObjects([box], 0)
+        sim.stopSimulation()
+        assert sim.isHandle(box) and not sim.isHandle(copy)
+        sim.removeObjects([box])
+        with pytest.raises(Exception, match="no object has the handle"):
+            sim.removeObjects([box])
     finally:
         over.set()
         thread.join()

@@ -8,9 +8,8 @@ import pytest
 from drawing import AHEAD, BLUE, CAMERA, FLOOR, GREY, RED, at, box, draw, looking, pixel, reddish, seen
 
 from drone_sim.render import context
-from drone_sim.render.intrinsics import Intrinsics
-from drone_sim.render.orthographic import Orthographic
-from drone_sim.render.renderer import Renderer, RendererUnavailable
+from drone_sim.render.intrinsics import Intrinsics, Orthographic
+from drone_sim.render.renderer import Renderer
 from drone_sim.shapes.box import Box
 from drone_sim.shapes.cylinder import Cylinder
 from drone_sim.shapes.mesh import Mesh
@@ -277,6 +276,6 @@ def test_another_thread_is_refused(renderer):
 
 def test_without_egl_it_says_in_one_line_what_is_missing(monkeypatch):
     monkeypatch.setattr(context, "LIBEGL", "libNoSuchEGL.so.1")
-    with pytest.raises(RendererUnavailable, match="libegl1") as caught:
+    with pytest.raises(context.RendererUnavailable, match="libegl1") as caught:
         Renderer()
     assert "\n" not in str(caught.value)

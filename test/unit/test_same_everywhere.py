@@ -24,11 +24,11 @@ def test_the_tutorials_flight_is_the_same_to_the_last_bit():
     flown = hashlib.sha256()
     for step in range(STEPS):
         if step == 20:
-            simulation.drone.receive(Twist(Vector3(0.8, -0.4, 0.1), Vector3(0, 0, 0.5)))
+            simulation.drone.commands.receive(Twist(Vector3(0.8, -0.4, 0.1), Vector3(0, 0, 0.5)))
         if step == 300:
-            simulation.drone.receive(Twist())
+            simulation.drone.commands.receive(Twist())
         simulation.step()
-        flown.update(struct.pack("13d", *(number for part in simulation.drone.state for number in part)))
+        flown.update(struct.pack("13d", *(number for part in simulation.drone.body.state for number in part)))
     simulation.close()
     assert flown.hexdigest() == FLIGHT
 

@@ -99,14 +99,14 @@ def test_names_given_beside_a_file_are_found_from_another_folder(tmp_path, monke
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -3.0])
 def test_yaw_is_the_heading_however_the_drone_leans(simulation, scene, yaw):
     leaning = frames.from_rpy((0, 0, 2), (0.7, -0.6, yaw))
-    simulation.drone.move(Pose((0, 0, 2), frames.to_quaternion(leaning)))
+    simulation.drone.body.move(Pose((0, 0, 2), frames.to_quaternion(leaning)))
     simulation.save_scene(scene)
     assert parameters.load({"scene_file": str(scene)}).drone.yaw == pytest.approx(yaw)
 
 
 def test_what_could_not_be_loaded_is_not_saved(simulation, scene):
     before = scene.read_text(encoding="utf-8")
-    simulation.drone.move(Pose((0, 0, -0.5)))
+    simulation.drone.body.move(Pose((0, 0, -0.5)))
     with pytest.raises(ParameterError, match=r"cannot be saved: .*drone/position/2 = -0\.5") as refused:
         simulation.save_scene(scene)
     assert "\n" not in str(refused.value)

@@ -60,12 +60,12 @@ def _simulate(tmp_path):
 
 
 def found(simulation, name):
-    objects = simulation.drone.objects
+    objects = simulation.context.objects
     return objects[objects.handle(name)]
 
 
 def sim_of(simulation):
-    return make_sim(simulation.drone, Surroundings(lambda: simulation.time, 0.05))
+    return make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
 
 
 def place(simulation, name):
@@ -74,7 +74,7 @@ def place(simulation, name):
 
 def test_the_motion_of_joints_composes(simulate):
     simulation = simulate(SCENE)
-    sim, objects = sim_of(simulation), simulation.drone.objects
+    sim, objects = sim_of(simulation), simulation.context.objects
     slide, elbow, hand = (objects.handle(name) for name in ("Slide", "Elbow", "Hand"))
     assert place(simulation, "Hand") == pytest.approx((5 + math.cos(0.5), -1, math.sin(0.5)))
     sim.setJointPosition(slide, 1.5)
@@ -93,17 +93,17 @@ def test_the_motion_of_joints_composes(simulate):
 def test_a_body_without_mass_goes_where_its_parent_goes(simulate):
     simulation = simulate(SCENE)
     flag = found(simulation, "Flag")
-    simulation.drone.receive(Twist(Vector3(0.5, 0, 0.3)))
+    simulation.drone.commands.receive(Twist(Vector3(0.5, 0, 0.3)))
     for _ in range(20):
         simulation.step()
-    above = frames.transform(simulation.drone.matrix, (0, 0, 0.29))
-    assert simulation.drone.state.position[0] > 0.05
+    above = frames.transform(simulation.drone.body.matrix, (0, 0, 0.29))
+    assert simulation.drone.body.state.position[0] > 0.05
     assert simulation.world.state(flag.number).position == pytest.approx(above)
     finger, sim = found(simulation, "Finger"), sim_of(simulation)
-    sim.setJointPosition(simulation.drone.objects.handle("Slide"), 2)
+    sim.setJointPosition(simulation.context.objects.handle("Slide"), 2)
     simulation.step()
     assert simulation.world.state(finger.number).position == pytest.approx(frames.position(finger.matrix()))
-    tree = simulation.drone.objects
+    tree = simulation.context.objects
     tree.set_parent(tree.handle("Flag"), WORLD, keep_in_place=True)
     there = flag.matrix()
     for _ in range(5):
@@ -113,7 +113,7 @@ def test_a_body_without_mass_goes_where_its_parent_goes(simulate):
 
 def test_a_spherical_joint_turns_any_way(simulate):
     simulation = simulate(SCENE)
-    sim, joint = sim_of(simulation), simulation.drone.objects.handle("Ball")
+    sim, joint = sim_of(simulation), simulation.context.objects.handle("Ball")
     sim.setSphericalJointMatrix(joint, list(frames.from_rpy((0, 0, 0), (math.pi / 2, 0, 0))))
     assert place(simulation, "Under") == pytest.approx((0, 4, 1))
     assert sim.getJointMatrix(joint)[3::4] == [0, 0, 0]
@@ -125,7 +125,7 @@ def test_a_spherical_joint_turns_any_way(simulate):
 
 def test_kinds_aliases_and_paths_from_the_root(simulate):
     simulation = simulate(SCENE)
-    objects, sim = simulation.drone.objects, sim_of(simulation)
+    objects, sim = simulation.context.objects, sim_of(simulation)
     kinds = {name: found(simulation, name).kind for name in ("Hand", "Elbow", "Finger", "Table", "Way", "Eye", "Floor")}
     assert list(kinds.values()) == ["dummy", "joint", "shape", "shape", "path", "vision_sensor", "shape"]
     assert found(simulation, "Drone").kind == "shape" and found(simulation, "FrontVision").kind == "vision_sensor"
@@ -138,14 +138,14 @@ def test_kinds_aliases_and_paths_from_the_root(simulate):
 def test_what_nothing_meets_and_what_nobody_sees(simulate):
     simulation = simulate(SCENE)
     world, visuals = simulation.world, simulation.scene.visuals()[0]
-    assert world.ray((0, -6, 3), (0, -6, 0.1)) is None
-    assert world.ray((0, -9, 3), (0, -9, 0.1)).distance == pytest.approx(2, abs=1e-3)
+    assert world.queries.ray((0, -6, 3), (0, -6, 0.1)) is None
+    assert world.queries.ray((0, -9, 3), (0, -9, 0.1)).distance == pytest.approx(2, abs=1e-3)
     shown = {visual.key[0] for visual in visuals}
     assert found(simulation, "Ghost").number in shown and found(simulation, "Unseen").number not in shown
-    simulation.drone.move(Pose((0, -6, 0.5)))
+    simulation.drone.body.move(Pose((0, -6, 0.5)))
     for _ in range(5):
         simulation.step()
-    assert simulation.drone.state.position == pytest.approx((0, -6, 0.5), abs=0.06), "it flies inside"
+    assert simulation.drone.body.state.position == pytest.approx((0, -6, 0.5), abs=0.06), "it flies inside"
 
 
 def test_a_compound_is_one_rigid_body(simulate):
@@ -163,7 +163,7 @@ def test_a_compound_is_one_rigid_body(simulate):
 
 def test_paths(simulate):
     simulation = simulate(SCENE)
-    sim, way = sim_of(simulation), simulation.drone.objects.handle("Way")
+    sim, way = sim_of(simulation), simulation.context.objects.handle("Way")
     assert sim.getPathLength(way) == 7
     assert sim.getPositionOnPath(way, 5 / 7) == pytest.approx([3, 11, 1.85], abs=1e-3)
     assert sim.getOrientationOnPath(way, 1)[2] == pytest.approx(math.pi / 2)
@@ -184,7 +184,7 @@ def test_paths(simulate):
 
 def test_a_vision_sensor_of_the_scene_sees(simulate):
     simulation = simulate(SCENE)
-    sim, eye = sim_of(simulation), simulation.drone.objects.handle("Eye")
+    sim, eye = sim_of(simulation), simulation.context.objects.handle("Eye")
     image, width, height = sim.getVisionSensorCharImage(eye)
     assert (width, height, len(image)) == (32, 24, 32 * 24 * 3)
     middle = np.frombuffer(image, np.uint8).reshape(24, 32, 3)[12, 16].astype(int)
@@ -197,7 +197,7 @@ def test_a_vision_sensor_of_the_scene_sees(simulate):
 
 def test_it_begins_anew_is_saved_and_comes_back_with_a_snapshot(simulate, tmp_path):
     simulation = simulate(SCENE)
-    sim, objects = sim_of(simulation), simulation.drone.objects
+    sim, objects = sim_of(simulation), simulation.context.objects
     sim.setJointPosition(objects.handle("Slide"), 1)
     sim.setObjectParent(objects.handle("Finger"), objects.handle("Quadricopter_base"), True)
     simulation.step()
@@ -310,8 +310,8 @@ objects:
 
 @pytest.mark.ros
 def test_rviz_shows_dummies_as_balls_and_paths_as_lines(simulate):
-    frame_markers = pytest.importorskip("drone_sim.ros.rviz.frame_markers")
-    shown = [*frame_markers.markers_of(simulate(SCENE).scene.objects_now().values())]
+    scene_markers = pytest.importorskip("drone_sim.ros.rviz.scene_markers")
+    shown = [*scene_markers.bodiless_markers(simulate(SCENE).scene.objects.values())]
     balls, lines = ([one for one in shown if one.type == kind] for kind in (2, 4))
     assert len(balls) == 2 and len(lines) == 1
     assert balls[0].pose.position.x == pytest.approx(5 + math.cos(0.5))
@@ -345,5 +345,5 @@ def test_the_examples_of_the_docs_load(simulate):
     entries = ["".join(line for line in one.splitlines(True) if "file:" not in line) for one in examples]
     objects = "objects:\n" + "".join(one.partition("objects:")[2].partition("\n")[2] for one in entries)
     simulation = simulate(objects)
-    assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way"} <= set(simulation.drone.objects.names)
+    assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way"} <= set(simulation.context.objects.names)
     simulation.step()

@@ -86,13 +86,13 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     objects = "\n".join(f"  - {SHAPES[shape] % (2 * n, n % 2)}" for n, shape in enumerate(SHAPES, start=1))
     look = "{name: A, shape: box, size: [1, 2, 3], position: [1, -9, 2], rpy: [0.1, 0.2, 0.3], color: [1, 0, 0, 0.5]}"
     simulation = simulate(write(f"floor: {{size: 33}}\ndrone: {{yaw: 0.3}}\nobjects:\n{objects}\n  - {look}"))
-    simulation.drone.receive(Twist(Vector3(0.5, 0, 0.2)))
+    simulation.drone.commands.receive(Twist(Vector3(0.5, 0, 0.2)))
     for _ in range(10):
         simulation.step()
     saved = tmp_path / "elsewhere" / "saved.yaml"
     simulation.save_scene(saved)
     loaded = simulate(str(saved))
-    assert loaded.drone.state.position == simulation.drone.state.position
+    assert loaded.drone.body.state.position == simulation.drone.body.state.position
     for ours, theirs in zip(simulation.parameters.scene.objects, loaded.parameters.scene.objects):
         assert ours.model_dump(exclude={"position", "rpy"}) == theirs.model_dump(exclude={"position", "rpy"})
     assert loaded.parameters.scene.floor == simulation.parameters.scene.floor
@@ -111,7 +111,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: [", "scene.yaml: while parsing"),
         (
             "boxes: []",
-            f"line 1: unknown key boxes; known are {KEYS}",
+            f"line 1: parameter boxes: unknown key; known are {KEYS}",
         ),
         ("1: 2", "key '1' must be a text (line 1, column 1)"),
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
@@ -196,7 +196,7 @@ objects:
     first, *others = str(refused.value).split("; line ")
     assert first == f"{file}: line 1: parameter floor/size = 'a': input should be a valid number"
     assert others == [
-        f"2: unknown key boxes; known are {KEYS}",
+        f"2: parameter boxes: unknown key; known are {KEYS}",
         "4: parameter drone/position = [1, 2]: must be 3 numbers, [x, y, z] in m",
         "5: parameter drone/yam: unknown key; known are yaw",
         "9: parameter objects/0/color = [1, 0]: must be 3 or 4 numbers from 0 to 1, "
@@ -250,8 +250,8 @@ def test_one_entry_of_each_shape_to_copy(write, simulate):
     simulation = simulate(write(README))
     for _ in range(10):
         simulation.step()
-    assert {"Crate", "Pillar", "Ball", "Chair", "Barrel"} <= set(simulation.drone.objects.names)
-    assert simulation.drone.state.position[2] == pytest.approx(1, abs=0.01)
+    assert {"Crate", "Pillar", "Ball", "Chair", "Barrel"} <= set(simulation.context.objects.names)
+    assert simulation.drone.body.state.position[2] == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize("file", ["no.yaml", "/no/such.yaml", "package://drone_sim/config/scenes/no.yaml", "/tmp"])
@@ -264,19 +264,19 @@ def test_a_scene_that_is_not_there_gets_one_line(file):
 @pytest.mark.parametrize("name", ["empty", "gates", "room"])
 def test_the_shipped_scenes_load_and_let_the_drone_hover(simulate, name):
     simulation = simulate(f"package://drone_sim/config/scenes/{name}.yaml")
-    (x, y, z), things = simulation.drone.state.position, simulation.world.visual_poses()[:, :3, 3]
+    (x, y, z), things = simulation.drone.body.state.position, simulation.world.visual_poses()[:, :3, 3]
     for _ in range(100):
         simulation.step()
-    assert simulation.drone.state.position == pytest.approx((x, y, z), abs=0.002)
+    assert simulation.drone.body.state.position == pytest.approx((x, y, z), abs=0.002)
     np.testing.assert_allclose(simulation.world.visual_poses()[:, :3, 3], things, rtol=0, atol=0.005)
 
 
 def test_the_drone_flies_through_the_first_gate(simulate):
     simulation = simulate("package://drone_sim/config/scenes/gates.yaml")
-    simulation.drone.receive(Twist(Vector3(1.0, 0, 0.05)))
+    simulation.drone.commands.receive(Twist(Vector3(1.0, 0, 0.05)))
     for _ in range(100):
         simulation.step()
-    x, y, _ = simulation.drone.state.position
+    x, y, _ = simulation.drone.body.state.position
     assert x > 4.0 and abs(y) < 1e-6
 
 
@@ -328,7 +328,7 @@ def test_a_mesh_written_anew_is_seen_anew(tmp_path):
 
 def test_a_heap_that_would_take_seconds_a_step_is_refused():
     box = {"shape": "box", "size": [1, 1, 1], "position": [0, 0, 5], "mass": 1}
-    assert Simulation(parameters.load({"scene": {"objects": [box] * 20}})).world.overlaps() == 190
+    assert Simulation(parameters.load({"scene": {"objects": [box] * 20}})).world.queries.overlaps() == 190
     Simulation(parameters.load({"scene": {"objects": [{**box, "mass": 0}] * 100}})).close()  # what stands may
     with pytest.raises(ParameterError, match="4950 pairs of moving ones touch or overlap, at most 500 may"):
         Simulation(parameters.load({"scene": {"objects": [box] * 100}}))

@@ -9,10 +9,10 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.calls import UnknownName
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.modules import make_sim
-from drone_sim.scripting.errors import UnknownName
 
 SMALL = {"front": {"width": 8, "height": 6}}
 PICTURE = np.array([[[255, 0, 0]] * 3, [[0, 0, 255]] * 3], dtype=np.uint8)  # red above, blue below
@@ -29,7 +29,10 @@ def _simulation(tmp_path):
 
 @pytest.fixture(name="sim")
 def _sim(simulation):
-    return make_sim(simulation.drone, Surroundings(lambda: simulation.time, 0.05, {"FrontVision": lambda: PICTURE}))
+    return make_sim(
+        simulation.child_scripts["drone"],
+        Surroundings({"FrontVision": lambda: PICTURE}, operations=simulation.operations),
+    )
 
 
 @pytest.fixture(name="base")
@@ -38,7 +41,7 @@ def _base(sim):
 
 
 def test_positions_and_orientations(simulation, sim, base):
-    simulation.drone.move(Pose((1, 2, 3), frames.to_quaternion(frames.from_euler((0, 0, 0), (0.1, 0.2, 0.3)))))
+    simulation.drone.body.move(Pose((1, 2, 3), frames.to_quaternion(frames.from_euler((0, 0, 0), (0.1, 0.2, 0.3)))))
     heli = sim.getObject(".")
     assert sim.getObjectPosition(heli) == pytest.approx([1, 2, 3])
     assert sim.getObjectOrientation(base, -1) == pytest.approx([0.1, 0.2, 0.3])
@@ -120,24 +123,26 @@ def test_a_force_accelerates_and_lasts_one_step(simulation, sim):
     mass = 0.52
     sim.addForceAndTorque(sim.getObject("/Quadcopter"), [0.52, 0, 0], [0, 0, 0])
     simulation.step()
-    speed = simulation.drone.state.linear_velocity[0]
+    speed = simulation.drone.body.state.linear_velocity[0]
     assert speed == pytest.approx(0.52 / mass * 0.05, rel=0.05)
     simulation.step()
-    assert simulation.drone.state.linear_velocity[0] == pytest.approx(speed, rel=1e-3)
+    assert simulation.drone.body.state.linear_velocity[0] == pytest.approx(speed, rel=1e-3)
 
 
 def test_a_force_at_a_propeller_acts_at_its_centre_of_mass(simulation, sim):
     """The torque about z of a force along x at (0.09192, 0.09192) is -0.09192 F; inertia 8.93e-3."""
     sim.addForceAndTorque(sim.getObject("/propeller[0]/respondable"), [0.1, 0, 0])
     simulation.step()
-    assert simulation.drone.state.angular_velocity[2] == pytest.approx(-0.09192 * 0.1 / 8.93e-3 * 0.05, rel=1e-2)
+    assert simulation.drone.body.state.angular_velocity[2] == pytest.approx(-0.09192 * 0.1 / 8.93e-3 * 0.05, rel=1e-2)
 
 
 def test_add_force_is_given_in_the_frame_of_the_body(simulation, sim):
-    simulation.drone.move(Pose((0, 0, 2), frames.to_quaternion(frames.from_rpy((0, 0, 0), (0, 0, 1.5707963267948966)))))
+    simulation.drone.body.move(
+        Pose((0, 0, 2), frames.to_quaternion(frames.from_rpy((0, 0, 0), (0, 0, 1.5707963267948966))))
+    )
     sim.addForce(sim.getObject("/Quadcopter"), [0, 0, 0], [0.52, 0, 0])
     simulation.step()
-    x, y, _ = simulation.drone.state.linear_velocity
+    x, y, _ = simulation.drone.body.state.linear_velocity
     assert y == pytest.approx(0.05, rel=0.05) and abs(x) < 1e-6
 
 
@@ -154,10 +159,10 @@ def test_velocities(simulation, sim, base):
     linear, angular = sim.getObjectVelocity(base + sim.handleflag_axis)
     assert (linear, angular) == sim.getVelocity(base)
     assert sim.getObjectVelocity(base) == (linear, angular)
-    state = simulation.drone.state
+    state = simulation.drone.body.state
     swing = frames.cross(state.angular_velocity, frames.rotate(state.matrix, (0, 0, -0.01)))
     assert linear == pytest.approx([a + b for a, b in zip(state.linear_velocity, swing)], abs=1e-12)
-    assert angular == pytest.approx(simulation.drone.state.angular_velocity)
+    assert angular == pytest.approx(simulation.drone.body.state.angular_velocity)
 
 
 def test_images_come_with_the_bottom_row_first(sim):
@@ -184,8 +189,8 @@ def test_what_cannot_be_drawn_is_said_once(sim, caplog):
 
 @pytest.fixture(name="drawings")
 def _drawings(simulation):
-    simulation.drone._shared.drawings = Drawings()
-    return simulation.drone.drawings
+    simulation.context.drawings = Drawings()
+    return simulation.context.drawings
 
 
 def test_what_is_drawn_is_kept(drawings, sim, caplog):
@@ -250,7 +255,7 @@ def test_a_script_sees_each_step_once(tmp_path):
     camera.take = lambda: taken.append(simulation.steps) or take()
     simulation.step()
     simulation.step()
-    camera.watched = lambda: True
+    camera.viewers.add(lambda: True)
     simulation.step()
     simulation.close()
     assert taken == [1, 2, 3]

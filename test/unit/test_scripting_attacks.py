@@ -65,6 +65,12 @@ IN_LUA = [
     ("x = string.rep('x', 1e9)", "not enough memory"),
     ("x = {} for i = 1, 10 do x[i] = string.rep(tostring(i), 4e7) end", "uses more than 256 MiB"),
     ("x = {} while true do x[#x + 1] = {} end", ""),
+    ("function sysCall_init() while true do coroutine.resume(coroutine.create(sim.wait), 1) end end", STOPPED),
+    (
+        "function sysCall_init() for i = 1, 2e3 do local c = coroutine.create(sim.wait) "
+        "_G[i] = c assert(coroutine.resume(c, 1)) end end",
+        "at most 1000 coroutines",
+    ),
     ("x = {} while true do pcall(function() x[#x + 1] = string.rep(tostring(#x), 1e7) end) end", ""),
     *(
         (f"x = {{}} for i = 1, 300 do pcall(function() x[i] = string.rep(tostring(i), 2e6) end) end {crossing}", "")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.state import Pose
+from drone_sim.mechanics.clock import Clock
 from drone_sim.run import parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
@@ -42,7 +42,7 @@ def test_a_script_stops_the_simulation(tmp_path, caplog):
     simulation, told = played(tmp_path, ASKS % "stopSimulation")
     assert told == ["flying", "stopped"] and not simulation.running
     assert "16 17 17 17 22 true" in caplog.messages, "first after stop, running, last before stop"
-    assert simulation.asked == ""
+    assert simulation.context.control.asked == ""
     simulation.close()
 
 
@@ -79,25 +79,25 @@ def _simulation(tmp_path):
 
 def test_a_parent_carries_what_is_drawn(simulation):
     turned, local = simulation._drawings.objects.values()
-    x, y, z = simulation.drone.state.position
+    x, y, z = simulation.drone.body.state.position
     assert turned.in_world() == [pytest.approx((1, 0, 0, 0, 0, 1))], "a quaternion becomes a normal"
     assert local.in_world() == [pytest.approx((x + 1, y, z - 0.01))]
-    simulation.drone.move_target(Pose((5, 0, 0), frames.to_quaternion(frames.from_rpy((0, 0, 0), (0, 0, np.pi / 2)))))
+    simulation.drone.target.put(frames.from_rpy((5, 0, 0), (0, 0, np.pi / 2)))
     assert local.in_world() == [pytest.approx((5, 1, 0))]
     assert turned.in_world() == [pytest.approx((5 - y, 1 - x, 0.01 - z, 0, 0, 1))]
     assert simulation._drawings.carried
 
 
 def test_custom_data_and_tubes_are_of_a_snapshot_and_of_a_run(simulation):
-    data = simulation._setting.shared
+    data = simulation.context
     simulation.step()
     kept = simulation.snapshot()
     for _ in range(2):
         simulation.step()
-    assert list(data.data.values.values()) == ["3"] and simulation.drone.signals.getFloatSignal("waiting") == 3
+    assert list(data.data.values.values()) == ["3"] and simulation.context.signals.get(float, "waiting") == 3
     simulation.restore(kept)
     simulation.step()
-    assert list(data.data.values.values()) == ["2"] and simulation.drone.signals.getFloatSignal("waiting") == 2
+    assert list(data.data.values.values()) == ["2"] and simulation.context.signals.get(float, "waiting") == 2
     simulation.stop()
     assert not data.data.values
 
@@ -130,7 +130,7 @@ class Ros:
 def test_ros_is_reached_through_the_backend():
     bus = MessageBus("drone")
     bus.backend = ros = Ros()
-    sim_ros = make_sim_ros(bus)
+    sim_ros = make_sim_ros(bus, Clock(0.05))
     assert sim_ros.getTime() == 12.5
     assert sim_ros.getParamInt("gain") == (True, 2) and sim_ros.getParamDouble("gain") == (True, 2.0)
     assert sim_ros.getParamString("gain", "none") == (False, "none"), "of another type"

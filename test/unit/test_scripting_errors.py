@@ -1,5 +1,6 @@
 """A broken script gives one line: phase, file, line, message. The next start works."""
 
+import logging
 import time
 
 import pytest
@@ -9,7 +10,7 @@ from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.constants import PHASES
 from drone_sim.scripting.errors import ScriptError
-from drone_sim.scripting.time_limit import Stopped, TimeLimit
+from drone_sim.scripting.time_limit import ScriptStopped, TimeLimit
 
 PARAMETERS = parameters.load({"script_time_limit": 0.2})
 STOPPED = "stopped after 0.2 s without returning (script_time_limit)"
@@ -21,7 +22,7 @@ def run(path, steps=3):
     simulation = None
     try:
         simulation = Simulation(PARAMETERS, script=str(path))
-        simulation.drone.receive(Twist())
+        simulation.drone.commands.receive(Twist())
         for _ in range(steps):
             simulation.step()
     except ScriptError as error:
@@ -83,7 +84,12 @@ def _fails(tmp_path):
         ("sim.multiplyVector({1,2,3},{1,2,3})", "load", 1, ["sim.multiplyVector: 12 numbers are expected, not 3"]),
         ("simSetObjectPosition(1,-1,{1,2})\n", "load", 1, ["simSetObjectPosition: 3 numbers", "[1, 2]", "position"]),
         ("sim.getObjectPosition()", "load", 1, ["wrong number of values: got (), expected (handle: Handle"]),
-        ("sim.getObjectPosition(1,2,3)", "load", 1, ["wrong number of values: got (1, 2, 3)"]),
+        (
+            "sim.getObjectPosition('x',-1,3)",
+            "load",
+            1,
+            ["wrong kind of value: got ('x', -1), expected (handle: Handle"],
+        ),
         ("sim.getObjectPosition(nil,-1)", "load", 1, ["wrong kind of value: got (nothing, -1)"]),
         ("local h = 1\nsim.setObjectPosition(h,-1,{0,0,0/0})", "load", 2, ["finite numbers are expected"]),
         ("sim.setScriptSimulationParameter(1,'particleVelocity',{})", "load", 1, ["a number is expected"]),
@@ -98,6 +104,17 @@ def _fails(tmp_path):
 )
 def test_lua(fails, source, phase, line, words):
     fails("lua", source, phase, line, *words)
+
+
+def test_lua_may_give_more_values_than_a_function_takes(tmp_path, caplog):
+    """As in V-REP, where scripts of old give a value to what returns one."""
+    caplog.set_level(logging.INFO)
+    script = tmp_path / "lavish.lua"
+    call = "local result, mass = simGetObjectFloatParameter(simGetObjectHandle('Drone'), 3005, 1.5, {})"
+    script.write_text(f"function sysCall_actuation()\n  {call}\n  print(result, mass)\nend")
+    run(script)
+    said = [one for one in caplog.messages if "Object" in one or "0.12" in one]
+    assert said == ["simGetObjectFloatParameter: 4 values given, 2 taken: the others are ignored", *["1\t0.12"] * 3]
 
 
 @pytest.mark.parametrize(
@@ -238,7 +255,7 @@ def test_a_limit_that_passes_while_it_is_looked_at_holds():
         def left(self):
             return super().left() - 1.0  # the process had to wait for its turn
 
-    with pytest.raises(Stopped):
+    with pytest.raises(ScriptStopped):
         Slow(0.05).run(time.sleep, 10)
 
 
@@ -248,6 +265,6 @@ def test_a_late_stop_never_leaves_the_script():
     for wait in range(40):
         try:
             limit.run(time.sleep, 0.04 + 0.001 * wait)
-        except Stopped:
+        except ScriptStopped:
             continue
     time.sleep(0.2)

@@ -282,7 +282,7 @@ def test_a_script_anywhere_imports_the_built_in_ones_and_a_file_beside_it_comes_
     simulation = simulate(write("mine/script.py", user))
     for _ in range(20):
         simulation.step()
-    assert simulation.drone.state.position[2] == pytest.approx(0.8, abs=1e-3)
+    assert simulation.drone.body.state.position[2] == pytest.approx(0.8, abs=1e-3)
     write("mine/tutorial.py", "def sysCall_init():\n    print('mine')\n")
     simulation.start()
     assert printed() == ["mine"]

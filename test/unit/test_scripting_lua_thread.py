@@ -2,6 +2,7 @@
 
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -28,7 +29,7 @@ def test_results_and_errors_come_back(thread):
     assert thread.run(threading.get_ident) != threading.get_ident()
     with pytest.raises(ZeroDivisionError):
         thread.run(lambda: 1 / 0)
-    assert thread.run(lambda: 4, near=True) == 4
+    assert thread.run(lambda: 4) == 4
 
 
 def test_what_is_bound_to_the_callers_thread_runs_there_uncounted(thread):
@@ -46,16 +47,15 @@ def test_what_is_bound_to_the_callers_thread_runs_there_uncounted(thread):
 
 def test_who_hangs_is_left_behind_and_finds_the_api_closed(thread):
     class Values:
-        used = int
-
         def readers(self):
             return (tuple,)
 
         def answer_of(self, function):
             return lambda value: (1, value)
 
+    state = SimpleNamespace(executor=thread, values=Values(), used=int)
     called, outcomes, wake = [], [], threading.Event()
-    api = lua_function("sim.x", lambda: called.append(1), Values(), thread)
+    api = lua_function("sim.x", lambda: called.append(1), state)
 
     def script():
         outcomes.append(api(0))

@@ -117,6 +117,6 @@ def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue):
     path = tmp_path / "script.lua"
     path.write_text(source, encoding="utf-8")
     simulation = Simulation(parameters.load(), script=str(path))
-    found = simulation.drone.script_parameters["Drone"]
+    found = simulation.child_scripts["drone"].parameters
     assert found["product"] == list(frames.transform(m, v)) and found["inverse"] == list(frames.invert(m))
     simulation.close()

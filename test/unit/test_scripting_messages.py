@@ -9,7 +9,9 @@ from recorder import Recorder
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api.messages import Image, MessageBus
+from drone_sim.scripting.api.backend import Image
+from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.ros_functions import TopicFunctions
 
 
 class FakeSender:
@@ -63,11 +65,11 @@ def test_the_same_subscription_once_more_is_the_one_that_is_there():
         bus.subscribe("/more", "geometry_msgs/Twist", "on_twist"),
     ]
     assert others == [2, 3, 4]
-    bus.shutdownSubscriber(3)
+    bus.end_subscription(3)
     bus.post("/cmd_vel", 1)
     heard += bus.take()
     assert heard == [("on_twist", 1), ("on_other", 1)]
-    bus.shutdownSubscriber(1)
+    bus.end_subscription(1)
     assert bus.subscribe("/cmd_vel", "geometry_msgs/Twist", "on_twist") == 5
 
 
@@ -79,9 +81,9 @@ def test_the_last_messages_are_kept(queue, kept):
         bus.post("x", message)
     heard += [message for _, message in bus.take() + bus.take()]
     assert heard == kept
-    bus.shutdownSubscriber(handle)
+    bus.end_subscription(handle)
     with pytest.raises(ValueError, match=f"no subscription has the handle {handle}"):
-        bus.shutdownSubscriber(handle)
+        bus.end_subscription(handle)
 
 
 @pytest.mark.parametrize("backend", [None, Recorder()])
@@ -90,18 +92,18 @@ def test_what_is_published(backend):
     bus.backend = backend
     handle = bus.advertise("said", "std_msgs/String")
     bus.publish(handle, {"data": "x"})
-    image = bus.imageTransportAdvertise("/drone/front")
-    bus.imageTransportPublish(image, bytes(range(12)), 2, 2, "here")
+    image, sim_ros = bus.advertise_image("/drone/front"), TopicFunctions(bus)
+    sim_ros.imageTransportPublish(image, bytes(range(12)), 2, 2, "here")
     assert backend is None or backend.published == [
         ("/drone/said", "std_msgs/String", {"data": "x"}),
         ("/drone/front", "sensor_msgs/Image", Image(bytes([6, 7, 8, 9, 10, 11, 0, 1, 2, 3, 4, 5]), 2, 2, "here")),
     ]
-    assert [bus.getNumSubscribers(one) for one in (handle, image)] == ([0, 0] if backend is None else [1, 1])
+    assert [bus.subscribers(one) for one in (handle, image)] == ([0, 0] if backend is None else [1, 1])
     with pytest.raises(ValueError, match="an image of 2 x 2 has 12 bytes, not 3"):
-        bus.imageTransportPublish(image, b"abc", 2, 2, "here")
-    bus.shutdownPublisher(handle)
-    bus.imageTransportShutdownPublisher(image)
-    for call in (lambda: bus.publish(handle, {}), lambda: bus.getNumSubscribers(handle)):
+        sim_ros.imageTransportPublish(image, b"abc", 2, 2, "here")
+    bus.end_publisher(handle)
+    sim_ros.imageTransportShutdownPublisher(image)
+    for call in (lambda: bus.publish(handle, {}), lambda: bus.subscribers(handle)):
         with pytest.raises(ValueError, match="no publisher has the handle"):
             call()
 
@@ -119,7 +121,7 @@ def test_a_backend_carries_messages():
     assert heard == [("on_scan", "message")]
 
     bus.publish(bus.advertise("said", "std_msgs/String", 5, True), {"data": "x"})
-    bus.imageTransportAdvertise("front", 1)
+    bus.advertise_image("front")
     sender = backend.senders[("/drone/said", "std_msgs/String", 5, True)]
     assert sender.sent == [{"data": "x"}]
     bus.close()
@@ -198,7 +200,7 @@ def test_twists_reach_the_script(tmp_path):
         encoding="utf-8",
     )
     simulation = Simulation(parameters.load(), script=str(path))
-    simulation.drone.receive(Twist(Vector3(1, 0, 0), Vector3(0, 0, 0.5)))
+    simulation.drone.commands.receive(Twist(Vector3(1, 0, 0), Vector3(0, 0, 0.5)))
     simulation.step()
     simulation.close()
 
@@ -213,7 +215,7 @@ def test_scripts_leave_nothing_behind(tmp_path):
     for _ in range(5):
         simulation = Simulation(parameters.load(), script=str(path))
         simulation.step()
-        scripts.append(weakref.ref(simulation.drone.script))
+        scripts.append(weakref.ref(simulation.child_scripts["drone"].script))
         simulation.close()
     del simulation
     gc.collect()

@@ -6,7 +6,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api import object_paths
+from drone_sim.scripting.api import names
 
 
 @pytest.fixture(name="simulation", scope="module")
@@ -19,7 +19,7 @@ def _simulation():
 @pytest.fixture(name="objects")
 def _objects(simulation):
     simulation.drone.reset()
-    return simulation.drone.objects
+    return simulation.context.objects
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def _objects(simulation):
     ],
 )
 def test_paths(objects, path, name):
-    assert objects[object_paths.find(objects, path, "Drone", -1)].name == name
+    assert objects[names.find(objects, path, "Drone", -1)].name == name
 
 
 @pytest.mark.parametrize(
@@ -78,13 +78,13 @@ def test_paths(objects, path, name):
 )
 def test_unknown_names_list_the_near_ones(objects, path, near):
     with pytest.raises(ValueError, match="no object") as raised:
-        object_paths.find(objects, path, "Drone", -1)
+        names.find(objects, path, "Drone", -1)
     assert near in str(raised.value)
 
 
 def test_paths_are_found_again(objects):
     for handle in objects:
-        assert object_paths.find(objects, objects.path(handle), "Drone", -1) == handle
+        assert names.find(objects, objects.path(handle), "Drone", -1) == handle
 
 
 def test_parents(objects):
@@ -102,7 +102,7 @@ def test_a_target_without_parent_stays(simulation, objects):
     carried = objects.matrix(target)
     assert frames.position(carried) == pytest.approx((0, 0, 0.79))
     objects.set_parent(target, -1, True)
-    simulation.drone.move(Pose((1, 2, 3)))
+    simulation.drone.body.move(Pose((1, 2, 3)))
     assert objects.matrix(target) == carried
 
 

@@ -147,7 +147,7 @@ def test_one_drone_sees_another(drones):
 def test_no_two_things_drawn_have_one_handle(shown):
     scene = Scene(shown)
     first, second = Drone(scene).sim(), Drone(scene, "#0").sim()
-    recall = scene.drawings.remember()
+    restore = scene.drawings.save_state()
 
     def draw():
         return [
@@ -156,7 +156,7 @@ def test_no_two_things_drawn_have_one_handle(shown):
         ]
 
     assert draw() == [1, 2, 3, 4]
-    recall()
+    restore()
     assert draw() == [1, 2, 3, 4]
     assert list(scene.drawings.objects) == ([1, 2] if shown else [])
     scene.drawings.clear()
@@ -196,12 +196,12 @@ def test_a_snapshot_knows_the_suffix(drones, tmp_path, ending):
     path = tmp_path / f"script.{ending}"
     path.write_text(SPEAKS[ending], encoding="utf-8")
     script = drones[1].load(path)
-    recall = script.remember()
+    restore = script.save_state()
     found = []
     for _ in range(2):
         script.call("actuation")
         found.append(drones[1].parameters["base"])
-    recall()
+    restore()
     script.call("actuation")
     found.append(drones[1].parameters["base"])
     assert found == ["Quadricopter_base#0", "Quadricopter_base", "Quadricopter_base#0"]
@@ -212,8 +212,8 @@ def test_when_a_drone_is_gone_the_others_stay_what_they_are(drones):
     first, second, third = drones
     sim = second.sim()
     base = sim.getObject("./base")
-    first.objects.remove(third.handles)
-    first.objects.remove(first.handles)
+    first.context.objects.remove(third.handles)
+    first.context.objects.remove(first.handles)
     assert sim.getObject("Quadricopter_base") == base and sim.getObjectName(base) == "Quadricopter_base#0"
     assert name_of(second, "Floor") == "Floor"
     with pytest.raises(ValueError, match="no object named 'Quadricopter_base#1'"):

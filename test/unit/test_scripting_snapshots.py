@@ -40,8 +40,8 @@ def flight(simulation, steps=4):
     backend.published.clear()
     for _ in range(steps):
         simulation.step()
-        path.append(struct.pack("3d", *simulation.drone.state.position))
-    drawn = {handle: list(one.items) for handle, one in simulation.drone.drawings.objects.items()}
+        path.append(struct.pack("3d", *simulation.drone.body.state.position))
+    drawn = {handle: list(one.items) for handle, one in simulation.context.drawings.objects.items()}
     return path, list(backend.published), drawn
 
 
@@ -51,9 +51,9 @@ def test_commands_on_their_way_are_delivered_again(tmp_path):
     simulation = Simulation(parameters.load(), script=str(path), drawings=Drawings(), backend=Recorder())
     flights = []
     for x in (1, 2):
-        simulation.drone.receive(Twist(Vector3(x)))
+        simulation.drone.commands.receive(Twist(Vector3(x)))
         simulation.step()
-    simulation.drone.receive(Twist(Vector3(3)))
+    simulation.drone.commands.receive(Twist(Vector3(3)))
     snapshot = simulation.snapshot()
     for _ in range(3):
         flights.append(flight(simulation))
@@ -68,10 +68,10 @@ def test_commands_on_their_way_are_delivered_again(tmp_path):
 def test_flights_go_on_to_the_bit(script):
     simulation = Simulation(parameters.load(), script=script, drawings=Drawings(), backend=Recorder())
     simulation.step()
-    simulation.drone.receive(Twist(Vector3(1, 0.5, 0.2), Vector3(0, 0, 0.3)))
+    simulation.drone.commands.receive(Twist(Vector3(1, 0.5, 0.2), Vector3(0, 0, 0.3)))
     snapshot = simulation.snapshot()
     first = flight(simulation, 50)
-    simulation.drone.receive(Twist(Vector3(-1)))
+    simulation.drone.commands.receive(Twist(Vector3(-1)))
     simulation.restore(snapshot)
     assert flight(simulation, 50) == first
     simulation.close()
@@ -107,12 +107,12 @@ def test_topics_come_back_under_their_handles():
     bus.backend = Counted()
     heard, said = bus.subscribe("/in", "std_msgs/String", "f", 4), bus.advertise("/out", "std_msgs/String")
     bus.post("/in", {"data": [1]})
-    recall = bus.remember()
-    bus.shutdownSubscriber(heard)
-    bus.shutdownPublisher(said)
+    restore = bus.save_state()
+    bus.end_subscription(heard)
+    bus.end_publisher(said)
     assert (bus.subscribe("/more", "std_msgs/String", "g"), bus.advertise("/else", "std_msgs/String")) == (3, 4)
     for _ in range(2):
-        recall()
+        restore()
         assert bus.backend.topics == {"/in", "/out"}
         bus.publish(said, {})
         found = []
@@ -137,7 +137,7 @@ def test_the_time_between_calls_is_not_the_scripts(tmp_path):
     path = tmp_path / "script.lua"
     path.write_text("x = {} for i = 1, 20000 do x[i] = {i} end function sysCall_init() end", encoding="utf-8")
     simulation = Simulation(parameters.load({"script_time_limit": 5}), script=str(path))
-    simulation.drone.script._limit._deadline = 0.0  # as after a long pause
+    simulation.child_scripts["drone"].script._limit._deadline = 0.0  # as after a long pause
     for _ in range(5):
         simulation.step()
     simulation.restore(simulation.snapshot())
@@ -157,7 +157,7 @@ def test_a_script_that_keeps_itself_has_snapshots(tmp_path):
     simulation.step()
     simulation.restore(snapshot)
     simulation.step()
-    me = simulation.drone.script._globals["self"]
+    me = simulation.child_scripts["drone"].script._globals["self"]
     assert (me.me is me, me.too[0] is me, me.count, len(me.list)) == (True, True, 2, 2)
     simulation.close()
 

@@ -27,7 +27,7 @@ def hover_offset(law):
 )
 def test_settles_on_a_target_moved_aside_and_turned(script, law):
     simulation = Simulation(parameters.load({"propellers": {"law": law}}), script=script)
-    objects = simulation.drone.objects
+    objects = simulation.context.objects
     target, base = objects.handle("Quadricopter_target"), objects.handle("Quadricopter_base")
     simulation.step()
     height = frames.position(objects.matrix(target))[2]
@@ -35,7 +35,7 @@ def test_settles_on_a_target_moved_aside_and_turned(script, law):
     for _ in range(1200):
         simulation.step()
     there = objects.matrix(base)
-    speed = simulation.drone.state.linear_velocity
+    speed = simulation.drone.body.state.linear_velocity
     simulation.close()
     x, y, z = frames.position(there)
     assert math.hypot(x, y - 1) < 2e-3
@@ -54,12 +54,12 @@ def test_scripted_forces_fly_as_particles_do():
     flights = []
     for script in ("target", LUA):
         simulation = Simulation(parameters.load({"propellers": {"law": "4.x"}}), script=script)
-        objects = simulation.drone.objects
+        objects = simulation.context.objects
         objects.set_matrix(objects.handle("target"), -1, frames.from_euler((0.5, 0.5, 1), (0, 0, 1)))
         for _ in range(200):
             simulation.step()
-        flights.append(simulation.drone.state.position)
-        angles = simulation.drone.blade_angles
+        flights.append(simulation.drone.body.state.position)
+        angles = simulation.drone.propulsion.blades.angles
         simulation.close()
     assert flights[0] == pytest.approx(flights[1], abs=1e-9)
     assert set(angles.values()) == {199 * STEP * 10 % (2 * math.pi)}, "setJointPosition turns the blades"

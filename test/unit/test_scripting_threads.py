@@ -21,10 +21,10 @@ def _fly(tmp_path):
         try:
             for _ in range(steps):
                 simulation.step()
-                found.append(simulation.drone.signals.getFloatSignal(signal))
+                found.append(simulation.context.signals.get(float, signal))
         finally:
             simulation.close()
-        return [*found, simulation.drone.signals.getFloatSignal("end")] if "'end'" in text else found
+        return [*found, simulation.context.signals.get(float, "end")] if "'end'" in text else found
 
     return fly
 
@@ -163,7 +163,7 @@ def test_it_waits_for_a_signal(fly):
         ("def sysCall_thread():\n  sim.step()\n  1 / 0", r"\[thread\] .*script.py:3: ZeroDivisionError"),
         ("function sysCall_actuation()\n sim.wait(1)\nend", "script.lua:2: sim.wait: only in a thread: in"),
         ("def sysCall_actuation():\n  sim.wait(1)", "script.py:2: sim.wait: only in a thread: in sysCall_thread"),
-        ("function sysCall_thread()\n sim.wait('x')\nend", "script.lua:2: sim.wait: a number of seconds is expected"),
+        ("function sysCall_thread()\n sim.wait('x')\nend", "script.lua:2: sim.wait: a number is expected"),
         ("function sysCall_thread() while true do end end", "stopped after 0.2 s"),
         ("def sysCall_thread():\n  while True: pass", "script.py:2: stopped after 0.2 s"),
         ("def sysCall_thread():\n  yield", "sysCall_thread would not run: it has a `yield`"),

@@ -20,13 +20,13 @@ def pose(position, rpy):
 
 
 EVENTS = {
-    20: lambda drone: drone.receive(Twist(Vector3(1, 0, 0))),
-    120: lambda drone: drone.receive(Twist(Vector3(0, -1, 0.5), Vector3(0, 0, 0.7))),
-    250: lambda drone: drone.receive(Twist(Vector3(-0.5, 0.4, -0.3), Vector3(0, 0, -0.4))),
-    380: lambda drone: drone.receive(Twist()),
-    500: lambda drone: drone.move(pose((0, 0, 2.4), (0.3, 0.2, 1))),
-    700: lambda drone: drone.receive(Twist(Vector3(0, 0, 0), Vector3(0, 0, 1))),
-    850: lambda drone: drone.move(pose((1, 0, 1.5), (-0.3, 0.4, -2))),
+    20: lambda drone: drone.commands.receive(Twist(Vector3(1, 0, 0))),
+    120: lambda drone: drone.commands.receive(Twist(Vector3(0, -1, 0.5), Vector3(0, 0, 0.7))),
+    250: lambda drone: drone.commands.receive(Twist(Vector3(-0.5, 0.4, -0.3), Vector3(0, 0, -0.4))),
+    380: lambda drone: drone.commands.receive(Twist()),
+    500: lambda drone: drone.body.move(pose((0, 0, 2.4), (0.3, 0.2, 1))),
+    700: lambda drone: drone.commands.receive(Twist(Vector3(0, 0, 0), Vector3(0, 0, 1))),
+    850: lambda drone: drone.body.move(pose((1, 0, 1.5), (-0.3, 0.4, -2))),
 }
 
 
@@ -39,7 +39,7 @@ def fly(script, steps=STEPS, backend=None):
             if step in EVENTS:
                 EVENTS[step](simulation.drone)
             simulation.step()
-            path.append(simulation.drone.state.position)
+            path.append(simulation.drone.body.state.position)
         return path
     finally:
         simulation.close()

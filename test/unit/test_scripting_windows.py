@@ -53,13 +53,13 @@ def handles(simulation, kind):
 
 def result(simulation):
     simulation.step()
-    return simulation.shared.signals.getStringSignal("results")
+    return simulation.context.signals.get(str, "results")
 
 
 def test_a_person_sees_and_answers(fly):
     simulation = fly(OPENS)
     windows = simulation.windows
-    windows.can_answer = lambda: True
+    windows.readers.add(lambda: True)
     state = windows.state()
     assert [(one["sensor"], one["label"]) for one in state["views"]] == [("FrontVision", "FrontVision")]
     land, height, wait = state["dialogs"]
@@ -94,9 +94,9 @@ def test_a_button_that_is_not_there_is_refused(fly):
 
 def test_what_a_script_closes_is_closed_and_a_snapshot_opens_it_again(fly):
     simulation = fly(OPENS)
-    simulation.windows.can_answer = lambda: True
+    simulation.windows.readers.add(lambda: True)
     before, snapshot = simulation.windows.state(), simulation.snapshot()
-    simulation.shared.signals.setInt32Signal("close", 1)
+    simulation.context.signals.set(int, "close", 1)
     simulation.step()
     assert [len(one) for one in simulation.windows.state().values()] == [0, 2, 0]
     simulation.restore(snapshot)
@@ -107,7 +107,7 @@ def test_the_example_asks_and_prints(fly):
     text = (package_path() / "docs" / "scripts.md").read_text(encoding="utf-8").partition("## Windows")[2]
     simulation = fly(re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0])
     windows = simulation.windows
-    windows.can_answer = lambda: True
+    windows.readers.add(lambda: True)
     simulation.step()
     windows.answer(handles(simulation, "dialogs")[0], "ok", "1.5")
     simulation.step()

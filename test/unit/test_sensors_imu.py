@@ -82,7 +82,7 @@ def test_the_samples_add_up_to_the_motion_however_seldom_they_are_taken():
     began = drone.state
     for force, torque in [((1, 0, 5), (0, 2e-3, 0)), ((0, 1, 5), (1e-3, 0, 2e-3)), ((0.5, 0, 2), (0, 0, 0))] * 4:
         drone.step(20, force, torque)
-    assert any(one.body == drone.floor for one in drone.world.contacts(drone.body))
+    assert any(one.body == drone.floor for one in drone.world.queries.contacts(drone.body))
     for rate, imu in imus.items():
         velocity, turn = np.array(began.linear_velocity), began.orientation
         for value in drone.values(imu):
@@ -161,10 +161,10 @@ def test_it_is_brought_back_in_the_middle_of_a_sample():
         return list(imu.readings)
 
     fly(22)
-    recall, count, state = imu.remember(), body.count, body.state
+    restore, count, state = imu.save_state(), body.count, body.state
     first = fly(30)
     for _ in range(2):
-        recall()
+        restore()
         body.count, body.state = count, state
         assert fly(30) == first
     imu.reset()

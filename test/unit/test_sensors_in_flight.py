@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from drone_sim.files.resources import package_path
+from drone_sim.forces.pushes import Push
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.run.whereabouts import Diverged
+from drone_sim.run.stepping import Diverged
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.modules import make_sim
 
@@ -61,22 +62,22 @@ def test_every_sensor_comes_at_its_rate(simulate):
 def test_sensors_change_nothing_of_the_flight(simulate):
     with_them, without = simulate(), simulate({"cameras": {}})
     for simulation in (with_them, without):
-        simulation.drone.receive(FLYING)
+        simulation.drone.commands.receive(FLYING)
         fly(simulation, 100)
-    assert with_them.drone.state == without.drone.state
+    assert with_them.drone.body.state == without.drone.body.state
 
 
 def test_the_same_flight_has_the_same_readings(simulate):
     first, second = simulate(), simulate()
     for simulation in (first, second):
-        simulation.drone.receive(FLYING)
+        simulation.drone.commands.receive(FLYING)
     assert fly(first, 60) == fly(second, 60)
 
 
 def test_a_snapshot_and_a_restart(simulate):
     simulation = simulate()
     beginning = fly(simulation, 20)
-    simulation.drone.receive(FLYING)
+    simulation.drone.commands.receive(FLYING)
     fly(simulation, 3)
     snapshot = simulation.snapshot()
     first = fly(simulation, 40)
@@ -96,12 +97,12 @@ def test_two_drones_have_noise_of_their_own(simulate, still):
         for name in simulation.vehicles
     }
     assert np.abs(biases["drone1"] - biases["drone2"]).max() > 0.02
-    assert {"imu", "imu#0"} <= set(simulation.drone.objects.names)
+    assert {"imu", "imu#0"} <= set(simulation.context.objects.names)
 
 
 def test_what_touches_is_named(simulate, still):
     box = {"shape": "box", "size": [9, 9, 0.2], "position": [0, 0, 0.1]}
-    for named, expected in (({"name": "Table"}, "Table"), ({}, "objects/0")):
+    for named, expected in (({"name": "Table"}, "Table"), ({}, "Cuboid")):
         scene = {"objects": [{**box, **named}]}
         simulation = simulate({**ALL, "scene": scene, "drone": {"position": [0, 0, 0.4]}}, script=still)
         samples = [one.value for _, name, one in fly(simulation, 20) if name == "contacts"]
@@ -124,15 +125,15 @@ def test_two_drones_feel_each_other(simulate, still):
 def test_flown_acceleration_against_the_odometry(simulate):
     simulation = simulate({"sensors": EXACT})
     fly(simulation, 20)
-    simulation.drone.receive(Twist(Vector3(1.5, 0.5, 0)))
-    velocities, felt = [simulation.drone.state.linear_velocity], []
+    simulation.drone.commands.receive(Twist(Vector3(1.5, 0.5, 0)))
+    velocities, felt = [simulation.drone.body.state.linear_velocity], []
     for _ in range(60):
         mean = np.zeros(3)
         simulation.step()
         for reading in simulation.drone.instruments.by_name["imu"].readings:
             mean += np.array(frames.turned(reading.value.orientation, reading.value.specific_force)) / 10
         felt.append(mean)
-        velocities.append(simulation.drone.state.linear_velocity)
+        velocities.append(simulation.drone.body.state.linear_velocity)
     expected = np.diff(velocities, axis=0) / 0.05
     assert np.abs(expected[:, :2]).max() > 1.0
     assert np.array(felt)[:, :2] == pytest.approx(expected[:, :2], rel=1e-6, abs=1e-9)
@@ -150,11 +151,11 @@ def test_lying_on_any_floor_it_feels_its_weight(simulate, still, size):
 
 def test_being_moved_and_restored_is_no_acceleration(simulate):
     simulation = simulate({"sensors": EXACT})
-    simulation.drone.receive(Twist(Vector3(2, 0, 0)))
+    simulation.drone.commands.receive(Twist(Vector3(2, 0, 0)))
     fly(simulation, 40)
     snapshot = simulation.snapshot()
     fly(simulation, 20)
-    simulation.drone.move(Pose((0, 0, 3)))
+    simulation.drone.body.move(Pose((0, 0, 3)))
     fly(simulation, 1)
     strongest = [math.hypot(*one.value.specific_force) for _, _, one in fly(simulation, 1)]
     assert max(strongest) < 12
@@ -166,7 +167,7 @@ def test_a_snapshot_in_the_middle_of_a_picture_s_period(simulate):
     small = {"width": 8, "height": 6, "every": 3}
     simulation = simulate({"cameras": {"front": small}})
     front = simulation.drone.cameras["front"]
-    front.watched = lambda: True
+    front.viewers.add(lambda: True)
     fly(simulation, 3)
     assert front.latest.at == 3 and front.image is front.latest.value
     fly(simulation, 1)
@@ -183,7 +184,7 @@ def test_a_snapshot_in_the_middle_of_a_picture_s_period(simulate):
 def test_where_nothing_can_be_measured_the_flight_ends_as_without_sensors(simulate):
     simulation = simulate()
     fly(simulation, 3)
-    simulation.drone.push((0.0, 0.0, float("nan")), (0.0, 0.0, 0.0), 1.0)
+    simulation.drone.pushes.add(Push((0.0, 0.0, float("nan")), (0.0, 0.0, 0.0), 1.0))
     with pytest.raises(Diverged, match="the simulation has diverged"):
         fly(simulation, 3)
 
@@ -208,7 +209,7 @@ def _sim(simulate):
     box = {"name": "Box", "shape": "box", "size": [1, 1, 0.3], "position": [0, 0, 0.15]}
     sensors = {"down": {"kind": "range", "rate": 20, "min_range": 0.05, "max_range": 2.0}, **EXACT}
     simulation = simulate({"sensors": sensors, "scene": {"objects": [box]}})
-    sim = make_sim(simulation.drone, Surroundings(lambda: simulation.time, 0.05))
+    sim = make_sim(simulation.child_scripts["drone"], Surroundings(operations=simulation.operations))
     return simulation, sim
 
 
@@ -218,16 +219,16 @@ def test_a_script_reads_the_ray_as_in_v_rep(sim):
     assert sim.readProximitySensor(ray) == (-1, 0.0, [0.0, 0.0, 0.0], -1, [0.0, 0.0, 0.0])
     simulation.step()
     state, distance, point, met, normal = sim.readProximitySensor(ray)
-    height = simulation.drone.state.position[2]
+    height = simulation.drone.body.state.position[2]
     assert (state, met) == (1, sim.getObject("/Box"))
     assert distance == pytest.approx(height - 0.3, abs=1e-3)
     in_world = sim.multiplyVector(sim.getObjectMatrix(ray, -1), point)
     assert in_world == pytest.approx([0, 0, 0.3], abs=1e-3)
     assert normal == pytest.approx([0, 0, -1], abs=1e-3)
-    simulation.drone.move(Pose((0, 0, 3)))
+    simulation.drone.body.move(Pose((0, 0, 3)))
     simulation.step()
     assert sim.readProximitySensor(ray)[0] == 0
-    simulation.drone.move(Pose((3, 0, 1)))
+    simulation.drone.body.move(Pose((3, 0, 1)))
     simulation.step()
     assert sim.readProximitySensor(ray)[3] == sim.getObject("/Floor")
 
@@ -280,5 +281,5 @@ def test_scripts_in_both_languages(simulate, tmp_path, name, text):
     sensors = {"down": {"kind": "range", "rate": 20, "min_range": 0.05, "max_range": 2.0}, **EXACT}
     simulation = simulate({"sensors": sensors, "gravity": 0.0}, script=str(tmp_path / name))
     fly(simulation, 2)
-    assert simulation.drone.signals.getFloatSignal("distance") == pytest.approx(0.8, abs=1e-3)
-    assert simulation.drone.signals.getFloatSignal("felt") == pytest.approx(0.0, abs=1e-9)
+    assert simulation.context.signals.get(float, "distance") == pytest.approx(0.8, abs=1e-3)
+    assert simulation.context.signals.get(float, "felt") == pytest.approx(0.0, abs=1e-9)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from carried import BODY, FIELD, GRAVITY, SUB_STEP, ZURICH, Carried, Flown
 
-from drone_sim.mechanics import frames, geodesy
+from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.sensors.battery import BatteryParameters
 from drone_sim.sensors.contacts import ContactsParameters
-from drone_sim.sensors.fix import FixParameters
+from drone_sim.sensors.fix import FLATTENING, SEMI_MAJOR, FixParameters, from_earth, to_earth
 from drone_sim.sensors.magnetic_field import MagneticFieldParameters
 from drone_sim.sensors.pressure import PressureParameters, height_of, pressure_at
 from drone_sim.sensors.range import RangeParameters
@@ -133,13 +133,13 @@ def test_a_barometer_and_the_height_that_it_means():
 
 def test_a_place_on_the_earth_and_back():
     for latitude, longitude, height in [(0, 0, 0), (47.4, 8.5, 488), (-89.9, 120, 9000), (90, 0, 100), (45, -179.9, 0)]:
-        back = geodesy.from_earth(geodesy.to_earth(latitude, longitude, height))
+        back = from_earth(to_earth(latitude, longitude, height))
         assert back[0] == pytest.approx(latitude, abs=1e-12)
         assert back[2] == pytest.approx(height, abs=1e-8)
         if latitude != 90:
             assert back[1] == pytest.approx(longitude, abs=1e-12)
-    assert geodesy.to_earth(0, 90, 0) == pytest.approx((0, 6378137.0, 0), abs=1e-6)
-    assert geodesy.to_earth(90, 0, 0) == pytest.approx((0, 0, 6356752.3142), abs=1e-4)  # the semi-minor axis
+    assert to_earth(0, 90, 0) == pytest.approx((0, 6378137.0, 0), abs=1e-6)
+    assert to_earth(90, 0, 0) == pytest.approx((0, 0, 6356752.3142), abs=1e-4)  # the semi-minor axis
 
 
 def fixed(position, **noise):
@@ -152,9 +152,9 @@ def fixed(position, **noise):
 
 def test_a_kilometre_north_and_east_by_the_radii_of_curvature():
     """M and N of the ellipsoid: M = a (1 - e²) / (1 - e² sin² φ)^1.5, N = a / (1 - e² sin² φ)^0.5."""
-    sin2, e2 = math.sin(math.radians(ZURICH.latitude)) ** 2, geodesy.FLATTENING * (2 - geodesy.FLATTENING)
-    meridian = geodesy.SEMI_MAJOR * (1 - e2) / (1 - e2 * sin2) ** 1.5 + ZURICH.altitude
-    across = geodesy.SEMI_MAJOR / (1 - e2 * sin2) ** 0.5 + ZURICH.altitude
+    sin2, e2 = math.sin(math.radians(ZURICH.latitude)) ** 2, FLATTENING * (2 - FLATTENING)
+    meridian = SEMI_MAJOR * (1 - e2) / (1 - e2 * sin2) ** 1.5 + ZURICH.altitude
+    across = SEMI_MAJOR / (1 - e2 * sin2) ** 0.5 + ZURICH.altitude
     told = message(fixed((0.0, 100.0, 0.0)))
     assert told["latitude"] - ZURICH.latitude == pytest.approx(math.degrees(100 / meridian), rel=1e-4)
     assert told["longitude"] == pytest.approx(ZURICH.longitude, abs=1e-12)
@@ -277,11 +277,11 @@ def test_its_charge_comes_back_with_a_snapshot():
     body.thrusts = HOVER
     sensor = body.fit(BatteryParameters(**BATTERY))
     body.look()
-    recall = sensor.remember()
+    restore = sensor.save_state()
     for _ in range(40):
         body.look()
     last = sensor.latest
-    recall()
+    restore()
     body.count = 1
     for _ in range(40):
         body.look()

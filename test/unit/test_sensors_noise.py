@@ -80,6 +80,12 @@ def test_quantisation_rounds_to_whole_steps():
     assert record(1, 3, truth=0.3, quantisation=0.25).tolist() == [[0.25] * 3]
 
 
+def test_a_step_too_fine_to_divide_by_is_refused():
+    with pytest.raises(ValueError, match="quantisation"):
+        NoiseParameters(quantisation=5e-324)
+    assert record(1, 1, truth=1e9, quantisation=1e-15) == pytest.approx(1e9)
+
+
 def test_what_is_left_out_is_no_noise():
     assert record(3, 2, truth=0.1).tolist() == [[0.1, 0.1]] * 3
 
@@ -166,9 +172,9 @@ def test_a_snapshot_brings_back_noise_and_what_is_on_its_way():
         return list(sensor.readings), sensor.latest
 
     fly()
-    recall, count = sensor.remember(), body.count
+    restore, count = sensor.save_state(), body.count
     first = fly()
     for _ in range(2):
-        recall()
+        restore()
         body.count = count
         assert fly() == first

@@ -67,8 +67,8 @@ def test_in_a_namespace_everything_of_it_is_below():
 
 @pytest.mark.parametrize(("launched", "status"), [((), 1), (("__name:=rviz", "__log:=/tmp/rviz.log"), 0)])
 def test_without_rviz_one_line_says_what_to_do_and_a_launch_goes_on(monkeypatch, capsys, launched, status):
-    monkeypatch.setattr(show.viewer, "_PACKAGE", "no_such_package")
+    monkeypatch.setattr(show, "_RVIZ", "no_such_package")
     monkeypatch.setattr(show.sys, "argv", ["show", "--config", "none", *launched])
     monkeypatch.setattr(show.signal, "signal", lambda *_: None)
     assert show.main() == status
-    assert capsys.readouterr() == ("", f"show: rviz is not installed: {show.viewer.INSTEAD}\n")
+    assert capsys.readouterr() == ("", f"show: rviz is not installed: {show.INSTEAD}\n")

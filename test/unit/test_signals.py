@@ -35,8 +35,7 @@ def shut(reason):
     with lock:
         pass
 guardian = Guardian("node") if {guarded} else None
-from drone_sim.ros.node.ending import Ending
-from drone_sim.ros.node.signals import end_on_signals
+from drone_sim.ros.core.shutdown import Shutdown, end_on_signals
 rospy.core.add_shutdown_hook(shut)
 {install}
 with lock:
@@ -48,8 +47,8 @@ print("ended")
 """
 WAYS = {
     "shut down": ("end_on_signals()", "rospy.is_shutdown()", "", False),
-    "asked": ("ending = Ending()", "ending.asked()", "ending.complete()", False),
-    "guarded": ("ending = Ending(guardian)", "ending.asked()", "ending.complete()", True),
+    "asked": ("shutdown = Shutdown()", "shutdown.asked()", "shutdown.complete()", False),
+    "guarded": ("shutdown = Shutdown(guardian)", "shutdown.asked()", "shutdown.complete()", True),
 }
 
 

@@ -2,21 +2,23 @@
 
 import gc
 import os
+from itertools import pairwise
 from pathlib import Path
 
 import pybullet
 import pytest
 
+from drone_sim.forces.pushes import Push
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.run.whereabouts import Diverged
+from drone_sim.run.stepping import Diverged
 from drone_sim.scripting.errors import ScriptError
 
 SCRIPTS = Path(__file__).parent / "scripts"
 RUNS = 100
-LEAK = 3 * 2**19  # bytes that 50 runs may add to the process: 30 kB a run
+LEAK = 20 * 30_000  # bytes that 20 runs may add to the process: 30 kB a run
 SMALL = {name: {"width": 16, "height": 12} for name in ("front", "track")}
 CLUTTER = [
     {"name": "Tower", "shape": "box", "size": [0.3, 0.3, 0.3], "position": [0.0, 0.0, 0.15], "mass": 0.5},
@@ -46,9 +48,9 @@ def _simulate():
 
 def everything(simulation):
     """Return the state of all that moves, and the time."""
-    objects = simulation.drone.objects
+    objects = simulation.context.objects
     moving = [objects[handle].body.state for handle in objects if objects[handle].body is not None]
-    return [simulation.time, simulation.drone.state, *moving, simulation.drone.command]
+    return [simulation.time, simulation.drone.body.state, *moving, simulation.drone.commands.now]
 
 
 def fly(simulation, steps):
@@ -60,8 +62,8 @@ def fly(simulation, steps):
 
 
 def maneuver(simulation):
-    simulation.drone.receive(Twist(Vector3(1.0, -0.5, 0.3), Vector3(0, 0, 0.6)))
-    simulation.drone.push((0.4, 0.3, 0.0), (0.0, 0.01, 0.0), 0.4)
+    simulation.drone.commands.receive(Twist(Vector3(1.0, -0.5, 0.3), Vector3(0, 0, 0.6)))
+    simulation.drone.pushes.add(Push((0.4, 0.3, 0.0), (0.0, 0.01, 0.0), 0.4))
 
 
 def resources():
@@ -75,7 +77,7 @@ def resources():
 
 def test_100_runs_fly_alike_and_leak_nothing(simulate):
     simulation = simulate(scene={"objects": CLUTTER})
-    first = None
+    first, measured = None, []
     for run in range(RUNS):
         maneuver(simulation)
         path = fly(simulation, 5)
@@ -83,11 +85,11 @@ def test_100_runs_fly_alike_and_leak_nothing(simulate):
         assert path == first
         simulation.stop()
         simulation.start()
-        if run == RUNS // 2:  # by then every cache is full, and the heap has its shape
-            before = resources()
-    after = resources()
-    assert after[1:] == before[1:]
-    assert after[0] - before[0] < LEAK
+        if run in (39, 59, 79, 99):  # by then every cache is full, and the heap has its shape
+            measured.append(resources())
+    assert {one[1:] for one in measured} == {measured[0][1:]}
+    # What leaks does so in every part; what else the process holds, of the tests before, may move once.
+    assert min(after[0] - before[0] for before, after in pairwise(measured)) < LEAK
 
 
 def test_worlds_beside_each_other_do_not_meddle(simulate):
@@ -112,8 +114,8 @@ def test_a_snapshot_brings_the_flight_back_bit_for_bit(simulate, script):
     path = fly(simulation, 40)
     assert path[-1][3:] != now[3:], "nothing else moved"
     for steps in (3, 25, 40):
-        simulation.drone.move(Pose((3, 3, 3), (0, 0, 0, 1)))
-        simulation.drone.push((0, 0, 5), (0, 0, 0), 1.0)
+        simulation.drone.body.move(Pose((3, 3, 3), (0, 0, 0, 1)))
+        simulation.drone.pushes.add(Push((0, 0, 5), (0, 0, 0), 1.0))
         simulation.restore(snapshot)
         assert everything(simulation) == now
         assert fly(simulation, steps) == path[:steps]
@@ -126,14 +128,14 @@ def test_a_snapshot_brings_the_flight_back_bit_for_bit(simulate, script):
 def test_stop_restores_the_initial_scene(simulate):
     simulation = simulate(scene={"objects": CLUTTER})
     initial = everything(simulation)
-    target = simulation.drone.objects.matrix(simulation.drone.objects.handle("DronePosition"))
+    target = simulation.context.objects.matrix(simulation.context.objects.handle("DronePosition"))
     maneuver(simulation)
     fly(simulation, 20)
-    objects = simulation.drone.objects
+    objects = simulation.context.objects
     objects.set_matrix(objects.handle("DronePosition"), -1, frames.from_rpy((5, 5, 5), (0, 0, 0)))
     simulation.stop()
     assert everything(simulation) == initial
-    objects = simulation.drone.objects
+    objects = simulation.context.objects
     assert objects.matrix(objects.handle("DronePosition")) == target
     assert not simulation.running
 
@@ -145,17 +147,17 @@ def test_start_reads_script_and_scene_again(simulate, tmp_path):
         "drone: {position: [1, 0, 2]}\nobjects: [{name: A, shape: sphere, size: [1], position: [5, 0, 1]}]"
     )
     simulation = simulate(script, scene_file=str(scene))
-    assert "A" in simulation.drone.objects
+    assert "A" in simulation.context.objects
     script.write_text("def sysCall_init(): sim.setInt32Signal('edited', 1)\n")
     scene.write_text("drone: {yaw: 0.5}\n")
     simulation.stop()
-    assert simulation.drone.state.position[0] == 1.0 and "A" in simulation.drone.objects
+    assert simulation.drone.body.state.position[0] == 1.0 and "A" in simulation.context.objects
     simulation.start()
-    assert simulation.drone.state.position == (0.0, 0.0, 0.8), "what the file no longer says is as without it"
-    assert "A" not in simulation.drone.objects
-    assert simulation.drone.signals.getInt32Signal("edited") == 1
+    assert simulation.drone.body.state.position == (0.0, 0.0, 0.8), "what the file no longer says is as without it"
+    assert "A" not in simulation.context.objects
+    assert simulation.context.signals.get(int, "edited") == 1
     simulation.start(scene_file="")
-    assert frames.to_euler(simulation.drone.matrix)[2] == 0.0
+    assert frames.to_euler(simulation.drone.body.matrix)[2] == 0.0
 
 
 MESH = "objects: [{shape: mesh, file: %s, position: [0, 0, 0]}]"
@@ -174,7 +176,7 @@ def test_a_scene_that_cannot_be_read_leaves_the_last_one(simulate, tmp_path, wro
     with pytest.raises(parameters.ParameterError) as refused:
         simulation.start()
     assert str(tmp_path) in str(refused.value) and "\n" not in str(refused.value)
-    assert (simulation.running, simulation.time, simulation.drone.state.position) == (False, 0.0, (1.0, 0.0, 2.0))
+    assert (simulation.running, simulation.time, simulation.drone.body.state.position) == (False, 0.0, (1.0, 0.0, 2.0))
     assert simulation.drone.cameras["front"].take().shape == (12, 16, 3)
     scene.write_text(good)
     simulation.start()
@@ -228,7 +230,7 @@ def test_a_scene_that_cannot_be_built_leaves_the_last_one_standing(simulate, tmp
 def test_numbers_that_mean_nothing_end_the_flight_with_one_line(simulate):
     simulation = simulate()
     path = fly(simulation, 3)
-    simulation.drone.push((0.0, 0.0, float("nan")), (0.0, 0.0, 0.0), 1.0)
+    simulation.drone.pushes.add(Push((0.0, 0.0, float("nan")), (0.0, 0.0, 0.0), 1.0))
     with pytest.raises(Diverged, match=r"the simulation has diverged at t = 0\.\d\d s: position") as said:
         fly(simulation, 20)
     assert "\n" not in str(said.value)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline import timeline
 from drone_sim.run import parameters
@@ -37,7 +38,7 @@ def fly(simulation, seconds):
     states = []
     for _ in range(round(seconds / 0.05)):
         simulation.step()
-        states.append(simulation.drone.state)
+        states.append(simulation.drone.body.state)
     return states
 
 
@@ -65,14 +66,14 @@ def test_landed_stands_on_the_floor(landed):
     again(landed)
     states = fly(landed, 1.0)
     assert str(landed.drone.flight_state) == "landed"
-    assert landed.drone.particle_velocities == (0, 0, 0, 0)
+    assert landed.drone.propulsion.particle_velocities == (0, 0, 0, 0)
     assert all(0 < one.position[2] < 0.02 and math.hypot(*one.linear_velocity) < 0.1 for one in states)
 
 
 def test_take_off_climbs_to_its_height_and_holds(landed):
     again(landed)
     fly(landed, 0.5)
-    stood = landed.drone.state.position[2]
+    stood = landed.drone.body.state.position[2]
     landed.drone.ask("takeoff")
     climbed = until(landed, "flying", 3.0)
     held = fly(landed, 2.0)
@@ -84,7 +85,7 @@ def test_a_twist_during_take_off_counts_after_it(landed):
     again(landed)
     landed.drone.ask("takeoff")
     fly(landed, 0.5)
-    landed.drone.receive(FORWARD)
+    landed.drone.commands.receive(FORWARD)
     assert until(landed, "flying")[-1].position[0] == pytest.approx(0, abs=0.01)
     assert fly(landed, 2.0)[-1].position[0] > 0.3
 
@@ -92,8 +93,8 @@ def test_a_twist_during_take_off_counts_after_it(landed):
 @pytest.mark.parametrize("height", [0.8, 3.0])
 def test_landing_touches_softly_and_stops_the_propellers(flying, height):
     again(flying)
-    flying.drone.move(Pose((0, 0, height)))
-    flying.drone.receive(FORWARD)
+    flying.drone.body.move(Pose((0, 0, height)))
+    flying.drone.commands.receive(FORWARD)
     fly(flying, 0.5)
     flying.drone.ask("land")
     states = until(flying, "landed")
@@ -101,7 +102,7 @@ def test_landing_touches_softly_and_stops_the_propellers(flying, height):
     assert max(abs(one.linear_velocity[2]) for one in states[touched - 3 : touched + 1]) < 0.5
     assert max(one.position[2] for one in states[touched:]) - min(one.position[2] for one in states[touched:]) < 0.02
     fly(flying, 0.1)
-    assert flying.drone.particle_velocities == (0, 0, 0, 0)
+    assert flying.drone.propulsion.particle_velocities == (0, 0, 0, 0)
 
 
 def test_landing_ends_on_what_it_meets():
@@ -144,7 +145,7 @@ def test_a_twist_does_not_move_what_has_landed_and_says_why_once(landed, caplog)
     before = fly(landed, 0.5)[-1].position
     caplog.set_level(logging.WARNING)
     for _ in range(5):
-        landed.drone.receive(FORWARD)
+        landed.drone.commands.receive(FORWARD)
         after = fly(landed, 0.2)[-1].position
     assert after == pytest.approx(before, abs=1e-3)
     assert [one.getMessage() for one in caplog.records] == [
@@ -157,12 +158,12 @@ def test_goto_and_home(flying):
     flying.drone.ask("goto", Pose((1.0, -0.5, 1.5), (0.0, 0.0, math.sin(0.6), math.cos(0.6))))
     there = fly(flying, 14.0)[-20:]
     assert all(one.position == pytest.approx((1.0, -0.5, 1.5), abs=0.05) for one in there)
-    assert flying.drone.matrix[0] == pytest.approx(math.cos(1.2), abs=0.05)
+    assert flying.drone.body.matrix[0] == pytest.approx(math.cos(1.2), abs=0.05)
     flying.drone.ask("home")
     assert fly(flying, 14.0)[-1].position == pytest.approx((0, 0, 0.8), abs=0.05)
     flying.drone.ask("goto", Pose((5.0, 0.0, 1.0)))
     fly(flying, 1.0)
-    flying.drone.receive(Twist())
+    flying.drone.commands.receive(Twist())
     here = fly(flying, 4.0)[-1].position
     assert fly(flying, 2.0)[-1].position == pytest.approx(here, abs=0.1)
     assert here[0] < 3
@@ -180,12 +181,12 @@ def test_goto_is_refused_on_the_ground(landed, caplog):
 
 def test_a_crash_stops_the_propellers_until_reset(flying, caplog):
     again(flying)
-    flying.drone.move(ON_ITS_BACK)
+    flying.drone.body.move(ON_ITS_BACK)
     until(flying, "crashed", 3.0)
     fly(flying, 0.1)
-    assert flying.drone.particle_velocities == (0, 0, 0, 0)
+    assert flying.drone.propulsion.particle_velocities == (0, 0, 0, 0)
     flying.drone.ask("takeoff")
-    flying.drone.receive(FORWARD)
+    flying.drone.commands.receive(FORWARD)
     fly(flying, 0.5)
     assert str(flying.drone.flight_state) == "crashed"
     assert "`reset` puts it back" in caplog.text
@@ -201,16 +202,16 @@ def test_every_flight_after_a_reset_is_the_first_one(start):
     def flight():
         drone.ask("takeoff")
         states = fly(simulation, 1.0)
-        drone.receive(FORWARD)
+        drone.commands.receive(FORWARD)
         return [*states, *fly(simulation, 0.5)]
 
     def upside_down():
-        drone.move(ON_ITS_BACK)
+        drone.body.move(ON_ITS_BACK)
         until(simulation, "crashed")
 
     def half_landed():
         drone.ask("land")
-        drone.push((0.5, 0, 0), (0, 0.01, 0), 1.0)
+        drone.pushes.add(Push((0.5, 0, 0), (0, 0.01, 0), 1.0))
         fly(simulation, 0.4)
 
     first = flight()
@@ -225,13 +226,13 @@ def test_a_reset_leaves_others_where_they_are():
     simulation = Simulation(parameters.load({"vehicles": 2}))
     one, other = simulation.vehicles.values()
     for vehicle in (one, other):
-        vehicle.receive(FORWARD)
+        vehicle.commands.receive(FORWARD)
     fly(simulation, 1.0)
-    before = other.state.position
+    before = other.body.state.position
     one.ask("reset")
     fly(simulation, 0.05)
-    assert one.state.position == pytest.approx(one.parameters.position, abs=0.01)
-    assert other.state.position == pytest.approx(before, abs=0.05)
+    assert one.body.state.position == pytest.approx(one.parameters.position, abs=0.01)
+    assert other.body.state.position == pytest.approx(before, abs=0.05)
     simulation.close()
 
 
@@ -244,17 +245,17 @@ def fleet_flights(resets):
     def go(steps):
         for _ in range(steps):
             simulation.step()
-            others.append((left.state, right.state))
-            yield one.state
+            others.append((left.body.state, right.body.state))
+            yield one.body.state
 
-    left.receive(FORWARD)
-    right.receive(FORWARD)
+    left.commands.receive(FORWARD)
+    right.commands.receive(FORWARD)
     for number in range(20):
         crashes = number % 5 == 4
         if resets and crashes:
-            one.move(Pose((one.parameters.position[0], 0.1, 0.03), ON_ITS_BACK.orientation))
+            one.body.move(Pose((one.parameters.position[0], 0.1, 0.03), ON_ITS_BACK.orientation))
         elif resets:
-            one.receive(FORWARD)
+            one.commands.receive(FORWARD)
         list(go(30 if crashes else 5))
         assert str(one.flight_state) == ("crashed" if resets and crashes else "flying")
         if resets:
@@ -285,7 +286,7 @@ def test_requests_at_the_wrong_moment(landed, caplog):
     assert str(landed.drone.flight_state) == "taking off"
     landed.drone.ask("land")
     assert max(one.position[2] for one in until(landed, "landed")) < 0.6
-    landed.drone.move(ON_ITS_BACK)
+    landed.drone.body.move(ON_ITS_BACK)
     until(landed, "crashed")
     for topic in ("land", "takeoff", "home"):
         landed.drone.ask(topic)
@@ -355,7 +356,7 @@ def test_the_timeline_asks(tmp_path: Path):
         found.apply(step, simulation.vehicles)
         simulation.step()
     assert str(simulation.drone.flight_state) == "landed"
-    assert simulation.drone.state.position == pytest.approx((0.5, 0, 0.011), abs=0.05)
+    assert simulation.drone.body.state.position == pytest.approx((0.5, 0, 0.011), abs=0.05)
     simulation.close()
 
 
@@ -371,11 +372,11 @@ def test_the_diagnosis_says_the_state(landed):
     player = Player(landed, landed.step, lambda _: None, False)
     log = CommandLog()
     log.take("cmd_vel", "/pilot")
-    landed.drone.receive(FORWARD)
+    landed.drone.commands.receive(FORWARD)
     found = VehicleDiagnosis(landed.drone, player, log, None).finding()
     assert found.values["flight state"] == "landed"
     assert found.message == "landed: commands of /pilot do not move it; `takeoff` first"
-    landed.drone.move(ON_ITS_BACK)
+    landed.drone.body.move(ON_ITS_BACK)
     until(landed, "crashed")
     found = VehicleDiagnosis(landed.drone, player, log, None).finding()
     assert found.message.startswith("crashed: `reset` puts it back where it began")

@@ -3,7 +3,7 @@
 import pytest
 from matplotlib.figure import Figure
 
-from drone_sim.offline import tables
+from drone_sim.offline import recording
 from drone_sim.offline.fly import main
 from drone_sim.offline.recording import COLUMNS
 from drone_sim.ros.tools import plot_flight
@@ -22,7 +22,7 @@ def test_a_table_is_drawn_as_the_flight_was(tmp_path, monkeypatch):
     lines = [[line.get_xydata().tolist() for ax in figure.axes for line in ax.get_lines()] for figure in drawn]
     assert lines[0] == lines[1]
     assert (tmp_path / "flight.png").exists()
-    assert tables.read("flight.csv").rows[-1][0] == 1.0
+    assert recording.read_table("flight.csv").rows[-1][0] == 1.0
 
 
 @pytest.mark.parametrize(
@@ -52,8 +52,8 @@ def test_what_is_no_table_gets_one_line(tmp_path, capsys, content, said):
 
 
 def test_a_table_has_its_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, "MAX_ROWS", 2)
+    monkeypatch.setattr(recording, "MAX_ROWS", 2)
     path = tmp_path / "flight.csv"
     path.write_text(HEADER + "".join(f"{time}{ROW[1:]}" for time in range(3)))
-    with pytest.raises(tables.TableRefused, match=r"flight\.csv: has more than 2 rows"):
-        tables.read(path)
+    with pytest.raises(recording.TableRefused, match=r"flight\.csv: has more than 2 rows"):
+        recording.read_table(path)

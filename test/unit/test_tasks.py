@@ -90,7 +90,7 @@ def test_the_pad_lies_elsewhere_with_another_seed():
     places = set()
     for seed in (1, 2, 2):
         simulation = Simulation(plan.parameters(seed), script=NOTHING)
-        objects = simulation.drone.objects
+        objects = simulation.context.objects
         places.add(tuple(objects.matrix(objects.handle("Pad7"))[3:12:4]))
         simulation.close()
     assert len(places) == 2

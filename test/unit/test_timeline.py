@@ -19,6 +19,7 @@ class DroneLog:
 
     def __init__(self):
         self.calls = []
+        self.commands = self.body = self.pushes = self
 
     def receive(self, twist):
         self.calls.append(("receive", twist))
@@ -26,8 +27,8 @@ class DroneLog:
     def move(self, pose):
         self.calls.append(("move", pose))
 
-    def push(self, force, torque, duration):
-        self.calls.append(("push", force, torque, duration))
+    def add(self, push):
+        self.calls.append(("push", *push))
 
 
 def read(folder, text):

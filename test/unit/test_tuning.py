@@ -6,7 +6,7 @@ import struct
 import pytest
 import yaml
 
-from drone_sim.config.comments import comments
+from drone_sim.config.fields import comments
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.run import parameters
@@ -39,6 +39,10 @@ def sysCall_actuation():
 """
 
 
+def tuning_of(simulation):
+    return simulation.child_scripts["drone"].tuning
+
+
 @pytest.fixture(name="simulate")
 def _simulate():
     made = []
@@ -57,13 +61,13 @@ def fly(simulation, steps):
     flown = []
     for _ in range(steps):
         simulation.step()
-        flown.append(struct.pack("13d", *(x for part in simulation.drone.state for x in part)))
-        flown.append(repr([one.latest for one in simulation.drone.sensors.values()]))
+        flown.append(struct.pack("13d", *(x for part in simulation.drone.body.state for x in part)))
+        flown.append(repr([one.latest for one in simulation.drone.instruments.by_object.values()]))
     return flown
 
 
 def thrust(drone):
-    return sum(drone.particle_velocities) / 4
+    return sum(drone.propulsion.particle_velocities) / 4
 
 
 def dumped(values, path):
@@ -78,7 +82,7 @@ def dumped(values, path):
 
 
 def test_each_says_what_it_is_and_what_it_may_be(simulate):
-    tuning = simulate().drone.tuning
+    tuning = tuning_of(simulate())
     assert not [name for name, one in tuning.known.items() if not one.said]
     assert tuning.known["Kzref"].said == comments()["control/Kzref"] == "(m/s) per m"
     assert [(one.low, one.high) for one in (tuning.known["Kzref"], tuning.known["cmd_vel_timeout"])] == [
@@ -103,19 +107,22 @@ def test_a_gain_counts_from_the_next_step_on(simulate):
     drone = simulation.drone
     fly(simulation, 3)
     for gain in (5.0, 2.0):
-        drone.tuning.change({"Kzref": gain})
-        drone.move(Pose((0, 0, 0.9), (0, 0, 0, 1)))
+        tuning_of(simulation).change({"Kzref": gain})
+        drone.body.move(Pose((0, 0, 0.9), (0, 0, 0, 1)))
         simulation.step()
-        state = drone.state
+        state = drone.body.state
         simulation.step()
         wanted = 5.33 + gain * (0.8 - state.position[2]) - 3 * state.linear_velocity[2]
         assert thrust(drone) == pytest.approx(wanted, abs=1e-3)
 
 
 def test_limits_height_and_cameras_change_with_it(simulate):
-    drone = simulate().drone
+    simulation = simulate()
+    drone = simulation.drone
     camera = drone.cameras["front"]
-    drone.tuning.change({"cmd_vel_timeout": 0.5, "cameras/front/horizontal_fov": 0.5, "cameras/front/every": 3})
+    tuning_of(simulation).change(
+        {"cmd_vel_timeout": 0.5, "cameras/front/horizontal_fov": 0.5, "cameras/front/every": 3}
+    )
     assert camera.intrinsics == Intrinsics(16, 12, 0.5, 0.01, 100.0) and camera.period == 3
     assert drone.commands.timeout == 0.5 and drone.parameters.cmd_vel_timeout == 0.5
 
@@ -123,17 +130,17 @@ def test_limits_height_and_cameras_change_with_it(simulate):
 def test_noise_is_that_of_its_own_measurement(simulate):
     simulation = simulate()
     drone = simulation.drone
-    imu, fix = drone.sensors["imu"], drone.sensors["fix"]
+    imu, fix = drone.instruments.by_object["imu"], drone.instruments.by_object["fix"]
     fly(simulation, 2)
     before = fix.latest.value
-    drone.tuning.change(
+    tuning_of(simulation).change(
         {"sensors/imu/noise/angular_velocity/quantisation": 100.0, "sensors/fix/noise/vertical/bias": 4.0}
     )
-    drone.tuning.change({"sensors/imu/noise/linear_acceleration/bias": 3.0})
+    tuning_of(simulation).change({"sensors/imu/noise/linear_acceleration/bias": 3.0})
     fly(simulation, 1)
     assert imu.latest.value.angular_velocity == (0, 0, 0) and abs(imu.latest.value.specific_force[0]) > 0.1
     assert fix.latest.value[2] - 488.8 == pytest.approx(2 * (before[2] - 488.8), abs=0.01)
-    assert imu.latest.value.orientation == pytest.approx(drone.state.orientation, abs=1e-6)
+    assert imu.latest.value.orientation == pytest.approx(drone.body.state.orientation, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -158,25 +165,26 @@ def test_noise_is_that_of_its_own_measurement(simulate):
     ],
 )
 def test_what_is_wrong_changes_nothing_and_says_why(simulate, changes, said):
-    drone = simulate(script_parameters={"text": "a", "rate": 1}).drone
-    before = drone.tuning.values(), drone.parameters
+    simulation = simulate(script_parameters={"text": "a", "rate": 1})
+    drone = simulation.drone
+    before = tuning_of(simulation).values(), drone.parameters
     with pytest.raises(ParameterError) as refused:
-        drone.tuning.change({"Dzref": 1.0, **changes})
+        tuning_of(simulation).change({"Dzref": 1.0, **changes})
     assert said in str(refused.value) and "\n" not in str(refused.value) and len(str(refused.value)) < 600
-    assert (drone.tuning.values(), drone.parameters) == before
+    assert (tuning_of(simulation).values(), drone.parameters) == before
 
 
 def test_what_comes_otherwise_is_seen_and_what_holds_already_is_no_change(simulate):
     simulation = simulate()
-    drone, shared = simulation.drone, simulation.shared
-    drone.tuning.change(drone.tuning.values())
-    assert not shared.weather.is_felt and not drone.tuning.chosen
+    drone, shared = simulation.drone, simulation.context
+    tuning_of(simulation).change(tuning_of(simulation).values())
+    assert not shared.weather.is_felt and not tuning_of(simulation).chosen
     counted = shared.tunings
-    drone.change_weather({"wind": [1, 2, 3]})
+    drone.context.change_weather({"wind": [1, 2, 3]})
     drone.change_faults({"propellers": [1, 1, 0.5, 1]})
     assert shared.tunings == counted + 2
-    drone.tuning.change({"weather/wind/z": 0.0, "weather/gusts/speed": 3.0})
-    values = drone.tuning.values()
+    tuning_of(simulation).change({"weather/wind/z": 0.0, "weather/gusts/speed": 3.0})
+    values = tuning_of(simulation).values()
     assert [values[f"weather/wind/{axis}"] for axis in "xyz"] == [1, 2, 0]
     assert values["faults/propellers/back_right"] == 0.5 and shared.weather.now.gusts.speed == 3
 
@@ -188,9 +196,9 @@ def test_what_is_tuned_stays_through_every_start_and_conditions_do_not(simulate)
     simulation = simulate()
     for begin in (simulation.start, simulation.stop, lambda: simulation.drone.ask("reset")):
         simulation.start()
-        simulation.drone.tuning.change({**TUNED, "weather/wind/x": 1.0, "faults/propellers/front_left": 0.9})
+        tuning_of(simulation).change({**TUNED, "weather/wind/x": 1.0, "faults/propellers/front_left": 0.9})
         begin()
-        values = simulation.drone.tuning.values()
+        values = tuning_of(simulation).values()
         assert {name: values[name] for name in TUNED} == TUNED
         assert values["faults/propellers/front_left"] == 1
     assert simulation.drone.parameters.cmd_vel_limits.linear == 1 and simulation.drone.parameters.is_alone
@@ -199,20 +207,20 @@ def test_what_is_tuned_stays_through_every_start_and_conditions_do_not(simulate)
 def test_a_snapshot_brings_back_what_was_tuned(simulate):
     simulation = simulate()
     drone = simulation.drone
-    drone.receive(FORWARD)
+    drone.commands.receive(FORWARD)
     fly(simulation, 3)
-    snapshot, before, held = simulation.snapshot(), drone.tuning.values(), drone.parameters
+    snapshot, before, held = simulation.snapshot(), tuning_of(simulation).values(), drone.parameters
     flown = fly(simulation, 5)
     simulation.restore(snapshot)
     changes = {"Pangle": 0.1, "weather/wind/x": 2.0, "sensors/imu/noise/angular_velocity/bias": 1.0}
-    drone.tuning.change({**TUNED, **changes, "cmd_vel_timeout": 0.1})
+    tuning_of(simulation).change({**TUNED, **changes, "cmd_vel_timeout": 0.1})
     assert fly(simulation, 5) != flown
     simulation.restore(snapshot)
-    assert (drone.tuning.values(), drone.parameters, drone.tuning.chosen) == (before, held, {})
+    assert (tuning_of(simulation).values(), drone.parameters, tuning_of(simulation).chosen) == (before, held, {})
     assert drone.cameras["front"].period == 1
     assert fly(simulation, 5) == flown
     simulation.start()
-    assert simulation.drone.tuning.values()["Kzref"] == 5
+    assert tuning_of(simulation).values()["Kzref"] == 5
 
 
 # ---- scripts
@@ -222,26 +230,26 @@ def test_a_script_declares_parameters_and_hears_of_new_values(simulate, tmp_path
     script = tmp_path / "own.py"
     script.write_text(PYTHON, encoding="utf-8")
     simulation = simulate(str(script), script_parameters={"mood": "bright", "rate": 3})
-    names = {name for name in simulation.drone.tuning.values() if name.startswith("script_parameters/")}
+    names = {name for name in tuning_of(simulation).values() if name.startswith("script_parameters/")}
     assert names == {f"script_parameters/{name}" for name in ("speed", "careful", "mood", "rate")}
-    simulation.drone.tuning.change({"script_parameters/speed": 2.0, "script_parameters/careful": False})
+    tuning_of(simulation).change({"script_parameters/speed": 2.0, "script_parameters/careful": False})
     simulation.step()
-    assert [simulation.drone.signals.getStringSignal(name) for name in ("speed", "said")] == ["2.0", "2.0 1"]
+    assert [simulation.context.signals.get(str, name) for name in ("speed", "said")] == ["2.0", "2.0 1"]
     simulation.start()
-    own = simulation.drone.script_parameters[simulation.drone.own_script]
+    own = simulation.child_scripts["drone"].parameters
     assert [own[name] for name in ("speed", "careful", "mood", "rate")] == [2.0, False, "bright", 3.0]
     script.write_text("def sysCall_actuation():\n    pass\n", encoding="utf-8")
     simulation.start()
-    assert "script_parameters/speed" not in simulation.drone.tuning.values()
+    assert "script_parameters/speed" not in tuning_of(simulation).values()
 
 
 def test_what_a_script_puts_where_a_gain_was_breaks_nothing(simulate):
-    drone = simulate().drone
-    own = drone.script_parameters[drone.own_script]
+    simulation = simulate()
+    own = simulation.child_scripts["drone"].parameters
     own.update(Kzref="much", Dzref=7.0, thrust_limits=[1])
-    values = drone.tuning.values()
+    values = tuning_of(simulation).values()
     assert [values["Kzref"], values["Dzref"], values["thrust_limits/lowest"]] == [5.0, 7.0, 1.0]
-    drone.tuning.change({"Kzref": 2.0})
+    tuning_of(simulation).change({"Kzref": 2.0})
     assert own["Kzref"] == 2 and own["Dzref"] == 7
 
 
@@ -252,15 +260,15 @@ def test_the_flight_of_a_dump_is_the_flight_that_was_tuned(simulate, tmp_path):
     before = tmp_path / "before.yaml"
     before.write_text(yaml.dump({"sensors": SENSORS, "control": {"Kzref": 9}}), encoding="utf-8")
     first = simulate(config=str(before))
-    first.drone.tuning.change({**TUNED, "thrust_limits/lowest": 1.0})
+    tuning_of(first).change({**TUNED, "thrust_limits/lowest": 1.0})
     first.start()
-    file = dumped(first.drone.tuning.values(), tmp_path / "tuned.yaml")
+    file = dumped(tuning_of(first).values(), tmp_path / "tuned.yaml")
     second = simulate(config=f"{before},{file}")
     flights = []
     for simulation in (first, second, simulate()):
-        simulation.drone.receive(FORWARD)
+        simulation.drone.commands.receive(FORWARD)
         flights.append(fly(simulation, 30))
-    assert second.drone.tuning.values() == first.drone.tuning.values()
+    assert tuning_of(second).values() == tuning_of(first).values()
     assert flights[0] == flights[1] != flights[2]
     assert second.parameters.control.recovery_margin is None
 
@@ -282,7 +290,7 @@ def test_the_flight_of_a_dump_is_the_flight_that_was_tuned(simulate, tmp_path):
 )
 def test_a_mistake_in_a_dump_says_where(simulate, tmp_path, old, new, said):
     file = tmp_path / "dump.yaml"
-    dumped(simulate(sensors={}).drone.tuning.values(), file)
+    dumped(tuning_of(simulate(sensors={})).values(), file)
     text = file.read_text(encoding="utf-8")
     assert old in text
     file.write_text(text.replace(old, new), encoding="utf-8")
@@ -293,10 +301,10 @@ def test_a_mistake_in_a_dump_says_where(simulate, tmp_path, old, new, said):
 
 def test_vehicles_are_tuned_one_by_one_in_one_air(simulate):
     simulation = simulate(vehicles={"a": {}, "b": {"position": [0, 2, 0.8]}}, sensors={})
-    a, b = simulation.vehicles.values()
+    a, b = simulation.child_scripts.values()
     a.tuning.change({"Kzref": 1.0, "weather/wind/x": 3.0})
     assert [one.tuning.values()["Kzref"] for one in (a, b)] == [1, 5]
     assert b.tuning.values()["weather/wind/x"] == 3
     simulation.set_vehicles({"a": {}, "c": {"position": [0, 4, 0.8]}})
     simulation.start()
-    assert [one.tuning.values()["Kzref"] for one in simulation.vehicles.values()] == [1, 5]
+    assert [one.tuning.values()["Kzref"] for one in simulation.child_scripts.values()] == [1, 5]

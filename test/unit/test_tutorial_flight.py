@@ -34,24 +34,24 @@ def fly(simulation, seconds):
 
 
 def velocity(simulation):
-    state = simulation.drone.state
+    state = simulation.drone.body.state
     return (*state.linear_velocity, *state.angular_velocity)
 
 
 def test_hover_holds_the_height_for_a_minute(simulation):
     for _ in range(1200):
         simulation.step()
-        assert simulation.drone.state.position == pytest.approx((0, 0, 0.8), abs=1e-3)
+        assert simulation.drone.body.state.position == pytest.approx((0, 0, 0.8), abs=1e-3)
 
 
 @pytest.mark.parametrize("name, reached", [("vx", 0.943), ("vy", 0.943), ("vz", 0.998), ("wz", 1.0)])
 def test_a_command_reaches_its_velocity_in_5_s_and_ends_at_rest_in_6_s(simulation, name, reached):
     command, index = COMMANDS[name]
     fly(simulation, 1)
-    simulation.drone.receive(command)
+    simulation.drone.commands.receive(command)
     fly(simulation, 5)
     assert velocity(simulation)[index] == pytest.approx(reached, rel=0.02)
-    simulation.drone.receive(Twist())
+    simulation.drone.commands.receive(Twist())
     fly(simulation, 6)
     assert velocity(simulation) == pytest.approx([0.0] * 6, abs=0.02)
 
@@ -83,7 +83,7 @@ def returns(simulation, above, tilt, azimuth):
     """Tell whether the drone comes to rest within 12 s, at 5 m; a second of rest decides it."""
     half = math.sin(tilt / 2)
     turn = (half * math.cos(azimuth), half * math.sin(azimuth), 0.0, math.cos(tilt / 2))
-    simulation.drone.move(Pose((0.0, 0.0, 5.0 + above), turn))
+    simulation.drone.body.move(Pose((0.0, 0.0, 5.0 + above), turn))
     still = 0
     for _ in range(240):
         simulation.step()
@@ -94,5 +94,5 @@ def returns(simulation, above, tilt, azimuth):
 
 
 def is_still(drone):
-    speed, lean = math.hypot(*drone.state.linear_velocity), math.acos(min(1.0, drone.matrix[10]))
-    return abs(drone.state.position[2] - 5.0) < 0.02 and speed < 0.05 and lean < 0.02
+    speed, lean = math.hypot(*drone.body.state.linear_velocity), math.acos(min(1.0, drone.body.matrix[10]))
+    return abs(drone.body.state.position[2] - 5.0) < 0.02 and speed < 0.05 and lean < 0.02

@@ -13,7 +13,7 @@ from drone_sim.offline.fly import main
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
-LEVEL = hud.Flight(time=1.0, state="flying", height=0.8, speed=0.0, roll=0.0, pitch=0.0, yaw=0.0)
+LEVEL = hud.HudState(time=1.0, state="flying", height=0.8, speed=0.0, roll=0.0, pitch=0.0, yaw=0.0)
 SKY, GROUND = [200, 130, 60], [50, 90, 130]  # BGR
 
 
@@ -54,11 +54,11 @@ def test_a_flight_is_filmed_as_its_camera_saw_it(tmp_path):
     assert not list(tmp_path.glob(".*"))
 
     simulation = Simulation(parameters.load({"cameras": {"track": {"width": 320, "height": 240}}}))
-    simulation.drone.receive(Twist(Vector3(1, 0, 0.5)))
+    simulation.drone.commands.receive(Twist(Vector3(1, 0, 0.5)))
     for _ in range(19):
         simulation.step()
     track = simulation.drone.cameras["track"]
-    track.watched = lambda: True
+    track.viewers.add(lambda: True)
     simulation.step()
     seen = cv2.cvtColor(track.image, cv2.COLOR_RGB2BGR)
     simulation.close()
@@ -113,7 +113,7 @@ def test_a_film_that_cannot_be_written_whole_is_told(tmp_path):
     said = r"out\.mp4: 0 of 3 pictures could be written"
     with pytest.raises(OSError, match=said), video.writing_to(str(path), 20) as film:
         film.add(grey(), None, times=3)
-        film._writer._path = str(tmp_path / "elsewhere.mp4")
+        film._path = str(tmp_path / "elsewhere.mp4")
     assert not list(tmp_path.iterdir())
 
 
@@ -166,6 +166,6 @@ def test_the_horizon_turns_and_climbs(roll, pitch, sky, ground):
 def test_it_shows_what_a_row_of_a_recording_says():
     half = math.sqrt(0.5)
     row = (2.5, 1, 2, 3, 0, 0, half, half, 3, 4, 0, 0, 0, 0)
-    shown = hud.Flight.of(row, "flying")
+    shown = hud.HudState.of(row, "flying")
     assert shown[:4] == (2.5, "flying", 3, 5)
     assert shown[4:] == pytest.approx((0, 0, math.pi / 2))

@@ -69,10 +69,10 @@ def test_a_picture_is_taken_only_while_somebody_looks():
     front = simulation.drone.cameras["front"]
     simulation.step()
     assert front.image is None
-    front.watched = lambda: True
+    front.viewers.add(lambda: True)
     simulation.step()
     assert front.image.shape == (480, 640, 3)
-    front.watched = lambda: False
+    front.viewers.clear()
     simulation.step()
     assert front.image is None
     simulation.close()
@@ -95,7 +95,7 @@ def test_the_track_camera_stays_level_while_its_parent_is_the_track_frame():
     level = {}
     for parent in ("Track_base", "Quadricopter_base"):
         simulation = Simulation(parameters.load({"cameras": {"track": {"mount": {"parent": parent}}}}))
-        simulation.drone.move(simulation.drone.state._replace(orientation=(0.2, 0.0, 0.0, 0.98)))
+        simulation.drone.body.move(simulation.drone.body.state._replace(orientation=(0.2, 0.0, 0.0, 0.98)))
         simulation.step()
         across = simulation.drone.cameras["track"].pose()[8]  # z of the optical x axis in the world
         level[parent] = abs(across) < 1e-6
@@ -129,17 +129,17 @@ def _simulation(tmp_path):
 
 def test_a_camera_sees_what_is_there_now(simulation):
     front = simulation.drone.cameras["front"]
-    front.watched = lambda: True
+    front.viewers.add(lambda: True)
     first = front.take()
-    assert simulation.drone.signals.getStringSignal("init") == as_script(first)
-    simulation.drone.move(Pose((-3, 0, 2)))
+    assert simulation.context.signals.get(str, "init") == as_script(first)
+    simulation.drone.body.move(Pose((-3, 0, 2)))
     simulation.look()
     moved = front.image
     assert np.array_equal(moved, front.take()) and not np.array_equal(moved, first)
     snapshot = simulation.snapshot()
     simulation.step()
     flown = front.image
-    assert simulation.drone.signals.getStringSignal("sensing") == as_script(flown)
+    assert simulation.context.signals.get(str, "sensing") == as_script(flown)
     assert np.array_equal(flown, front.take()) and not np.array_equal(flown, moved)
     simulation.restore(snapshot)
     simulation.look()
@@ -148,7 +148,7 @@ def test_a_camera_sees_what_is_there_now(simulation):
     simulation.look()
     assert np.array_equal(front.image, first)
     simulation.start()
-    assert simulation.drone.signals.getStringSignal("init") == as_script(first)
+    assert simulation.context.signals.get(str, "init") == as_script(first)
 
 
 def test_another_scene_is_seen_at_once(simulation, tmp_path):
@@ -156,19 +156,19 @@ def test_another_scene_is_seen_at_once(simulation, tmp_path):
     first = front.look()
     (tmp_path / "scene.yaml").write_text("objects: [{shape: box, size: [1, 1, 1], position: [3, 0, 0.8]}]")
     simulation.start(str(tmp_path / "scene.yaml"))
-    now = simulation.drone.signals.getStringSignal("init")
+    now = simulation.context.signals.get(str, "init")
     assert now == as_script(front.take()) != as_script(first)
 
 
 def test_what_has_not_changed_is_not_drawn_again(simulation):
     front = simulation.drone.cameras["front"]
     assert front.look() is front.look()
-    simulation.drone.move(Pose((0, 0, 1)))
+    simulation.drone.body.move(Pose((0, 0, 1)))
     assert front.look() is not None
     again = front.look()
     simulation.look()
     assert front.look() is again
-    objects = simulation.drone.objects
+    objects = simulation.context.objects
     camera = objects[objects.handle("FrontVision")]
     here = camera.matrix()
     camera.put((*here[:3], here[3] + 0.5, *here[4:]))  # a script moves the camera

@@ -21,9 +21,9 @@ from vrep_encoder import (
     weight,
 )
 
-from drone_sim.vrep_files.errors import VrepFileError
-from drone_sim.vrep_files.meshes import _packed
+from drone_sim.vrep_files.model import VrepFileError
 from drone_sim.vrep_files.reading import read, read_file
+from drone_sim.vrep_files.shapes import _packed
 
 HALF_TURN_ABOUT_Z = (0.0, 0.0, 0.0, 1.0)  # w, x, y, z
 
@@ -50,7 +50,7 @@ def test_unknown_tags_are_passed_over():
     unknown = chunk("???", b"anything")
     dummy = scene_object("DMY", 0, "D", base=unknown, own=unknown)
     found = read(file(chunk("New", b"x"), dummy, version=25))
-    assert [one.name for one in found.objects] == ["D"] and found.ignored == {"New": 1}
+    assert [one.name for one in found.objects] == ["D"]
 
 
 def test_a_child_may_come_before_its_parent():
@@ -146,7 +146,7 @@ def test_a_step_that_is_a_preset_comes_before_the_number():
         read(file(chunk("SIM", integers("Spi", preset) + said), chunk("DYN", gravity))).settings for preset in (4, 5)
     ]
     assert [one.time_step for one in steps] == [0.01, 0.02]
-    assert (steps[0].gravity, steps[0].dynamics_step, steps[0].engine) == ((0, 0, -9.81), 0.005, "Bullet")
+    assert (steps[0].gravity, steps[0].dynamics_step) == ((0, 0, -9.81), 0.005)
 
 
 # ---- scripts
@@ -170,10 +170,10 @@ def test_a_script_object_acts_on_its_parent():
     assert (found.object, found.text, found.is_enabled) == (2, "x = 1", True)
 
 
-@pytest.mark.parametrize("switches, threaded, enabled", [(8, False, True), (9, True, True), (10, False, False)])
-def test_the_switches_of_a_script(switches, threaded, enabled):
+@pytest.mark.parametrize("switches, enabled", [(8, True), (9, True), (10, False)])
+def test_the_switches_of_a_script(switches, enabled):
     (found,) = read(file(scene_object("DMY", 0, "D"), script(0, "x = 1", switches=switches))).scripts
-    assert (found.is_threaded, found.is_enabled) == (threaded, enabled)
+    assert found.is_enabled == enabled
 
 
 # ---- what is no such file

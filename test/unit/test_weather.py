@@ -4,11 +4,12 @@ import hashlib
 import itertools
 import math
 import struct
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from drone_sim.forces.dryden import MOST, Gusts, Series
+from drone_sim.forces.dryden import MOST, Gusts, GustSeries
 from drone_sim.forces.weather import Weather, WeatherParameters
 from drone_sim.mechanics.frames import to_euler
 from drone_sim.run import parameters
@@ -20,8 +21,8 @@ GUSTS = {**CALM, "deviation": (3, 2, 1)}
 
 
 def weather(wind=(0, 0, 0), gusts=CALM, now=0.0):
-    clock = [now]
-    return Weather(WeatherParameters(wind=wind, gusts=gusts), lambda: clock[0]), clock
+    clock = SimpleNamespace(time=now)
+    return Weather(WeatherParameters(wind=wind, gusts=gusts), clock), clock
 
 
 @pytest.fixture(name="simulate")
@@ -41,7 +42,7 @@ def fly(simulation, steps):
     path = []
     for _ in range(steps):
         simulation.step()
-        path.append([vehicle.state for vehicle in simulation.vehicles.values()])
+        path.append([vehicle.body.state for vehicle in simulation.vehicles.values()])
     return path
 
 
@@ -52,7 +53,7 @@ def fly(simulation, steps):
 def test_gusts_have_drydens_variance_and_correlation(is_along):
     """4000 lengths in all; an estimate of the variance then is good to some 3 %."""
     spacing, ways = 0.25, np.arange(0, 1000, 0.25)
-    series = np.array([list(map(Series((seed,), is_along).at, ways)) for seed in range(4)])
+    series = np.array([list(map(GustSeries((seed,), is_along).at, ways)) for seed in range(4)])
     assert series.var() == pytest.approx(1.0, abs=0.08)
     assert abs(series.mean()) < 0.05
     for distance in (0.5, 1.0, 2.0, 3.0):
@@ -66,7 +67,7 @@ def test_the_spectrum_is_drydens():
     frequencies = np.fft.rfftfreq(len(ways), 1 / 16) * 2 * math.pi  # rad per length
     bands = np.geomspace(0.05, 12, 8)
     for is_along in (True, False):
-        gusts = np.array(list(map(Series((7,), is_along).at, ways)))
+        gusts = np.array(list(map(GustSeries((7,), is_along).at, ways)))
         power = np.abs(np.fft.rfft(gusts)) ** 2 / len(ways) / 16 / math.pi  # one-sided, per rad
         square = 1 + frequencies**2
         theory = 2 / math.pi / square if is_along else (1 + 3 * frequencies**2) / math.pi / square**2
@@ -96,7 +97,7 @@ def test_gusts_are_the_same_everywhere():
 
 def test_however_far_somebody_is_there_is_a_gust(monkeypatch):
     monkeypatch.setattr("drone_sim.forces.dryden.MOST", 1000)
-    series = Series((3,), True)
+    series = GustSeries((3,), True)
     assert MOST > 1000 >= len(series._knots)
     ends = [series.at(place / 128) for place in (990, 1010)]  # it turns back, without a jump
     assert ends[0] == ends[1]
@@ -110,9 +111,9 @@ def test_however_far_somebody_is_there_is_a_gust(monkeypatch):
 
 def test_who_is_further_downwind_meets_the_same_gusts_later():
     air, clock = weather((3.0, 4.0, 0.0), GUSTS)
-    clock[0] = 10.0
+    clock.time = 10.0
     here = air.at((1.0, 2.0, 0.5))
-    clock[0] = 12.0
+    clock.time = 12.0
     assert air.at((1.0 + 6.0, 2.0 + 8.0, 3.0)) == pytest.approx(here, abs=1e-12)
     assert air.at((1.0, 2.0, 0.5)) != pytest.approx(here, abs=0.1)
 
@@ -132,16 +133,16 @@ def test_components_are_along_the_wind_across_it_and_up():
 
 def test_a_change_of_the_wind_lets_the_gusts_go_on():
     air, clock = weather((5.0, 0.0, 0.0), GUSTS)
-    clock[0] = 8.0
+    clock.time = 8.0
     before = air.at((0, 0, 0))
     air.change({"wind": [2.5, 0, 0]})
     after = air.at((0, 0, 0))
     assert after[0] - before[0] == pytest.approx(-2.5)
     assert after[1:] == before[1:]
-    clock[0] = 10.0  # and now they pass at half the speed
+    clock.time = 10.0  # and now they pass at half the speed
     slow = air.at((0, 0, 0))[1:]
-    other, time = weather((5.0, 0.0, 0.0), GUSTS)
-    time[0] = 9.0
+    other, clock = weather((5.0, 0.0, 0.0), GUSTS)
+    clock.time = 9.0
     assert other.at((0, 0, 0))[1:] == pytest.approx(slow)
 
 
@@ -178,12 +179,13 @@ def test_drag_of_ones_own_is_the_only_one(simulate):
 
 def test_without_weather_nothing_follows_the_sub_steps(simulate):
     simulation = simulate()
-    assert simulation.drone.sub_step_forces == [] and not simulation._any_between
-    simulation.drone.change_weather({"wind": [3, 0, 0]})
-    assert len(simulation.drone.sub_step_forces) == 1 and simulation._any_between
-    assert fly(simulation, 20)[-1][0].linear_velocity[0] > 0.05
+    assert simulation.drone.sub_step_forces == [] and not simulation._stepper._any_between
+    simulation.drone.context.change_weather({"wind": [3, 0, 0]})
+    flown = fly(simulation, 20)
+    assert len(simulation.drone.sub_step_forces) == 1 and simulation._stepper._any_between
+    assert flown[-1][0].linear_velocity[0] > 0.05
     simulation.start()  # as the parameters say
-    assert simulation.drone.sub_step_forces == [] and not simulation._any_between
+    assert simulation.drone.sub_step_forces == [] and not simulation._stepper._any_between
 
 
 def test_a_flight_in_gusts_comes_again_to_the_bit(simulate):
@@ -200,11 +202,11 @@ def test_a_snapshot_brings_the_weather_back(simulate):
     simulation = simulate()
     fly(simulation, 10)
     calm = simulation.snapshot()
-    simulation.drone.change_weather({"wind": [2, 0, 0], "gusts": GUSTS})
+    simulation.drone.context.change_weather({"wind": [2, 0, 0], "gusts": GUSTS})
     fly(simulation, 30)
     windy = simulation.snapshot()
     then = fly(simulation, 50)
-    simulation.drone.change_weather({"wind": [0, 0, 0], "gusts": {"seed": 9}})
+    simulation.drone.context.change_weather({"wind": [0, 0, 0], "gusts": {"seed": 9}})
     fly(simulation, 20)
     simulation.restore(windy)
     assert fly(simulation, 50) == then
@@ -256,6 +258,6 @@ def test_a_saved_scene_has_the_weather_that_it_had_or_that_came(simulate, tmp_pa
         (field, {}, (0, 0, 0)),  # which is the parameters', and is not in the file
         (field, {"wind": [0, 1, 0]}, (0, 1, 0)),
     ):
-        simulation.drone.change_weather(change)
+        simulation.drone.context.change_weather(change)
         simulation.save_scene(saved)
         assert parameters.load({"scene_file": str(saved)}).weather.wind == wind

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from drone_sim.forces.pushes import Push
 from drone_sim.offline import timeline
 from drone_sim.offline.fly import settings
 from drone_sim.run import parameters
@@ -35,9 +36,9 @@ def fly(simulation, seconds, commands=None):
         if commands is not None:
             commands.apply(step, simulation.vehicles)
         simulation.step()
-        states.append([number for part in simulation.drone.state for number in part])
-        yaws.append(math.atan2(simulation.drone.matrix[4], simulation.drone.matrix[0]))
-        propellers.append(simulation.drone.particle_velocities)
+        states.append([number for part in simulation.drone.body.state for number in part])
+        yaws.append(math.atan2(simulation.drone.body.matrix[4], simulation.drone.body.matrix[0]))
+        propellers.append(simulation.drone.propulsion.particle_velocities)
     columns = np.array(states).T
     names = ["x", "y", "z", "qx", "qy", "qz", "qw", "vx", "vy", "vz", "wx", "wy", "wz"]
     flight = SimpleNamespace(**dict(zip(names, columns)))
@@ -56,4 +57,4 @@ def at(values, seconds):
 
 
 def push(drone, force=(0, 0, 0), torque=(0, 0, 0), seconds=0.2):
-    drone.push(force, torque, seconds)
+    drone.pushes.add(Push(force, torque, seconds))

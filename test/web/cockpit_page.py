@@ -88,12 +88,12 @@ class Panel:
         return self.scene.locator(f"xpath={beside}//*[self::input or self::textarea]").first
 
     @property
-    def says(self):
-        return self.field("Says").input_value()
+    def message(self):
+        return self.scene.get_by_role("status").inner_text()
 
     @property
-    def state(self):
-        return self.field("State").input_value()
+    def status(self):
+        return self.field("Status").input_value()
 
     def press(self, button, answer=""):
         """Press a button, and wait until the panel answers so."""
@@ -102,7 +102,7 @@ class Panel:
             self.wait_for(answer)
 
     def wait_for(self, answer):
-        wait_until(self.page, lambda: answer in self.says)
+        wait_until(self.page, lambda: answer in self.message)
 
     def show(self, tab):
         self.scene.get_by_role("tab", name=tab).click()

@@ -55,7 +55,7 @@ def test_a_page_of_another_origin_opens_no_socket_though_the_browser_has_the_coo
     page = context.new_page()
     for address, outcome in ((f"http://{host}/cockpit.css", "open"), (stranger, "refused")):
         page.goto(address)
-        for path, protocol in ((f"{host}/wire", "drone_sim"), (f"{host}/scene/", "viser-v1.1.0")):
+        for path, protocol in ((f"{host}/socket", "drone_sim"), (f"{host}/scene/", "viser-v1.1.0")):
             assert page.evaluate(SOCKET, [path, protocol]) == outcome, (address, path)
     context.close()
 
@@ -89,10 +89,10 @@ def test_a_page_under_a_foreign_name_gets_nothing(cockpit, rebound):
         answer = page.goto(foreign + path)
         assert answer.status == 403 and "token" in page.inner_text("body")
     host = f"evil.example:{port}"
-    for path, protocol in ((f"{host}/wire", "drone_sim"), (f"{host}/scene/", "viser-v1.1.0")):
+    for path, protocol in ((f"{host}/socket", "drone_sim"), (f"{host}/scene/", "viser-v1.1.0")):
         assert page.evaluate(SOCKET, [path, protocol]) == "refused"
     # From there to this machine's own name: the browser would send the cookie, were it of the same site.
-    for path, protocol in ((f"127.0.0.1:{port}/wire", "drone_sim"), (f"127.0.0.1:{port}/scene/", "viser-v1.1.0")):
+    for path, protocol in ((f"127.0.0.1:{port}/socket", "drone_sim"), (f"127.0.0.1:{port}/scene/", "viser-v1.1.0")):
         assert page.evaluate(SOCKET, [path, protocol]) == "refused"
     context.close()
 

@@ -71,9 +71,9 @@ def test_two_browsers_see_the_same_and_the_keys_of_both_count(cockpit, browser, 
     with open_page(cockpit, browser) as other:
         panels = Panel(tablet), Panel(other)
         panels[1].press("pause", "paused at")
-        wait_until(tablet, lambda: panels[0].state == panels[1].state == "paused")
-        panels[0].press("go on", "goes on")
-        wait_until(other, lambda: panels[1].state == "flying")
+        wait_until(tablet, lambda: panels[0].status == panels[1].status == "paused")
+        panels[0].press("resume", "resumed")
+        wait_until(other, lambda: panels[1].status == "flying")
         for page in (tablet, other):
             page.locator("#command").click()
         tablet.keyboard.down("w")

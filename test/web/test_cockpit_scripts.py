@@ -25,7 +25,7 @@ def page_without_scene(cockpit, browser):
     page.on("pageerror", lambda error: page.troubles.append(str(error)))
     page.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
     page.goto(cockpit.address)
-    wait_until(page, lambda: len(text(page)) > 100)
+    wait_until(page, lambda: text(page).strip())
     yield page
     assert page.troubles == []
     context.close()
@@ -93,6 +93,29 @@ def test_a_task_flies_in_its_scene_and_after_it_the_users_comes_back(cockpit, de
     desk.click("#run")
     wait_until(desk, lambda: "the launch" in said(desk))
     assert rospy.get_param("/drone_sim/scene_file") == before
+    wait_until(desk, lambda: desk.inner_text("#flown") == "tutorial/2_elevation.py flies")
+
+
+def test_the_mark_of_an_error_goes_when_its_line_is_mended(cockpit, desk):
+    cockpit.scripts.mkdir(exist_ok=True)
+    (cockpit.scripts / "fails.py").write_text("1 / 0\nx = 1\n")
+    wait_until(desk, lambda: desk.locator("#script option[value='mine/fails.py']").count())
+    open_script(desk, "mine/fails.py", "1 / 0")
+    desk.click("#run")
+    wait_until(desk, lambda: "ZeroDivisionError" in said(desk))
+    assert desk.locator(".cm-lintRange-error").inner_text() == "1 / 0"
+    write_at_the_end(desk, "y = 2")
+    assert desk.locator(".cm-lintRange-error").count()
+    desk.keyboard.press("Control+Home")
+    desk.keyboard.type("#")
+    assert not desk.locator(".cm-lintRange-error").count()
+
+
+def test_a_question_mark_shows_all_keys(desk):
+    desk.click("#help-open")
+    assert "forward, back" in desk.inner_text("#sheet") and "find, replace" in desk.inner_text("#sheet")
+    desk.get_by_role("button", name="Close").click()
+    assert not desk.is_visible("#sheet")
 
 
 def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(cockpit, desk):
@@ -114,7 +137,7 @@ def test_a_file_that_another_program_changes_is_told_and_both_texts_are_kept(coc
     desk.locator("#text .cm-content").press("Control+z")
     assert "takes off" in text(desk), "each script has a history of its own"
     desk.click("#as")
-    desk.keyboard.type("named.py")
+    desk.keyboard.type("named")
     desk.keyboard.press("Enter")
     wait_until(desk, lambda: desk.input_value("#script") == "mine/named.py")
     assert (cockpit.scripts / "named.py").read_text() == (package_path() / PILOT).read_text()

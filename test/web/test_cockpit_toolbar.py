@@ -9,7 +9,7 @@ from cockpit_page import Drone, wait_for, wait_until
 from diagnostic_msgs.msg import KeyValue
 
 HOSTILE = '<img src=x onerror="window.top.hacked = true">'
-# Of the chart of heights: the first time, the last height, and how many pixels have the colour of its line.
+# Of the chart of heights: the first time, the last height, how many pixels have its line's colour, the axis's ends.
 HEIGHTS = """() => {
     const charts = Object.values(window.__viserTestpoints?.uplots ?? {}).map((one) => one.chart);
     const chart = charts.find((one) => one.series[1].label === "z");
@@ -19,14 +19,14 @@ HEIGHTS = """() => {
     let red = 0;
     for (let at = 0; at < colours.length; at += 4)
         red += colours[at] > colours[at + 1] + 80 && colours[at] > colours[at + 2] + 80 && colours[at + 3] > 90;
-    return [chart.data[0].at(0), chart.data[1].at(-1), red];
+    return [chart.data[0].at(0), chart.data[1].at(-1), red, chart.scales.y.min, chart.scales.y.max];
 }"""
 
 
 @pytest.fixture(autouse=True)
 def _afresh(cockpit, panel):
     cockpit.start_afresh()
-    wait_until(panel.page, lambda: panel.state == "flying")
+    wait_until(panel.page, lambda: panel.status == "flying")
     panel.show("Fly")
 
 
@@ -41,26 +41,26 @@ def stands(panel, drone):
 
 def test_pause_one_step_snapshot_and_restore(cockpit, panel):
     panel.press("pause", "paused at t =")
-    assert panel.state == "paused"
+    assert panel.status == "paused"
     before = stands(panel, cockpit.drone)
-    time = float(panel.says.rpartition("= ")[2].removesuffix(" s"))
-    panel.press("snapshot", f"remembered t = {time:.2f} s")
+    time = float(panel.message.rpartition("= ")[2].removesuffix(" s"))
+    panel.press("snapshot", f"snapshot at t = {time:.2f} s")
     cockpit.drone.flown.clear()
     panel.press("step", f"step: t = {time + 0.05:.2f} s")
     assert stands(panel, cockpit.drone) != before
     assert len({one["place"] for one in cockpit.drone.flown.values() if "place" in one} - {before}) == 1
-    panel.press("restore", f"back at t = {time:.2f} s")
+    panel.press("restore", f"restored t = {time:.2f} s")
     wait_until(panel.page, lambda: cockpit.drone.place == before)
-    panel.press("go on", "goes on at t =")
-    wait_until(panel.page, lambda: panel.state == "flying")
+    panel.press("resume", "resumed at t =")
+    wait_until(panel.page, lambda: panel.status == "flying")
 
 
 def test_stop_start_and_restart(cockpit, panel):
     panel.press("stop", "stop: stopped")
-    wait_until(panel.page, lambda: panel.state == "stopped")
+    wait_until(panel.page, lambda: panel.status == "stopped")
     panel.press("step", "failed: ")
     panel.press("start", "start: started")
-    wait_until(panel.page, lambda: panel.state == "flying")
+    wait_until(panel.page, lambda: panel.status == "flying")
     panel.press("restart", "restart: started")
 
 
@@ -84,7 +84,7 @@ def test_another_scene(cockpit, panel):
 def test_the_keys_fly_the_drone_that_is_chosen(cockpit, panel):
     rospy.set_param("/drone_sim/vehicles", {"drone": {}, "wing": {"position": [0, 2, 1]}})
     try:
-        assert cockpit.call("set_vehicles") == "wing came"
+        assert cockpit.call("set_vehicles") == "wing added"
         wing = Drone("wing")
         panel.choose("Vehicle", "wing")
         panel.page.locator("#command").click()
@@ -107,8 +107,8 @@ def test_plots_are_drawn_and_a_slider_tunes(cockpit, panel):
     panel.show("Plots")
 
     def plotted():
-        began, height, red = panel.scene.locator("body").evaluate(HEIGHTS) or (0, 0, 0)
-        return began < -1 and abs(height - cockpit.drone.place[2]) < 0.02 and red > 50
+        began, height, red, low, high = panel.scene.locator("body").evaluate(HEIGHTS) or (0, 0, 0, 0, 0)
+        return began < -1 and abs(height - cockpit.drone.place[2]) < 0.02 and red > 50 and low <= 0 and high >= 1
 
     wait_until(panel.page, plotted)
     panel.show("Tune")
@@ -116,11 +116,11 @@ def test_plots_are_drawn_and_a_slider_tunes(cockpit, panel):
     before = float(slider.get_attribute("aria-valuenow"))
     slider.focus()
     slider.press("ArrowRight")
-    wait_until(panel.page, lambda: " = " in panel.says and "refused" not in panel.says)
-    name, _, value = panel.says.partition(" = ")
+    wait_until(panel.page, lambda: " = " in panel.message and "refused" not in panel.message)
+    name, _, value = panel.message.partition(" = ")
     assert float(value) > before
     slider.press("ArrowLeft")
-    wait_until(panel.page, lambda: panel.says.startswith(f"{name} = ") and panel.says != f"{name} = {value}")
+    wait_until(panel.page, lambda: panel.message.startswith(f"{name} = ") and panel.message != f"{name} = {value}")
     assert float(slider.get_attribute("aria-valuenow")) == before
 
 

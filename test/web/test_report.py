@@ -7,7 +7,7 @@ import pytest
 from graded import EVIL, SCENE, place, read_plan, result, write_table
 from PIL import Image
 
-from drone_sim.grading.outputs import html
+from drone_sim.grading.outputs.html import report
 
 HUB = (255, 90, 0)  # the drone's middle on the canvas
 NEAR = 2.0  # px
@@ -24,7 +24,7 @@ def _report(tmp_path_factory):
         result("bad.py", 0, (False, False)),
         result("evil.py", error=EVIL, names=(EVIL, EVIL), passed=(True, False)),
     ]
-    html.write(plan, results, lambda one: None if one.error else table, folder / "out")
+    report.write(plan, results, lambda one: None if one.error else table, folder / "out")
     return folder / "out"
 
 

@@ -1,11 +1,12 @@
 // The page around the scene: held keys, the script in an editor with its text, and what floats over the scene. The rest
 // is viser's, in the frame.
-import { Flying } from "./flying.js";
+import { Teleop } from "./teleop.js";
+import { Console } from "./console.js";
 import { Lesson } from "./lesson.js";
 import { Scripts } from "./scripts.js";
 import { split } from "./split.js";
 import { Windows } from "./windows.js";
-import { Wire } from "./wire.js";
+import { PageSocket } from "./socket.js";
 
 const at = (id) => document.getElementById(id);
 
@@ -16,7 +17,8 @@ function inScene(act) {
   frame.addEventListener("load", () => act(frame.contentWindow));
 }
 
-function show({ saved, said, bad = false, lists, script, of, question }) {
+function show({ saved, said, bad = false, lists, script, of, question, flown }) {
+  if (flown !== undefined) at("flown").textContent = flown && `${flown} flies`;
   if (saved !== undefined) {
     at("saved").textContent = saved;
     at("saved").classList.toggle("bad", bad);
@@ -61,6 +63,7 @@ function told(message) {
   if (message.windows) windows.show(message.windows);
   if (message.pictures) windows.showPictures(message.pictures);
   if (message.failure) scripts.fail(message.failure);
+  if (message.log) log.add(message.log);
 }
 
 // viser paints everything, shadows too, with whatever the browser has.
@@ -70,7 +73,10 @@ function paintsInSoftware() {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "");
 }
 
-const run = () => scripts.run(lesson.name).catch(tell);
+const run = () => {
+  log.clear();
+  return scripts.run(lesson.name).catch(tell);
+};
 const open = (script) => scripts.open(script).catch(tell);
 
 const lesson = new Lesson(
@@ -79,19 +85,19 @@ const lesson = new Lesson(
     body: at("lesson-body"), start: at("start"), flies: at("flies"), text: at("lesson-text"),
     grade: at("grade"), graded: at("graded"),
   },
-  (...question) => wire.ask(...question),
+  (...question) => socket.ask(...question),
   open,
   () => scripts.save(),
 );
 let isLost = false;
-const wire = new Wire(
+const socket = new PageSocket(
   told,
   (data) => windows.picture(data),
   () => {
     if (isLost) show({ said: "" });
     isLost = false;
-    if (paintsInSoftware()) wire.ask("spare").catch(tell);
-    wire.ask("windows").then(told, () => {}); // told anyway, once the node is ready
+    if (paintsInSoftware()) socket.ask("spare").catch(tell);
+    socket.ask("windows").then(told, () => {}); // told anyway, once the node is ready
     scripts.connected().catch(tell);
   },
   () => {
@@ -100,11 +106,12 @@ const wire = new Wire(
     show({ said: "the cockpit's node does not answer; what you write is kept here until it does. Started anew, it has a new address.", bad: true });
   },
 );
-const windows = new Windows(at("windows"), wire);
-const scripts = new Scripts(at("text"), wire, { show }, (name) => lesson.go(name));
+const log = new Console(at("console"));
+const windows = new Windows(at("windows"), socket);
+const scripts = new Scripts(at("text"), socket, { show }, (name) => lesson.go(name));
 scripts.onRun = run;
-const flying = new Flying(
-  (command) => wire.hold(command),
+const teleop = new Teleop(
+  (command) => socket.hold(command),
   ({ vx, vy, vz, wz }) => {
     const [x, y, z, turn] = [vx, vy, vz, wz].map((value) => (value < 0 ? "" : "+") + value.toFixed(2));
     at("command").textContent = `vx ${x}  vy ${y}  vz ${z} m/s  wz ${turn} rad/s`;
@@ -137,14 +144,16 @@ window.addEventListener("keydown", (event) => {
   event.preventDefault(); // the browser would save the page
   scripts.save().catch(tell);
 });
-const letGo = (event) => event.key === "Escape" && wire.ask("let go").catch(tell);
+at("help-open").onclick = () => at("sheet").showModal();
+at("help-close").onclick = () => at("sheet").close();
+const letGo = (event) => event.key === "Escape" && socket.ask("let go").catch(tell);
 window.addEventListener("keydown", letGo);
 inScene((scene) => scene.addEventListener("keydown", letGo));
 window.addEventListener("beforeunload", (event) => scripts.drafts.isSafe(scripts.is.script) || event.preventDefault());
 split(at("beside"), "--editor", "x", 300, () => window.innerWidth - 320, (event) => window.innerWidth - event.clientX);
 const above = () => at("lesson-body").getBoundingClientRect().top;
 split(at("under"), "--lesson", "y", 60, () => window.innerHeight - 260, (event) => event.clientY - above());
-flying.listenTo(window);
-inScene((scene) => flying.listenTo(scene));
-flying.stick(at("left"), "wz", "vz");
-flying.stick(at("right"), "vy", "vx");
+teleop.listenTo(window);
+inScene((scene) => teleop.listenTo(scene));
+teleop.stick(at("left"), "wz", "vz");
+teleop.stick(at("right"), "vy", "vx");

@@ -4,7 +4,7 @@ import { indentWithTab } from "@codemirror/commands";
 import { EditorState, Prec } from "@codemirror/state";
 import { EditorView, keymap } from "@codemirror/view";
 import { StreamLanguage, indentUnit } from "@codemirror/language";
-import { setDiagnostics } from "@codemirror/lint";
+import { forEachDiagnostic, setDiagnostics } from "@codemirror/lint";
 import { python } from "@codemirror/lang-python";
 import { lua } from "@codemirror/legacy-modes/mode/lua";
 
@@ -12,7 +12,11 @@ export class Editor {
   constructor(parent, onChange, onRun) {
     this.states = new Map(); // of scripts that have been open, by name
     this.script = "";
-    const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && onChange());
+    const changed = EditorView.updateListener.of((update) => {
+      if (!update.docChanged || this.filling) return;
+      this.unmark(update);
+      onChange();
+    });
     const run = { key: "Mod-Enter", run: () => (onRun(), true) }; // else it would begin a line, too
     this.common = [
       Prec.highest(keymap.of([run])),
@@ -67,6 +71,11 @@ export class Editor {
     const insert = text.slice(from, text.length - end);
     this.view.dispatch({ changes: { from, to: before.length - end, insert } });
     this.filling = false;
+  }
+
+  // A failure in a line that is written anew is none of that line any more.
+  unmark({ startState, changes }) {
+    forEachDiagnostic(startState, (_, from, to) => changes.touchesRange(from, to) && this.mark(null));
   }
 
   // Shows a failure at its line, or none.

@@ -10,10 +10,10 @@ const LARGEST = 1 << 20; // bytes
 const size = (text) => new TextEncoder().encode(text).length;
 
 export class Scripts {
-  // `page` shows what is told: { saved, said, bad, lists, script, question }; `onOpen` hears of the text that a script has.
-  constructor(parent, wire, page, onOpen) {
-    this.ask = (...question) => wire.ask(...question);
-    this.wire = wire;
+  // `page` shows what is told: { saved, said, bad, lists, script, question, flown }; `onOpen` hears of the text that a script has.
+  constructor(parent, socket, page, onOpen) {
+    this.ask = (...question) => socket.ask(...question);
+    this.socket = socket;
     this.page = page;
     this.onOpen = onOpen;
     this.drafts = new Drafts();
@@ -36,7 +36,7 @@ export class Scripts {
 
   async list() {
     const lists = await this.ask("scripts");
-    this.shelf = lists.shelf;
+    this.digest = lists.digest;
     this.page.show({ lists, script: this.is.script || lists.flown });
     return lists;
   }
@@ -56,27 +56,27 @@ export class Scripts {
 
   async take(script) {
     const draft = this.drafts.get(script);
-    let gone = "";
+    let failure;
     const answer = await this.ask("open", { script }).catch((error) => {
       this.page.show({ script: this.is.script });
-      if (!draft || !this.wire.open) throw error;
-      gone = error.message;
+      if (!draft || !this.socket.open) throw error;
+      failure = error;
       return { script, file: "", version: "", text: "", lesson: "" };
     });
     this.know(answer);
     this.conflict = this.dirty = false;
     this.page.show({ saved: "", script, of: answer.lesson, question: null });
     this.editor.show(script, answer.text);
-    if (draft && draft.text !== answer.text) this.resume(draft, gone);
+    if (draft && draft.text !== answer.text) this.resume(draft, failure);
     else this.drafts.drop(script);
     this.onOpen(answer.lesson);
   }
 
   // Goes on with what was not saved.
-  resume(draft, gone) {
+  resume(draft, failure) {
     this.editor.fill(draft.text);
     this.dirty = true;
-    if (gone || (draft.version !== this.is.version && this.isOwn)) return this.disagree(gone);
+    if (failure || (draft.version !== this.is.version && this.isOwn)) return this.disagree(failure);
     this.page.show({ said: "what was not saved yet is here again" });
     setTimeout(() => this.save().catch(() => {}));
   }
@@ -132,7 +132,9 @@ export class Scripts {
     if (before !== this.is.script) return this.list();
   }
 
-  async saveAs(name) {
+  // A name without an ending gets that of the script whose text it is.
+  async saveAs(given) {
+    const name = /\.\w+$/.test(given) ? given : given + this.is.script.slice(this.is.script.lastIndexOf("."));
     await this.inTurn(async () => {
       const text = this.editor.text;
       const answer = await this.ask("save_as", { name, text });
@@ -152,7 +154,7 @@ export class Scripts {
   // ---- what others change
 
   watch() {
-    if (document.hidden || !this.wire.open || !this.is.script || this.looking) return;
+    if (document.hidden || !this.socket.open || !this.is.script || this.looking) return;
     this.looking = true;
     this.inTurn(() => this.look())
       .catch(() => {})
@@ -162,7 +164,8 @@ export class Scripts {
   async look() {
     const { script, version } = this.is;
     const now = await this.ask("look", { script });
-    if (now.shelf !== this.shelf) await this.list();
+    this.page.show({ flown: now.flown });
+    if (now.digest !== this.digest) await this.list();
     if (this.conflict) return;
     if (now.version !== version) await this.compare();
     else if (this.dirty && Date.now() - (this.failed ?? 0) > RETRY) await this.write();
@@ -172,8 +175,8 @@ export class Scripts {
   async compare() {
     const { script } = this.is;
     const theirs = await this.ask("open", { script }).catch((error) => ({ error }));
-    if (theirs.error && !this.wire.open) throw theirs.error;
-    if (theirs.error) return this.disagree(theirs.error.message);
+    if (theirs.error && !this.socket.open) throw theirs.error;
+    if (theirs.error) return this.disagree(theirs.error);
     const isTouched = theirs.text === this.is.text || !this.isOwn; // another version of the same
     const isOurs = theirs.text === this.editor.text;
     if (this.dirty && !isTouched && !isOurs) return this.disagree();
@@ -186,18 +189,18 @@ export class Scripts {
     this.page.show({ saved: "", said: `${script} has been changed by another program: this is the new text. Ctrl+Z brings yours back.` });
   }
 
-  disagree(why = "") {
+  disagree(failure) {
     this.conflict = true;
     const { script } = this.is;
-    const gone = why.includes("no such script");
+    const gone = failure?.kind === "NoSuchScript";
     const keep = (mine) => () => this.keep(mine);
     this.drafts.put(script, { text: this.editor.text, version: this.is.version });
     const said = gone
       ? `${script} has been removed or renamed by another program. Its text is still here.`
-      : why || `${script} has been changed by another program while you wrote. Both texts will be kept; which stays under this name?`;
+      : failure?.message ?? `${script} has been changed by another program while you wrote. Both texts will be kept; which stays under this name?`;
     const again = ["Write it again", keep(true)];
     const others = gone ? ["Let it go", () => this.letGo()] : ["The other's", keep(false)];
-    const choices = why && !gone ? [again] : [gone ? again : ["Mine", keep(true)], others];
+    const choices = failure && !gone ? [again] : [gone ? again : ["Mine", keep(true)], others];
     this.page.show({ saved: "not saved", said: "", bad: true, question: { said, choices } });
   }
 
@@ -228,12 +231,12 @@ export class Scripts {
     await this.save();
     this.editor.mark(null);
     this.page.show({ said: "starting ..." });
-    const { done, said, line } = await this.ask("run", { script: this.is.script, lesson });
-    this.page.show({ said, bad: !done });
-    if (line) this.editor.mark({ line, said });
+    const { done, said, failure } = await this.ask("run", { script: this.is.script, lesson });
+    if (failure) this.fail(failure);
+    else this.page.show({ said, bad: !done });
   }
 
-  // A failure while it flies, or at its start.
+  // A failure while it flies, or at its start: that one comes as the answer and from the node's log, in either order.
   fail({ file, line, said, phase }) {
     const where = file === this.is.file ? `line ${line}` : `${file.split("/").pop()}, line ${line}`;
     this.page.show({ said: `${phase}, ${where}: ${said}`, bad: true });

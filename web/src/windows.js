@@ -2,9 +2,9 @@
 const LINE_FEED = 10;
 
 export class Windows {
-  constructor(parent, wire) {
+  constructor(parent, socket) {
     this.parent = parent;
-    this.wire = wire; // { ask, say }
+    this.socket = socket; // { ask, say }
     this.open = new Map(); // windows, by kind and handle or topic
     this.labels = new Map(); // of views, by topic
   }
@@ -68,7 +68,7 @@ export class Windows {
   dialog({ handle, title, text, buttons, typed }) {
     const element = this.frame("dialog", title);
     const field = typed === null ? null : create("input", { value: typed, ariaLabel: title });
-    const press = (button) => this.wire.ask("answer", { handle, button, typed: field?.value ?? "" }).catch(() => {});
+    const press = (button) => this.socket.ask("answer", { handle, button, typed: field?.value ?? "" }).catch(() => {});
     if (field) field.onkeydown = (event) => event.key === "Enter" && press(buttons[0]);
     element.append(create("p", { textContent: text }));
     if (field) element.append(field);
@@ -90,7 +90,7 @@ export class Windows {
   }
 
   figure(topic) {
-    const element = this.frame("picture", topic, () => this.wire.ask("camera", { topic, on: false }).catch(() => {}));
+    const element = this.frame("picture", topic, () => this.socket.ask("camera", { topic, on: false }).catch(() => {}));
     const image = create("img", { alt: topic });
     const note = create("p");
     element.append(image, note);
@@ -102,7 +102,7 @@ export class Windows {
     const bytes = new Uint8Array(message);
     const end = bytes.indexOf(LINE_FEED);
     const said = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
-    const shown = () => requestAnimationFrame(() => this.wire.say({ shown: said.picture }));
+    const shown = () => requestAnimationFrame(() => this.socket.say({ shown: said.picture }));
     const there = this.open.get(`picture ${said.picture}`);
     if (!there) return shown();
     const address = URL.createObjectURL(new Blob([bytes.subarray(end + 1)]));

@@ -13,7 +13,6 @@ from tutorial import sysCall_actuation  # noqa: F401 -- a phase, called as it is
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
 
 LANDED, TAKING_OFF, FLYING, LANDING, CRASHED = "landed", "taking off", "flying", "landing", "crashed"
-AT_REST = (LANDED, CRASHED)
 
 CLIMB = 0.6  # m/s
 AT_HEIGHT, SETTLED = 0.01, 0.05  # m, m/s: the take-off is over

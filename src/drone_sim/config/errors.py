@@ -1,74 +1,79 @@
-"""What is wrong with values that were read from a YAML file: every wrong key, in plain words, with its line."""
+"""Values that come from outside, checked: every wrong key, in plain words, with its line."""
 
 from __future__ import annotations
 
 import difflib
-import itertools
 from collections.abc import Mapping, Sequence
 from types import UnionType
-from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from drone_sim.config.types import PATTERNS, Key, Location, ParameterError, Word, readable_key, word_of
-from drone_sim.files.yaml_files import Lines
-from drone_sim.wording import shown
+from drone_sim.config.types import (
+    PATTERNS,
+    Checked,
+    Key,
+    Location,
+    ParameterError,
+    ParameterProblem,
+    Word,
+    merged,
+    one_line,
+    word_of,
+)
+from drone_sim.files.yaml_files import YamlLines
+from drone_sim.message_text import shown
 
-MOST = 8  # problems that are told
 _UNIONS = (Union, UnionType)  # Union[A, B] and A | B
-LONG = 900  # characters after which no other is
+_Model = TypeVar("_Model", bound=Checked)
 
 
-class Problem(NamedTuple):
-    """One wrong key: where it stands among the parameters, and what to say."""
-
-    location: Location
-    text: str
-    is_missing: bool = False
+def changed(model: _Model, changes: Mapping[str, Any]) -> _Model:
+    """Return a model with other values laid over some of its own. Raises ParameterError."""
+    return checked(type(model), merged(model.model_dump(), changes))
 
 
-def problems(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
+def checked(model: type[_Model], values: Any, lines: YamlLines | None = None, file: str = "") -> _Model:
+    """Return a model of values. Raises ParameterError, which says where in the `lines` of a `file` they stand."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        found = problems(error, model)
+        placed = [(line_of(lines, one) if lines else None, one.sentence) for one in found]
+        in_file = any(line for line, _ in placed)  # else it is for whoever says it to name what it is of
+        raise ParameterError.of(found, one_line(placed, file) if in_file else "") from None
+
+
+def problems(error: ValidationError, model: type[BaseModel]) -> list[ParameterProblem]:
     """Return what is wrong; the keys that one mapping lacks are one problem."""
-    found: dict[Problem, None] = {}  # a list that is too short is reported once for each number that it lacks
-    missing: dict[Location, list[_Place]] = {}
+    found: dict[ParameterProblem, None] = {}  # a list that is too short is reported once for each number that it lacks
+    missing: dict[Location, list[_ErrorPlace]] = {}
     for one in error.errors():
         place = _place(model, one["loc"])
         if one["type"] == "missing" and not place.is_in_list:
             missing.setdefault(place.location[:-1], []).append(place)
         else:
-            found[_problem(one, place)] = None
+            found.update(dict.fromkeys(_problems(one, place)))
     return [*found, *map(_missing, missing.values())]
 
 
-def told(placed: Sequence[tuple[int | None, str]], file: str = "") -> str:
-    """Return problems in one line: those with a line of a file by it, then the others."""
-    inside = sorted(((line, text) for line, text in placed if line is not None), key=lambda one: one[0])
-    words = [f"line {line}: {text}" for line, text in inside]
-    words += [text for line, text in placed if line is None]
-    lengths = itertools.accumulate(map(len, words), initial=0)  # of all that comes before
-    first = [word for word, before in zip(words, lengths) if before < LONG][:MOST]
-    more = f"; and {len(words) - len(first)} more" if len(first) < len(words) else ""
-    return (f"{file}: " if file else "") + "; ".join(first) + more
-
-
-def line_of(lines: Lines, problem: Problem) -> int | None:
-    """Return the line of a wrong key, that of the mapping for a missing one; None for what the file does not have."""
-    sought = problem.location[:-1] if problem.is_missing else problem.location
-    depth, line = lines.find(sought)
-    return line if sought and depth == len(sought) else None
+def line_of(lines: YamlLines, problem: ParameterProblem) -> int | None:
+    """Return the line of a wrong key, or of the mapping that has it not; None for what the file does not have."""
+    depth, line = lines.find(problem.location)
+    return line if depth >= max(1, len(problem.location) - problem.or_above) else None
 
 
 # ---- where
 
 
-class _Place(NamedTuple):
+class _ErrorPlace(NamedTuple):
     location: Location  # without pydantic's own additions
     annotation: Any  # of the value that stands there, or of the list that it stands in
     is_in_list: bool
     known: tuple[str, ...]  # the keys beside it
 
 
-def _place(model: Any, loc: Location) -> _Place:
+def _place(model: Any, loc: Location) -> _ErrorPlace:
     location: list[Key] = []
     annotation = model
     known: tuple[str, ...] = ()
@@ -81,9 +86,9 @@ def _place(model: Any, loc: Location) -> _Place:
             continue
         location.append(part)
         if get_origin(_bare(annotation)) is tuple:
-            return _Place(tuple(location), annotation, True, ())
+            return _ErrorPlace(tuple(location), annotation, True, ())
         annotation, known = _inside(annotation, part)
-    return _Place(tuple(location), annotation, False, known)
+    return _ErrorPlace(tuple(location), annotation, False, known)
 
 
 def _inside(annotation: Any, part: Key) -> tuple[Any, tuple[str, ...]]:
@@ -121,22 +126,17 @@ def _choice(annotation: Any) -> _Choice:
         for key in (getattr(one, "discriminator", None) for one in others):
             if isinstance(key, str):
                 models = get_args(_bare(first))
-                return _Choice(key, {word: one for one in models for word in _words(one, key)})
+                return _Choice(
+                    key, {word: one for one in models for word in get_args(one.model_fields[key].annotation)}
+                )
             if isinstance(key, Word):
-                return _choice_of_either(key, [_bare(one) for one in get_args(_bare(first))])
+                either = [_bare(one) for one in get_args(_bare(first))]
+                words = tuple(word_of(one, key.or_key) for one in either if key.or_key in one.model_fields)
+                return _Choice(key.key, {word_of(one, key.key, key.or_key): one for one in either}, key.or_key, words)
         return _choice(first)
     if get_origin(annotation) in _UNIONS and not others:
         return _choice(first)
     return _Choice("", {})
-
-
-def _choice_of_either(word: Word, models: Sequence[Any]) -> _Choice:
-    others = tuple(word_of(one, word.or_key) for one in models if word.or_key in one.model_fields)
-    return _Choice(word.key, {word_of(one, word.key, word.or_key): one for one in models}, word.or_key, others)
-
-
-def _words(model: Any, key: str) -> tuple[str, ...]:
-    return get_args(model.model_fields[key].annotation)
 
 
 def _description(annotation: Any) -> str:
@@ -159,41 +159,40 @@ def _description(annotation: Any) -> str:
 # ---- what
 
 
-def _missing(places: list[_Place]) -> Problem:
-    *above, _ = location = places[0].location
+def _missing(places: list[_ErrorPlace]) -> ParameterProblem:
+    location = places[0].location
     if len(places) == 1:
-        return Problem(location, f"parameter {readable_key(location)}: missing{_must(places[0], '; it must be')}", True)
-    keys = ", ".join(str(place.location[-1]) for place in places)
-    return Problem(location, f"parameter {readable_key(tuple(above))}: {keys} are missing", True)
+        return ParameterProblem(location, f"missing{_must(places[0], '; it must be')}", or_above=True)
+    return ParameterProblem(location[:-1], f"{', '.join(str(place.location[-1]) for place in places)} are missing")
 
 
-def _problem(error: Any, place: _Place) -> Problem:
+def _problems(error: Any, place: _ErrorPlace) -> Sequence[ParameterProblem]:
     raised = error.get("ctx", {}).get("error")
-    if isinstance(raised, ParameterError):  # of several keys at once: it names them itself
-        if raised.location:
-            return Problem(raised.location, str(raised))
-        return Problem(place.location, f"parameter {readable_key((*place.location, str(raised)))}")
+    if isinstance(raised, ParameterError):  # of several keys at once
+        return [one._replace(or_above=bool(one.location)) for one in raised.below(*place.location).problems]
+    return [_problem(error, place)]
+
+
+def _problem(error: Any, place: _ErrorPlace) -> ParameterProblem:
     location, value = place.location, error["input"]
     if error["type"] in ("union_tag_invalid", "union_tag_not_found") and isinstance(value, Mapping):
         return _wrong_choice(_choice(place.annotation), location, value)
     if error["type"] == "missing":  # a number of a list
         location = location[:-1]
-    key = f"parameter {readable_key(location)}"
     if error["type"] == "extra_forbidden":
-        return Problem(location, f"{key}: unknown key{_near(str(location[-1]), place.known)}")
-    return Problem(location, f"{key} = {shown(value)}: {_reason(error, place)}")
+        return ParameterProblem(location, f"unknown key{_near(str(location[-1]), place.known)}")
+    return ParameterProblem(location, _reason(error, place), shown(value))
 
 
-def _wrong_choice(choice: _Choice, location: Location, value: Mapping[str, Any]) -> Problem:
+def _wrong_choice(choice: _Choice, location: Location, value: Mapping[str, Any]) -> ParameterProblem:
     """Return what is wrong where no model is chosen: no word, or a wrong one."""
     key = choice.or_key if choice.or_key in value else choice.key
-    said = f"parameter {readable_key((*location, key))}"
     if key in value:
-        return Problem((*location, key), f"{said} = {shown(value[key])}: {_must_be_one_of(choice, key)}")
-    return Problem((*location, key), f"{said}: missing; {_must_be_one_of(choice)}", True)
+        return ParameterProblem((*location, key), _must_be_one_of(choice, key), shown(value[key]))
+    return ParameterProblem((*location, key), f"missing; {_must_be_one_of(choice)}", or_above=True)
 
 
-def _reason(error: Any, place: _Place) -> str:
+def _reason(error: Any, place: _ErrorPlace) -> str:
     kind, message = error["type"], error["msg"].replace("Value error, ", "")
     if (place.is_in_list and kind == "missing") or kind in ("tuple_type", "too_long"):
         return _must(place, "must be") or message
@@ -209,7 +208,7 @@ def _reason(error: Any, place: _Place) -> str:
     return plain.get(kind) or f"{message[0].lower()}{message[1:]}"
 
 
-def _must(place: _Place, verb: str) -> str:
+def _must(place: _ErrorPlace, verb: str) -> str:
     what = _description(place.annotation)
     return f"{verb} {what}" if what else ""
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Union, get_args
+from typing import Annotated, Any, ClassVar, NamedTuple, Union, get_args
 
 from annotated_types import Ge, GroupedMetadata, Le
 from pydantic import (
@@ -25,9 +26,11 @@ from pydantic import (
 
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import resolve
-from drone_sim.wording import MAX_NAME, shown
+from drone_sim.message_text import MAX_NAME, shown
 
 MAX_FILE_NAME = 4096  # characters
+MOST = 8  # problems that are told
+LONG = 900  # characters after which no other is
 _EXPONENT = re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$")
 
 
@@ -35,13 +38,69 @@ Key = int | str
 Location = tuple[Key, ...]  # the keys and indices on the way to a value
 
 
-class ParameterError(ValueError):
-    """A parameter is wrong; the message is one line that names key, value and what is allowed."""
+class ParameterProblem(NamedTuple):
+    """A wrong value: the keys above it, what is wrong, and the value as messages show it, if it is one."""
 
-    def __init__(self, message: str, location: Location = ()):
-        """Take where the wrong value stands, if it is one."""
-        super().__init__(message)
-        self.location = location
+    location: Location
+    reason: str
+    value: str = ""
+    or_above: bool = False  # whether the key may be left out, and what is around it is as wrong
+
+    @property
+    def text(self) -> str:
+        """What a message says of it."""
+        words = [" = ".join(filter(None, (readable_key(self.location), self.value))), self.reason]
+        return ": ".join(filter(None, words))
+
+    @property
+    def sentence(self) -> str:
+        """The text, with what it speaks of."""
+        return f"parameter {self.text}" if self.location else self.text
+
+
+class ParameterError(ValueError):
+    """Parameters are wrong: where, and why. As a text it is one line that names key, value and what is allowed."""
+
+    def __init__(self, reason: str, location: Location = (), value: str = ""):
+        """Take what is wrong; with the keys above the wrong value, and that as messages show it, where it is one."""
+        self._take([ParameterProblem(location, reason, value)], "")
+
+    @classmethod
+    def of(cls, problems: Sequence[ParameterProblem], line: str = "") -> ParameterError:
+        """Return the error of several problems, for which one line may be ready that says where they stand."""
+        error = cls("")
+        error._take(problems, line)
+        return error
+
+    def _take(self, problems: Sequence[ParameterProblem], line: str) -> None:
+        self.problems = tuple(problems)
+        self.text = line or one_line([(None, one.text) for one in problems])  # where it is plain that it is a parameter
+        self.args = (line or one_line([(None, one.sentence) for one in problems]),)
+
+    @property
+    def location(self) -> Location:
+        """The keys above the first wrong value; none where it is not one."""
+        return self.problems[0].location if self.problems else ()
+
+    def below(self, *keys: Key) -> ParameterError:
+        """Return the error as one who has what is wrong under some keys knows it."""
+        return self.of([one._replace(location=(*keys, *one.location)) for one in self.problems])
+
+
+def one_line(placed: Sequence[tuple[int | None, str]], file: str = "") -> str:
+    """Return what is wrong in one line: what has a line of a file with it, then the rest."""
+    inside = sorted(((line, text) for line, text in placed if line is not None), key=lambda one: one[0])
+    words = [f"line {line}: {text}" for line, text in inside]
+    words += [text for line, text in placed if line is None]
+    lengths = itertools.accumulate(map(len, words), initial=0)  # of all that comes before
+    first = [word for word, before in zip(words, lengths) if before < LONG][:MOST]
+    more = f"; and {len(words) - len(first)} more" if len(first) < len(words) else ""
+    return (f"{file}: " if file else "") + "; ".join(first) + more
+
+
+def readable_key(location: Location) -> str:
+    """Return the path to a value as a message shows it: cut, and on one line."""
+    return "/".join(part if part.isprintable() and len(part) < 80 else shown(part) for part in map(str, location))
 
 
 # ---- numbers
@@ -223,6 +282,29 @@ def merged(base: Any, overrides: Any) -> Any:
     return laid
 
 
+def nested(values: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a nested mapping of keys with dots between their parts; of several for one key the last one counts."""
+    made: dict[str, Any] = {}
+    for key, value in values:
+        *parents, last = key.split(".")
+        place = made
+        for parent in parents:
+            if not isinstance(place.get(parent), dict):
+                place[parent] = {}
+            place = place[parent]
+        place[last] = value
+    return made
+
+
+def flattened(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield what `nested` makes a nested mapping of."""
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            yield from flattened(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
 class Checked(BaseModel):
     """Every key is known, every value checked, and nothing changes after that."""
 
@@ -276,6 +358,15 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     return values
 
 
-def readable_key(location: Location) -> str:
-    """Return the path to a value as a message shows it: cut, and on one line."""
-    return "/".join(part if part.isprintable() and len(part) < 80 else shown(part) for part in map(str, location))
+_Tesla = Annotated[Finite, Within(-1, 1)]
+MagneticField = Annotated[
+    tuple[_Tesla, _Tesla, _Tesla], Field(description="3 numbers, [east, north, up] in T, as the world's x, y, z")
+]
+
+
+class DatumParameters(Checked):
+    """The world's origin in WGS 84; the world's x is east there, y north, z up (REP-103)."""
+
+    latitude: Annotated[Finite, Within(-90, 90)]  # degrees, as in sensor_msgs/NavSatFix
+    longitude: Annotated[Finite, Within(-180, 180)]  # degrees
+    altitude: Annotated[Finite, Within(-500, 9000)]  # m above the ellipsoid

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from drone_sim.files.file_cache import FileCache, Reading
-from drone_sim.files.resources import MEBIBYTE, read_bytes
+from drone_sim.files.resources import MEBIBYTE, FileCache, ReadFile, read_bytes
 
 MAX_SIZE = 32 * MEBIBYTE  # bytes of a file
 MAX_SIDE = 4096  # px
@@ -38,7 +37,7 @@ def check(content: bytes) -> None:
         raise ValueError(f"{width} x {height} px: at most {MAX_SIDE} x {MAX_SIDE} px are allowed")
 
 
-def _read(path: str) -> Reading:
+def _read(path: str) -> ReadFile:
     try:
         content = read_bytes(path, MAX_SIZE)
         check(content)
@@ -58,7 +57,7 @@ def _read(path: str) -> Reading:
     else:
         image = cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA if image.shape[2] == 4 else cv2.COLOR_BGR2RGB)
     image.setflags(write=False)
-    return Reading(image, image.nbytes)
+    return ReadFile(image, image.nbytes)
 
 
 _CACHE: FileCache[np.ndarray] = FileCache(_read, 256 * MEBIBYTE)

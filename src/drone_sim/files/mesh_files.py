@@ -14,8 +14,7 @@ from PIL import Image
 from trimesh.resolvers import Resolver
 
 from drone_sim.files import images
-from drone_sim.files.file_cache import FileCache, Reading
-from drone_sim.files.resources import MEBIBYTE, read_bytes
+from drone_sim.files.resources import MEBIBYTE, FileCache, ReadFile, read_bytes
 
 KINDS = (".obj", ".stl", ".dae")
 MAX_SIZE = 32 * MEBIBYTE  # bytes of a file, and of each that it names
@@ -35,7 +34,7 @@ _HULL = 256  # corners that a hull may have
 _Colour = tuple[float, float, float, float]
 
 
-class Part(NamedTuple):
+class MeshPart(NamedTuple):
     """One material's triangles, in metres.
 
     vertices: (n, 3) float64; faces: (m, 3); uv: (n, 2), v upwards, or None; rgba: 0..1; texture: (h, w, 3 or 4)
@@ -54,7 +53,7 @@ class Part(NamedTuple):
         return sum(one.nbytes for one in (self.vertices, self.faces, self.uv, self.texture) if one is not None)
 
 
-def read(path: str) -> tuple[Part, ...]:
+def read(path: str) -> tuple[MeshPart, ...]:
     """Return a mesh file's parts, placed as the file says. Raises ValueError, in one line that names the file."""
     return _CACHE.get(path)
 
@@ -139,7 +138,7 @@ class _Beside(Resolver):
         return []
 
 
-def _read(path: str) -> Reading:
+def _read(path: str) -> ReadFile:
     kind = Path(path).suffix.lower()
     if kind not in KINDS:
         raise ValueError(f"mesh {path}: must be one of {', '.join(KINDS)}")
@@ -161,7 +160,7 @@ def _read(path: str) -> Reading:
         if not isinstance(error, (ValueError, OSError, IndexError)):
             said = "it is broken"
         raise ValueError(f"mesh {path}: cannot be read ({' '.join(said.split()):.200})") from error
-    return Reading(parts, sum(part.nbytes for part in parts), beside.files)
+    return ReadFile(parts, sum(part.nbytes for part in parts), beside.files)
 
 
 def _utf8(text: bytes) -> bytes:
@@ -203,7 +202,7 @@ def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:
             yield part
 
 
-def _part(mesh: trimesh.Trimesh) -> Part:
+def _part(mesh: trimesh.Trimesh) -> MeshPart:
     vertices = np.array(mesh.vertices, dtype=np.float64)
     faces = np.array(mesh.faces)
     if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
@@ -218,10 +217,10 @@ def _part(mesh: trimesh.Trimesh) -> Part:
     for array in (vertices, faces, uv, texture):
         if array is not None:
             array.setflags(write=False)
-    return Part(vertices, faces, uv, rgba, None if uv is None else texture)
+    return MeshPart(vertices, faces, uv, rgba, None if uv is None else texture)
 
 
-def _check(parts: tuple[Part, ...]) -> None:
+def _check(parts: tuple[MeshPart, ...]) -> None:
     count = sum(len(part.faces) for part in parts)
     if not count:
         raise ValueError("holds no triangles")
@@ -266,4 +265,4 @@ def _colour(values: Any) -> _Colour:
     return (red, green, blue, alpha)
 
 
-_CACHE: FileCache[tuple[Part, ...]] = FileCache(_read, 256 * MEBIBYTE)
+_CACHE: FileCache[tuple[MeshPart, ...]] = FileCache(_read, 256 * MEBIBYTE)

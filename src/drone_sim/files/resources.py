@@ -1,13 +1,16 @@
-"""Where the files of the package lie, in the source tree or installed under share/; and how a file is read."""
+"""Files: where they are, what is in them, and what was read of them, kept while they stay as they are."""
 
 from __future__ import annotations
 
 import os
 import stat
 import sysconfig
+from collections import OrderedDict
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from drone_sim.wording import shown
+from drone_sim.message_text import shown
 
 _HERE = Path(__file__).resolve()
 MEBIBYTE = 2**20
@@ -29,6 +32,19 @@ def python_path(*others: str) -> str:
     Where the package is installed, the system's packages lie beside it, and are older than those of our environment.
     """
     return os.pathsep.join(filter(None, (sysconfig.get_path("purelib"), str(_HERE.parents[2]), *others)))
+
+
+def cache_path() -> Path:
+    """Return the folder for what may be deleted at any time: of ours, below ~/.cache or XDG_CACHE_HOME."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "drone_sim"
+
+
+def is_file(path: Path) -> bool:
+    """Tell whether there is a regular file, of whatever name: none of such as no file can have."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long a name, a NUL in it
+        return False
 
 
 def locate(name: str) -> Path:
@@ -91,3 +107,48 @@ def _in_package(name: str) -> Path:
         raise FileNotFoundError(f"finding a ROS package needs ROS (in {shown(name)})") from None
     except rospkg.ResourceNotFound:
         raise FileNotFoundError(f"no ROS package {package:.60} (in {shown(name)})") from None
+
+
+T = TypeVar("T")
+Identity = tuple[int, int, int] | None  # modification time (ns), size (bytes), inode
+
+
+class ReadFile(NamedTuple):
+    """What a file held, how much memory it takes (bytes), and what other files it depends on."""
+
+    value: Any
+    size: int
+    files: Iterable[str] = ()
+
+
+class FileCache(Generic[T]):
+    """Reads files by path; the ones used last stay, up to `limit` bytes."""
+
+    def __init__(self, read: Callable[[str], ReadFile], limit: int):
+        """Take what reads a file."""
+        self._read = read
+        self._limit = limit
+        self._kept: OrderedDict[str, tuple[ReadFile, dict[str, Identity]]] = OrderedDict()
+
+    def get(self, path: str) -> T:
+        """Return what is in a file now. Raises what `read` raises."""
+        kept = self._kept.get(path)
+        if kept is None or any(identity_of(file) != identity for file, identity in kept[1].items()):
+            before = identity_of(path)
+            reading = self._read(path)
+            kept = (reading, {path: before, **{file: identity_of(file) for file in reading.files}})
+            self._kept[path] = kept
+        self._kept.move_to_end(path)
+        while len(self._kept) > 1 and sum(one.size for one, _ in self._kept.values()) > self._limit:
+            self._kept.popitem(last=False)
+        value: T = kept[0].value
+        return value
+
+
+def identity_of(path: str) -> Identity:
+    """Return what changes when a file is written anew; None where there is no such file."""
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size, status.st_ino

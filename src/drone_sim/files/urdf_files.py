@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as Xml
 
 from drone_sim.files.mesh_files import KINDS
-from drone_sim.files.resources import MEBIBYTE, locate, read_bytes
-from drone_sim.wording import MAX_NAME, shown
+from drone_sim.files.resources import MEBIBYTE, is_file, locate, read_bytes
+from drone_sim.message_text import MAX_NAME, shown
 
 MAX_SIZE = 4 * MEBIBYTE  # bytes of a file
 MAX_LINKS = 100
@@ -147,16 +148,11 @@ def _check_tree(links: Sequence[Xml.Element], joints: Sequence[Xml.Element], kin
     roots = [name for name in names if name not in parents]
     if len(roots) != 1:
         raise ValueError(f"must have one root link, has {', '.join(roots[:5]) or 'none: its joints form a circle'}")
-    for name in names:
-        _check_way_to_the_root(name, parents)
-
-
-def _check_way_to_the_root(name: str, parents: Mapping[str, str]) -> None:
-    here, steps = name, 0
-    while here in parents:
-        here, steps = parents[here], steps + 1
-        if steps > len(parents):
-            raise ValueError(f"link {name}: its joints form a circle")
+    try:
+        TopologicalSorter({child: [parent] for child, parent in parents.items()}).prepare()
+    except CycleError as error:
+        first = next(name for name in names if name in error.args[1])
+        raise ValueError(f"link {first}: its joints form a circle") from None
 
 
 def _names(elements: Sequence[Xml.Element]) -> list[str]:
@@ -252,24 +248,17 @@ def _add_shape(shape: Xml.Element, link: Xml.Element, folder: Path) -> None:
     _add(kinds[0], _SHAPES[kinds[0].tag], own, kinds[0].tag)
     if kinds[0].tag == "mesh":
         own[0].set("filename", _mesh(kinds[0].get("filename", ""), folder))
-        _check_scale(own[0].get("scale", ""))
+        scale = own[0].get("scale", "")
+        if any(abs(float(word)) < 1e-6 for word in scale.split()):
+            raise ValueError(f"mesh scale = {scale}: must not be smaller than 1e-06")
     if kinds[0].tag == "plane" and not any(float(word) for word in own[0].get("normal", "").split()):
         raise ValueError("plane normal: must not be 0 0 0")
-
-
-def _check_scale(text: str) -> None:
-    if any(abs(float(word)) < 1e-6 for word in text.split()):
-        raise ValueError(f"mesh scale = {text}: must not be smaller than 1e-06")
 
 
 def _mesh(name: str, folder: Path) -> str:
     plain = name[len("file://") :] if name.startswith("file://") else name
     path = locate(plain) if plain.startswith("package://") else folder / plain
-    try:
-        found = path.is_file()
-    except (OSError, ValueError):
-        found = False
-    if not found:
+    if not is_file(path):
         raise ValueError(f"no such mesh file: {shown(name) if name else '(no filename)'}")
     if path.suffix.lower() not in KINDS:
         raise ValueError(f"mesh {path}: must be one of {', '.join(KINDS)}")

@@ -21,7 +21,7 @@ def replacing(path: str | Path, binary: bool = False, through_links: bool = True
     it is touched. Raises OSError, in one line that names the file.
     """
     options: Any = {"mode": "xb"} if binary else {"mode": "x", "encoding": "utf-8", "newline": "\n"}
-    with _named(path):
+    with naming(path):
         check(path)
         if through_links and _is_special(path):
             with open(path, **{**options, "mode": options["mode"].replace("x", "w")}) as file:
@@ -55,7 +55,7 @@ def write(path: str | Path, content: str, through_links: bool = True) -> None:
 
 def write_new(path: str | Path, content: str | bytes) -> None:
     """Write a file, text in UTF-8, where nothing is of that name, no link either. Raises FileExistsError, OSError."""
-    with _named(path), open(path, "xb") as file:  # which follows no link
+    with naming(path), open(path, "xb") as file:  # which follows no link
         try:
             file.write(content.encode("utf-8") if isinstance(content, str) else content)
             file.flush()
@@ -67,7 +67,7 @@ def write_new(path: str | Path, content: str | bytes) -> None:
 
 def check(path: str | Path) -> None:
     """Raise OSError, in one line, where `path` cannot become a file."""
-    with _named(path):
+    with naming(path):
         if os.path.isdir(path):
             raise IsADirectoryError(0, "is a folder")
         folder = os.path.dirname(os.path.realpath(path))
@@ -97,7 +97,8 @@ def _finish(file: IO[Any], temporary: str, target: str) -> None:
 
 
 @contextlib.contextmanager
-def _named(path: str | Path) -> Iterator[None]:
+def naming(path: str | Path) -> Iterator[None]:
+    """Let an OSError be one line that names the file; so is a ValueError for a name with a NUL in it."""
     try:
         yield
     except OSError as error:

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import yaml
 
 from drone_sim.files.resources import MEBIBYTE, read_bytes
-from drone_sim.wording import shown
+from drone_sim.message_text import shown
 
 MAX_SIZE = MEBIBYTE  # bytes of a file
 MAX_DEPTH = 32  # lists and mappings within each other
@@ -71,14 +71,14 @@ def parse(text: str) -> Any:
         raise YamlError(f"{' '.join(str(error).split()):.200}") from None
 
 
-class Found(NamedTuple):
+class Depth(NamedTuple):
     """How far the way to a value leads in a file, and the line (from 1) where it ends."""
 
     depth: int
     line: int
 
 
-class Lines:
+class YamlLines:
     """Where the values of a YAML text stand."""
 
     def __init__(self, text: str):
@@ -88,23 +88,23 @@ class Lines:
         except (yaml.YAMLError, RecursionError):
             self._root = None
 
-    def find(self, location: Sequence[int | str]) -> Found:
+    def find(self, location: Sequence[int | str]) -> Depth:
         """Return how many of these keys and indices lead to a value, and the line of the last that does."""
         node, line = self._root, 1
         for depth, part in enumerate(location):
             inner = _inner(node, part)
             if inner is None:
-                return Found(depth, line)
+                return Depth(depth, line)
             node, line = inner
-        return Found(len(location), line)
+        return Depth(len(location), line)
 
 
-def lines(path: str | Path) -> Lines:
+def lines(path: str | Path) -> YamlLines:
     """Return where the values of a YAML file stand, as far as it can be read."""
     try:
-        return Lines(read_bytes(path, MAX_SIZE).decode("utf-8-sig"))
+        return YamlLines(read_bytes(path, MAX_SIZE).decode("utf-8-sig"))
     except (OSError, ValueError):
-        return Lines("")
+        return YamlLines("")
 
 
 def _inner(node: Any, part: int | str) -> tuple[Any, int] | None:

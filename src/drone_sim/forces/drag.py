@@ -13,7 +13,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from drone_sim.config.types import Checked, Finite, Within
-from drone_sim.forces.force import Carried, Force
+from drone_sim.forces.force import Force, PushedBody
 from drone_sim.mechanics.frames import invert, rotate
 from drone_sim.mechanics.wrench import Wrench
 
@@ -46,7 +46,7 @@ class Drag(Force):
         """Take coefficients and wind."""
         self._coefficients, self._wind = parameters.coefficients, parameters.wind
 
-    def add_to(self, wrench: Wrench, body: Carried) -> None:
+    def add_to(self, wrench: Wrench, body: PushedBody) -> None:
         """Add the drag of this moment."""
         (vx, vy, vz), (wx, wy, wz), (ax, ay, az) = body.state.linear_velocity, self._wind, body.wind
         x, y, z = rotate(invert(body.matrix), (vx - wx - ax, vy - wy - ay, vz - wz - az))

@@ -38,7 +38,7 @@ _AT_ONCE = 256  # knots
 _NOWHERE = 1e12  # knots
 
 
-class Series:
+class GustSeries:
     """One component's gusts along the way, of deviation 1: made as far as somebody has been, the same for a seed."""
 
     def __init__(self, seed: Sequence[int], is_along: bool):
@@ -66,7 +66,7 @@ class Gusts:
 
     def __init__(self, seed: int):
         """Begin a field that the seed tells from others."""
-        self._series = [Series((seed, number), is_along=number == 0) for number in range(3)]
+        self._series = [GustSeries((seed, number), is_along=number == 0) for number in range(3)]
 
     def at(self, way: float, deviations: Vector, lengths: Vector) -> Vector:
         """Return the gust (m/s) after a way (m), of so large deviations (m/s) and lengths (m)."""

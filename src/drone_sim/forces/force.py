@@ -10,7 +10,7 @@ from drone_sim.mechanics.state import State
 from drone_sim.mechanics.wrench import Wrench
 
 
-class Carried(Protocol):
+class PushedBody(Protocol):
     """The body that forces act on."""
 
     @property
@@ -40,10 +40,10 @@ class Force:
     every_sub_step: ClassVar[bool] = False
     feels_wind: ClassVar[bool] = False  # of a vehicle that has such a force, weather needs no other
 
-    def add_to(self, wrench: Wrench, body: Carried) -> None:
+    def add_to(self, wrench: Wrench, body: PushedBody) -> None:
         """Add what acts now. Forces in N, torques in N m, both in the world; points in the body's inertial frame."""
         raise NotImplementedError
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that brings back what it is now, for a snapshot."""
         return lambda: None

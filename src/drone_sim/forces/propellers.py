@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from typing import Annotated, Literal
 
 from drone_sim.config.types import Checked, Finite, Limits, Within
-from drone_sim.forces.force import Carried, Force
+from drone_sim.forces.force import Force, PushedBody
 from drone_sim.mechanics.frames import Vector, rotate
 from drone_sim.mechanics.wrench import Wrench
 
@@ -82,7 +82,7 @@ class Propellers(Force):
             by_axis.setdefault(axis, []).append((number, *point, rotation * parameters.torque_per_velocity))
         self._by_axis = list(by_axis.items())
 
-    def add_to(self, wrench: Wrench, body: Carried) -> None:
+    def add_to(self, wrench: Wrench, body: PushedBody) -> None:
         """Emit a step's particles at the velocities that are commanded, within limits."""
         velocities, matrix = self._commanded(), body.matrix
         if min(velocities) < self._slowest or max(velocities) > self._fastest:
@@ -111,8 +111,11 @@ class Propellers(Force):
             )
 
     def weaken(self, effectiveness: Sequence[float]) -> None:
-        """Let each blow at this share of the velocity, and so of thrust and torque: 1 is sound, 0 is stopped."""
-        self.effectiveness = tuple(effectiveness)
+        """Let each blow at this share of the velocity, and so of thrust and torque: 1 is sound, 0 is stopped.
+
+        Those for which there is no number are sound.
+        """
+        self.effectiveness = (*effectiveness, *[1.0] * (len(self.air) - len(effectiveness)))
         if all(share == 1 for share in effectiveness):
             self._commanded, (self._slowest, self._fastest) = self._given, self._limits
         else:
@@ -127,12 +130,12 @@ class Propellers(Force):
         """Thrust of each propeller in N, as in the last step."""
         return [self._newtons * velocity for velocity in self._emitted]
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that brings back the fraction of a particle, the blades' way, and what is broken."""
         carry, air, effectiveness = self._law.carry, list(self.air), self.effectiveness
 
-        def recall() -> None:
+        def restore() -> None:
             self._law.carry, self.air = carry, list(air)
             self.weaken(effectiveness)
 
-        return recall
+        return restore

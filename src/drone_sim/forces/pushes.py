@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drone_sim.forces.force import Carried, Force
+from drone_sim.forces.force import Force, PushedBody
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.wrench import Wrench
 
@@ -30,17 +30,17 @@ class Pushes(Force):
         """Begin a push; its duration is rounded to whole steps, one at least."""
         self.lasting.append((push, max(1, round(push.duration / self._time_step))))
 
-    def add_to(self, wrench: Wrench, body: Carried) -> None:
+    def add_to(self, wrench: Wrench, body: PushedBody) -> None:
         """Add what pushes, and use up a step of it."""
         for push, _ in self.lasting:
             wrench.add(push.force, push.torque, (0.0, 0.0, 0.0))
         self.lasting = [(push, steps - 1) for push, steps in self.lasting if steps > 1]
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that brings back what still lasts."""
         kept = list(self.lasting)
 
-        def recall() -> None:
+        def restore() -> None:
             self.lasting = list(kept)
 
-        return recall
+        return restore

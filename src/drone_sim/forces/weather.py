@@ -13,9 +13,10 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from drone_sim.config.changing import changed
+from drone_sim.config.errors import changed
 from drone_sim.config.types import Checked, Finite, Parts, Within
 from drone_sim.forces.dryden import Gusts
+from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Vector
 
 _BEFORE = 100.0  # m of gusts that have passed when a run begins: who is a bit downwind has some, too
@@ -51,14 +52,14 @@ class WeatherParameters(Checked):
 class Weather:
     """The air of one simulation. Without wind and gusts there is none to feel, until a change brings some.
 
-    `changed` is called after every change.
+    `changes` counts them.
     """
 
-    def __init__(self, parameters: WeatherParameters, time: Callable[[], float]):
-        """Begin as the parameters say; `time` returns the simulated time in s."""
+    def __init__(self, parameters: WeatherParameters, clock: Clock):
+        """Begin as the parameters say, at the time of the simulation's clock."""
         self._parameters = parameters
-        self._time = time
-        self.changed: Callable[[], None] = lambda: None
+        self._clock = clock
+        self.changes = 0
         self._field: tuple[int, Gusts] | None = None  # the last one, and its seed
         self.reset()
 
@@ -71,11 +72,11 @@ class Weather:
     def change(self, changes: Mapping[str, Any]) -> None:
         """Lay other values over some of the present ones, as in YAML. Raises ParameterError."""
         new = changed(self.now, changes)
-        time = self._time()
+        time = self._clock.time
         self._passed, self._since = self._way(time), time
         self.is_felt = True
         self._be(new)
-        self.changed()
+        self.changes += 1
 
     def _be(self, now: WeatherParameters) -> None:
         self.now = now
@@ -101,17 +102,17 @@ class Weather:
         if self._gusts is None:
             return self.now.wind
         (ex, ey), (wx, wy, wz), own = self._along, self.now.wind, self.now.gusts
-        way = self._way(self._time()) - ex * place[0] - ey * place[1]
+        way = self._way(self._clock.time) - ex * place[0] - ey * place[1]
         along, across, up = self._gusts.at(way, own.deviation, own.length)
         return wx + ex * along - ey * across, wy + ey * along + ex * across, wz + up
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that brings back the present weather: gusts are a matter of seed, time and place."""
         now, felt, passed, since = self.now, self.is_felt, self._passed, self._since
 
-        def recall() -> None:
+        def restore() -> None:
             self.is_felt, self._passed, self._since = felt, passed, since
             self._be(now)
-            self.changed()
+            self.changes += 1
 
-        return recall
+        return restore

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import functools
 import os
-import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -15,33 +13,27 @@ from typing import NoReturn
 
 from tqdm import tqdm
 
-from drone_sim.config.types import ParameterError
+from drone_sim.command_line import SIGNALLED, Parser, format_error
+from drone_sim.command_line import status_of as status_of_action
 from drone_sim.grading import plan as plans
 from drone_sim.grading.flight import ungraded
 from drone_sim.grading.jobs import pool, sandbox, settings
-from drone_sim.grading.jobs.job import Job
-from drone_sim.grading.jobs.pool import Orders, PoolError
-from drone_sim.grading.jobs.process import Flight
+from drone_sim.grading.jobs.job import Job, JobResult, ResultStore, default_folder, forget_old
+from drone_sim.grading.jobs.pool import FlightOptions
 from drone_sim.grading.jobs.sandbox import NoSandbox
-from drone_sim.grading.jobs.store import Store, default_folder, forget_old
-from drone_sim.grading.plan import Plan, PlanError
+from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
-from drone_sim.offline.command_line import SIGNALLED, Parser
+from drone_sim.message_text import printable, shown
 from drone_sim.run.guardian import Guardian
-from drone_sim.scripting.errors import ScriptError
-from drone_sim.wording import printable, shown
 
 WRONG = 2  # exit status
 _MOST_JOBS = 1024
-_EXPECTED = (PlanError, ParameterError, ScriptError, PoolError, OSError, ValueError, RuntimeError)
 
 
-class WrongArguments(Parser):
+class GradingParser(Parser):
     """A parser whose exit status for wrong arguments is not that of flights that fail."""
 
-    def error(self, message: str) -> NoReturn:
-        """End the program, with one line on stderr."""
-        self.exit(WRONG, f"{self.prog}: {' '.join(message.split())} (see {self.prog} --help)\n")
+    wrong = WRONG
 
 
 def add_to(parser: argparse.ArgumentParser) -> None:
@@ -69,16 +61,19 @@ class Runner:
     """Flies jobs as the options say, keeps their results, and takes those that are there already."""
 
     def __init__(self, program: str, options: argparse.Namespace, plan: Plan, tables: bool = False):
-        """Look for bubblewrap, and make the folder of results. Raises OSError."""
+        """Look for bubblewrap, and make the folder of results of a `plan`, as the `options` of a `program` say.
+
+        `tables`: each flight's table is wanted, too. Raises OSError.
+        """
         numbers = settings.load()
         self._options = options
         folder = Path(options.results) if options.results else default_folder()
-        self.store = Store(folder, plan)
+        self.store = ResultStore(folder, plan)
         if not options.results:
             forget_old(folder, numbers.results.kept)
         if options.fresh:
             self.store.forget()
-        self._orders = Orders(
+        self._flight_options = FlightOptions(
             numbers.limits, numbers.batches, _is_sandboxed(program, options.sandbox), tables, numbers.workers.patience
         )
         self._program = program
@@ -97,7 +92,7 @@ class Runner:
 
     def fly(self, jobs: Sequence[Job], quiet: bool = False) -> Iterator[tuple[Job, Result]]:
         """Give each job and its result, as they come, those first that are there already; `quiet`: without a word."""
-        known = self.store.known(jobs, self._orders.tables)
+        known = self.store.known(jobs, self._flight_options.tables)
         if known and not quiet:
             said = "--fresh flies them anew"
             print(f"{self._program}: {len(known)} of {len(jobs)} flights are known ({said})", file=sys.stderr)
@@ -117,21 +112,22 @@ class Runner:
                 bar.update()
                 yield flight.job, flight.result
 
-    def _keep(self, flight: Flight) -> None:
+    def _keep(self, flight: JobResult) -> None:
         """Keep a flight where there is room; the others fly all the same."""
         try:
             self.store.add(flight)
         except OSError as error:
             if self.all_kept:
-                tqdm.write(f"{self._program}: {printable(_said(error))}: not all results are kept", file=sys.stderr)
+                why = printable(format_error(error))
+                tqdm.write(f"{self._program}: {why}: not all results are kept", file=sys.stderr)
             self.all_kept = False
 
-    def _flights(self, jobs: Sequence[Job]) -> Iterator[Flight]:
+    def _flights(self, jobs: Sequence[Job]) -> Iterator[JobResult]:
         if not jobs:
             return
         if self._fly is None:
             workers = min(self._options.jobs, len(jobs))
-            self._fly = self._open.enter_context(pool.opened(self._orders, workers, self._options.scheduler))
+            self._fly = self._open.enter_context(pool.opened(self._flight_options, workers, self._options.scheduler))
         yield from self._fly(jobs)
 
 
@@ -147,32 +143,15 @@ def on_standard_output() -> Iterator[None]:
 
 def all_done(program: str, actions: Iterable[Callable[[], None]]) -> bool:
     """Do everything, whatever cannot be done, which gets a line; return whether it all was."""
-
-    def done(action: Callable[[], None]) -> int:
-        action()
-        return 0
-
-    statuses = [status_of(program, functools.partial(done, action), None) for action in actions]
-    return not any(statuses)
+    return not any([status_of_action(program, action, WRONG) for action in actions])
 
 
 def status_of(program: str, action: Callable[[], int], guardian: Guardian | None) -> int:
     """Return an action's exit status: 2 after one line for what cannot be done, 130 after Ctrl-C."""
     if guardian is not None:
         guardian.ready(_interrupt)
-    try:
-        return action()
-    except KeyboardInterrupt:
-        return SIGNALLED + (guardian.asked if guardian is not None and guardian.asked else signal.SIGINT)
-    except _EXPECTED as error:
-        print(f"{program}: {printable(' '.join(_said(error).split()))}", file=sys.stderr, flush=True)
-        return WRONG
-
-
-def _said(error: Exception) -> str:
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
+    status = status_of_action(program, action, WRONG)
+    return SIGNALLED + guardian.asked if status > SIGNALLED and guardian is not None and guardian.asked else status
 
 
 def _interrupt() -> NoReturn:

@@ -11,19 +11,16 @@ from typing import Any, cast
 
 import numpy as np
 
+from drone_sim.command_line import EXPECTED, format_error
 from drone_sim.files import writing
+from drone_sim.grading.flight_recorder import FlightRecorder, OfflineBackend
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
-from drone_sim.grading.topics import Topics
-from drone_sim.grading.watching import Witness
+from drone_sim.grading.rules import Rules
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import first_step
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import DEFAULT
-from drone_sim.world import connect_ahead
-
-EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
 
 def grade(
@@ -41,16 +38,11 @@ def grade(
     try:
         flight = Flight(plan, script, seed, changes)
     except EXPECTED as error:
-        return ungraded(plan, script, seed, changes, _one_line(error))
+        return ungraded(plan, script, seed, changes, format_error(error))
     result = flight.grade()
     if table is not None:
         write(flight.rows, table)
     return result
-
-
-def prepare() -> None:
-    """Do beforehand what the next flight of this process, and the first of each of its forks, needs not do then."""
-    connect_ahead()
 
 
 def ungraded(plan: Plan, script: str | None, seed: int, changes: Mapping[str, Any] | None, why: str) -> Result:
@@ -63,18 +55,20 @@ class Flight:
     """A flight that is ready: all is read and built, and no line of a script has run."""
 
     def __init__(self, plan: Plan, script: str | None = None, seed: int = 0, changes: Mapping[str, Any] | None = None):
-        """Build it; see `grade`. Raises one of EXPECTED."""
+        """Build it; `plan`, `script`, `seed` and `changes` are as in `grade`. Raises one of EXPECTED."""
         self._plan, self._seed, self._changes = plan, seed, changes or {}
         parameters = plan.parameters(seed, None, changes)
         self._script = plan.script_of(script) or (parameters.script if script is None else "")
         self._timeline = plan.timeline_of(parameters)
         self._steps = first_step(plan.duration, parameters.time_step)
-        topics = Topics(plan.topics_of(parameters))
-        backend = topics if topics.wanted else None
-        self._simulation = Simulation(parameters, script=self._script or DEFAULT, backend=backend, started=False)
-        topics.clock = lambda: self._simulation.time
+        backend = OfflineBackend(plan.topics_of(parameters))
+        self._simulation = Simulation(
+            parameters, script=self._script or DEFAULT, backend=backend if backend.wanted else None, started=False
+        )
+        backend.clock = lambda: self._simulation.time
         try:
-            self._witness = Witness(plan, self._simulation, topics)
+            self._recorder = FlightRecorder(plan, self._simulation, backend)
+            self._rules = Rules(plan, self._simulation)
         except BaseException:
             self._simulation.close()
             raise
@@ -86,26 +80,29 @@ class Flight:
                 failed = _failure(self._fly) or self._failed_scripts()
             finally:
                 closed = _failure(self._simulation.close)  # cleanup may fail, too
-        plan, wrong, flown = self._plan, failed or closed, self._witness.flown()
-        if flown is None:
+        plan, wrong, record = self._plan, failed or closed, self._recorder.record()
+        if record is None:
             return ungraded(plan, self._script, self._seed, self._changes, wrong or "nothing was flown")
-        outcomes = tuple(one.judge(flown) for one in plan.criteria)
-        digest = digest_of(flown.rows)
-        return result_of(plan.name, self._script, self._seed, self._changes, outcomes, flown.end, wrong, digest)
+        outcomes = tuple(one.judge(record) for one in plan.criteria)
+        digest = digest_of(record.rows)
+        return result_of(plan.name, self._script, self._seed, self._changes, outcomes, record.end, wrong, digest)
 
     @property
     def rows(self) -> np.ndarray:
         """The table of what has been flown, (N, 22): see offline.recording.COLUMNS."""
-        return self._witness.rows
+        return self._recorder.rows
 
     def _fly(self) -> None:
         self._simulation.load_scripts()
-        self._witness.keep()
+        self._rules.check()
+        self._recorder.record_step()
         for step in range(self._steps):
             self._timeline.apply(step, self._simulation.vehicles)
-            self._simulation.step()
-            self._witness.keep()
-            if self._witness.is_over:
+            self._rules.accept()
+            self._simulation.step(self._recorder.look)
+            self._rules.check()  # what breaks them is not recorded: nothing is reached by it
+            self._recorder.record_step()
+            if self._recorder.is_over:
                 return
 
     def _failed_scripts(self) -> str | None:
@@ -131,7 +128,7 @@ def _failure(action: Callable[[], None]) -> str | None:
     try:
         action()
     except EXPECTED as error:
-        return _one_line(error)
+        return format_error(error)
     return None
 
 
@@ -146,7 +143,3 @@ def _seeded(seed: int) -> Iterator[None]:
     finally:
         random.setstate(kept)
         np.random.set_state(kept_numpy)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import functools
+import hmac
+import itertools
 import os
 import sys
 from collections import Counter
@@ -15,18 +17,20 @@ from tqdm import tqdm
 from drone_sim.files import writing
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
-from drone_sim.grading.arguments import WRONG, Runner, WrongArguments, add_to, all_done, on_standard_output, status_of
-from drone_sim.grading.jobs.files import Unreadable, given_script
+from drone_sim.grading.arguments import WRONG, GradingParser, Runner, add_to, all_done, on_standard_output, status_of
+from drone_sim.grading.jobs.files import Unreadable, given_script, read
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.outputs import as_json, gradescope, junit, table
 from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
+from drone_sim.message_text import printable, shown
 from drone_sim.run.guardian import Guardian
-from drone_sim.wording import printable
 
 PROGRAM = "grade"
 FAILED = 1
+_SHORTEST_SECRET, _LARGEST_SECRET = 16, 2**16  # bytes
+_LARGEST_SEED = 10**12
 _WRITERS = {"junit": junit.write, "json": as_json.write, "gradescope": gradescope.write}
 
 
@@ -43,11 +47,11 @@ class _Grading:
     """One run of the program."""
 
     def __init__(self, options: argparse.Namespace, guardian: Guardian | None):
-        """Read and check everything. Raises what status_of expects."""
+        """Read and check what `options` say; a `guardian` stands by. Raises what status_of expects."""
         self._options = options
         self._guardian = guardian
         self._plan = plans.read(tasks.find(options.plan))
-        self._jobs = jobs_of(self._plan, options.script, options.seeds or self._plan.seeds)
+        self._jobs = jobs_of(self._plan, options.script, seeds_of(options.seeds or self._plan.seeds, options.secret))
         self._scripts = len({job.script for job in self._jobs})
         _check_outputs(options, self._scripts)
         self._runner = Runner(PROGRAM, options, self._plan, tables=bool(options.html))
@@ -61,7 +65,7 @@ class _Grading:
         except KeyboardInterrupt:
             if self._guardian is not None:
                 self._guardian.stand_down()  # what follows takes its time
-            self._tell()
+            self._report()
             print(
                 f"{PROGRAM}: {len(self._results)} of {len(self._jobs)} flights were flown, and are kept",
                 file=sys.stderr,
@@ -69,7 +73,7 @@ class _Grading:
             raise
         if self._guardian is not None:
             self._guardian.stand_down()
-        if not (self._tell() and self._runner.all_kept):
+        if not (self._report() and self._runner.all_kept):
             return WRONG
         return 0 if all(result.passed for result in self._results.values()) else FAILED
 
@@ -88,35 +92,53 @@ class _Grading:
         points = f"{one.points:.4g} of {one.of:.4g} points"
         tqdm.write(f"{name}: {one.passed} of {len(one.flights)} flights passed, {points}", file=sys.stderr)
 
-    def _tell(self) -> bool:
+    def _report(self) -> bool:
         """Show and write everything that can be; return whether all of it was."""
         results = [self._results[job] for job in self._jobs if job in self._results]
         if not results:
             return True
-        told: list[Callable[[], None]] = [lambda: self._show(results)]
+        outputs: list[Callable[[], None]] = [lambda: self._show(results)]
         for option, write in _WRITERS.items():
             if path := getattr(self._options, option):
-                told.append(functools.partial(write, self._plan, results, path))
+                outputs.append(functools.partial(write, self._plan, results, path))
         if self._options.html:
-            told.append(lambda: self._write_html(results))
-        return all_done(PROGRAM, told)
+            outputs.append(lambda: self._write_html(results))
+        return all_done(PROGRAM, outputs)
 
     def _show(self, results: Sequence[Result]) -> None:
         with on_standard_output():
             table.show(self._plan, results)
 
     def _write_html(self, results: Sequence[Result]) -> None:
-        from drone_sim.grading.outputs import html
+        from drone_sim.grading.outputs.html import report
 
         keys = {(job.script, job.seed): job.key for job in self._jobs}
-        html.write(
+        report.write(
             self._plan, results, lambda one: self._runner.store.table(keys[one.script, one.seed]), self._options.html
         )
         with on_standard_output():
             print(f"wrote {Path(self._options.html) / 'index.html'}")
 
 
-def jobs_of(plan: Plan, scripts: Sequence[str], seeds: int) -> list[Job]:
+def seeds_of(count: int, secret: str | None) -> list[int]:
+    """Return the seeds to fly: from 0 on, or those that follow from the contents of the file `secret` alone.
+
+    Raises Unreadable, and ValueError for a file of so few bytes that one could try them all.
+    """
+    if secret is None:
+        return list(range(count))
+    key = read(Path(secret), _LARGEST_SECRET)
+    if len(key) < _SHORTEST_SECRET:
+        raise ValueError(f"--secret {shown(secret)}: holds {len(key)} bytes; it must hold {_SHORTEST_SECRET} at least")
+    drawn = (int.from_bytes(hmac.digest(key, b"seed %d" % number, "sha256"), "big") for number in itertools.count())
+    seeds = (1 + one % _LARGEST_SEED for one in drawn)  # not 0, which is the plan as everybody knows it
+    found: dict[int, None] = {}
+    while len(found) < count:
+        found[next(seeds)] = None
+    return list(found)
+
+
+def jobs_of(plan: Plan, scripts: Sequence[str], seeds: Sequence[int]) -> list[Job]:
     """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError.
 
     A script that is there, and cannot be read, is an error of its own flights.
@@ -129,7 +151,7 @@ def jobs_of(plan: Plan, scripts: Sequence[str], seeds: int) -> list[Job]:
             contents = contents_of(plan, script)
         except Unreadable as why:
             script, error = os.path.abspath(script), str(why)
-        jobs += [Job(str(plan.path), script, seed, {}, key_of(contents, seed, {}), error) for seed in range(seeds)]
+        jobs += [Job(str(plan.path), script, seed, {}, key_of(contents, seed, {}), error) for seed in seeds]
     return jobs
 
 
@@ -141,13 +163,13 @@ def _check_outputs(options: argparse.Namespace, scripts: int) -> None:
     if options.gradescope and scripts > 1:
         raise ValueError(f"--gradescope: is for one script; here are {scripts}")
     if options.html:
-        from drone_sim.grading.outputs import html
+        from drone_sim.grading.outputs.html import report
 
-        html.check(options.html)
+        report.check(options.html)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = WrongArguments(
+    parser = GradingParser(
         prog=PROGRAM, description="Fly scripts by a plan and grade them; exit status 0 if all pass, 1 if not."
     )
     add_to(parser)
@@ -158,6 +180,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         help="child scripts (default: the plan's, or the built-in one)",
     )
+    parser.add_argument("--secret", metavar="FILE", help="fly seeds that follow from a file which only the teacher has")
     parser.add_argument("--junit", metavar="OUT.xml", help="write results as JUnit's XML")
     parser.add_argument("--json", metavar="OUT.json", help="write all results and figures")
     parser.add_argument("--gradescope", metavar="results.json", help="write one script's results for Gradescope")

@@ -4,59 +4,56 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from drone_sim.files import writing
-from drone_sim.grading.ranges import Range
-
-if TYPE_CHECKING:
-    from drone_sim.grading.sweep import Trial
 
 _FIGURES_IN_CELLS = 150  # cells at most that have room for a number
 
 
-def save(path: str, title: str, ranges: Sequence[Range], trials: Sequence[Trial], figure_of: str = "") -> None:
-    """Draw the trials' mean points, or a criterion's mean figure, over one parameter or two. Raises OSError."""
+_Trial = tuple[tuple[Any, ...], float | None]  # its values, one of each key, and a figure
+
+
+def save(path: str, title: str, keys: Sequence[str], trials: Sequence[_Trial], label: str) -> None:
+    """Draw the trials' figures, which `label` names, over one parameter or two. Raises OSError."""
     figure = Figure(figsize=(7, 5), layout="constrained")
     axes = figure.subplots()
-    label = figure_of or "points"
-    shown = [(one.values, one.figures[figure_of] if figure_of else one.points) for one in trials]
-    if len(ranges) == 1:
-        _curve(axes, ranges[0], shown, label)
+    if len(keys) == 1:
+        _curve(axes, keys[0], trials, label)
     else:
-        _map(figure, axes, ranges, shown, label)
+        _map(figure, axes, keys, trials, label)
     axes.set_title(title)
     with writing.replacing(path, binary=True) as file:
         figure.savefig(file, format=Path(path).suffix[1:], dpi=120)
 
 
-def _curve(axes: Any, one: Range, shown: Sequence[tuple[tuple[Any, ...], float | None]], label: str) -> None:
-    points = sorted((values[0], np.nan if figure is None else figure) for values, figure in shown)
+def _curve(axes: Any, key: str, trials: Sequence[_Trial], label: str) -> None:
+    points = sorted((values[0], np.nan if figure is None else figure) for values, figure in trials)
     axes.plot(*zip(*points), "o-")
-    axes.set_xlabel(one.key)
+    axes.set_xlabel(key)
     axes.set_ylabel(label)
     axes.grid(alpha=0.3)
 
 
-def _map(figure: Any, axes: Any, ranges: Sequence[Range], shown: Sequence[Any], label: str) -> None:
+def _map(figure: Any, axes: Any, keys: Sequence[str], trials: Sequence[_Trial], label: str) -> None:
     """Draw a cell for every combination; of an optimiser's scattered trials, a dot for each."""
-    rows, columns = (sorted({values[index] for values, _ in shown}) for index in (0, 1))
-    if len(rows) * len(columns) == len(shown):
+    rows, columns = (sorted({values[index] for values, _ in trials}) for index in (0, 1))
+    if len(rows) * len(columns) == len(trials):
         cells = np.full((len(rows), len(columns)), np.nan)
-        for (row, column), value in shown:
+        for (row, column), value in trials:
             cells[rows.index(row), columns.index(column)] = np.nan if value is None else value
         drawn = axes.imshow(cells, origin="lower", aspect="auto")
         _name_cells(axes, cells, rows, columns)
     else:
-        known = [(column, row, value) for (row, column), value in shown if value is not None]
+        known = [(column, row, value) for (row, column), value in trials if value is not None]
         across, up, colours = zip(*known)
         drawn = axes.scatter(across, up, c=colours)
-    axes.set_ylabel(ranges[0].key)
-    axes.set_xlabel(ranges[1].key)
+    axes.set_ylabel(keys[0])
+    axes.set_xlabel(keys[1])
     figure.colorbar(drawn, label=label)
 
 

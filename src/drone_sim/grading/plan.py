@@ -5,35 +5,34 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, PrivateAttr, TypeAdapter, ValidationError
 
-from drone_sim.config.errors import line_of, problems, told
+from drone_sim.config.errors import line_of, problems
 from drone_sim.config.types import (
     Checked,
     FileName,
     Finite,
     Label,
-    Location,
     Name,
     ParameterError,
     Within,
     merged,
     named_in,
-    readable_key,
+    one_line,
 )
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import resolve
 from drone_sim.grading.criteria import AnyCriterion
-from drone_sim.grading.spread import Spread, check_objects, spread_out
+from drone_sim.grading.randomization import Randomization, check_objects, randomized
+from drone_sim.message_text import near_names, shown
 from drone_sim.offline import timeline as timelines
-from drone_sim.offline.tables import MAX_ROWS
+from drone_sim.offline.recording import MAX_ROWS
 from drone_sim.offline.timeline import Timeline, TimelineError
 from drone_sim.run import parameters as parameters_module
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene import scene_parameters
-from drone_sim.wording import near_names, shown
 
 MAX_DURATION = 20_000.0  # s
 MAX_SEEDS = 1_000_000
@@ -68,8 +67,11 @@ class Plan(Checked):
     vehicle: Label = ""
     duration: Annotated[Finite, Within(1e-3, MAX_DURATION)]  # s
     seeds: Annotated[int, Within(1, MAX_SEEDS)] = 1
-    spread: Spread = Spread()
+    spread: Randomization = Randomization()
     timeline: Annotated[list[Any], Field(max_length=MAX_ENTRIES)] = Field(default_factory=list)
+    allowed: Annotated[list[Literal["move", "push", "change"]], Field(max_length=3)] = Field(
+        default_factory=list
+    )  # see `rules`
     criteria: Annotated[list[AnyCriterion], Field(min_length=1, max_length=MAX_CRITERIA)]
 
     _path: str = PrivateAttr(default="")
@@ -82,12 +84,12 @@ class Plan(Checked):
         for index, one in enumerate(self.criteria):
             here = ("criteria", index)
             if one.called in taken:
-                raise _refused((*here, "name"), f"'{one.called}' comes twice; give each a `name` of its own")
+                raise ParameterError("comes twice; give each a `name` of its own", (*here, "name"), f"'{one.called}'")
             taken.add(one.called)
             for key in ("after", "until"):
                 time = getattr(one, key)
                 if time is not None and time > self.duration:
-                    raise _refused((*here, key), f"{time:g}: the flight lasts {self.duration:g} s (duration)")
+                    raise ParameterError(f"the flight lasts {self.duration:g} s (duration)", (*here, key), f"{time:g}")
 
     def __getstate__(self) -> dict[Any, Any]:
         """Return what is pickled: not the parameters, which are read anew."""
@@ -135,7 +137,7 @@ class Plan(Checked):
             if len(self._loaded) >= _MOST_LOADED:
                 self._loaded.clear()
             self._loaded[key] = self._load(changes)
-        return spread_out(self._loaded[key], self.spread, seed)
+        return randomized(self._loaded[key], self.spread, seed)
 
     def _load(self, changes: Mapping[str, Any]) -> Parameters:
         own: dict[str, Any] = {"scene_file": named_in(self.folder, self.scene)} if self.scene else {}
@@ -158,10 +160,6 @@ class Plan(Checked):
     def timeline_of(self, parameters: Parameters) -> Timeline:
         """Return what happens in a flight with these parameters. Raises TimelineError."""
         return timelines.of_rows(self.timeline, parameters, self._path, ("timeline",))
-
-
-def _refused(location: Location, why: str) -> ParameterError:
-    return ParameterError(f"{readable_key(location)} = {why}", location)
 
 
 def _beside(folder: Path, config: Mapping[str, Any]) -> dict[str, Any]:
@@ -200,8 +198,8 @@ def _checked(values: dict[str, Any], path: Path) -> Plan:
         plan = Plan.model_validate({"name": path.stem, **values})
     except ValidationError as error:
         lines = yaml_files.lines(path)
-        placed = [(line_of(lines, one), one.text.removeprefix("parameter ")) for one in problems(error, Plan)]
-        raise PlanError(told(placed, str(path))) from None
+        placed = [(line_of(lines, one), one.text) for one in problems(error, Plan)]
+        raise PlanError(one_line(placed, str(path))) from None
     plan._path = str(path.resolve())
     return plan
 
@@ -210,20 +208,21 @@ def _check_with(plan: Plan, parameters: Parameters) -> None:
     """Raise ParameterError for a vehicle or an object that is not there, and for more steps than a table can have."""
     steps = plan.duration / parameters.time_step
     if steps > MAX_ROWS:
-        raise _refused(("duration",), f"{plan.duration:g}: makes {steps:.0f} steps; at most {MAX_ROWS} are kept")
+        raise ParameterError(
+            f"makes {steps:.0f} steps; at most {MAX_ROWS} are kept", ("duration",), f"{plan.duration:g}"
+        )
     names = [one.name for one in parameters.fleet] or [parameters.first.name]
     if plan.vehicle and plan.vehicle not in names:
-        raise _refused(("vehicle",), f"{shown(plan.vehicle)}: no such vehicle; {near_names(plan.vehicle, names)}")
+        near = near_names(plan.vehicle, names)
+        raise ParameterError(f"no such vehicle; {near}", ("vehicle",), shown(plan.vehicle))
     check_objects(parameters, plan.spread)
 
 
 def _placed(error: ParameterError, path: str | Path) -> str:
     """Return what is wrong, with the plan's file and, where the wrong key stands in it, the line."""
-    said = str(error).removeprefix("parameter ")
     lines = yaml_files.lines(path)
-    for above in ((), ("config",)):  # what stands under `config` is called as in config/drone.yaml
-        location = (*above, *error.location)
-        depth, line = lines.find(location)
-        if error.location and depth == len(location):
-            return f"{path}: line {line}: {'/'.join((*above, said))}"
-    return f"{path}: {said}"
+    for own in (error, error.below("config")):  # what stands under `config` is called as in config/drone.yaml
+        depth, line = lines.find(own.location)
+        if error.location and depth == len(own.location):
+            return f"{path}: line {line}: {own.text}"
+    return f"{path}: {error.text}"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from drone_sim.files.resources import package_path
+from drone_sim.files.resources import is_file, package_path
 from drone_sim.grading.plan import PlanError
-from drone_sim.wording import near_names, shown
+from drone_sim.message_text import near_names, shown
 
 _PLAN = "plan.yaml"
 
@@ -29,16 +29,9 @@ def find(name: str) -> Path:
     given = Path(name)
     if given.suffix.lower() in (".yaml", ".yml"):
         return given
-    if name and _is_file(given / _PLAN):
+    if name and is_file(given / _PLAN):
         return given / _PLAN
     known = names()
     if name in known:
         return folder() / name / _PLAN
     raise PlanError(f"{shown(name)}: no such plan: must be a file.yaml, or a task; {near_names(name, known)}")
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # too long a name, a NUL in it
-        return False

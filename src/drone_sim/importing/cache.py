@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import os
 import shutil
 import tempfile
 from pathlib import Path
 
-from drone_sim.files.resources import read_bytes
-from drone_sim.importing import modules
-from drone_sim.importing.labels import word
+from drone_sim.files.resources import cache_path, read_bytes
+from drone_sim.importing.folder import word
 from drone_sim.importing.scene_folder import LIST, SCENE, import_file
+from drone_sim.importing.scripts import renew
 from drone_sim.vrep_files.container import MAX_SIZE
-from drone_sim.vrep_files.errors import VrepFileError
+from drone_sim.vrep_files.model import VrepFileError
 
 _LOG = logging.getLogger(__name__)
 _LOG.setLevel(logging.INFO)
@@ -31,7 +30,7 @@ def imported_scene(path: Path) -> Path:
     if not (folder / SCENE).is_file():
         _import_into(path, folder)
     else:
-        modules.renew(path.parent, folder)
+        renew(path.parent, folder)
     if (folder / LIST).is_file():
         _LOG.warning("%s: imported into %s; not all is as it was there: see %s", path, folder, LIST)
     else:
@@ -41,7 +40,7 @@ def imported_scene(path: Path) -> Path:
 
 def cache_folder() -> Path:
     """Return the folder below which imported scenes lie."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "drone_sim" / "scenes"
+    return cache_path() / "scenes"
 
 
 def _folder(path: Path) -> Path:

@@ -6,13 +6,11 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from drone_sim.importing.forms import form
-from drone_sim.importing.meshes import MeshWriter, TooLarge
-from drone_sim.importing.numbers import number, numbers, pose_keys
+from drone_sim.importing.folder import Report, number, numbers, pose_keys
 from drone_sim.importing.placing import Placed
-from drone_sim.importing.report import Report
+from drone_sim.importing.shapes import MeshWriter, TooLarge, form
 from drone_sim.mechanics import frames
-from drone_sim.vrep_files.model import Camera, Dummy, Inertia, Joint, ProximitySensor, Shape
+from drone_sim.vrep_files.model import VrepCamera, VrepDummy, VrepInertia, VrepJoint, VrepProximitySensor, VrepShape
 
 _LARGEST_PICTURE = 4096  # px, of a side
 _NEAREST, _FARTHEST = 1e-4, 1e5  # m
@@ -28,11 +26,11 @@ class Entries:
         self._writer = writer
         self._report = report
         self._readers: dict[type, Callable[[Placed], dict[str, Any] | None]] = {
-            Shape: self._shape,
-            Dummy: self._dummy,
-            Joint: self._joint,
-            Camera: self._camera,
-            ProximitySensor: self._proximity_sensor,
+            VrepShape: self._shape,
+            VrepDummy: self._dummy,
+            VrepJoint: self._joint,
+            VrepCamera: self._camera,
+            VrepProximitySensor: self._proximity_sensor,
         }
 
     def make(self, one: Placed, parent: str, local: frames.Matrix) -> dict[str, Any]:
@@ -80,7 +78,7 @@ class Entries:
 
     def _dummy(self, one: Placed) -> dict[str, Any]:
         of = one.object.of
-        assert isinstance(of, Dummy)
+        assert isinstance(of, VrepDummy)
         if len(of.path) > 1:
             points = {"kind": "path", "points": [numbers(point[:3]) for point in of.path]}
             lengths = [math.hypot(*point[3:]) for point in of.path]
@@ -94,7 +92,7 @@ class Entries:
 
     def _joint(self, one: Placed) -> dict[str, Any]:
         joint = one.object.of
-        assert isinstance(joint, Joint)
+        assert isinstance(joint, VrepJoint)
         if joint.kind == "screw":
             self._report.add(one.name, "a screw: it turns without sliding")
         kind = "revolute" if joint.kind == "screw" else joint.kind
@@ -105,7 +103,8 @@ class Entries:
             return keys
         if joint.limits is not None and joint.limits[0] < joint.limits[1]:
             keys["limits"] = numbers(joint.limits)
-        keys["value"] = number(_between(joint.position, joint.limits))
+        low, high = joint.limits or (-math.inf, math.inf)
+        keys["value"] = number(min(max(joint.position, low), high))
         if joint.mode == "kinematic":
             return keys
         keys["mode"] = joint.mode
@@ -115,7 +114,7 @@ class Entries:
 
     def _camera(self, one: Placed) -> dict[str, Any]:
         camera = one.object.of
-        assert isinstance(camera, Camera)
+        assert isinstance(camera, VrepCamera)
         if camera.resolution is None:
             return {"kind": "dummy"}
         width, height = (min(max(side, 1), _LARGEST_PICTURE) for side in camera.resolution)
@@ -129,7 +128,7 @@ class Entries:
 
     def _proximity_sensor(self, one: Placed) -> dict[str, Any]:
         sensor = one.object.of
-        assert isinstance(sensor, ProximitySensor)
+        assert isinstance(sensor, VrepProximitySensor)
         keys: dict[str, Any] = {
             "kind": "proximity_sensor",
             "type": sensor.kind,
@@ -158,20 +157,16 @@ def _is_only_carried(one: Placed) -> bool:
     Joints that it does, and force sensors, hold the one shape right below them. What hangs on nothing is free.
     """
     joint = one.above.object.of if one.above is not None else None
-    return isinstance(joint, Joint) and (joint.mode == "kinematic" or joint.kind in ("spherical", "screw"))
+    return isinstance(joint, VrepJoint) and (joint.mode == "kinematic" or joint.kind in ("spherical", "screw"))
 
 
-def _inertia(mass: float, inertia: Inertia | None) -> dict[str, Any]:
+def _inertia(mass: float, inertia: VrepInertia | None) -> dict[str, Any]:
     if inertia is None or min(inertia.moments) * mass < _LEAST_MOMENT:
         return {}
     moments = [number(moment * mass, 15) for moment in inertia.moments]
     return {"inertia": {"moments": moments, **pose_keys(inertia.pose.matrix)}}
 
 
-def _between(value: float, limits: tuple[float, float] | None) -> float:
-    return value if limits is None else min(max(value, limits[0]), limits[1])
-
-
-def _opening(sensor: ProximitySensor) -> float:
+def _opening(sensor: VrepProximitySensor) -> float:
     """Return the angle (rad) at which a pyramid would end as wide as this one, which begins with some width."""
     return min(max(2 * math.atan2(max(sensor.size) / 2, max(sensor.offset + sensor.range, _NEAREST)), 1e-3), 3.1)

@@ -1,11 +1,51 @@
-"""The folder that an import writes: every file under a name of its own."""
+"""The folder that an import writes: files, names and numbers as a scene has them, and what is not as it was."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from drone_sim.files import writing
-from drone_sim.importing.labels import word
+from drone_sim.mechanics import frames
+from drone_sim.message_text import MAX_NAME
+
+_DIGITS = 6  # after the point: micrometres and microradians
+_NOTHING = [0.0, 0.0, 0.0]
+
+
+def number(value: float, digits: int = _DIGITS) -> float:
+    """Return a number without the noise of its last digits, and without a -0."""
+    return round(float(value), digits) + 0.0
+
+
+def numbers(values: Iterable[float]) -> list[float]:
+    """Return a list of such numbers."""
+    return [number(value) for value in values]
+
+
+def shade(color: Iterable[float]) -> list[float]:
+    """Return a colour; of one that hides what is behind it, without the opacity."""
+    red, green, blue, opacity = (number(value, 3) for value in color)
+    return [red, green, blue] if opacity == 1 else [red, green, blue, opacity]
+
+
+def pose_keys(matrix: Sequence[float]) -> dict[str, Any]:
+    """Return `position` and `rpy` of a transform, what is zero left out."""
+    keys = {"position": numbers(frames.position(matrix)), "rpy": numbers(frames.to_rpy(matrix))}
+    return {key: value for key, value in keys.items() if value != _NOTHING}
+
+
+def label(text: str) -> str:
+    """Return a text as a scene file may have it as a name: printable and not too long."""
+    return "".join(letter if letter.isprintable() else "_" for letter in text)[:MAX_NAME]
+
+
+def word(name: str, otherwise: str) -> str:
+    """Return a name of letters, digits and _ alone, a letter first: for files, topics and vehicles."""
+    plain = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_")[:48]
+    return plain if re.match(r"[A-Za-z]", plain) else f"{otherwise}_{plain}".rstrip("_")
 
 
 class Folder:
@@ -30,3 +70,28 @@ class Folder:
         path = self.path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         writing.write(path, content)
+
+
+class Report:
+    """Lines for the end of an import, by what they say; objects of which the same is said share one."""
+
+    def __init__(self) -> None:
+        """Begin with nothing to say."""
+        self.notes: list[str] = []  # what is the same by other means
+        self._said: dict[str, list[str]] = {}
+
+    def add(self, name: str, what: str) -> None:
+        """Say something of an object; '' is the whole file."""
+        names = self._said.setdefault(what, [])
+        if name not in names:
+            names.append(name)
+
+    def __len__(self) -> int:
+        """How much there is to say."""
+        return len(self._said)
+
+    def lines(self, most: int | None = None) -> Iterator[str]:
+        """Yield one line for everything that is said, with all of its objects, or the first so many."""
+        for what, names in self._said.items():
+            more = f" and {len(names) - most} more" if most is not None and len(names) > most else ""
+            yield f"{', '.join(names[:most])}{more}: {what}" if names != [""] else what

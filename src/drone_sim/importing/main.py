@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
+from drone_sim.command_line import Parser, status_of
 from drone_sim.importing.scene_folder import LIST, Imported, import_file
-from drone_sim.vrep_files.errors import VrepFileError
+from drone_sim.vrep_files.model import VrepFileError
 from drone_sim.vrep_files.reading import SUFFIXES
 
-_FAILED, _SIGNALLED = 1, 128
+_NAME = "import_scene"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Import; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
     options = _parser().parse_args(arguments)
-    try:
-        _say(_import(Path(options.file), options.out, options.force))
-        return 0
-    except (VrepFileError, OSError) as error:
-        print(f"import_scene: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
-        return _FAILED
-    except KeyboardInterrupt:
-        return _SIGNALLED + signal.SIGINT
+    return status_of(_NAME, lambda: _say(_import(Path(options.file), options.out, options.force)))
 
 
 def _import(path: Path, out: str | None, force: bool) -> Imported:
@@ -48,19 +40,13 @@ def _say(imported: Imported) -> None:
         print(note)
     if imported.report:
         print(f"Not as it was in the file (all of it in {LIST}):")
-        for line in imported.report.short():
+        for line in imported.report.lines(most=8):
             print(f"  {line}")
     print(f"roslaunch drone_sim drone.launch scene:={imported.scene}")
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        """Give one line, as for every other mistake, instead of the usage."""
-        self.exit(_FAILED, f"import_scene: {' '.join(message.split())} (see import_scene --help)\n")
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="import_scene", description="Make a scene of V-REP or CoppeliaSim one that flies here.")
+    parser = Parser(prog=_NAME, description="Make a scene of V-REP or CoppeliaSim one that flies here.")
     parser.add_argument("file", metavar="FILE.ttt", help="scene or model (.ttm), V-REP 3.0 to CoppeliaSim 4.9")
     parser.add_argument("out", metavar="OUT", nargs="?", help="folder to write (default: FILE without its ending)")
     parser.add_argument("--force", action="store_true", help="write into a folder that is not empty")

@@ -1,23 +1,30 @@
-"""Where the objects of a file stand in the world, and what the models that they are part of say of them."""
+"""Where the objects of a file stand in the world, and what the models that they are part of say of them.
+
+V-REP's floor is a model of flat shapes that end at z = 0; ours takes its place.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from drone_sim.importing.labels import label
+import numpy as np
+
+from drone_sim.importing.folder import label
+from drone_sim.importing.shapes import moved
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
+from drone_sim.mechanics.object_names import plain
 from drone_sim.vrep_files.model import (
     INVISIBLE,
     NOT_DYNAMIC,
     NOT_RESPONDABLE,
     WITHOUT_SCRIPTS,
-    Joint,
     Other,
-    SceneObject,
     VrepFile,
+    VrepJoint,
+    VrepObject,
 )
 
 
@@ -25,7 +32,7 @@ from drone_sim.vrep_files.model import (
 class Placed:
     """An object in its place: world from its frame, and world from the frame of what hangs on it."""
 
-    object: SceneObject
+    object: VrepObject
     above: Placed | None
     matrix: Matrix
     below: Matrix
@@ -99,7 +106,7 @@ def placed(file: VrepFile) -> list[Placed]:
             flags |= above.flags
             base = above.below
         matrix = frames.multiply(base, one.pose.matrix)
-        below = frames.multiply(matrix, motion(one.of)) if isinstance(one.of, Joint) else matrix
+        below = frames.multiply(matrix, motion(one.of)) if isinstance(one.of, VrepJoint) else matrix
         made = Placed(one, above, matrix, below, flags, file.settings.visible_layers)
         by_handle[one.handle] = made
         if above is not None:
@@ -107,7 +114,7 @@ def placed(file: VrepFile) -> list[Placed]:
     return list(by_handle.values())
 
 
-def motion(joint: Joint) -> Matrix:
+def motion(joint: VrepJoint) -> Matrix:
     """Return the transform that a joint's position makes, between its own frame and what hangs on it."""
     if joint.kind == "spherical":
         return joint.turn.matrix
@@ -115,3 +122,42 @@ def motion(joint: Joint) -> Matrix:
         return frames.from_rpy((0.0, 0.0, joint.position), (0.0, 0.0, 0.0))
     slid = joint.lead * joint.position / math.tau if joint.kind == "screw" else 0.0
     return frames.from_rpy((0.0, 0.0, slid), (0.0, 0.0, joint.position))
+
+
+_NAMES = ("ResizableFloor", "DefaultFloor", "Floor", "resizableFloor")
+_LEVEL = 2e-3  # m: a floor's top is as near as that to z = 0
+_LARGEST = 1e4  # m
+
+
+def floor_parts(objects: Sequence[Placed]) -> list[Placed]:
+    """Return the objects that our floor takes the place of: roots of floors, and what is flat below them."""
+    parts = []
+    for root in objects:
+        is_named = plain(root.object.name).startswith(_NAMES) or root.object.alias in _NAMES
+        if root.above is None and is_named and _is_level(root, with_children=True):
+            parts += [one for one in root.subtree() if one is root or _is_level(one)]
+    return parts
+
+
+def floor_size(parts: Sequence[Placed]) -> float:
+    """Return the side (m) of the square, centred on the origin, that covers the parts of floors."""
+    vertices = np.concatenate([_vertices(one) for one in parts])
+    return min(2 * float(np.abs(vertices[:, :2]).max()), _LARGEST)
+
+
+def _is_level(one: Placed, with_children: bool = False) -> bool:
+    """Tell whether a shape that stands still has its top at z = 0, it or a child right below it."""
+    several = [one, *one.children] if with_children else [one]
+    return any(not each.is_dynamic and _top(each) < _LEVEL for each in several)
+
+
+def _top(one: Placed) -> float:
+    """Return how far from z = 0 the top of a shape is, m; infinity for what is no shape."""
+    vertices = _vertices(one)
+    return abs(float(vertices[:, 2].max())) if len(vertices) else math.inf
+
+
+def _vertices(one: Placed) -> np.ndarray:
+    """Return where the corners of a shape are, (n, 3), m, world."""
+    meshes = one.object.shape.meshes if one.object.shape is not None else ()
+    return np.concatenate([np.zeros((0, 3)), *(moved(mesh.vertices, one.matrix) for mesh in meshes)])

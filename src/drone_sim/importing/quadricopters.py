@@ -2,19 +2,20 @@
 
 V-REP's is a dynamic shape with four others on force sensors, which are the propellers: as heavy as each other, and
 they say by their names or their scripts what they are, or a script of the model applies forces.
+For the scripts of V-REP's own propellers the built-in law stands in; others are brought.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from drone_sim.importing.placing import Placed
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_names import split, suffixed
-from drone_sim.vrep_files.model import Dummy, Joint, Script
+from drone_sim.vrep_files.model import VrepDummy, VrepJoint, VrepScript
 
 COUNT = 4  # propellers
 _EQUAL = 0.1  # masses that differ by less than this part are the same
@@ -36,7 +37,7 @@ class Propeller:
 
 
 @dataclass(frozen=True)
-class Quadricopter:
+class VrepQuadricopter:
     """A body with propellers 1 to 4, the frame that its scripts read, and the target that it follows."""
 
     root: Placed
@@ -50,12 +51,12 @@ class Quadricopter:
         return self.root.subtree(without=self.others)
 
 
-def find(objects: Sequence[Placed], scripts: Mapping[int, Sequence[Script]]) -> list[Quadricopter]:
+def find(objects: Sequence[Placed], scripts: Mapping[int, Sequence[VrepScript]]) -> list[VrepQuadricopter]:
     """Return the quadricopters, in the order of the file; `scripts` are by the handle of their object."""
     built = {one: _propellers(one, scripts) for one in objects if one.is_dynamic}
     roots = frozenset(one for one, propellers in built.items() if propellers is not None)
     return [
-        Quadricopter(
+        VrepQuadricopter(
             one, propellers, _base(one), _target(one, roots - {one}) or _free_target(one, objects), roots - {one}
         )
         for one, propellers in built.items()
@@ -63,8 +64,9 @@ def find(objects: Sequence[Placed], scripts: Mapping[int, Sequence[Script]]) -> 
     ]
 
 
-def _propellers(root: Placed, scripts: Mapping[int, Sequence[Script]]) -> tuple[Propeller, ...] | None:
-    tied = [(link, body) for link in root.children if link.is_force_sensor for body in _bodies(link)]
+def _propellers(root: Placed, scripts: Mapping[int, Sequence[VrepScript]]) -> tuple[Propeller, ...] | None:
+    links = (one for one in root.children if one.is_force_sensor)
+    tied = [(link, body) for link in links for body in link.children if body.is_dynamic]
     named = [pair for pair in tied if any(_says_propeller(one, scripts) for one in pair)]
     chosen = tied if not named and _is_pushed(root, scripts) else named
     if len(chosen) != COUNT or not _are_equal([body for _, body in chosen]):
@@ -73,11 +75,7 @@ def _propellers(root: Placed, scripts: Mapping[int, Sequence[Script]]) -> tuple[
     return None if by_number is None else tuple(_propeller(*by_number[number]) for number in range(1, COUNT + 1))
 
 
-def _bodies(link: Placed) -> list[Placed]:
-    return [child for child in link.children if child.is_dynamic]
-
-
-def _says_propeller(one: Placed, scripts: Mapping[int, Sequence[Script]]) -> bool:
+def _says_propeller(one: Placed, scripts: Mapping[int, Sequence[VrepScript]]) -> bool:
     own = [
         *one.object.parameters,
         *(pair for script in scripts.get(one.object.handle, ()) for pair in script.parameters),
@@ -85,7 +83,7 @@ def _says_propeller(one: Placed, scripts: Mapping[int, Sequence[Script]]) -> boo
     return bool(_PROPELLER.search(one.object.name)) or any(name == "particleVelocity" for name, _ in own)
 
 
-def _is_pushed(root: Placed, scripts: Mapping[int, Sequence[Script]]) -> bool:
+def _is_pushed(root: Placed, scripts: Mapping[int, Sequence[VrepScript]]) -> bool:
     """Tell whether a script of the model applies forces."""
     own = (script for one in root.subtree() for script in scripts.get(one.object.handle, ()))
     return any("ddForce" in script.text for script in own)
@@ -121,23 +119,20 @@ def swings_on(one: Placed, root: Placed) -> Placed | None:
     What a pair of linked dummies ties together again below such a joint, as in a hand, does not swing.
     """
     for here in reversed(one.between(root)):
-        if isinstance(here.object.of, Joint) and here.object.of.kind == "spherical":
-            return None if any(_is_tied(below) for below in here.subtree()) else here
+        if isinstance(here.object.of, VrepJoint) and here.object.of.kind == "spherical":
+            kinds = [below.object.of for below in here.subtree()]
+            return None if any(isinstance(one, VrepDummy) and one.linked >= 0 for one in kinds) else here
     return None
 
 
-def _is_tied(one: Placed) -> bool:
-    return isinstance(one.object.of, Dummy) and one.object.of.linked >= 0
-
-
 def _propeller(link: Placed, body: Placed) -> Propeller:
-    joints = [one for one in body.subtree() if isinstance(one.object.of, Joint)]
-    return Propeller(link, body, joints[0] if joints else None)
+    joints = (one for one in body.subtree() if isinstance(one.object.of, VrepJoint))
+    return Propeller(link, body, next(joints, None))
 
 
 def _base(root: Placed) -> Placed | None:
     """Return the frame that scripts read: the dummy called base."""
-    dummies = [one for one in root.children if isinstance(one.object.of, Dummy)]
+    dummies = [one for one in root.children if isinstance(one.object.of, VrepDummy)]
     return next((one for one in dummies if plain_name(one).lower().endswith("base")), None)
 
 
@@ -157,6 +152,47 @@ def _free_target(root: Placed, objects: Sequence[Placed]) -> Placed | None:
     return next((free[name] for name in names if name in free), None)
 
 
-def turned_over(one: Placed) -> float:
-    """Return how far an object leans, rad: the angle between its z axis and the vertical."""
-    return math.acos(min(1.0, max(-1.0, one.matrix[10])))
+_UNIT_SIZE = 0.005  # m: what the stock script multiplies its parameter `particleSize` with, and the size factor
+_STOCK = {  # what V-REP's script has on one line, without blanks, beside one force and one torque
+    "count": "requiredParticleCnt=particleCountPerSecond*ts+notFullParticles",
+    "carry": "notFullParticles=requiredParticleCnt%1",
+    "thrust": "particleCnt*particleDensity*particleVelocity*math.pi*particleSize*particleSize*particleSize/(6*ts)",
+    "size": "'particleSize')*0.005*s",
+}
+_TORQUE = re.compile(r"torque=\{0,0,(-?)(0?\.\d+)\*particleVelocity\}")
+_SENSES = ("-", "", "-", "")  # of the torque, of propellers 1 to 4
+_OTHER_DEEDS = re.compile(r"[Ss]ignal|imExt|imROS|setObject|SetObject|[cC]allScript")
+_DECIMAL = re.compile(r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?")
+
+
+def built_in_law(quadricopter: VrepQuadricopter, scripts: Mapping[int, Sequence[VrepScript]]) -> dict[str, Any] | None:
+    """Return the keys of `propellers:` that stand for a quadricopter's own scripts; None where they are other ones."""
+    laws = []
+    for propeller, sense in zip(quadricopter.propellers, _SENSES):
+        own = scripts.get(propeller.body.object.handle, ())
+        if len(own) != 1:
+            return None
+        given = dict(own[0].parameters) or dict(propeller.body.object.parameters)
+        laws.append(_law(own[0].text, given, propeller.link.object.size_factor, sense))
+    return laws[0] if laws[0] is not None and all(law == laws[0] for law in laws) else None
+
+
+def _law(text: str, parameters: Mapping[str, str], size_factor: float, sense: str) -> dict[str, Any] | None:
+    code = re.sub(r"\s+", "", re.sub(r"--[^\n]*", "", text))
+    torque = _TORQUE.search(code)
+    if not all(part in code for part in _STOCK.values()) or torque is None or torque.group(1) != sense:
+        return None
+    if code.count("ddForceAndTorque(") != 1 or _OTHER_DEEDS.search(code):
+        return None
+    names = ("particleCountPerSecond", "particleDensity", "particleSize")
+    values = [parameters.get(name, "") for name in names]
+    if not all(_DECIMAL.fullmatch(value.strip()) for value in values):
+        return None
+    rate, density, size = map(float, values)
+    return {
+        "law": "3.x",
+        "particles_per_second": rate,
+        "particle_density": density,
+        "particle_size": round(size * _UNIT_SIZE * size_factor, 9),
+        "torque_per_velocity": float(torque.group(2)),
+    }

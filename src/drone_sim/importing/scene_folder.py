@@ -4,29 +4,68 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
 
-from drone_sim.importing import modules
 from drone_sim.importing.entries import Entries
-from drone_sim.importing.floors import floor_parts, floor_size
-from drone_sim.importing.folder import Folder
-from drone_sim.importing.meshes import MeshWriter
-from drone_sim.importing.naming import Names
-from drone_sim.importing.numbers import number, pose_keys
-from drone_sim.importing.placing import Placed, placed
-from drone_sim.importing.quadricopters import find
-from drone_sim.importing.report import Report
-from drone_sim.importing.reserved import reserved_names
-from drone_sim.importing.script_files import ScriptFiles, values
+from drone_sim.importing.folder import Folder, Report, label, number, pose_keys
+from drone_sim.importing.placing import Placed, floor_parts, floor_size, placed
+from drone_sim.importing.quadricopters import find, plain_name
+from drone_sim.importing.scripts import ScriptFiles, bring, values
+from drone_sim.importing.shapes import MeshWriter
 from drone_sim.importing.vehicles import ImportedVehicle, suffixes, vehicle_names
 from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import IDENTITY
+from drone_sim.mechanics.object_names import suffixed
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.message_text import MAX_NAME
 from drone_sim.scene.scene_parameters import MAX_OBJECTS
-from drone_sim.vrep_files.model import Camera, Dummy, Other, Script, VrepFile
+from drone_sim.vehicles.quadricopter_objects import QuadricopterObjects
+from drone_sim.vrep_files.model import Other, VrepCamera, VrepDummy, VrepFile, VrepScript
 from drone_sim.vrep_files.reading import read_file
+
+_CAMERAS = ("FrontVision", "DepthVision", "TrackCam", "FloorVision")
+_FLOOR = ("Floor", "ResizableFloor_5_25")
+
+
+def reserved_names(suffixes: Sequence[int]) -> set[str]:
+    """Return the names of our floor, and of the objects and cameras of vehicles with these suffixes (none: our own)."""
+    names = set(_FLOOR)
+    for suffix in suffixes or (-1,):
+        tree = ObjectTree()
+        QuadricopterObjects(tree, suffixed("", suffix), []).add(None, {}, [IDENTITY] * 4, {}, {})  # type: ignore[arg-type]
+        names |= {*tree.names, *(suffixed(camera, suffix) for camera in _CAMERAS)}
+    return names
+
+
+class UniqueNames:
+    """Gives every object a name of its own."""
+
+    def __init__(self, taken: Iterable[str] = ()):
+        """Take the names that are not free."""
+        self._taken = set(taken)
+
+    def give(self, objects: Iterable[Placed], report: Report) -> None:
+        """Name every object as in the file, where that can be."""
+        for one in objects:
+            wanted = one.object.name or one.object.alias or f"object_{one.object.handle}"
+            one.name = self.free(wanted)
+            if one.name != wanted:
+                report.add(wanted, f"is called {one.name} here")
+
+    def free(self, wanted: str) -> str:
+        """Return a name like the one wanted, and take it."""
+        plain = label(wanted) or "object"
+        name, number = plain, 2
+        while name in self._taken:
+            end = f"_{number}"
+            name, number = plain[: MAX_NAME - len(end)] + end, number + 1
+        self._taken.add(name)
+        return name
+
 
 SCENE, LIST = "scene.yaml", "IMPORT.txt"
 _STEP, _SUB_STEP, _GRAVITY = 0.05, 0.005, -9.81  # which a scene file need not say
@@ -48,7 +87,7 @@ def import_file(path: Path, out: Path) -> Imported:
     """Write what is in a file into the folder `out`. Raises VrepFileError and OSError."""
     work = _Import(read_file(path), path.name, Folder(out))
     imported = work.run()
-    modules.bring(path.parent, out, work.script_files)
+    bring(path.parent, out, work.script_files.lua_names)
     return imported
 
 
@@ -59,7 +98,7 @@ class _Import:
         self._folder = folder
         self._report = Report()
         self._writer = MeshWriter(folder)
-        self._script_files = ScriptFiles(folder)
+        self.script_files = ScriptFiles(folder)
         self._objects = placed(file)
         self._by_handle = {one.object.handle: one for one in self._objects}
         self._floor = floor_parts(self._objects)
@@ -68,21 +107,20 @@ class _Import:
         self._vehicles = [ImportedVehicle(*pair) for pair in zip(found, [self._scripts] * len(found), suffixes(found))]
         self._vehicle_names = vehicle_names(found)
         self._words = set(re.findall(r"\w+", "\n".join(script.text for script in file.scripts)))
-        own = [one for vehicle in self._vehicles for one in vehicle.objects.values()]
-        self._of_vehicles = {id(one) for one in own}
-        Names().give(own, self._report)
-        taken = reserved_names([vehicle.suffix for vehicle in self._vehicles]) | {one.name for one in own}
+        self._of_vehicles = {id(one) for vehicle in self._vehicles for one in vehicle.objects.values()}
+        taken: set[str] = set()
+        for vehicle in self._vehicles:  # whose objects have our names, too, which no other vehicle's may have
+            others = [one.suffix for one in self._vehicles if one is not vehicle]
+            UniqueNames(taken | reserved_names(others) if others else ()).give(vehicle.objects.values(), self._report)
+            taken |= {one.name for one in vehicle.objects.values()}
+        taken |= reserved_names([vehicle.suffix for vehicle in self._vehicles])
         ours = self._of_vehicles | {id(one) for one in self._floor}
-        Names(taken).give((one for one in self._objects if id(one) not in ours), self._report)
-
-    @property
-    def script_files(self) -> set[str]:
-        """Names of the scripts that it has written, those of Lua."""
-        return {name for name in self._script_files.names if name.endswith(".lua")}
+        UniqueNames(taken).give((one for one in self._objects if id(one) not in ours), self._report)
 
     def run(self) -> Imported:
         content: dict[str, Any] = {**self._world()}
-        vehicles = {name: self._vehicle(one) for name, one in zip(self._vehicle_names, self._vehicles)}
+        tools = self._folder, self._writer, self.script_files, self._report
+        vehicles = {name: one.entry(*tools) for name, one in zip(self._vehicle_names, self._vehicles)}
         content["vehicles"] = vehicles
         if not vehicles:
             self._report.notes.append("No quadricopter is in the file: none flies, unless `vehicles` says so")
@@ -117,14 +155,11 @@ class _Import:
             self._report.add("", "the file has no floor at z = 0: ours is there")
         return world
 
-    def _vehicle(self, one: ImportedVehicle) -> dict[str, Any]:
-        return one.entry(self._folder, self._writer, self._script_files, self._report)
-
     # ---- scripts
 
-    def _child_scripts(self) -> Mapping[int, list[Script]]:
+    def _child_scripts(self) -> Mapping[int, list[VrepScript]]:
         """Return the child scripts that run, by the handle of their object."""
-        found: dict[int, list[Script]] = defaultdict(list)
+        found: dict[int, list[VrepScript]] = defaultdict(list)
         for script in self._file.scripts:
             on = self._by_handle.get(script.object)
             if on in self._floor:
@@ -165,8 +200,8 @@ class _Import:
                 elif index > 0 or id(one) not in roots:
                     yield self._entry_of(script, on)
 
-    def _entry_of(self, script: Script, on: Placed) -> dict[str, Any]:
-        entry = {"object": on.name, "script": self._script_files.write(on.name, script)}
+    def _entry_of(self, script: VrepScript, on: Placed) -> dict[str, Any]:
+        entry = {"object": on.name, "script": self.script_files.write(on.name, script)}
         parameters = values(script.parameters or on.object.parameters)
         return {**entry, "parameters": parameters} if parameters else entry
 
@@ -217,14 +252,14 @@ class _Import:
     def _is_idle(self, one: Placed) -> bool:
         """Tell whether a scene is the same without an object that nothing asks for and nothing hangs on."""
         of = one.object.of
-        if isinstance(of, Dummy):
+        if isinstance(of, VrepDummy):
             return bool(one.children) and not of.path  # it held nothing but what is left out
-        return (isinstance(of, Camera) and of.resolution is None) or (
+        return (isinstance(of, VrepCamera) and of.resolution is None) or (
             isinstance(of, Other) and of.kind in (*_ONLY_LOOKED_THROUGH, "script", "force sensor")
         )
 
     def _is_mentioned(self, one: Placed) -> bool:
-        names = (one.object.name.partition("#")[0], one.object.alias)
+        names = (plain_name(one), one.object.alias)
         return any(name in self._words for name in names if name)
 
     def _hangs_on(self, one: Placed) -> tuple[str, frames.Matrix]:
@@ -243,7 +278,7 @@ class _Import:
     # ---- files
 
     def _write(self, content: dict[str, Any]) -> None:
-        lines = list(self._report.whole())
+        lines = list(self._report.lines())
         said = f"From {self._name}, {self._file.program} (format {self._file.version})."
         if lines:
             self._folder.write(LIST, "\n".join([said, "", *lines, ""]))

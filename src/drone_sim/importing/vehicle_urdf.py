@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree as Xml
 
-from drone_sim.importing.forms import simple_size
-from drone_sim.importing.meshes import MeshWriter, Surface, TooLarge, color, has_triangles
-from drone_sim.importing.numbers import number
+from drone_sim.importing.folder import Report, number
 from drone_sim.importing.placing import Placed
-from drone_sim.importing.quadricopters import Propeller, Quadricopter, swings_on
-from drone_sim.importing.report import Report
+from drone_sim.importing.quadricopters import Propeller, VrepQuadricopter, swings_on
+from drone_sim.importing.shapes import MeshWriter, Surface, TooLarge, color, has_triangles, simple_size
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
-from drone_sim.vrep_files.model import Mesh, Rgba
+from drone_sim.vrep_files.model import Rgba, VrepMesh
 
 PLACES = ("front_left", "back_left", "back_right", "front_right")  # of V-REP's propellers 1 to 4
 _MOST_COLLISIONS = 16  # of one body; more become one hull
@@ -25,7 +23,7 @@ _RADIUS_OF_GYRATION = 0.05  # m, of what a file gives a mass and no inertia
 class VehicleUrdf:
     """Builds the URDF of one quadricopter; poses in it are relative to the root's."""
 
-    def __init__(self, quadricopter: Quadricopter, writer: MeshWriter, report: Report):
+    def __init__(self, quadricopter: VrepQuadricopter, writer: MeshWriter, report: Report):
         """Take what to build, what writes mesh files, and what is told of the rest."""
         self._quadricopter = quadricopter
         self._writer = writer
@@ -37,20 +35,23 @@ class VehicleUrdf:
         quadricopter = self._quadricopter
         root = quadricopter.root
         base = self._link("base_link", root, root.matrix)
-        turning = [self._turning(one) for one in quadricopter.propellers]
+        joints = (one.joint for one in quadricopter.propellers)
+        turning = [[] if joint is None else list(joint.subtree()) for joint in joints]
         bodies = [root, *(one.body for one in quadricopter.propellers), *parts]
         still = [one for one in (*bodies, *looks) if one.is_visible and not any(one in each for each in turning)]
         self._add_visuals(base, root.name, still, root.matrix)
         for place, propeller, blades in zip(PLACES, quadricopter.propellers, turning):
             self._add_propeller(place, propeller, [one for one in blades if one.is_visible and one in looks])
         for index, one in enumerate(parts, start=1):
-            swings = swings_on(one, root)
+            name, swings = f"part_{index}", swings_on(one, root)
             frame = one.matrix if swings is None else swings.matrix
             if swings is None:
-                self._link(f"part_{index}", one, frame)
-            else:
-                self._add_load(f"part_{index}", one)
-            self._joint(f"part_{index}", "base_link", frames.relative(root.matrix, frame))
+                self._link(name, one, frame)
+            else:  # its weight is where its joint holds it, which hands on no torque
+                mass = one.object.shape.mass if one.object.shape is not None else 0.0
+                mass = max(mass, _LEAST_MASS) if mass else 0.0
+                _add_inertial(Xml.SubElement(self._robot, "link", name=name), mass, IDENTITY, (0.0, 0.0, 0.0))
+            self._joint(name, "base_link", frames.relative(root.matrix, frame))
         self._add_front_camera()
         Xml.indent(self._robot)
         return f'<?xml version="1.0"?>\n{Xml.tostring(self._robot, encoding="unicode")}\n'
@@ -66,15 +67,6 @@ class VehicleUrdf:
             _add_inertial(link, 0.0, IDENTITY, (0.0, 0.0, 0.0))
             self._add_visuals(link, f"{propeller.body.name}_blades", blades, propeller.joint.matrix)
             self._joint(f"blades_{place}", name, frames.relative(frame, propeller.joint.matrix), "continuous")
-
-    def _add_load(self, name: str, body: Placed) -> None:
-        """Add the weight of a body that swings, where its joint holds it: the joint hands on no torque."""
-        mass = 0.0 if body.object.shape is None else body.object.shape.mass
-        _add_inertial(Xml.SubElement(self._robot, "link", name=name), mass, IDENTITY, (0.0, 0.0, 0.0))
-
-    def _turning(self, propeller: Propeller) -> list[Placed]:
-        """Return what turns with a propeller's joint."""
-        return [] if propeller.joint is None else list(propeller.joint.subtree())
 
     def _link(self, name: str, body: Placed, frame: Matrix) -> Xml.Element:
         """Add a link, whose frame is given in the world, with the mass and the collision shapes of a body."""
@@ -95,7 +87,7 @@ class VehicleUrdf:
             self._add_collisions(link, body, shape.meshes, place)
         return link
 
-    def _add_collisions(self, link: Xml.Element, body: Placed, meshes: Sequence[Mesh], place: Matrix) -> None:
+    def _add_collisions(self, link: Xml.Element, body: Placed, meshes: Sequence[VrepMesh], place: Matrix) -> None:
         if len(meshes) > _MOST_COLLISIONS:
             self._add_mesh(link, "collision", body.name, [(mesh, IDENTITY) for mesh in meshes], place)
             return
@@ -118,7 +110,7 @@ class VehicleUrdf:
 
     def _add_front_camera(self) -> None:
         """Add the link that our own front camera looks from: the front of the body."""
-        Xml.SubElement(self._robot, "link", name="front_optical").append(_massless())
+        _add_inertial(Xml.SubElement(self._robot, "link", name="front_optical"), 0.0, IDENTITY, (0.0, 0.0, 0.0))
         forward = frames.from_rpy((0.16, 0.0, 0.0), (-1.5707963267948966, 0.0, -1.5707963267948966))
         self._joint("front_optical", "base_link", forward)
 
@@ -160,12 +152,6 @@ def force_frame(propeller: Propeller) -> Matrix:
     centre = frames.transform(body.matrix, (0.0, 0.0, 0.0) if inertia is None else inertia.pose.position)
     m = propeller.link.matrix
     return (*m[:3], centre[0], *m[4:7], centre[1], *m[8:11], centre[2])
-
-
-def _massless() -> Xml.Element:
-    link = Xml.Element("link")
-    _add_inertial(link, 0.0, IDENTITY, (0.0, 0.0, 0.0))
-    return link[0]
 
 
 def _add_inertial(link: Xml.Element, mass: float, place: Matrix, moments: tuple[float, float, float]) -> None:

@@ -7,22 +7,18 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drone_sim.importing.folder import Folder
-from drone_sim.importing.labels import label, word
-from drone_sim.importing.meshes import MeshWriter
-from drone_sim.importing.numbers import number, numbers, pose_keys
+from drone_sim.importing.folder import Folder, Report, label, number, numbers, pose_keys, word
 from drone_sim.importing.placing import Placed
-from drone_sim.importing.propeller_scripts import built_in_law
-from drone_sim.importing.quadricopters import Quadricopter, plain_name, swings_on
-from drone_sim.importing.report import Report
-from drone_sim.importing.script_files import ScriptFiles, values
+from drone_sim.importing.quadricopters import VrepQuadricopter, built_in_law, plain_name, swings_on
+from drone_sim.importing.scripts import ScriptFiles, values
+from drone_sim.importing.shapes import MeshWriter
 from drone_sim.importing.vehicle_urdf import VehicleUrdf
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_names import split
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS
 from drone_sim.vehicles.quadricopter_objects import DRONE, TARGET, TRACK_BASE, joint, respondable
-from drone_sim.vrep_files.model import Camera, Joint, Script
+from drone_sim.vrep_files.model import VrepCamera, VrepJoint, VrepScript
 
 _OWN_CAMERAS = {"FrontVision": "front", "DepthVision": "depth", "TrackCam": "track", "FloorVision": "floor"}
 _FROM_SENSOR = (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # x forward, y left, z up, in its axes
@@ -36,7 +32,7 @@ _BY_NAME = {
 class ImportedVehicle:
     """What is made of one quadricopter."""
 
-    def __init__(self, quadricopter: Quadricopter, scripts: Mapping[int, Sequence[Script]], suffix: int):
+    def __init__(self, quadricopter: VrepQuadricopter, scripts: Mapping[int, Sequence[VrepScript]], suffix: int):
         """Take it, the scripts of the file by handle, and the suffix of the names of its objects."""
         self.quadricopter = quadricopter
         self.suffix = suffix
@@ -94,7 +90,7 @@ class ImportedVehicle:
             if (
                 here.is_dynamic
                 and above is not None
-                and not (above.is_force_sensor or isinstance(above.object.of, Joint))
+                and not (above.is_force_sensor or isinstance(above.object.of, VrepJoint))
             ):
                 return False
             here = above
@@ -102,7 +98,7 @@ class ImportedVehicle:
 
     def _is_own_camera(self, one: Placed) -> bool:
         camera = one.object.of
-        if not isinstance(camera, Camera) or camera.resolution is None or not camera.is_perspective:
+        if not isinstance(camera, VrepCamera) or camera.resolution is None or not camera.is_perspective:
             return False
         if one.object.handle in self._scripts or one.above not in (self.root, self.quadricopter.base):
             return False  # paths, or scripts, find it in another place of the tree than a vehicle's cameras have
@@ -187,7 +183,7 @@ class ImportedVehicle:
 
     def _camera(self, one: Placed) -> dict[str, Any]:
         camera = one.object.of
-        assert isinstance(camera, Camera) and camera.resolution is not None
+        assert isinstance(camera, VrepCamera) and camera.resolution is not None
         width, height = (min(max(side, 1), 4096) for side in camera.resolution)
         wide = camera.angle if width >= height else 2 * math.atan(math.tan(camera.angle / 2) * width / height)
         key, near = self._camera_key(one), min(max(camera.near, 1e-4), 1e4)
@@ -207,7 +203,7 @@ class ImportedVehicle:
         }
 
 
-def suffixes(found: Sequence[Quadricopter]) -> list[int]:
+def suffixes(found: Sequence[VrepQuadricopter]) -> list[int]:
     """Return the suffix of each quadricopter's names, no two the same."""
     given: list[int] = []
     for one in found:
@@ -220,7 +216,7 @@ def suffixes(found: Sequence[Quadricopter]) -> list[int]:
     return given
 
 
-def vehicle_names(found: Sequence[Quadricopter]) -> list[str]:
+def vehicle_names(found: Sequence[VrepQuadricopter]) -> list[str]:
     """Return the vehicles' names: `drone` for the only one."""
     if len(found) == 1:
         return ["drone"]

@@ -33,7 +33,7 @@ class Inertial(NamedTuple):
         return Inertia(tuple(map(float, tensor)), (1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z))
 
 
-def together(parts: Sequence[Inertial]) -> Inertial:
+def combined(parts: Sequence[Inertial]) -> Inertial:
     """Return several as one, by the parallel axis theorem. Raises ValueError where they have no mass."""
     mass = sum(one.mass for one in parts)
     if not mass > 0:

@@ -6,12 +6,12 @@ Revolute joints turn about their z axis (rad), prismatic ones slide along it (m)
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.scene_object import SceneObject
 
 REVOLUTE, PRISMATIC, SPHERICAL = "revolute", "prismatic", "spherical"
@@ -19,7 +19,7 @@ KINEMATIC, PASSIVE, POSITION, VELOCITY, FORCE = "kinematic", "passive", "positio
 
 
 @dataclass(frozen=True)
-class Control:
+class JointControl:
     """What moves a joint: one of the modes above, its targets (rad or m, rad/s or m/s, N m or N), and its motor.
 
     `max_force` is the most that the motor gives in the modes position and velocity.
@@ -35,14 +35,8 @@ class Control:
 class Drive(Protocol):
     """A joint in the dynamics."""
 
-    def value(self) -> float:
-        """Return its position, rad or m."""
-
-    def velocity(self) -> float:
-        """Return its velocity, rad/s or m/s."""
-
-    def force(self) -> float:
-        """Return what its motor gave in the last sub-step, N m or N."""
+    def state(self) -> tuple[float, float, float]:
+        """Return position (rad or m), velocity (rad/s or m/s), what its motor gave in the last sub-step (N m or N)."""
 
     def put(self, value: float) -> None:
         """Put it at a position, at rest."""
@@ -50,7 +44,7 @@ class Drive(Protocol):
     def limit(self, limits: tuple[float, float] | None) -> None:
         """Let it have other limits, rad or m, or none."""
 
-    def command(self, control: Control) -> None:
+    def command(self, control: JointControl) -> None:
         """Let its motor do from now on what is told; in the mode kinematic it stands still."""
 
 
@@ -67,7 +61,7 @@ class Joint(SceneObject):
         motion: str = REVOLUTE,
         limits: tuple[float, float] | None = None,
         value: float = 0.0,
-        control: Control = Control(),
+        control: JointControl = JointControl(),
     ):
         """Stand at `local` in the parent's frame; `motion` is one of the three, without `limits` it has no end."""
         super().__init__(names, alias, parent, local, kind="joint")
@@ -86,7 +80,7 @@ class Joint(SceneObject):
     @property
     def value(self) -> float:
         """How far it is turned or slid, rad or m; within half a turn where it has no end."""
-        value = self._value if self.drive is None else self.drive.value()
+        value = self._value if self.drive is None else self.drive.state()[0]
         if self.motion == REVOLUTE and self.limits is None:
             return math.remainder(value, math.tau)
         return value
@@ -94,7 +88,7 @@ class Joint(SceneObject):
     @property
     def velocity_along(self) -> float:
         """How fast it moves, rad/s or m/s; 0 where the dynamics does not move it."""
-        return 0.0 if self.drive is None else self.drive.velocity()
+        return 0.0 if self.drive is None else self.drive.state()[1]
 
     def place(self, value: float) -> None:
         """Put it at a position, rad or m, or at the end of its way."""
@@ -111,6 +105,10 @@ class Joint(SceneObject):
             self.drive.limit(limits)
         elif limits is not None:
             self.place(self._value)
+
+    def release(self) -> None:
+        """Be moved by the dynamics no longer, and stay as it stands."""
+        self._value, self.drive = self.value, None
 
     def below(self) -> Matrix:
         """Return the transform world from the frame in which stands what hangs on it."""
@@ -131,7 +129,7 @@ class Joint(SceneObject):
 
     # ---- what moves it
 
-    def command(self, control: Control) -> None:
+    def command(self, control: JointControl) -> None:
         """Let it be moved like that from now on; without a drive, a target position is where it goes at once."""
         before, self.control = self.control, control
         self.dynamic_mode = control.mode if control.mode != KINEMATIC else self.dynamic_mode
@@ -144,16 +142,12 @@ class Joint(SceneObject):
         """Change some of what moves it."""
         self.command(replace(self.control, **changes))  # type: ignore[arg-type]
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back what the dynamics does not: place, position and control."""
-        put_back = super().remember()
-        value, turn, control, limits = self._value, self.turn, self.control, self.limits
+        own = saved(self, "_value", "turn", "control", "limits")
+        return in_turn(super().save_state(), own, self._tell_drive)
 
-        def recall() -> None:
-            put_back()
-            self._value, self.turn, self.control, self.limits = value, turn, control, limits
-            if self.drive is not None:
-                self.drive.limit(limits)
-                self.drive.command(control)
-
-        return recall
+    def _tell_drive(self) -> None:
+        if self.drive is not None:
+            self.drive.limit(self.limits)
+            self.drive.command(self.control)

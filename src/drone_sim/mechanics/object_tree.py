@@ -5,19 +5,18 @@ Several models may stand in it, each under names with a suffix of its own (objec
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.mechanics.object_names import plain
-from drone_sim.mechanics.scene_object import Body, SceneObject
-from drone_sim.wording import near_names
+from drone_sim.mechanics.saved_state import Restore
+from drone_sim.mechanics.scene_object import DynamicBody, SceneObject
+from drone_sim.message_text import near_names
 
 # V-REP's handles that are no object's: the world, and the parent of the object that is spoken of.
 WORLD, PARENT = -1, -11
-
-__all__ = ["PARENT", "WORLD", "Body", "ObjectTree", "SceneObject"]
 
 DEEPEST = 200  # objects above one; what asks for places goes up from each to the next
 
@@ -31,14 +30,31 @@ def levels(one: SceneObject, top: SceneObject | None = None) -> int:
     return count
 
 
+class Handles(NamedTuple):
+    """Which handles objects have, by their names, and the first that none has had."""
+
+    by_name: Mapping[str, int] = {}
+    next: int = 0
+
+
+NO_HANDLES = Handles()
+
+
 class ObjectTree:
     """All objects, by handle (a small integer that no other object of the run has had) and by name."""
 
-    def __init__(self) -> None:
-        """Start empty."""
+    def __init__(self, kept: Handles = NO_HANDLES):
+        """Start empty; an object whose name is among those that are `kept` gets that handle, also after `clear`."""
+        self._begun = kept
+        self.cleared = 0  # times
+        self.clear()
+
+    def clear(self) -> None:
+        """Be empty, and give out handles anew."""
+        self.cleared += 1
         self._objects: dict[int, SceneObject] = {}
         self._handles: dict[str, int] = {}
-        self._numbers = itertools.count()  # none is given twice
+        self._kept, self._next = self._begun  # no handle is given twice
         self._copied: set[str] = set()  # names that some object has, or had, with a suffix
         self._loose: list[SceneObject] = []  # bodies below others, which only a script's moves take along
 
@@ -47,7 +63,7 @@ class ObjectTree:
         name: str,
         parent: str | None = None,
         local: Matrix = IDENTITY,
-        body: Body | None = None,
+        body: DynamicBody | None = None,
         *,
         alias: str = "",
         also: Sequence[str] = (),
@@ -66,7 +82,9 @@ class ObjectTree:
         for one in added.names:
             if one in self._handles:
                 raise ValueError(f"an object named '{one}' is there already")
-        handle = next(self._numbers)
+        handle = self._kept.get(added.name, self._next)
+        if handle == self._next or handle in self._objects:
+            handle, self._next = self._next, self._next + 1
         self._objects[handle] = added
         self._handles.update((one, handle) for one in added.names)
         self._copied.update(plain(one) for one in added.names if plain(one) != one)
@@ -84,6 +102,30 @@ class ObjectTree:
             for name in self._objects.pop(handle).names:
                 del self._handles[name]
         self.look_for_loose_ones()
+
+    def rename(self, handle: int, name: str) -> None:
+        """Give an object another name in the place of all that it has. Raises ValueError for a name that is taken."""
+        renamed = self[handle]
+        if name in self._handles and self._handles[name] != handle:
+            raise ValueError(f"an object named '{name}' is there already")
+        for one in renamed.names:
+            del self._handles[one]
+        renamed.names = (name,)
+        self._handles[name] = handle
+        if plain(name) != name:
+            self._copied.add(plain(name))
+
+    def exchange(self, handle: int, other: SceneObject) -> None:
+        """Let another object take the place of one, whose names and parent it has."""
+        before, self._objects[handle] = self._objects[handle], other
+        for one in self._objects.values():
+            if one.parent is before:
+                one.parent = other
+        self.look_for_loose_ones()
+
+    def handles(self) -> Handles:
+        """Return which handle every object has, for another tree of the same objects."""
+        return Handles(dict(self._handles), self._next)
 
     def look_for_loose_ones(self) -> None:
         """Look anew which bodies go along only where a script moves what they hang on."""
@@ -139,21 +181,21 @@ class ObjectTree:
                 raise ValueError(f"no object has the handle {handle}") from None
             raise TypeError("a handle is a whole number") from None
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that puts every object back where it is now, under its present parent.
 
         An object that was removed since, or whose parent was, is left as it is.
         """
-        kept = [(one, one.parent, one.remember()) for one in self._objects.values()]
+        kept = [(one, one.parent, one.save_state()) for one in self._objects.values()]
 
-        def recall() -> None:
+        def restore() -> None:
             there = {None, *self._objects.values()}
             for one, parent, put_back in kept:
                 if one in there and parent in there:
                     put_back()
             self.look_for_loose_ones()
 
-        return recall
+        return restore
 
     def matrix(self, handle: int, relative_to: int = WORLD) -> Matrix:
         """Return the transform of an object relative to another, to its PARENT, or to the WORLD."""
@@ -205,8 +247,20 @@ class ObjectTree:
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Hang an object on another (WORLD for none): it stays where it is, or keeps its local transform.
 
-        Raises ValueError where that would make a loop, or more than DEEPEST objects above one.
+        Raises ValueError where it cannot.
         """
+        self.check_parent(handle, parent)
+        moved = self[handle]
+        new = None if parent == WORLD else self[parent]
+        matrix = moved.matrix()
+        moved.parent = new
+        if moved.body is not None:
+            self.look_for_loose_ones()
+        elif keep_in_place:
+            moved.put(matrix)
+
+    def check_parent(self, handle: int, parent: int) -> None:
+        """Raise ValueError where a parent would make a loop, or more than DEEPEST objects above one."""
         moved = self[handle]
         new = None if parent == WORLD else self[parent]
         if new is moved or (new is not None and new.hangs_on(moved)):
@@ -214,9 +268,3 @@ class ObjectTree:
         below = max(levels(one, moved) for one in self._objects.values() if one is moved or one.hangs_on(moved))
         if new is not None and levels(new) + 1 + below > DEEPEST:
             raise ValueError(f"'{moved.name}' cannot hang there: more than {DEEPEST} objects above each other")
-        matrix = moved.matrix()
-        moved.parent = new
-        if moved.body is not None:
-            self.look_for_loose_ones()
-        elif keep_in_place:
-            moved.put(matrix)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector
 from drone_sim.mechanics.object_names import plain
+from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.mechanics.state import Pose, State
 
 KINDS = ("shape", "joint", "dummy", "proximity_sensor", "vision_sensor", "path", "camera", "force_sensor")
 
 
-class Body(Protocol):
+class DynamicBody(Protocol):
     """What the tree asks of something that the dynamics moves."""
 
     @property
@@ -37,7 +37,7 @@ class SceneObject:
         alias: str,
         parent: SceneObject | None,
         local: Matrix = IDENTITY,
-        body: Body | None = None,
+        body: DynamicBody | None = None,
         *,
         kind: str = "",
     ):
@@ -109,14 +109,9 @@ class SceneObject:
         else:
             self.local = frames.multiply(frames.invert(self.parent.below()), matrix)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that puts it back where it is now, under its present parent."""
-        parent, local = self.parent, self.local
-
-        def recall() -> None:
-            self.parent, self.local = parent, local
-
-        return recall
+        return saved(self, "parent", "local")
 
     def velocity(self) -> tuple[Vector, Vector]:
         """Return linear (m/s) and angular (rad/s) velocity in the world; zero where no body carries it."""

@@ -19,14 +19,14 @@ import numpy as np
 
 from drone_sim.files import urdf_files
 from drone_sim.mechanics.frames import IDENTITY, Matrix, from_rpy, multiply, position, to_rpy, transform
-from drone_sim.mechanics.inertia import Inertial, together
+from drone_sim.mechanics.inertia import Inertial, combined
 
 
 class UrdfError(ValueError):
     """A URDF cannot be used; the message is one line that names the file, the element and the reason."""
 
 
-class Blades(NamedTuple):
+class BladesLink(NamedTuple):
     """A visual that turns about the z axis of a joint's frame: its index, the joint, the visual in it."""
 
     visual: int
@@ -47,7 +47,7 @@ class RigidBody:
     parents: dict[str, tuple[str, Matrix]]  # of each link but the root: the link above, and above from link
     blade_joints: dict[str, str]  # of each link that turns about its z axis: the joint
     visuals: tuple[tuple[str, Matrix], ...]  # of each visual: its link, and link from visual
-    blades: tuple[Blades, ...]
+    blades: tuple[BladesLink, ...]
     xml: str  # the same body as a URDF of one link
 
 
@@ -67,7 +67,7 @@ def _merge(robot: Xml.Element) -> RigidBody:
     poses = {name: _pose(name, joints) for name in links}
     roots = [name for name in links if name not in joints]
     inertials = {name: _inertial(link, poses[name]) for name, link in links.items()}
-    mass, centre, inertia = together(list(inertials.values()))
+    mass, centre, inertia = combined(list(inertials.values()))
     visuals = [(name, visual) for name, link in links.items() for visual in link.findall("visual")]
     return RigidBody(
         mass=mass,
@@ -134,9 +134,9 @@ def inertia_tensor(link: Xml.Element, pose: Matrix = IDENTITY) -> np.ndarray:
 
 def _blades(
     visuals: Sequence[tuple[str, Xml.Element]], joints: dict[str, Xml.Element], poses: dict[str, Matrix]
-) -> list[Blades]:
+) -> list[BladesLink]:
     return [
-        Blades(index, joints[link].attrib["name"], poses[link], origin_of(visual))
+        BladesLink(index, joints[link].attrib["name"], poses[link], origin_of(visual))
         for index, (link, visual) in enumerate(visuals)
         if link in joints and joints[link].attrib["type"] == "continuous"
     ]

@@ -9,34 +9,30 @@ import itertools
 import logging
 import math
 import os
-import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
+from drone_sim.command_line import SIGNALLED, Parser, status_of
+from drone_sim.config.types import ParameterError, nested
 from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics.frames import to_euler
-from drone_sim.offline import film as film_module
+from drone_sim.message_text import near_names, shown
 from drone_sim.offline import timeline as timeline_module
-from drone_sim.offline.command_line import FAILED, SIGNALLED, Parser
-from drone_sim.offline.film import Film
-from drone_sim.offline.recording import Recording, TableError
+from drone_sim.offline import video
+from drone_sim.offline.recording import OutputError, Recording
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
-from drone_sim.offline.video import VideoError
 from drone_sim.run import parameters as parameters_module
 from drone_sim.run.guardian import Guardian
-from drone_sim.run.parameters import ParameterError, Parameters
+from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import STOP
-from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
 from drone_sim.vrep_files.reading import SUFFIXES
-from drone_sim.wording import near_names, shown
 
 _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
@@ -51,7 +47,6 @@ _ENDINGS = {
     "csv": (".csv", ".txt", ""),
     "video": (".mp4",),
 }
-_EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 
 
 def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
@@ -63,7 +58,7 @@ def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = Non
     if guardian is not None:
         guardian.ready()
     with _shown_on_stdout(SCRIPT_LOG):
-        return _status_of(lambda: _run(options, guardian))
+        return status_of("fly", lambda: _run(options, guardian))
 
 
 def settings(assignments: Sequence[str]) -> dict[str, Any]:
@@ -71,23 +66,16 @@ def settings(assignments: Sequence[str]) -> dict[str, Any]:
 
     Of several for one key the last one counts. Raises ParameterError.
     """
-    nested: dict[str, Any] = {}
+    values: list[tuple[str, Any]] = []
     for assignment in assignments:
         key, equals, text = assignment.partition("=")
-        *parents, last = key.split(".")
-        if not equals or not all((*parents, last)):
+        if not equals or not all(key.split(".")):
             raise ParameterError(f"--set {_shown(assignment)}: must be KEY=VALUE, such as control.Kzref=4")
         try:
-            value = yaml_files.parse(text)
+            values.append((key, yaml_files.parse(text)))
         except yaml_files.YamlError as error:
             raise ParameterError(f"--set {_shown(assignment)}: {error}") from None
-        place = nested
-        for parent in parents:
-            if not isinstance(place.get(parent), dict):
-                place[parent] = {}
-            place = place[parent]
-        place[last] = value
-    return nested
+    return nested(values)
 
 
 def _shown(assignment: str) -> str:
@@ -104,28 +92,40 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
         timeline = timeline_module.read(options.commands, parameters)
     steps = first_step(_duration(options, timeline), parameters.time_step)
     if options.plot:
-        _check_plot(options.plot, steps)
+        from drone_sim.offline import plot  # matplotlib takes as long to import as a short flight
+
+        plot.check(options.plot)
+        if steps > _PLOTTED:
+            raise ValueError(f"--plot: {steps} steps; at most {_PLOTTED} are drawn")
     camera = _camera(options, parameters, recorded)
     for output in filter(None, (options.csv, options.video)):
         writing.check(output)
     simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
     began = time.perf_counter()
     try:
-        with _csv(options.csv) as file, _film(options.video, simulation, recorded, camera) as films:
+        with contextlib.ExitStack() as written:
+            file = written.enter_context(writing.replacing(options.csv)) if options.csv else None
+            filming = video.filming(options.video, simulation, recorded, camera) if options.video else None
+            films = [written.enter_context(filming)] if filming else []
             recording = Recording(file, keep=bool(options.plot), vehicle=recorded)
-            flown = _status_of(lambda: _fly(simulation, timeline, steps, (recording, *films), guardian))
+            flown = status_of(
+                "fly",
+                lambda: _fly(simulation, timeline, steps, (recording, *films), guardian),
+                passed_on=OutputError,  # which ends the writing of the file, which then says so
+            )
             took = time.perf_counter() - began
             flown = flown or int(bool(simulation.failed_scripts))
     finally:
         # What was flown is of use even where the flight failed: cleanup, summary and plot come in any case.
-        closed = _status_of(simulation.close)
+        closed = status_of("fly", simulation.close)
     if guardian is not None:
         guardian.stand_down()  # no script runs any more, and a plot takes its time
     print(_summary(recording, took), flush=True)
     for film in films:
         print(f"wrote {options.video}: {film}", flush=True)
-    draw = options.plot and recording.rows
-    drawn = _status_of(lambda: _plot(options.plot, recording, timeline.of(recorded))) if draw else 0
+    drawn = 0
+    if options.plot and recording.rows:
+        drawn = status_of("fly", lambda: plot.save(options.plot, recording, timeline.of(recorded)))
     return flown or closed or drawn
 
 
@@ -149,18 +149,6 @@ def _vehicle(name: str | None, parameters: Parameters) -> str:
     return parameters.first.name if name is None else name
 
 
-def _check_plot(path: str, steps: int) -> None:
-    from drone_sim.offline import plot
-
-    plot.check(path)
-    if steps > _PLOTTED:
-        raise ValueError(f"--plot: {steps} steps; at most {_PLOTTED} are drawn")
-
-
-def _csv(path: str | None) -> AbstractContextManager[Any]:
-    return writing.replacing(path) if path else contextlib.nullcontext()
-
-
 def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -> str:
     """Return the camera whose pictures the video shows, '' without one. Raises ValueError."""
     if not options.video:
@@ -168,13 +156,9 @@ def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -
             raise ValueError(f"--camera {_shown(options.camera)}: is of --video FILE.mp4, which is not given")
         return ""
     own = next(one for one in parameters.fleet if one.name == vehicle)
-    camera = film_module.camera_of(own, options.camera)
-    film_module.rate_of(own.cameras[camera], parameters.time_step)
+    camera = video.camera_of(own, options.camera)
+    video.rate_of(own.cameras[camera], parameters.time_step)
     return camera
-
-
-def _film(path: str | None, simulation: Simulation, vehicle: str, camera: str) -> AbstractContextManager[list[Film]]:
-    return film_module.filming(path, simulation, vehicle, camera) if path else contextlib.nullcontext([])
 
 
 @contextlib.contextmanager
@@ -200,7 +184,7 @@ def _fly(
     simulation: Simulation,
     timeline: Timeline,
     steps: int,
-    observers: Iterable[Recording | Film],
+    observers: Iterable[Recording | video.CameraRecorder],
     guardian: Guardian | None,
 ) -> int:
     for observer in observers:
@@ -215,15 +199,9 @@ def _fly(
             for observer in observers:
                 observer.add(simulation)
             bar.update()
-            if simulation.asked == STOP:
+            if simulation.context.control.asked == STOP:
                 break
     return 0
-
-
-def _plot(path: str, recording: Recording, timeline: Timeline) -> None:
-    from drone_sim.offline import plot  # matplotlib takes as long to import as a short flight
-
-    plot.save(path, recording, timeline)
 
 
 def _summary(recording: Recording, took: float) -> str:
@@ -236,19 +214,6 @@ def _summary(recording: Recording, took: float) -> str:
         f"flew {row[0]:.2f} s in {took:.2f} s ({row[0] / took:.0f} times real time); "
         f"ended at x {x:.3f} y {y:.3f} z {z:.3f} m, yaw {yaw:.3f} rad"
     )
-
-
-def _status_of(action: Callable[[], int | None]) -> int:
-    """Return the action's exit status, 0 for None; where it fails as users may expect, after one line."""
-    try:
-        return action() or 0
-    except KeyboardInterrupt:
-        return SIGNALLED + signal.SIGINT
-    except (TableError, VideoError):  # ends the writing of the file, which then says so
-        raise
-    except _EXPECTED as error:
-        print(f"fly: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
-        return FAILED
 
 
 # ---- arguments

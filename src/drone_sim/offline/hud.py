@@ -21,7 +21,7 @@ _DIAL = 2.6  # strips, the diameter of the artificial horizon
 _SHOWN_PITCH = math.radians(45)  # at the horizon's rim
 
 
-class Flight(NamedTuple):
+class HudState(NamedTuple):
     """What is shown: of one moment."""
 
     time: float  # s
@@ -33,13 +33,13 @@ class Flight(NamedTuple):
     yaw: float  # rad, to the left
 
     @classmethod
-    def of(cls, row: Sequence[float], state: str) -> Flight:
+    def of(cls, row: Sequence[float], state: str) -> HudState:
         """Return that of a row of a recording."""
         roll, pitch, yaw = frames.to_rpy(frames.from_quaternion(row[1:4], row[4:8]))
         return cls(row[0], state, row[3], math.hypot(*row[8:11]), roll, pitch, yaw)
 
 
-def draw(picture: np.ndarray, flight: Flight) -> None:
+def draw(picture: np.ndarray, flight: HudState) -> None:
     """Draw it over a picture, BGR (height, width, 3) uint8, at least 160 x 120."""
     strip = _strip(picture)
     for part in (picture[:strip], picture[-strip:]):
@@ -80,7 +80,7 @@ def _write(strip: np.ndarray, left: str, right: str) -> None:
         cv2.putText(strip, text, place, _FONT, scale, _WHITE, 1, cv2.LINE_AA)
 
 
-def _horizon(square: np.ndarray, flight: Flight) -> None:
+def _horizon(square: np.ndarray, flight: HudState) -> None:
     """Draw an artificial horizon: the ground as it would be seen straight ahead, behind the wings of the drone."""
     size = len(square)
     right, down = np.meshgrid(*[np.linspace(-1, 1, size)] * 2)

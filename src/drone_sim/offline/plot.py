@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.gridspec import SubplotSpec
 
 from drone_sim.files import writing
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose, Twist
-from drone_sim.offline import plot_sensors
-from drone_sim.offline.plot_sensors import Series
-from drone_sim.offline.recording import Recording
+from drone_sim.offline.recording import Recording, SensorSeries
 from drone_sim.offline.timeline import Push, Timeline
 
 _BLUE, _ORANGE, _GREEN, _RED = "#1f5fa8", "#d9730d", "#2c8a57", "#a8325e"
@@ -26,7 +23,15 @@ _VELOCITIES = ("forward $v_x$ [m/s]", "left $v_y$ [m/s]", "up $v_z$ [m/s]", "yaw
 _USUAL = (1, 99)  # percentiles of the propellers' velocities, between which their axis shows everything
 _SMALLEST_PROPELLER_RANGE = 1.0  # m/s
 _SMALLEST_PATH = 1.0  # m
+_PLACES = (
+    ("vx", "place", "path"),
+    ("vy", "height", "path"),
+    ("vz", "lean", "propellers"),
+    ("wz", "heading", "propellers"),
+)
 _HEIGHT, _SENSOR_HEIGHT = 9.5, 2.6  # inches, of all above the sensors, and of a row of them
+_PANELS, _PANEL_COLUMNS = 12, 3  # of the sensors: at most, and beside each other
+_LARGEST = 1e12  # beyond it a sensor has measured nothing
 _SMALLEST_RANGE = 0.05  # of an axis, in its unit: less would blow a ripple up to look like a manoeuvre
 
 
@@ -39,63 +44,53 @@ def check(path: str) -> None:
         raise ValueError(f"{path}: matplotlib does not write .{ending}; it writes {', '.join(sorted(known))}")
 
 
-class _Places(NamedTuple):
-    left: list[Axes]
-    middle: list[Axes]
-    propellers: Axes
-    path: Axes
-    sensors: list[Axes]
-
-    @property
-    def lowest(self) -> tuple[Axes, ...]:
-        """Those with a time axis that is written out."""
-        return self.left[-1], self.middle[-1], self.propellers, *self.sensors
-
-
-def save(path: str, recording: Recording, timeline: Timeline, sensors: Sequence[Series] = ()) -> None:
+def save(path: str, recording: Recording, timeline: Timeline, sensors: Sequence[SensorSeries] = ()) -> None:
     """Draw a recording, with the timeline's poses and pushes marked; the path's ending gives the format.
 
     What sensors measured stands below, as far as there is room. Propellers that are not known are NaN.
     Raises OSError, and ValueError for a format that matplotlib does not have.
     """
-    figure, places = _laid_out(len(sensors))
+    sensors = sensors[:_PANELS]
+    figure, axes = _laid_out(len(sensors))
+    of_time = {name: ax for name, ax in axes.items() if name != "path"}
+    lowest = [axes[name] for name in (*_PLACES[-1], *map(str, range(len(sensors))))]
+    velocities, drone, _ = ([axes[name] for name in column] for column in zip(*_PLACES))
     rows = np.array(recording.rows)
     in_track = np.array([_in_track(recording.matrix(index), row[8:11]) for index, row in enumerate(rows)])
     flown = np.column_stack((in_track[:, :3], rows[:, 13]))
-    _draw_velocities(places.left, rows[:, 0], rows[:, 14:18], flown)
-    _draw_drone(places.middle, rows, in_track[:, 3:])
-    _draw_propellers(places.propellers, rows)
-    for ax, series in zip(places.sensors, sensors):
-        plot_sensors.draw(ax, series)
-    for ax in (*places.left, *places.middle, places.propellers, *places.sensors):
+    _draw_velocities(velocities, rows[:, 0], rows[:, 14:18], flown)
+    _draw_drone(drone, rows, in_track[:, 3:])
+    _draw_propellers(axes["propellers"], rows)
+    for number, series in enumerate(sensors):
+        _draw_sensor(axes[str(number)], series)
+    for ax in of_time.values():
         _finish(ax)
         _mark(ax, timeline)
-        ax.tick_params(labelbottom=ax in places.lowest)
-    for ax in places.lowest:
+        ax.tick_params(labelbottom=ax in lowest)
+    for ax in lowest:
         ax.set_xlabel(f"{recording.clock} [s]")
         ax.set_xlim(0, max(rows[-1, 0], 1e-3))
-    _draw_path(places.path, rows, timeline)
+    _draw_path(axes["path"], rows, timeline)
     with writing.replacing(path, binary=True) as file:
         figure.savefig(file, dpi=120, format=Path(path).suffix[1:] or "png")
 
 
-def _laid_out(sensors: int) -> tuple[Figure, _Places]:
-    """Return an empty figure, with room for so many plots of sensors as far as there is."""
-    below = plot_sensors.rows_of(sensors)
+def _laid_out(sensors: int) -> tuple[Figure, dict[str, Axes]]:
+    """Return an empty figure and its axes by name; the sensors', below the others, have numbers."""
+    below = -(-sensors // _PANEL_COLUMNS)
+    names = [*map(str, range(sensors)), *["."] * (below * _PANEL_COLUMNS - sensors)]
     # No pyplot: it would look for a display, and keep every figure.
     figure = Figure(figsize=(16, _HEIGHT + _SENSOR_HEIGHT * below), layout="constrained")
-    heights = [_HEIGHT / 4] * 4 + [_SENSOR_HEIGHT] * below
-    grid = figure.add_gridspec(4 + below, 3, width_ratios=(1, 1, 1.1), height_ratios=heights)
-    first = figure.add_subplot(grid[0, 0])
-
-    def of_time(place: SubplotSpec) -> Axes:
-        return figure.add_subplot(place, sharex=first)
-
-    left = [first, *(of_time(grid[row, 0]) for row in (1, 2, 3))]
-    middle = [of_time(grid[row, 1]) for row in range(4)]
-    propellers = of_time(grid[2:4, 2])
-    lowest = [of_time(grid[4 + number // 3, number % 3]) for number in range(min(sensors, plot_sensors.PANELS))]
-    return figure, _Places(left, middle, propellers, figure.add_subplot(grid[:2, 2]), lowest)
+    panels = (names[first : first + _PANEL_COLUMNS] for first in range(0, len(names), _PANEL_COLUMNS))
+    rows: list[Any] = [*_PLACES, *panels]
+    axes = figure.subplot_mosaic(
+        rows,
+        gridspec_kw={"width_ratios": (1, 1, 1.1), "height_ratios": [_HEIGHT / 4] * 4 + [_SENSOR_HEIGHT] * below},
+    )
+    for name, ax in axes.items():
+        if name not in ("path", "vx"):
+            ax.sharex(axes["vx"])
+    return figure, axes
 
 
 def _in_track(matrix: frames.Matrix, velocity: Sequence[float]) -> tuple[float, ...]:
@@ -149,6 +144,16 @@ def _draw_propellers(ax: Axes, rows: np.ndarray) -> None:
         ax.text(0.99, 0.01, f"goes from {least:.1f} to {most:.1f} m/s", transform=ax.transAxes,
                 ha="right", va="bottom", fontsize="small", color=_GREY)  # fmt: skip
     _title(ax, legend=True)
+
+
+def _draw_sensor(ax: Axes, series: SensorSeries) -> None:
+    """Draw what one sensor measured."""
+    values = np.where(np.abs(series.values) < _LARGEST, series.values, np.nan)
+    for column, color in zip(range(values.shape[1]), (_BLUE, _ORANGE, _GREEN)):
+        label = series.labels[column] if series.labels else ""
+        ax.plot(series.times, values[:, column], color=color, linewidth=1, label=label)
+    ax.set_ylabel(series.unit)
+    _title(ax, series.title, legend=bool(series.labels))
 
 
 def _draw_path(ax: Axes, rows: np.ndarray, timeline: Timeline) -> None:

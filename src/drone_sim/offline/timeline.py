@@ -17,24 +17,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
-from drone_sim.config.errors import told
-from drone_sim.config.types import Finite, Label, Location, Within, numeric, readable_key
+from drone_sim.config.errors import changed
+from drone_sim.config.types import (
+    Checked,
+    Finite,
+    Label,
+    Location,
+    ParameterError,
+    Within,
+    numeric,
+    one_line,
+    readable_key,
+)
 from drone_sim.files import yaml_files
 from drone_sim.forces.pushes import Push
-from drone_sim.mechanics.frames import Vector, from_rpy, to_quaternion
+from drone_sim.mechanics.frames import Vector, from_rpy, to_quaternion, to_rpy
+from drone_sim.mechanics.object_tree import WORLD, ObjectTree
 from drone_sim.mechanics.state import Pose, Twist
-from drone_sim.offline.changes import CHANGES, Change, read_change
-from drone_sim.offline.moves import ObjectMove
+from drone_sim.message_text import near_names, shown
 from drone_sim.run.parameters import Parameters
 from drone_sim.vehicles import checks
+from drone_sim.vehicles.commands import EMPTY, REQUESTS
 from drone_sim.vehicles.parameters import EquipmentParameters, VehicleParameters
-from drone_sim.vehicles.requests import EMPTY, REQUESTS
 from drone_sim.vehicles.vehicle import Vehicle
-from drone_sim.wording import near_names, shown
 
 MAX_TIME = 1e6  # s, the longest flight
 _ZERO = (0.0, 0.0, 0.0)
@@ -45,11 +55,66 @@ class TimelineError(ValueError):
     """A timeline is wrong; one line that names file, entry (from 1), key, value and what is allowed."""
 
 
+class ScriptRequest(NamedTuple):
+    """What a vehicle's script is asked for: the topic, and a pose where it needs one."""
+
+    topic: str
+    pose: Pose | None = None
+
+
+class ObjectMove(NamedTuple):
+    """Where an object is to be (m, rad, world); without angles it stays turned as it is."""
+
+    name: str  # as scripts find it
+    position: Vector
+    rpy: Vector | None
+
+    def apply(self, objects: ObjectTree) -> None:
+        """Put it there, with all that hangs on it. Raises ValueError where there is no such object."""
+        handle = objects.handle(self.name)
+        rpy = to_rpy(objects.matrix(handle)) if self.rpy is None else self.rpy
+        objects.set_matrix(handle, WORLD, from_rpy(self.position, rpy))
+
+
+@dataclass(frozen=True)
+class ParameterChange:
+    """Keys of the parameters that become others."""
+
+    changes: Mapping[str, Any]
+
+    def checked(self, _parameters: EquipmentParameters) -> ParameterChange:
+        """Return this: it has been checked."""
+        return self
+
+    def apply(self, vehicle: Vehicle) -> None:
+        """Change them."""
+        raise NotImplementedError
+
+
+class WeatherChange(ParameterChange):
+    """Keys of `weather`, for all vehicles."""
+
+    def apply(self, vehicle: Vehicle) -> None:
+        """Change the air that it is in."""
+        vehicle.context.change_weather(self.changes)
+
+
+class FaultsChange(ParameterChange):
+    """Keys of `faults`, for one vehicle."""
+
+    def apply(self, vehicle: Vehicle) -> None:
+        """Change what is wrong with it."""
+        vehicle.change_faults(self.changes)
+
+
+CHANGES: dict[str, type[ParameterChange]] = {"weather": WeatherChange, "faults": FaultsChange}
+
+
 class Entry(NamedTuple):
     """What happens to a vehicle ('' is the first) at `at` seconds of simulated time."""
 
     at: float
-    action: Twist | Pose | Push | Change | Request | ObjectMove
+    action: Twist | Pose | Push | ParameterChange | ScriptRequest | ObjectMove
     vehicle: str = ""
 
     @property
@@ -61,31 +126,24 @@ class Entry(NamedTuple):
         """Do it to one of these."""
         vehicle = vehicles[self.vehicle] if self.vehicle else next(iter(vehicles.values()))
         if isinstance(self.action, Twist):
-            vehicle.receive(self.action)
+            vehicle.commands.receive(self.action)
         elif isinstance(self.action, Pose):
-            vehicle.move(self.action)
+            vehicle.body.move(self.action)
         elif isinstance(self.action, Push):
-            vehicle.push(*self.action)
-        elif isinstance(self.action, Request):
+            vehicle.pushes.add(self.action)
+        elif isinstance(self.action, ScriptRequest):
             vehicle.ask(*self.action)
         elif isinstance(self.action, ObjectMove):
-            self.action.apply(vehicle.objects)
+            self.action.apply(vehicle.context.objects)
         else:
             self.action.apply(vehicle)
-
-
-class Request(NamedTuple):
-    """What a vehicle's script is asked for: the topic, and a pose where it needs one."""
-
-    topic: str
-    pose: Pose | None = None
 
 
 class Timeline:
     """Entries by the simulation step whose actuation is the first at or after their time."""
 
     def __init__(self, entries: Iterable[Entry], time_step: float):
-        """Sort the entries by time, those of one time in the order given; `time_step` in seconds."""
+        """Sort the `entries` by time, those of one time in the order given; `time_step` in seconds."""
         self.entries = sorted(entries, key=lambda entry: entry.at)
         self._time_step = time_step
         self._due: dict[int, list[Entry]] = {}
@@ -127,15 +185,16 @@ def of_rows(rows: Any, parameters: Parameters, path: str, above: Location = ()) 
         key = f"{readable_key(above)}: " if above else ""
         raise TimelineError(f"{path}: {key}must be a list of `- {{at: 1.0, twist: ...}}` entries, not {shown(rows)}")
     entries: list[Entry] = []
-    wrong: list[tuple[Location, str]] = []
+    wrong: _Wrong = []
     for index, row in enumerate(rows):
-        try:
-            entries.append(_entry(row, parameters))
-        except _WrongKeys as error:
-            wrong += [((*above, index, *location), f"entry {index + 1}: {text}") for location, text in error.found]
+        found: _Wrong = []
+        entry = _entry(row, parameters, found)
+        if entry is not None:
+            entries.append(entry)
+        wrong += [((*above, index, *location), f"entry {index + 1}: {text}") for location, text in found]
     if wrong:
         lines = yaml_files.lines(path)
-        raise TimelineError(told([(lines.find(location).line, text) for location, text in wrong], path))
+        raise TimelineError(one_line([(lines.find(location).line, text) for location, text in wrong], path))
     return Timeline(entries, parameters.time_step)
 
 
@@ -159,11 +218,11 @@ class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class _Time(_Model):
+class _TimeModel(_Model):
     at: Annotated[Finite, Within(0, MAX_TIME)]
 
 
-class _Twist(_Model):
+class _TwistModel(_Model):
     linear: _Vector = _ZERO
     angular: _Vector = _ZERO
 
@@ -171,7 +230,7 @@ class _Twist(_Model):
         return checks.twist(self.linear, self.angular, parameters)
 
 
-class _Pose(_Model):
+class _PoseModel(_Model):
     position: _Vector = _ZERO
     rpy: _Vector = _ZERO
 
@@ -179,7 +238,7 @@ class _Pose(_Model):
         return checks.pose(self.position, to_quaternion(from_rpy(_ZERO, self.rpy)), parameters)
 
 
-class _Object(_Model):
+class _ObjectModel(_Model):
     name: Label
     position: _Vector
     rpy: _Vector | None = None
@@ -188,22 +247,22 @@ class _Object(_Model):
         return ObjectMove(self.name, self.position, self.rpy)
 
 
-class _Goto(_Pose):
-    def checked(self, parameters: EquipmentParameters) -> Request:  # type: ignore[override]
-        return Request("goto", super().checked(parameters))
+class _GotoModel(_PoseModel):
+    def checked(self, parameters: EquipmentParameters) -> ScriptRequest:  # type: ignore[override]
+        return ScriptRequest("goto", super().checked(parameters))
 
 
 def _asking(topic: str) -> type[_Model]:
     """Return the model of a request that says no more than its name."""
 
     class Asking(_Model):
-        def checked(self, _parameters: EquipmentParameters) -> Request:
-            return Request(topic)
+        def checked(self, _parameters: EquipmentParameters) -> ScriptRequest:
+            return ScriptRequest(topic)
 
     return Asking
 
 
-class _Push(_Model):
+class _PushModel(_Model):
     force: _Vector = _ZERO
     torque: _Vector = _ZERO
     duration: Annotated[Finite, Within(1e-4, MAX_TIME)]
@@ -213,70 +272,77 @@ class _Push(_Model):
 
 
 _KINDS: dict[str, type[Any]] = {
-    **{"twist": _Twist, "pose": _Pose, "push": _Push, "goto": _Goto, "object": _Object},
+    **{"twist": _TwistModel, "pose": _PoseModel, "push": _PushModel, "goto": _GotoModel, "object": _ObjectModel},
     **{topic: _asking(topic) for topic, kind in REQUESTS.items() if kind == EMPTY},
 }
 _ALL_KINDS = (*_KINDS, *CHANGES)
 
 
-class _WrongKeys(Exception):
-    """What is wrong with an entry: the keys on the way to each wrong value, and a text."""
-
-    def __init__(self, *found: tuple[Location, str]):
-        super().__init__()
-        self.found = found
+_Wrong = list[tuple[Location, str]]  # the keys on the way to each wrong value, and a text
 
 
-def _entry(row: Any, parameters: Parameters) -> Entry:
-    """Return an entry; raises _WrongKeys."""
-    here: Location = ()
+def _entry(row: Any, parameters: Parameters, wrong: _Wrong) -> Entry | None:
+    """Return an entry; or None, with what is wrong with it added to `wrong`, which is empty before."""
     if not isinstance(row, dict):
-        raise _WrongKeys((here, f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
+        wrong.append(((), f"{shown(row)}: must be a mapping such as {{at: 1.0, twist: ...}}"))
+        return None
     known = ("at", "vehicle", *_ALL_KINDS)
-    unknown: list[tuple[Location, str]] = [
-        ((key,), f"{readable_key((key,))}: unknown key; known are {', '.join(known)}")
-        for key in row
-        if key not in known
-    ]
+    unknown = f"unknown key; known are {', '.join(known)}"
+    wrong += [((key,), f"{readable_key((key,))}: {unknown}") for key in row if key not in known]
     kinds = [kind for kind in _ALL_KINDS if kind in row]
     if len(kinds) != 1:
         held = " and ".join(kinds) or "none"
-        raise _WrongKeys(*(unknown or [(here, f"must hold one of {', '.join(_ALL_KINDS)}; it holds {held}")]))
+        wrong += [] if wrong else [((), f"must hold one of {', '.join(_ALL_KINDS)}; it holds {held}")]
+        return None
     kind = kinds[0]
-    times = {key: row[key] for key in row if key == "at"}
-    at, no_time = _checked(_Time, times, ())
-    own, no_vehicle = _vehicle(row.get("vehicle", ""), parameters)
+    at = _checked(_TimeModel, {"at": row["at"]} if "at" in row else {}, (), wrong)
+    own = _vehicle(row.get("vehicle", ""), parameters, wrong)
     values = {} if row[kind] is None and REQUESTS.get(kind) == EMPTY else row[kind]
     is_change = kind in CHANGES
-    action, no_action = (
-        read_change(kind, values, parameters, own) if is_change else _checked(_KINDS[kind], values, (kind,))
+    action = (
+        _change(kind, values, parameters, own, wrong) if is_change else _checked(_KINDS[kind], values, (kind,), wrong)
     )
-    wrong = [*unknown, *no_time, *no_vehicle, *no_action]
     if wrong:
-        raise _WrongKeys(*wrong)
+        return None
     try:
         return Entry(at.at, action.checked(own), row.get("vehicle", ""))
     except checks.Refused as refused:
-        key = str(refused).partition(".")[0].partition(" ")[0]
-        raise _WrongKeys(((kind, key), f"{kind}.{refused}")) from None
+        wrong.append(((kind, refused.field), f"{kind}.{refused}"))
+        return None
 
 
-def _vehicle(name: Any, parameters: Parameters) -> tuple[VehicleParameters, list[tuple[Location, str]]]:
-    """Return what is allowed of a vehicle, and what is wrong with its name."""
+def _vehicle(name: Any, parameters: Parameters, wrong: _Wrong) -> VehicleParameters:
+    """Return what is allowed of a vehicle; of the first one for a wrong name."""
     fleet = {one.name: one for one in parameters.fleet}
-    if name == "" or (isinstance(name, str) and name in fleet):
-        return fleet.get(name, parameters.first), []
-    return parameters.first, [
-        (("vehicle",), f"vehicle = {shown(name)}: no such vehicle; {near_names(str(name), fleet)}")
-    ]
+    if name != "" and not (isinstance(name, str) and name in fleet):
+        wrong.append((("vehicle",), f"vehicle = {shown(name)}: no such vehicle; {near_names(str(name), fleet)}"))
+        return parameters.first
+    return fleet.get(name, parameters.first)
 
 
-def _checked(model: type[Any], values: Any, above: Location) -> tuple[Any, list[tuple[Location, str]]]:
-    """Return a model of the values, or None and what is wrong with them."""
+def _change(kind: str, values: Any, parameters: Parameters, vehicle: VehicleParameters, wrong: _Wrong) -> Any:
+    """Return the change that an entry's `weather` or `faults` asks for, or None."""
+    base: Checked = parameters.weather if kind == "weather" else vehicle.faults
     try:
-        return model.model_validate(values), []
+        new = changed(base, values)
+    except ParameterError as error:
+        wrong += [(one.location, one.text) for one in error.below(kind).problems]
+        return None
+    try:
+        if kind == "faults":
+            vehicle.model_copy(update={"faults": new}).check_faults()
+    except ParameterError as error:
+        wrong += [(one.location, one.text) for one in error.problems]
+    return CHANGES[kind](values)
+
+
+def _checked(model: type[Any], values: Any, above: Location, wrong: _Wrong) -> Any:
+    """Return a model of the values, or None."""
+    try:
+        return model.model_validate(values)
     except ValidationError as error:
-        return None, [((*above, *one["loc"]), _one_line(one, model, above)) for one in error.errors()]
+        wrong += [((*above, *one["loc"]), _one_line(one, model, above)) for one in error.errors()]
+        return None
 
 
 def _one_line(error: Any, model: type[BaseModel], above: Location) -> str:

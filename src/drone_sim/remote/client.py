@@ -6,24 +6,23 @@ import functools
 from collections.abc import Callable, Generator, Iterable
 from typing import Any
 
-from drone_sim.remote.arrangement import Arrangement
-from drone_sim.remote.control import STATES, Control
-from drone_sim.remote.conversation import Call, ClientFunction, Refused, Task
+from drone_sim.message_text import near_names
+from drone_sim.remote.control import ClientControl, MovedObjects
+from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task
 from drone_sim.remote.host import ClientHost
-from drone_sim.remote.messages import Request
-from drone_sim.remote.stepping import Stepping
-from drone_sim.run.pacing import Stopwatch
+from drone_sim.remote.messages import ClientRequest
 from drone_sim.run.player import Player
-from drone_sim.run.whereabouts import Diverged
+from drone_sim.run.stepping import Diverged
 from drone_sim.scripting import script_log
 from drone_sim.scripting.api.backend import Backend
-from drone_sim.scripting.api.calls import Api, Function, contents, explain
+from drone_sim.scripting.api.calls import Api, Function, contents, explain, functions_of
+from drone_sim.scripting.api.control import Wait
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
 from drone_sim.scripting.api.service_servers import ServiceRequest
 from drone_sim.scripting.api.types import Name
-from drone_sim.scripting.errors import ScriptError, UnknownName
-from drone_sim.wording import near_names
+from drone_sim.scripting.api.unknown import not_there
+from drone_sim.scripting.errors import ScriptError
 
 _IS_FUNCTION = "@func"  # what the name of a client's own function ends in, among the arguments
 _BUFFERS = ("getStringSignal", "getVisionSensorImg", "getVisionSensorDepth", "packTable", "readCustomDataBlock")
@@ -36,19 +35,22 @@ class Client:
     def __init__(
         self,
         player: Player,
-        arrangement: Arrangement,
+        moved: MovedObjects,
         backend: Backend | None,
         everybody: Callable[[], Iterable[Stepping]],
         clock: Callable[[], float],
     ):
-        """Take what plays the simulation, what carries messages, and a monotonic clock of real seconds."""
+        """`player` plays the simulation, `moved` watches where objects are put, `backend` carries messages.
+
+        `everybody` returns the say that each client has in the steps; `clock` counts real seconds.
+        """
         self.stepping = Stepping()
         self.connections: set[int] = set()
-        self.silence = Stopwatch(clock)
+        self.heard = clock()  # s, when it last said something
         self.patience = 0.0  # s
         self.tasks: dict[tuple[bytes, ...], list[Task]] = {}  # what is not answered yet, by the way back
         self._simulation = player.simulation
-        self._control = Control(player, arrangement, self.stepping, everybody, clock)
+        self._control = ClientControl(player, moved, self.stepping, everybody, clock)
         self._bus = MessageBus(next(iter(self._simulation.vehicles), ""), {})
         self._bus.backend = backend
         self._run = self._era = -1
@@ -56,8 +58,8 @@ class Client:
         self._modules: dict[str, Api] = {}
         self._functions: dict[str, Function] = {}
 
-    def answer(self, request: Request) -> Task:
-        """Carry out a request; raises Refused."""
+    def answer(self, request: ClientRequest) -> Task:
+        """Carry out a request; raises RequestRefused."""
         self._keep_up()
         yield from self._hear()
         function = self._function(request.function)
@@ -66,14 +68,16 @@ class Client:
             arguments.pop()
         try:
             values = function(*arguments)
+            if isinstance(values, Wait):
+                values = self._control.wait_for(values)
             if isinstance(values, Generator):
                 values = yield from values
-        except Refused:
+        except RequestRefused:
             raise
         except _OWN_LINES as error:
-            raise Refused(str(error)) from None
+            raise RequestRefused(str(error)) from None
         except Exception as error:
-            raise Refused(explain(request.function, function, arguments, error)) from None
+            raise RequestRefused(explain(request.function, function, arguments, error)) from None
         finally:
             script_log.end_call()
         return _values(request.function, values)
@@ -83,7 +87,7 @@ class Client:
         self.stepping.let_go()
         self.tasks.clear()
         self._bus.close()
-        drawings = self._simulation.shared.drawings
+        drawings = self._simulation.context.drawings
         if self._run == self._simulation.run:
             for handle in self._drawn & set(drawings.objects):
                 drawings.remove(handle)
@@ -101,7 +105,7 @@ class Client:
         if self._era != simulation.era:
             self._era = simulation.era
             host = ClientHost(simulation)
-            ros = make_sim_ros(self._bus, simulation.shared.time)
+            ros = make_sim_ros(self._bus, simulation.clock)
             self._modules = {"sim": self._sim(host), "simROS": ros, **make_plugins(host)}
             self._functions = {
                 f"{name}.{function}": one
@@ -111,20 +115,18 @@ class Client:
 
     def _sim(self, host: ClientHost) -> Api:
         name, functions, constants = contents(make_sim(host, host.surroundings()))
-        drawing = {one: self._recorded(functions[one]) for one in ("addDrawingObject",)}
-        return Api(name, {**functions, **drawing, **self._control.functions()}, {**constants, **STATES})
+        draw = functions["addDrawingObject"]
 
-    def _recorded(self, make: Function) -> Function:
-        @functools.wraps(make)
-        def call(*arguments: Any) -> Any:
-            handle = make(*arguments)
+        @functools.wraps(draw)
+        def recorded(*arguments: Any) -> Any:
+            handle = draw(*arguments)
             self._drawn.add(handle)
             return handle
 
-        return call
+        return Api(name, {**functions, draw.__name__: recorded, **functions_of(self._control)}, constants)
 
     def _function(self, name: str) -> Function:
-        """Return a function by name; raises Refused."""
+        """Return a function by name; raises RequestRefused."""
         function = self._functions.get(name)
         if function is not None:
             return function
@@ -133,8 +135,11 @@ class Client:
             return own[name]
         module, dot, function_name = name.partition(".")
         if dot and module in self._modules:
-            raise Refused(str(_unknown(self._modules[module], function_name)))
-        raise Refused(f"no function '{name:.80}'; {near_names(name[:80], [*self._functions, *own])}")
+            _, functions, constants = contents(self._modules[module])
+            if function_name in constants:
+                raise RequestRefused(f"{name} is no function")
+            raise RequestRefused(not_there(f"{module}.", function_name, [*functions, *constants]))
+        raise RequestRefused(f"no function '{name:.80}'; {near_names(name[:80], [*self._functions, *own])}")
 
     def require(self, module: Name) -> None:
         """Raise ValueError for a module that there is not."""
@@ -157,14 +162,6 @@ class Client:
                 yield Call(name, [message])
             elif not message.is_abandoned:
                 message.answer((yield Call(name, [message.content])))
-
-
-def _unknown(api: Api, name: str) -> UnknownName:
-    try:
-        getattr(api, name)
-    except UnknownName as error:
-        return error
-    return UnknownName(f"{contents(api)[0]}.{name} is no function")
 
 
 def _argument(value: Any) -> Any:

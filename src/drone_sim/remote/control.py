@@ -3,60 +3,88 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
-from drone_sim.remote.arrangement import Arrangement
-from drone_sim.remote.conversation import Call, ClientFunction, Refused, Task, Until
-from drone_sim.remote.stepping import Stepping
-from drone_sim.run.pacing import Stopwatch
+from drone_sim.files.resources import resolve
+from drone_sim.mechanics.frames import Matrix
+from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Until
 from drone_sim.run.player import Player
-from drone_sim.scripting.api.calls import Function, WrongValue, numbers
-from drone_sim.scripting.api.types import Name, Number
+from drone_sim.run.simulation import Simulation
+from drone_sim.scene.models import inside
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.control import Wait, has_passed
+from drone_sim.scripting.api.types import Name, Number, WrongValue, numbers
 
-STATES = {  # CoppeliaSim's values (simConst.h)
-    "simulation_stopped": 0,
-    "simulation_paused": 8,
-    "simulation_advancing": 16,
-    "simulation_advancing_firstafterstop": 16,
-    "simulation_advancing_running": 17,
-    "simulation_advancing_lastbeforepause": 18,
-    "simulation_advancing_firstafterpause": 19,
-    "simulation_advancing_abouttostop": 20,
-    "simulation_advancing_lastbeforestop": 21,
-}
-_STOPPED, _PAUSED, _RUNNING = (STATES[f"simulation_{one}"] for one in ("stopped", "paused", "advancing_running"))
+_STOPPED, _PAUSED, _RUNNING = (CONSTANTS[f"simulation_{one}"] for one in ("stopped", "paused", "advancing_running"))
 _MOST_CALLS = 10_000
+Places = dict[str, Matrix]  # by the names of objects
 
 
-class Control:
+class MovedObjects:
+    """Where objects are put while the simulation is stopped: V-REP begins there; here `start` reads the scene anew."""
+
+    def __init__(self, simulation: Simulation):
+        """Take the simulation."""
+        self._simulation = simulation
+        self._era = -1
+        self._initial: Places = {}
+
+    def watch(self) -> None:
+        """Remember how an era begins; call it before anything is done to the simulation."""
+        if self._era != self._simulation.era:
+            self._era = self._simulation.era
+            self._initial = {} if self._simulation.running else self._all()
+
+    def places(self) -> Places:
+        """Return where in the world what is that has been put somewhere else since the simulation stopped.
+
+        Carried by an object that was moved is not moved.
+        """
+        objects = self._simulation.context.objects
+        changed = (name for name, place in self._all().items() if self._initial.get(name, place) != place)
+        return {name: objects[objects.handle(name)].matrix() for name in changed}
+
+    def put(self, places: Places) -> None:
+        """Put objects there again, as far as there still are some of these names."""
+        objects = self._simulation.context.objects
+        for name, place in places.items():
+            if name in objects:
+                objects[objects.handle(name)].put(place)
+
+    def _all(self) -> Places:
+        """Return where every object is: in the world what the dynamics moves, else in its parent."""
+        objects = self._simulation.context.objects
+        found = (objects[handle] for handle in objects)
+        return {one.name: one.local if one.body is None else one.matrix() for one in found}
+
+
+class ClientControl:
     """What a client does with the simulation as V-REP's toolbar does, and how it steps."""
 
     def __init__(
         self,
         player: Player,
-        arrangement: Arrangement,
+        moved: MovedObjects,
         stepping: Stepping,
         everybody: Callable[[], Iterable[Stepping]],
         clock: Callable[[], float],
     ):
-        """Take what plays the simulation, where objects are put, the client's say in the steps, and all clients'.
+        """`player` plays the simulation, `moved` watches where objects are put; `clock` counts real seconds.
 
-        `clock` counts real seconds.
+        `stepping` is the client's say in the steps, `everybody` returns all clients'.
         """
         self._clock = clock
         self._player = player
         self._simulation = player.simulation
-        self._arrangement = arrangement
+        self._moved = moved
         self._stepping = stepping
         self._everybody = everybody
 
-    def functions(self) -> dict[str, Function]:
-        """Return what a client may call, by name."""
-        names = [name for name in dir(self) if not name.startswith("_") and name != "functions"]
-        return {**{name: getattr(self, name) for name in names}, "yield": self.step, "switchThread": self.step}
-
     # ---- the toolbar
 
+    @sim("345")
     def startSimulation(self) -> None:
         """Begin at time 0, or go on after a pause; what was moved while it was stopped begins where it was put."""
         if self._player.playing:
@@ -64,81 +92,84 @@ class Control:
         if self._simulation.running:
             self._player.pause(False)
             return
-        moved = self._arrangement.moved()
+        moved = self._moved.places()
         self._player.start()
-        self._arrangement.put(moved)
+        self._moved.put(moved)
 
+    @sim("345")
     def pauseSimulation(self) -> None:
         """Pause, unless it is stopped."""
         if self._simulation.running:
             self._player.pause(True)
 
+    @sim("345")
     def stopSimulation(self, _wait: bool = True) -> None:
         """Stop, and restore the initial scene. As in CoppeliaSim, stepping is off for all clients then."""
         for one in self._everybody():
             one.let_go()
         self._player.stop()
 
+    @sim("345")
     def getSimulationState(self) -> int:
         """Return sim.simulation_stopped, _paused or _advancing_running."""
         return _RUNNING if self._player.playing else _PAUSED if self._simulation.running else _STOPPED
 
+    # ---- scenes
+
+    @sim("345")
+    def loadScene(self, filename: Name) -> int:
+        """Let another scene file, beside the last one, take its place while the simulation is stopped; return 1."""
+        if self._simulation.running:
+            raise ValueError("a scene is loaded while the simulation is stopped: call stopSimulation first")
+        self._simulation.load_scene(str(self._beside(filename)))
+        return 1
+
+    @sim("345")
+    def saveScene(self, filename: Name) -> int:
+        """Write the scene as it stands into a file (.yaml) beside the scene file; return 1."""
+        self._simulation.save_scene(self._beside(filename))
+        return 1
+
+    def _beside(self, filename: str) -> Path:
+        file = self._simulation.parameters.scene_file
+        return inside(resolve(file).parent if file else None, filename)
+
     # ---- steps
 
+    @sim("5")
     def setStepping(self, enabled: bool = True) -> int:
         """Let the simulation step only when this client calls `step`, or freely; return the level from before."""
         return self._stepping.set(bool(enabled))
 
-    def step(self, *_wait: Any) -> Task:
-        """Let the simulation take a step, and return when it has. Raises Refused where a script fails in it."""
-        simulation, player = self._simulation, self._player
-        run, steps = simulation.run, simulation.steps
-        if player.playing:
-            yield self._stepping.wait(Until(lambda: (simulation.run, simulation.steps) != (run, steps)))
-            self._raise_failure(run)
-
-    def wait(self, seconds: Number, simulationTime: bool = True) -> Task:
+    @sim("345")
+    def wait(self, seconds: Number, simulationTime: bool = True) -> Wait:
         """Return after so many seconds: of simulated time, for which it is stepped, or else of real time."""
         (duration,) = numbers((seconds,), 1)
-        simulation, run = self._simulation, self._simulation.run
-        if not simulationTime:
-            watch = Stopwatch(self._clock)
-            yield self._stepping.wait(Until(lambda: watch.seconds() >= duration))
-        elif self._player.playing:
-            ahead = simulation.time + duration - 1e-9  # which a number of steps adds up to
-            yield self._stepping.wait(Until(lambda: simulation.run != run or simulation.time >= ahead))
-            self._raise_failure(run)
-        return duration
+        clock = (lambda: self._simulation.time) if simulationTime else self._clock
+        return Wait(has_passed(clock, duration), lambda: duration, by_steps=bool(simulationTime))
 
-    def waitForSignal(self, name: Name) -> Task:
-        """Return the value of a signal of any kind, as soon as it is set; nothing where the simulation stops before."""
-        simulation, run, signals = self._simulation, self._simulation.run, self._simulation.shared.signals
-        kinds = (signals.getInt32Signal, signals.getFloatSignal, signals.getStringSignal)
-
-        def value() -> Any:
-            return next((one for one in (get(name) for get in kinds) if one is not None), None)
-
-        if value() is None:
-            yield self._stepping.wait(Until(lambda: simulation.run != run or value() is not None))
-        return value()
-
+    @sim("345")
     def getSystemTime(self) -> float:
         """Return the real time in seconds, from any beginning."""
         return self._clock()
 
+    @sim("5")
     def acquireLock(self) -> None:
         """Let the simulation stand until releaseLock."""
         self._stepping.lock(1)
 
+    @sim("5")
     def releaseLock(self) -> None:
         """Let the simulation go on that acquireLock had stand."""
         self._stepping.lock(-1)
 
     # ---- calls of the client's own functions
 
+    @sim("")
     def handleExtCalls(self) -> None:
         """Do nothing: messages that wait for the client are handed to it before whatever it asks for."""
 
+    @sim("")
     def testCB(self, first: Any, callback: Any, second: Any, iterations: int = 99) -> Task:
         """Call a function of the client's with two values, so many times and once more; return what it returned."""
         if not isinstance(callback, ClientFunction):
@@ -150,6 +181,17 @@ class Control:
             answer = yield Call(callback.name, [first, second])
         return answer
 
-    def _raise_failure(self, run: int) -> None:
-        if self._simulation.run != run and self._player.failure:
-            raise Refused(str(self._player.failure))
+    def wait_for(self, wait: Wait) -> Task:
+        """Let the simulation go on until a wait is over; return what it brings.
+
+        Where that takes steps, and the simulation is not playing, nothing is waited for. Raises RequestRefused where a
+        script fails in such a step.
+        """
+        simulation, run = self._simulation, self._simulation.run
+        if wait.by_steps and not self._player.playing:
+            return wait.value()
+        if not wait.over():
+            yield self._stepping.wait(Until(lambda: simulation.run != run or wait.over()))
+        if wait.by_steps and simulation.run != run and self._player.failure:
+            raise RequestRefused(str(self._player.failure))
+        return wait.value()

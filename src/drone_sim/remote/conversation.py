@@ -1,13 +1,16 @@
-"""What a request may have to wait for before it has its answer: a task is a generator that yields these.
+"""What a request may have to wait for before it has its answer, and who lets the simulation step meanwhile.
+
+A task is a generator that yields what it waits for, and returns the list of values that the client gets:
 
     values = yield Call("on_message", [message])     the client calls a function of its own
     yield Until(lambda: simulation.steps > steps)    the simulation goes on
 
-and returns the list of values that the client gets.
+The simulation steps when every client that wants to be asked has said so.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Generator
 from typing import Any, NamedTuple
 
@@ -25,7 +28,7 @@ class Until(NamedTuple):
     over: Callable[[], bool]
 
 
-class Refused(Exception):
+class RequestRefused(Exception):
     """What a client asked for cannot be done; one line that says why, which the client raises."""
 
 
@@ -47,3 +50,62 @@ class ClientFunction:
 def returned(values: list[Any]) -> Any:
     """Return what a client's function has returned: nothing, one value, or several."""
     return None if not values else values[0] if len(values) == 1 else tuple(values)
+
+
+class Stepping:
+    """One client's say. Levels and locks count, as CoppeliaSim's do: what was switched on twice is off after twice."""
+
+    def __init__(self) -> None:
+        """Let the simulation run."""
+        self.level = 0
+        self.locks = 0
+        self._waits: list[Until] = []
+
+    def set(self, enabled: bool) -> int:
+        """Be asked before every step, or no more; return the level from before."""
+        before = self.level
+        self.level = before + 1 if enabled else max(0, before - 1)
+        return before
+
+    def lock(self, more: int) -> None:
+        """Let the simulation stand as long as there are locks."""
+        self.locks = max(0, self.locks + more)
+
+    def wait(self, until: Until) -> Until:
+        """Let the simulation go on until then; return what to wait for."""
+        self._waits = [one for one in self._waits if not one.over()]
+        self._waits.append(until)
+        return until
+
+    def let_go(self) -> None:
+        """Let the simulation run, whatever was said before."""
+        self.level = self.locks = 0
+
+    @property
+    def holds(self) -> bool:
+        """Whether the next step has to wait for this client."""
+        return bool(self.locks or (self.level and all(one.over() for one in self._waits)))
+
+
+class RemoteApi:
+    """Who else has a say in when the simulation steps, and is to be heard meanwhile: nobody, unless it is a server."""
+
+    address = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the next step has to wait."""
+        return False
+
+    def wait(self, seconds: float) -> None:
+        """Sleep for so long, or until somebody has been heard."""
+        time.sleep(seconds)
+
+    def serve(self) -> None:
+        """Hear whoever has come by now."""
+
+    def wake(self) -> None:
+        """End a `wait`; any thread may call it."""
+
+    def close(self) -> None:
+        """Let go of everybody."""

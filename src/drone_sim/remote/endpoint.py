@@ -27,7 +27,7 @@ class Endpoint:
     """A ROUTER for the clients' REQ sockets. One thread owns it; `wake` alone may be called from any."""
 
     def __init__(self, address: str, port: int):
-        """Listen; port 0 is a free one. Raises OSError, in one line."""
+        """Listen on an `address`, and a `port`, of which 0 is a free one. Raises OSError, in one line."""
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.setsockopt(zmq.LINGER, 0)

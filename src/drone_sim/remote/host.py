@@ -3,54 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
+from drone_sim.hosting.child_scripts import surroundings
 from drone_sim.mechanics.frames import Vector
 from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.host import Readable, Surroundings
 from drone_sim.scripting.api.registry import Attachment, Callee, Scripts
-from drone_sim.scripting.api.turns import Turns
 from drone_sim.scripting.time_limit import TimeLimit
-from drone_sim.vehicles.child_script import surroundings
 from drone_sim.vehicles.quadricopter_objects import DRONE
-from drone_sim.vehicles.shared_view import SharedView
 from drone_sim.vehicles.vehicle import Vehicle
 
 
-class ClientHost(SharedView):
+class ClientHost:
     """Names without a suffix mean the first vehicle's objects, as in its script."""
 
     def __init__(self, simulation: Simulation):
         """Take the simulation as it is in this era."""
-        super().__init__(simulation.shared)
+        self.context = replace(simulation.context, scripts=_FromOutside(simulation.context.scripts))
+        self._operations = simulation.operations
         self._vehicles = list(simulation.vehicles.values())
 
     def surroundings(self) -> Surroundings:
         """Return clock, cameras and the rest; no client's call is ended after a time."""
-        return surroundings(self._vehicles, self._shared, TimeLimit(0.0), Turns())
+        return surroundings(self._vehicles, self.context, self._operations, TimeLimit(0.0), Turns())
 
     @property
     def sensors(self) -> Mapping[str, Readable]:
         """The sensors of all vehicles."""
-        return {name: sensor for one in self._vehicles for name, sensor in one.sensors.items()}
-
-    @property
-    def scripts(self) -> Scripts:
-        """The scripts of the simulation."""
-        return _FromOutside(self._shared.scripts)
+        return {name: sensor for one in self._vehicles for name, sensor in one.instruments.by_object.items()}
 
     @property
     def own_script(self) -> str:
         """Name of the object whose script `sim.handle_self` means: the first vehicle's."""
-        return self._vehicles[0].own_script if self._vehicles else DRONE
+        return self._vehicles[0].object_name if self._vehicles else DRONE
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m)."""
-        self._of(shape).add_force(shape, force, torque, offset)
+        self._of(shape).propulsion.add_force(shape, force, torque, offset)
 
     def turn_joint(self, joint: str, angle: float | None) -> float:
         """Turn a propeller's blades to an angle (rad), unless None; return the angle."""
-        return self._of(joint).turn_joint(joint, angle)
+        return self._of(joint).propulsion.blades.turn(joint, angle)
 
     def _of(self, name: str) -> Vehicle:
         """Return the vehicle whose objects end in the same suffix; the first for an object of the scene.

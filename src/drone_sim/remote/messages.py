@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import cbor2
 import numpy as np
 
+from drone_sim.message_text import shown
 from drone_sim.scripting.api.script_values import DEEPEST, refuse_if_too_large
-from drone_sim.wording import shown
 
 EXECUTED = "_*executed*_"
 END = "_*end*_"  # says goodbye
@@ -29,7 +29,7 @@ _NUMBERS = {  # RFC 8746: arrays of numbers in one string of bytes, by tag
 }  # fmt: skip
 
 
-class Request(NamedTuple):
+class ClientRequest(NamedTuple):
     """What a client wants: a function such as sim.getObject, by name, and what to call it with.
 
     client: its uuid, '' in version 1; patience: s without a word from it after which it counts as gone.
@@ -41,7 +41,7 @@ class Request(NamedTuple):
     patience: float = _PATIENCE
 
 
-def read(payload: bytes) -> Request:
+def read(payload: bytes) -> ClientRequest:
     """Return the request in a message. Raises ValueError, in one line, for what is none."""
     try:
         content = cbor2.loads(payload, tag_hook=_untagged, max_depth=DEEPEST + 2)
@@ -49,7 +49,7 @@ def read(payload: bytes) -> Request:
         raise ValueError(f"no request: {' '.join(str(error).split())[:_LONGEST]}") from None
     if not isinstance(content, dict):
         raise ValueError(f"no request: a map with `func` and `args` is expected, not {shown(content)}")
-    return Request(
+    return ClientRequest(
         _text(content, "func"),
         _arguments(content.get("args")),
         _text(content, "uuid", ""),

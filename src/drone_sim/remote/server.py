@@ -7,12 +7,11 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from drone_sim.remote import messages
-from drone_sim.remote.arrangement import Arrangement
 from drone_sim.remote.client import Client
-from drone_sim.remote.conversation import Until, returned
+from drone_sim.remote.control import MovedObjects
+from drone_sim.remote.conversation import RemoteApi, Stepping, Until, returned
 from drone_sim.remote.endpoint import Endpoint, Incoming
-from drone_sim.remote.messages import Request
-from drone_sim.remote.stepping import Stepping
+from drone_sim.remote.messages import ClientRequest
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 from drone_sim.scripting.api.backend import Backend
@@ -30,7 +29,7 @@ class _Waiting(NamedTuple):
     until: Until
 
 
-class Server:
+class RemoteApiServer(RemoteApi):
     """Serves the remote API. One thread owns it, that of the simulation; `wake` alone may be called from any."""
 
     def __init__(
@@ -41,17 +40,19 @@ class Server:
         backend: Backend | None = None,
         clock: Callable[[], float] = time.monotonic,
     ):
-        """Listen; port 0 is a free one. `backend` carries clients' messages. Raises OSError."""
+        """Listen for who drives a `player`, on an `address`, and a `port`, of which 0 is a free one.
+
+        `backend` carries clients' messages, `clock` counts real seconds. Raises OSError.
+        """
         self._player = player
         self._backend = backend
-        self._arrangement = Arrangement(player.simulation)
+        self._moved = MovedObjects(player.simulation)
         self._clients: dict[str, Client] = {}
         self._waiting: list[_Waiting] = []
         self._clock = clock
         self._seldom = Throttle(_SELDOM, clock)
         self._endpoint = Endpoint(address, port)
         self.address, self.port = self._endpoint.address, self._endpoint.port
-        self.wake = self._endpoint.wake
 
     @property
     def holds(self) -> bool:
@@ -66,7 +67,7 @@ class Server:
 
     def serve(self) -> None:
         """Answer what has come by now."""
-        self._arrangement.watch()
+        self._moved.watch()
         self._forget()
         self._go_on_waiting()
         for _ in range(_BATCH):
@@ -74,6 +75,10 @@ class Server:
             if incoming is None:
                 return
             self._take(incoming)
+
+    def wake(self) -> None:
+        """End a `wait`; any thread may call it."""
+        self._endpoint.wake()
 
     def close(self) -> None:
         """Let go of the clients, and of the port."""
@@ -106,7 +111,7 @@ class Server:
 
     def _go_on(self, client: Client, envelope: tuple[bytes, ...], value: Any) -> None:
         """Carry on with the newest task of a socket, and answer."""
-        client.silence.restart()
+        client.heard = self._clock()
         tasks = client.tasks.get(envelope)
         if not tasks:
             self._endpoint.send(envelope, messages.failure("there is nothing that was to be executed"))
@@ -118,21 +123,17 @@ class Server:
                 return
             reply = messages.call(*asked)
         except StopIteration as done:
-            reply = self._ended(tasks, done.value)
+            tasks.pop()
+            try:
+                reply = messages.success(done.value)
+            except ValueError as error:
+                reply = messages.failure(str(error))
         except Exception as error:  # whatever it is, the flight goes on
             tasks.pop()
             reply = messages.failure(" ".join(str(error).split()))
         if not tasks:
             client.tasks.pop(envelope, None)
         self._endpoint.send(envelope, reply)
-
-    @staticmethod
-    def _ended(tasks: list[Any], values: Any) -> bytes:
-        tasks.pop()
-        try:
-            return messages.success(values)
-        except ValueError as error:
-            return messages.failure(str(error))
 
     def _go_on_waiting(self) -> bool:
         """Answer those whose waiting is over; return whether there were any."""
@@ -144,14 +145,14 @@ class Server:
 
     # ---- clients
 
-    def _client(self, request: Request, incoming: Incoming) -> Client:
+    def _client(self, request: ClientRequest, incoming: Incoming) -> Client:
         """Return the client that a request is from. Raises ValueError where there are too many."""
         name = request.client or incoming.envelope[0].hex()
         client = self._clients.get(name)
         if client is None:
             if len(self._clients) >= _MOST_CLIENTS:
                 raise ValueError(f"{_MOST_CLIENTS} clients are there already")
-            client = Client(self._player, self._arrangement, self._backend, self._everybody, self._clock)
+            client = Client(self._player, self._moved, self._backend, self._everybody, self._clock)
             client.patience = request.patience
             self._clients[name] = client
         client.connections.add(incoming.connection)
@@ -171,7 +172,7 @@ class Server:
         if self._seldom.passes():
             waiting = [one.client for one in self._waiting]
             for name, client in list(self._clients.items()):
-                if client.silence.seconds() > client.patience and client not in waiting:
+                if self._clock() - client.heard > client.patience and client not in waiting:
                     self._let_go(name)
 
     def _let_go(self, name: str) -> None:

@@ -62,7 +62,7 @@ class Batch:
         self.arrays[role].render(instances=len(self.members))
 
 
-class Batches:
+class DrawBatches:
     """The visuals as batches; must be used with its context current."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, software: bool) -> None:

@@ -17,13 +17,9 @@ import moderngl
 import numpy as np
 
 from drone_sim.render import context, shaders, sky
-from drone_sim.render.batches import SHADE, Batch, Batches, Programs
-from drone_sim.render.context import RendererUnavailable
-from drone_sim.render.intrinsics import Intrinsics
-from drone_sim.render.orthographic import Lens, Orthographic
+from drone_sim.render.batches import SHADE, Batch, DrawBatches, Programs
+from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
 from drone_sim.shapes.visual import Visual
-
-__all__ = ["Renderer", "RendererUnavailable"]
 
 TO_SUN = (-0.34, 0.30, 0.89)  # world frame, about 27 degrees from the vertical
 
@@ -59,7 +55,7 @@ class Renderer:
             self._samples = samples
             self.description: str = gl.info["GL_RENDERER"]
             self._programs = _programs(gl)
-            self._batches = Batches(gl, self._programs, context.is_software(gl))
+            self._batches = DrawBatches(gl, self._programs, context.is_software(gl))
             self._sky = gl.vertex_array(
                 self._programs["sky"],
                 [(gl.buffer(sky.dome()), "3f 3f", "direction", "tint")],

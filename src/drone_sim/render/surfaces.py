@@ -9,7 +9,7 @@ import trimesh
 
 from drone_sim.files import images
 from drone_sim.files.mesh_files import WHITE
-from drone_sim.shapes.triangles import Rgba, Triangles
+from drone_sim.shapes.shape import Rgba, Triangles
 from drone_sim.shapes.visual import Visual
 
 CREASE = np.radians(40.0)  # faces that meet more sharply than this keep an edge

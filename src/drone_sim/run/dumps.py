@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from drone_sim.config.leaves import Leaf
+from drone_sim.config.fields import ParameterField
 from drone_sim.config.types import ParameterError, read_yaml
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import read_bytes
-from drone_sim.vehicles.tunable import SCRIPT, common, nested
-from drone_sim.wording import shown
+from drone_sim.hosting.tunable import SCRIPT, common, nested
+from drone_sim.message_text import shown
 
 _BEGIN = b"!!python/object/new:dynamic_reconfigure.encoding.Config"
 _VALUES = "dictitems"
@@ -46,7 +46,10 @@ def read_config(path: Path, below: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _keys(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    known = {**common(), **{name: Leaf(_location(name), float) for name in values if name not in common()}}
+    known = {
+        **common(),
+        **{name: ParameterField(_location(name), float) for name in values if name not in common()},
+    }
     try:
         return nested(known, {}, values)
     except KeyError as missing:

@@ -1,10 +1,17 @@
-"""When the next step is due, and when it is time to show something. The clock is an argument."""
+"""When the next step is due, at which pace, and when it is time to show something. The clock is an argument."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from drone_sim.config.fields import ParameterField, comments, fields_of
+from drone_sim.config.types import ParameterError
+from drone_sim.message_text import near_names, shown
+from drone_sim.run.parameters import PaceParameters, Parameters
+from drone_sim.run.simulation import Simulation
 
 _SLICE = 0.1  # s; a long sleep is cut so that a shutdown is noticed
 
@@ -65,23 +72,6 @@ class Pacer:
         self._due = self._clock() + self._period
 
 
-class Stopwatch:
-    """Says how long ago something was."""
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic):
-        """Take a monotonic clock, and start."""
-        self._clock = clock
-        self.restart()
-
-    def seconds(self) -> float:
-        """Return the real seconds since the start."""
-        return self._clock() - self._began
-
-    def restart(self) -> None:
-        """Start anew."""
-        self._began = self._clock()
-
-
 class Throttle:
     """Lets something pass, but not more often than once per period."""
 
@@ -116,3 +106,35 @@ class Beat:
     def restart(self) -> None:
         """Count from now: it has been shown."""
         self._last = self._clock()
+
+
+FACTOR = "real_time_factor"
+
+
+def period(parameters: Parameters) -> float:
+    """Return the real seconds from one step to the next, 0 where they come as fast as they can."""
+    factor = parameters.real_time_factor
+    return parameters.time_step / factor if factor else 0.0
+
+
+class Pace:
+    """The pace of one simulation. It holds from the step that is waited for, through every start."""
+
+    def __init__(self, simulation: Simulation, pacer: Pacer):
+        """Take the simulation, and what lets its steps pass."""
+        self._simulation, self._pacer = simulation, pacer
+        said = comments()[FACTOR]
+        self.known: dict[str, ParameterField] = {one.name: one._replace(said=said) for one in fields_of(PaceParameters)}
+
+    def values(self) -> dict[str, Any]:
+        """Return what holds now, by name."""
+        return {FACTOR: self._simulation.parameters.real_time_factor}
+
+    def change(self, changes: Mapping[str, Any]) -> None:
+        """Let another factor hold. Raises ParameterError."""
+        for name in changes.keys() - self.known.keys():
+            near = near_names(name[:80], self.known)
+            raise ParameterError(f"cannot be changed while the simulation runs; {near}", (shown(name),))
+        if changes:
+            self._simulation.set_pace(changes[FACTOR])
+            self._pacer.change(period(self._simulation.parameters))

@@ -5,14 +5,13 @@ No value is defined here: config/drone.yaml holds every default, this module say
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, model_validator
 
-from drone_sim.config.changing import changed
-from drone_sim.config.errors import Problem, line_of, problems, told
+from drone_sim.config.errors import changed, line_of, problems
 from drone_sim.config.types import (
     ADDRESS,
     Checked,
@@ -21,28 +20,27 @@ from drone_sim.config.types import (
     Location,
     Name,
     ParameterError,
+    ParameterProblem,
     Switch,
     Within,
     merged,
     named_in,
     numeric,
+    one_line,
     read_yaml,
 )
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import package_path, resolve
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.importing.cache import imported_scene
+from drone_sim.message_text import MAX_NAME, shown
 from drone_sim.run.dumps import read_config
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
-from drone_sim.sensors.camera_parameters import CameraParameters
-from drone_sim.sensors.together import check_rates
+from drone_sim.sensors.validation import check_rates
 from drone_sim.vehicles.parameters import DroneParameters, EquipmentParameters, VehicleParameters, laid_over
-from drone_sim.vrep_files.errors import VrepFileError
+from drone_sim.vrep_files.model import VrepFileError
 from drone_sim.vrep_files.reading import SUFFIXES
-from drone_sim.wording import MAX_NAME, shown
-
-__all__ = ["CameraParameters", "ParameterError", "Parameters", "load", "read_yaml"]
 
 MAX_SUB_STEPS = 1000
 MAX_VEHICLES = 256
@@ -182,14 +180,13 @@ class Parameters(PaceParameters, EquipmentParameters):
         steps = self.sub_steps
         if steps < 1 or abs(steps * self.sub_step - self.time_step) > 1e-9 * self.time_step:
             raise ParameterError(
-                f"parameter time_step = {self.time_step}: must be a whole multiple of sub_step = {self.sub_step}",
-                ("time_step",),
+                f"must be a whole multiple of sub_step = {self.sub_step}", ("time_step",), str(self.time_step)
             )
         if steps > MAX_SUB_STEPS:
             raise ParameterError(
-                f"parameter sub_step = {self.sub_step}: makes {steps} of a time_step of {self.time_step} s; "
-                f"at most {MAX_SUB_STEPS} are allowed",
+                f"makes {steps} of a time_step of {self.time_step} s; at most {MAX_SUB_STEPS} are allowed",
                 ("sub_step",),
+                str(self.sub_step),
             )
         super().model_post_init(_context)
         check_rates(self.sensors, self.sub_step)
@@ -206,7 +203,7 @@ def _entries(given: Any, drone: Any) -> Any:
     is_number = isinstance(given, (int, float)) and not isinstance(given, bool)
     if not (is_number and 0 <= given <= MAX_VEHICLES and given == int(given)):
         must = f"a whole number from 0 to {MAX_VEHICLES}, or entries such as drone1: {{position: [0, 0, 0.8]}}"
-        raise ParameterError(f"parameter vehicles = {shown(given)}: must be {must}", ("vehicles",))
+        raise ParameterError(f"must be {must}", ("vehicles",), shown(given))
     try:
         x, y, z = map(float, drone["position"])
     except (TypeError, KeyError, ValueError):  # refused with the other values
@@ -229,7 +226,7 @@ def load(overrides: Mapping[str, Any] | None = None) -> Parameters:
     given = read_yaml(package_path() / "config" / "drone.yaml")
     config = overrides.get("config") or ""
     if not isinstance(config, str):
-        raise ParameterError(f"parameter config = {shown(config)}: must be the name of a file")
+        raise ParameterError("must be the name of a file", ("config",), shown(config))
     for name in filter(None, config.split(",")):
         given = merged(given, _config(name, given))
         _checked(given, "", {}, name)
@@ -244,7 +241,7 @@ def _config(name: str, below: Mapping[str, Any]) -> dict[str, Any]:
     try:
         path = resolve(name)
     except FileNotFoundError as error:
-        raise ParameterError(f"parameter config = {shown(name)}: {error}") from None
+        raise ParameterError(str(error), ("config",), shown(name)) from None
     values = read_config(path, below)
     if "config" in values:
         raise ParameterError(f"{name}: a config file names no other `config`")
@@ -268,7 +265,7 @@ def _imported(file: str) -> str:
     try:
         return str(imported_scene(resolve(file)))
     except (OSError, VrepFileError) as error:
-        raise ParameterError(f"parameter scene_file = {shown(file)}: {error}") from None
+        raise ParameterError(str(error), ("scene_file",), shown(file)) from None
 
 
 def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str = "") -> Parameters:
@@ -281,8 +278,10 @@ def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str
     try:
         parameters = Parameters.model_validate(merged({**given, "scene_file": file}, laid))
     except ValidationError as error:
-        found = [one for one in problems(error, Parameters) if _is_given(one, given, scene)]
-        raise ParameterError(_told(found, named, bool(scene)), found[0].location if found else ()) from None
+        found = problems(error, Parameters)
+        own = [one for one in found if _is_given(one, given, scene)]  # what is only a vehicle's own is told at the top
+        told = own or list(dict.fromkeys(one._replace(location=one.location[2:]) for one in found))
+        raise ParameterError.of(told, _in_file(told, named, bool(scene))) from None
     parameters._given = given
     parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
     if nobody and not parameters.vehicles:
@@ -290,7 +289,7 @@ def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str
     return parameters
 
 
-def _is_given(problem: Problem, *sources: Mapping[str, Any]) -> bool:
+def _is_given(problem: ParameterProblem, *sources: Mapping[str, Any]) -> bool:
     """Tell a wrong value of a vehicle's own from one that it has from the keys at the top, which is told of there."""
     if problem.location[:1] != ("vehicles",) or len(problem.location) < 3:
         return True
@@ -303,11 +302,14 @@ def _is_given(problem: Problem, *sources: Mapping[str, Any]) -> bool:
     return False
 
 
-def _told(found: list[Problem], file: str, is_scene: bool) -> str:
-    lines = yaml_files.lines(resolve(file)) if file else yaml_files.Lines("")
+def _in_file(found: Sequence[ParameterProblem], file: str, is_scene: bool) -> str:
+    """Return what is wrong with the lines of a file that it stands in; '' where there is none."""
+    if not file:
+        return ""
+    lines = yaml_files.lines(resolve(file))
     placed = []
     for problem in found:
         inner = scene_parameters.problem_in_file(problem) if is_scene else problem
         line = line_of(lines, inner) if inner is not None else None
-        placed.append((line, problem.text if line is None or inner is None else inner.text))
-    return told(placed, file if not is_scene or any(line for line, _ in placed) else "")
+        placed.append((line, problem.sentence if line is None or inner is None else inner.sentence))
+    return one_line(placed, file if not is_scene or any(line for line, _ in placed) else "")

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 
 from drone_sim.run.simulation import Simulation
-from drone_sim.run.whereabouts import Diverged
+from drone_sim.run.stepping import Diverged
 from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.errors import ScriptError
 
@@ -73,7 +73,7 @@ class Player:
     def stop(self) -> str:
         """Run the script's cleanup, and restore the initial scene. Raises ScriptError."""
         if not self.simulation.running:
-            return "is stopped already"
+            return "already stopped"
         try:
             self.simulation.stop()
         finally:
@@ -91,7 +91,7 @@ class Player:
         return self.start()
 
     def pause(self, on: bool) -> str:
-        """Pause or go on. Raises ValueError when stopped."""
+        """Pause or resume. Raises ValueError when stopped."""
         if not self.simulation.running:
             raise ValueError("is stopped: start it first")
         self.paused = on
@@ -99,8 +99,8 @@ class Player:
         if on:
             self._say_that_the_clock_stands("paused")
         else:
-            _LOG.info("goes on")
-        return f"{'paused' if on else 'goes on'} at t = {self.simulation.time:.2f} s"
+            _LOG.info("resumed")
+        return f"{'paused' if on else 'resumed'} at t = {self.simulation.time:.2f} s"
 
     def one_step(self) -> str:
         """Run one step while paused. Raises ValueError when it is not, ScriptError."""
@@ -115,7 +115,8 @@ class Player:
             self.attempt(self._step)
         except (ScriptError, Diverged):
             return False
-        return not self.simulation.asked or self._obey(self.simulation.take_asked())
+        asked = self.simulation.context.control.take()
+        return not asked or self._obey(asked)
 
     def _obey(self, asked: str) -> bool:
         """Stop or pause, as a script asked for; return whether the simulation still runs."""

@@ -9,12 +9,12 @@ from typing import Any
 
 import yaml
 
-from drone_sim.config.types import Checked, FoundFile, ParameterError
+from drone_sim.config.types import ParameterError
 from drone_sim.files import writing, yaml_files
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.mechanics import frames
 from drone_sim.run.parameters import Parameters, load
-from drone_sim.scene import scene_parameters, state_now
+from drone_sim.scene import models, scene_parameters
 from drone_sim.scene.scene import Scene
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -41,11 +41,11 @@ def save(
     if own.magnetic_field != default.magnetic_field:
         content["magnetic_field"] = list(own.magnetic_field)
     if own.floor != default.floor:
-        content["floor"] = _plain(own.floor, path.parent)
+        content["floor"] = models.plain(own.floor, path.parent)
     content.update(_flying(parameters, vehicles, path.parent))
     content["objects"] = _objects(scene, path.parent)
-    if own.scripts:
-        content["scripts"] = [_plain(one, path.parent) for one in own.scripts]
+    if scene.scripts:
+        content["scripts"] = [models.plain(one, path.parent) for one in scene.scripts.values()]
     text = _HEAD + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
     try:
         parameters.check_scene(yaml_files.parse(text), path)
@@ -76,37 +76,22 @@ def _flying(parameters: Parameters, vehicles: Iterable[Vehicle], folder: Path) -
 
 
 def _place(vehicle: Vehicle) -> dict[str, Any]:
-    roll, pitch, yaw = frames.to_rpy(vehicle.matrix)
-    place: dict[str, Any] = {"position": list(frames.position(vehicle.matrix)), "yaw": yaw}
+    roll, pitch, yaw = frames.to_rpy(vehicle.body.matrix)
+    place: dict[str, Any] = {"position": list(frames.position(vehicle.body.matrix)), "yaw": yaw}
     return {**place, "tilt": [roll, pitch]} if any(vehicle.parameters.tilt) else place
 
 
 def _named(said: Any, folder: Path) -> dict[str, Any]:
     """Return what a scene file said, its files named as a scene file in `folder` can name them."""
-    return {key: _file_name(value, folder) for key, value in said.items()} if isinstance(said, dict) else {}
+    return {key: models.file_name(value, folder) for key, value in said.items()} if isinstance(said, dict) else {}
 
 
 def _objects(scene: Scene, folder: Path) -> list[dict[str, Any]]:
-    here = zip(scene.parameters.objects, state_now.of_all(scene))
-    return [_without_defaults({**_plain(one, folder), **now}) for one, now in here]
-
-
-def _without_defaults(entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry without the keys that say that it is upright, or hangs on nothing."""
-    said = {"rpy": any(entry["rpy"]), "parent": entry["parent"] != ""}
-    return {key: value for key, value in entry.items() if said.get(key, True)}
-
-
-def _plain(values: Checked, folder: Path) -> dict[str, Any]:
-    """Return them as YAML has them, their files named as a scene file in `folder` can name them."""
-    plain = values.model_dump(mode="json", exclude_defaults=True)
-    for key in ("file", "texture", "script"):
-        if plain.get(key):
-            plain[key] = _file_name(getattr(values, key), folder)
-    if "parts" in plain:  # of a compound
-        plain["parts"] = [_plain(one, folder) for one in getattr(values, "parts")]  # noqa: B009
-    return plain
-
-
-def _file_name(value: Any, folder: Path) -> Any:
-    return value.seen_from(folder) if isinstance(value, FoundFile) else value
+    """Return the entries without the keys that say that one is upright, or hangs on nothing."""
+    entries = [{**models.plain(one, folder), **scene.now(index)} for index, one in scene.entries.items()]
+    for one in entries:
+        if not any(one["rpy"]):
+            del one["rpy"]
+        if not one["parent"]:
+            del one["parent"]
+    return entries

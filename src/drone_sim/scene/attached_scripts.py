@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any
+from collections.abc import Collection, Sequence
+from typing import Annotated, Protocol
 
 from pydantic import Field
 
@@ -24,6 +24,19 @@ class AttachedScriptParameters(Checked):
 AttachedScripts = Annotated[list[AttachedScriptParameters], Field(max_length=MAX_SCRIPTS)]
 
 
+class RunningScripts(Protocol):
+    """What runs the scripts of the scene's objects, and is told what becomes of these."""
+
+    def attach(self, objects: Collection[str]) -> object:
+        """Attach the scripts of objects that have come; they begin before they are called for the first time."""
+
+    def rename(self, name: str, new: str) -> None:
+        """Know the script of an object, if it has one, by the object's new name."""
+
+    def end(self, objects: Collection[str]) -> None:
+        """Call the cleanup of scripts whose objects are about to go, and let go of them; one that runs ends later."""
+
+
 def check(scripts: Sequence[AttachedScriptParameters]) -> None:
     """Raise ParameterError where an object has two scripts, or a script no file."""
     names: set[str] = set()
@@ -33,7 +46,5 @@ def check(scripts: Sequence[AttachedScriptParameters]) -> None:
             ("script", not one.script and "no file"),
         ):
             if mistake:
-                location = ("scene", "scripts", index, key)
-                value: Any = getattr(one, key)
-                raise ParameterError(f"parameter scene/scripts/{index}/{key} = '{value}': {mistake}", location)
+                raise ParameterError(mistake, ("scripts", index, key), f"'{getattr(one, key)}'")
         names.add(one.object)

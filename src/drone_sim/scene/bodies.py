@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Matrix, cross
+from drone_sim.mechanics.frames import IDENTITY, Matrix, cross
 from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.scene.entry import Place
 from drone_sim.world import World
+
+
+class ShapeInWorld(NamedTuple):
+    """What a shape is in the world: a link (-1: the root) of a body, how heavy (kg), and whether it stands still.
+
+    local: the shape's frame in its parent's; of what is held, in that of its joint, as it has moved.
+    """
+
+    number: int
+    link: int
+    local: Matrix
+    mass: float
+    static: bool = False
 
 
 class SceneBody:
@@ -72,24 +86,7 @@ class LinkBody:
         raise ValueError("a shape that a joint holds is put nowhere else")
 
 
-class HeldShape(SceneObject):
-    """A shape that a joint or a force sensor holds: nobody puts it anywhere else."""
-
-    is_loose = False
-    is_held = True
-    mass = 0.0  # kg
-
-    def inertia(self) -> Inertia | None:
-        """Return how its mass lies in it, None where it has none."""
-        return self.body.inertia() if isinstance(self.body, LinkBody) and self.mass else None
-
-    def put(self, matrix: Matrix) -> None:
-        """Refuse. Raises ValueError."""
-        above = self.parent.name if self.parent is not None else ""
-        raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move what it hangs on")
-
-
-class Carried:
+class CarriedBody:
     """A body without mass that goes where the frame goes that carries it."""
 
     def __init__(self, world: World, number: int, frame: Callable[[], Matrix]):
@@ -113,33 +110,56 @@ class Carried:
             self.follow()
 
 
-class Shape(SceneObject):
-    """A shape that no joint holds: free where it has a mass, else it stands still in its parent's frame."""
+class ShapeObject(SceneObject):
+    """A shape: free where it has a mass, held where it hangs on a joint, else it stands still in its parent's frame."""
+
+    number: int  # its body in the world
+    link: int  # its link there, -1 for the root
+    mass: float  # kg, 0 for what never moves
 
     def __init__(
         self,
         place: Place,
-        *,
         world: World,
-        number: int,
-        mass: float,
-        changed: Callable[[Shape], None],
+        changed: Callable[[ShapeObject], None],
         follow: Callable[[], None],
+        solid: ShapeInWorld,
     ):
-        """Take where it is, the number of its body, and its mass (kg).
+        """Take where it is in the tree, and as what in the world.
 
         `changed` is told whenever it hangs on something else, or has become static or dynamic; `follow` when it is put.
         """
-        self.number = number
         self._world = world
-        self.mass = mass
-        self._parent: SceneObject | None = None
+        self._parent = place.parent
         self._changed, self._follow = changed, follow
+        super().__init__(*place, kind="shape")
+        self.embody(solid)
+        self.pass_carriers()
+
+    def embody(self, solid: ShapeInWorld) -> None:
+        """Be this in the world from now on; `pass_carriers` is due then."""
+        self.number, self.link, local, self.mass, static = solid
         self._passing: set[int] = set()
-        self.carried = Carried(world, number, self.matrix)
-        self.body = None
-        super().__init__(*place, SceneBody(world, number) if mass else None, kind="shape")
-        self._renew()
+        self.carried = CarriedBody(self._world, self.number, self.matrix)
+        if self.is_held:
+            self.local = IDENTITY
+            self.body = LinkBody(self._world, self.number, self.link, local)
+        else:
+            self.local = local
+            self.body = SceneBody(self._world, self.number) if self.mass and not static else None
+            if static and self.mass:
+                self._world.collision_filter.freeze(self.number, still=True)
+        self._changed(self)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a joint or a force sensor holds it: nobody puts it anywhere else."""
+        return self.link != -1
+
+    @property
+    def is_loose(self) -> bool:
+        """Whether nothing but a script's moves take it along where its parent goes."""
+        return not self.is_held and super().is_loose
 
     @property
     def parent(self) -> SceneObject | None:  # type: ignore[override]
@@ -154,6 +174,8 @@ class Shape(SceneObject):
 
     def inertia(self) -> Inertia | None:
         """Return how its mass lies in it, None where the dynamics leaves it alone."""
+        if isinstance(self.body, LinkBody):
+            return self.body.inertia() if self.mass else None
         return None if self.is_static else self._world.inertia(self.number)
 
     @property
@@ -163,18 +185,21 @@ class Shape(SceneObject):
 
     def set_static(self, static: bool) -> None:
         """Let the dynamics leave it alone, or move it again. Raises ValueError for what has never had a mass."""
-        if static == self.is_static:
+        if static == self.is_static or self.is_held:
             return
         if not self.mass:
             raise ValueError(f"'{self.name}' has no mass in the scene file: it stays static")
         matrix = self.matrix()
         self.body = None if static else SceneBody(self._world, self.number)
-        self._world.solidity.freeze(self.number, static)
+        self._world.collision_filter.freeze(self.number, static)
         self._renew()
         self.put(matrix)
 
     def put(self, matrix: Matrix) -> None:
-        """Put it there, and its body."""
+        """Put it there, and its body. Raises ValueError for what is held."""
+        if self.is_held:
+            above = self.parent.name if self.parent is not None else ""
+            raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move what it hangs on")
         super().put(matrix)
         if self.is_static:
             self.carried.follow()
@@ -186,25 +211,32 @@ class Shape(SceneObject):
             self.set_static(False)
         self.parent = None
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that puts it back where it is now, as static as it is."""
-        put_back, static = super().remember(), self.is_static
+        put_back, static = super().save_state(), self.is_static
 
-        def recall() -> None:
+        def restore() -> None:
             self.set_static(static)
             put_back()
 
-        return recall
+        return restore
+
+    def forget_body(self, number: int) -> None:
+        """Know that a body is gone through which it passed."""
+        self._passing.discard(number)
 
     def _renew(self) -> None:
-        """Do not collide with what carries it, and tell that something has changed."""
+        self.pass_carriers()
+        self._changed(self)
+
+    def pass_carriers(self) -> None:
+        """Do not collide with what carries it."""
         above = bodies_above(self) if self.is_static else set()
         for number in self._passing - above:
-            self._world.solidity.let_pass(self.number, number, passes=False)
+            self._world.collision_filter.let_pass(self.number, number, passes=False)
         for number in above - self._passing:
-            self._world.solidity.let_pass(self.number, number)
+            self._world.collision_filter.let_pass(self.number, number)
         self._passing = above
-        self._changed(self)
 
 
 def bodies_above(one: SceneObject) -> set[int]:
@@ -212,7 +244,7 @@ def bodies_above(one: SceneObject) -> set[int]:
     found = set()
     above = one.parent
     while above is not None:
-        carrier = above if isinstance(above, Shape) else above.body
+        carrier = above if isinstance(above, ShapeObject) else above.body
         number = getattr(carrier, "number", None)
         if number is not None:
             found.add(number)

@@ -8,7 +8,7 @@ other: the tree does not weld.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from drone_sim.mechanics.frames import IDENTITY, Matrix, multiply
@@ -39,6 +39,16 @@ class Chain(NamedTuple):
     root: int | None
     hung: list[Hung]
 
+    def shapes(self) -> Iterator[int | None]:
+        """Yield the entries of its shapes, first the root."""
+        yield self.root
+        yield from (one.shape for one in self.hung)
+
+    def members(self) -> Iterator[int]:
+        """Yield the entries of all that it is made of."""
+        yield from (one for one in self.shapes() if one is not None)
+        yield from (one.joint for one in self.hung)
+
 
 class Chains(NamedTuple):
     """All chains; and why other joints are moved by scripts alone, by their entry."""
@@ -47,7 +57,7 @@ class Chains(NamedTuple):
     reasons: dict[int, str]
 
 
-def found(entries: Sequence[EntryParameters]) -> Chains:
+def found(entries: Mapping[int, EntryParameters]) -> Chains:
     """Return the chains among the entries of a scene, whose parents come in any order, but not in a circle."""
     return _Search(entries).run()
 
@@ -58,15 +68,15 @@ def _holds(one: _Holding) -> bool:
 
 
 class _Search:
-    def __init__(self, entries: Sequence[EntryParameters]):
+    def __init__(self, entries: Mapping[int, EntryParameters]):
         self._entries = entries
-        self._index = {one.name: index for index, one in enumerate(entries) if one.name}
+        self._index = {one.name: index for index, one in entries.items()}
         self._held: dict[int, int] = {}  # shape by joint
         self._place: dict[int, tuple[Chain, int]] = {}  # of a shape or a joint: the chain, and the index in it
 
     def run(self) -> Chains:
         reasons = {}
-        joints = {index: one for index, one in enumerate(self._entries) if isinstance(one, _Holding)}
+        joints = {index: one for index, one in self._entries.items() if isinstance(one, _Holding)}
         below = self._shapes_below(joints)
         for index, one in joints.items():
             reason = self._reason(one, below[index])
@@ -82,8 +92,8 @@ class _Search:
     def _shapes_below(self, joints: Mapping[int, _Holding]) -> dict[int, list[int]]:
         """Return the shapes with a mass right below each joint."""
         below: dict[int, list[int]] = {index: [] for index in joints}
-        for index, one in enumerate(self._entries):
-            if one.parent and isinstance(one, ObjectParameters) and one.mass:
+        for index, one in self._entries.items():
+            if one.parent and isinstance(one, ObjectParameters) and one.moves:
                 above = self._index.get(one.parent, -1)
                 if above in below:
                     below[above].append(index)
@@ -115,7 +125,7 @@ class _Search:
         local, above = joint.local, self._index.get(joint.parent)
         while above is not None:
             one = self._entries[above]
-            if above in self._held or (isinstance(one, ObjectParameters) and one.mass):
+            if above in self._held or (isinstance(one, ObjectParameters) and one.moves):
                 return above, local
             if isinstance(one, JointParameters):
                 break  # scripts move it: what hangs on it is carried

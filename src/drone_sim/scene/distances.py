@@ -3,50 +3,41 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
+from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene.bodies import LinkBody, Shape
-from drone_sim.scene.kinds.kind import Around
-from drone_sim.world.probing import Gap
+from drone_sim.scene.bodies import ShapeObject
+from drone_sim.scripting.api.distances import Nearest
+from drone_sim.world.queries import Gap
 
 _BASE = "Quadricopter_base"
 _Solid = tuple[int, int]  # a body in the world and its link, -1 the root
 
 
-class Nearest(NamedTuple):
-    """The shortest way from one object to another: m, 0 where they overlap; its ends, world frame; the other's name."""
-
-    distance: float
-    start: Vector
-    end: Vector
-    name: str
-
-
 class Distances:
     """Measures between solids. A vehicle is one; an object that is no shape, such as a dummy, is a point."""
 
-    def __init__(self, around: Around, floor: int):
-        """Take what is around, and the floor's body."""
-        self._around = around
-        self._floor = floor
+    def __init__(self, context: SimulationContext):
+        """Take what the simulation shares."""
+        self._context = context
 
     def nearest(self, one: SceneObject, other: SceneObject | None, reach: float) -> Nearest | None:
         """Return the shortest way within `reach` (m) from an object to another, or to any (None).
 
         Raises ValueError for two that are parts of the same solid, and for a point without another object.
         """
-        self._around.follow()
+        self._context.carried.follow()
         solid, another = self._solid(one), self._solid(other)
         if other is not None and (one is other or (solid is not None and solid == another)):
             raise ValueError(f"'{one.name}' and '{other.name}' are parts of one rigid body")
         if solid is None:
             return self._from_point(one, other, another, reach)
         if other is not None and another is None:
-            return _back(self._to_solid(frames.position(other.matrix()), solid, reach), one.name)
+            back = self._to_solid(frames.position(other.matrix()), solid, reach)
+            return back and Nearest(back.distance, back.end, back.start, one.name)
         return self._between(solid, another, reach)
 
     def _from_point(
@@ -63,28 +54,28 @@ class Distances:
 
     def _to_solid(self, point: Vector, solid: _Solid, reach: float, name: str = "") -> Nearest | None:
         """Return the shortest way from a point to a solid."""
-        met = self._around.world.solidity.nearest_points(point, reach, lambda *place: place == solid, measured=True)
+        queries = self._context.world.queries
+        met = queries.nearest_points(point, reach, lambda *place: place == solid, measured=True)
         ways = [Nearest(math.dist(point, one.point), point, one.point, name) for one in met]
         return min(ways, default=None)
 
     def _between(self, solid: _Solid, other: _Solid | None, reach: float) -> Nearest | None:
-        gaps = self._around.world.gaps(*solid, reach, lambda *place: place == other if other else place[0] != solid[0])
+        queries = self._context.world.queries
+        gaps = queries.gaps(*solid, reach, lambda *place: place == other if other else place[0] != solid[0])
         best: Gap | None = min(gaps, key=lambda gap: gap.distance, default=None)
         if best is None:
             return None
-        name = self._around.name_of(best.body, best.link)
+        name = self._context.name_of(best.body, best.link)
         return Nearest(max(0.0, best.distance), best.own_point, best.point, name)
 
     def _solid(self, one: SceneObject | None) -> _Solid | None:
         """Return what an object is in the world, or what carries it where it is a shape of a vehicle; None for none."""
         if one is None:
             return None
-        if isinstance(one, Shape):
-            return one.number, -1
+        if isinstance(one, ShapeObject):
+            return one.number, one.link
         if one.name == "Floor":
-            return self._floor, -1
-        if isinstance(one.body, LinkBody):
-            return one.body.number, one.body.link
+            return self._context.body_of("Floor"), -1
         number = getattr(_carrier(one).body, "number", None)
         return None if number is None else (number, -1)
 
@@ -96,8 +87,3 @@ def _carrier(one: SceneObject) -> SceneObject:
         return one
     is_part = above.kind == "force_sensor" or plain(one.name) == _BASE
     return _carrier(above) if is_part or one.kind == "force_sensor" else one
-
-
-def _back(way: Nearest | None, name: str) -> Nearest | None:
-    """Return a way the other way round."""
-    return None if way is None else Nearest(way.distance, way.end, way.start, name)

@@ -1,11 +1,14 @@
-"""What all entries of `objects` have in common: a name, a parent, a place in the parent's frame."""
+"""What all entries of `objects` have in common: a name, a parent, a place in the parent's frame, also as it is now."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point
+from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, from_rpy, to_quaternion
+from drone_sim.mechanics.joint import FORCE, POSITION, SPHERICAL, VELOCITY, Joint
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
 
@@ -36,7 +39,7 @@ class EntryParameters(Checked):
         """Refuse what scripts could not find under a name."""
         if (self.parent or self.alias) and not self.name:
             key, value = ("parent", self.parent) if self.parent else ("alias", self.alias)
-            raise ParameterError(f"{key} = '{value}': what has one needs a `name`, too")
+            raise ParameterError("what has one needs a `name`, too", (key,), f"'{value}'")
 
     @property
     def pose(self) -> Pose:
@@ -53,3 +56,40 @@ class EntryParameters(Checked):
     def shown(self) -> str:
         """What 4.x paths call it."""
         return self.alias or self.name
+
+
+# ---- as it is now
+
+
+def place_of(one: SceneObject) -> dict[str, Any]:
+    """Return the keys of an entry that say where an object is now, what it hangs on, and how a joint stands."""
+    above = one.parent
+    matrix = one.matrix() if above is None else frames.relative(above.below(), one.matrix())
+    values = place_at(matrix, "" if above is None else above.name)
+    return {**values, **_joint(one)} if isinstance(one, Joint) else values
+
+
+def place_at(matrix: Matrix, parent: str) -> dict[str, Any]:
+    """Return the keys of an entry that say where it is in the frame of its parent."""
+    turn = [angle + 0.0 for angle in frames.to_rpy(matrix)]  # without a -0.0
+    return {"position": list(frames.position(matrix)), "rpy": turn, "parent": parent}
+
+
+def placed(entry: EntryParameters, parent: str, matrix: Matrix) -> EntryParameters:
+    """Return an entry in another place, in the frame of its parent."""
+    place = {"parent": parent, "position": frames.position(matrix), "rpy": tuple(frames.to_rpy(matrix))}
+    return entry.model_copy(update=place)
+
+
+def _joint(joint: Joint) -> dict[str, Any]:
+    control = joint.control
+    values: dict[str, Any] = {"mode": control.mode, "max_force": control.max_force}
+    targets = {POSITION: control.position, VELOCITY: control.velocity, FORCE: control.force}
+    if control.mode in targets:
+        values["target"] = targets[control.mode]
+    if joint.limits is not None:
+        values["limits"] = list(joint.limits)
+    low, high = joint.limits or (-math.inf, math.inf)
+    if joint.motion != SPHERICAL:
+        values["value"] = min(max(joint.value, low), high)
+    return values

@@ -24,7 +24,7 @@ from drone_sim.mechanics.frames import from_rpy
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.shapes import SCENE_SHAPES
 from drone_sim.shapes.compound import MAX_PARTS, Compound, Part
-from drone_sim.shapes.mass import Inertia
+from drone_sim.shapes.mass import PrincipalInertia
 from drone_sim.shapes.shape import SceneShape
 
 _Moment = Annotated[Finite, Within(1e-12, 1e12)]  # kg m²
@@ -39,16 +39,20 @@ class InertiaParameters(Checked):
     rpy: Angles = (0.0, 0.0, 0.0)
 
     @property
-    def inertia(self) -> Inertia:
+    def inertia(self) -> PrincipalInertia:
         """The same for the dynamics."""
-        return Inertia(self.moments, from_rpy(self.position, self.rpy))
+        return PrincipalInertia(self.moments, from_rpy(self.position, self.rpy))
 
 
 class ObjectParameters(EntryParameters):
-    """A shape in the scene: what all have in common; each brings its own keys. A mass of 0 stands still."""
+    """A shape in the scene: what all have in common; each brings its own keys.
+
+    A mass of 0 stands still, and what is `static`, until a script lets it move.
+    """
 
     mass: Mass = 0.0
     inertia: InertiaParameters | None = None
+    static: Switch = False
     respondable: Switch = True
     visible: Switch = True
     color: Color
@@ -59,7 +63,12 @@ class ObjectParameters(EntryParameters):
         """Refuse an inertia where the URDF says it."""
         super().model_post_init(context)
         if self.inertia is not None and self.shape == "urdf":
-            raise ParameterError("inertia: a urdf says its own")
+            raise ParameterError("a urdf says its own", ("inertia",))
+
+    @property
+    def moves(self) -> bool:
+        """Whether the dynamics moves it."""
+        return bool(self.mass) and not self.static
 
     def to_shape(self) -> SceneShape | Compound:
         """Return its shape, of the keys that this brings."""

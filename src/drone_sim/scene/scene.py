@@ -3,229 +3,351 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from drone_sim.config.types import ParameterError
-from drone_sim.mechanics.frames import IDENTITY, Matrix, multiply
+from drone_sim.context import SimulationContext
+from drone_sim.mechanics.frames import Matrix, Vector, multiply
 from drone_sim.mechanics.joint import Joint
-from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene import building, chains, order, scene_files
-from drone_sim.scene.bodies import Carried, HeldShape, LinkBody, SceneBody, Shape, bodies_above
-from drone_sim.scene.distances import Distances
-from drone_sim.scene.drive import JointDrive
-from drone_sim.scene.entry import Place
-from drone_sim.scene.grip import Grip
-from drone_sim.scene.kinds.force_sensor import ForceSensor
-from drone_sim.scene.kinds.kind import Around, KindParameters, Look
+from drone_sim.message_text import near_names
+from drone_sim.scene import building, chains
+from drone_sim.scene.attached_scripts import AttachedScriptParameters
+from drone_sim.scene.bodies import CarriedBody, ShapeInWorld, ShapeObject, bodies_above
+from drone_sim.scene.building import Built
+from drone_sim.scene.chains import Chain
+from drone_sim.scene.entry import EntryParameters, Place, place_of
+from drone_sim.scene.kinds.force_sensor import ForceSensor, ForceSensorParameters
+from drone_sim.scene.kinds.joint import JointParameters
+from drone_sim.scene.kinds.kind import KindParameters
+from drone_sim.scene.object_drag import ObjectDrag
 from drone_sim.scene.object_parameters import ObjectParameters
-from drone_sim.scene.scene_parameters import SceneParameters
+from drone_sim.scene.scene_parameters import SceneParameters, check_files
 from drone_sim.shapes.visual import Visual
-from drone_sim.wording import near_names
-from drone_sim.world import World
+from drone_sim.world.joints import JointDrive
 
 _LOG = logging.getLogger(__name__)
+_Key = tuple[Any, ...]  # of what a body is made of
+_AT_REST = (0.0, 0.0, 0.0)
 
 
 class Scene:
-    """What stands in the world besides the vehicles."""
+    """What stands in the world besides the vehicles: entries as in a scene file, their bodies, their objects.
 
-    def __init__(self, parameters: SceneParameters, world: World, look: Look, names: dict[int, tuple[str, str]]):
-        """Put floor and objects into an empty world. Raises ParameterError for a file that cannot be used.
+    Entries may come, go and change at any time (operations.py): `renew` makes of them what is not there yet, and takes
+    away what they do not say any more; all else goes on as it would have.
+    """
 
-        `look` takes pictures; `names` has for each body in the world what a person calls it, and its name among the
-        objects of scripts, or '': those of the scene are added.
+    def __init__(self, parameters: SceneParameters, context: SimulationContext):
+        """Put floor and objects into the empty world of `context`, and the bodies' names into its names.
+
+        Raises ParameterError for a file that cannot be used.
         """
-        self.parameters = parameters
-        scene_files.check(parameters)
-        self._world, self._names = world, names
+        self.parameters = parameters  # as it began
+        self.entries: dict[int, EntryParameters] = dict(enumerate(parameters.objects))  # by a number that stays theirs
+        self.scripts: dict[str, AttachedScriptParameters] = {one.object: one for one in parameters.scripts}  # by object
+        check_files(parameters.floor, parameters.objects)
+        self._context, self.tree = context, context.objects
+        self._world = world = context.world
         floor = parameters.floor
         self.floor = world.add_floor(floor.size, floor.texture, ground=not floor.edge)
-        self._entries = parameters.objects
-        found = chains.found(self._entries)
-        _warn(self._entries, found.reasons)
-        self._chains = found.chains
+        context.names[self.floor] = ("Floor", "Floor")
+        self.drag = ObjectDrag(context, self.things, floor.size)
+        self.next_index = len(self.entries)
+        self.is_changed = False  # whether anything has been done to it (operations.py) since it was made
+        self.rebuilt = 0  # bodies that have come or gone by now
+        self.changed: Counter[int] = Counter()  # how often an entry has become other than its body is
+        self.factors: dict[int, Vector] = {}  # by which entries were scaled
+        self._built: dict[_Key, Built] = {}
+        self._places: dict[int, tuple[int, int]] = {}  # body and link of each shape
+        self._began: dict[int, Matrix] = {}  # where the objects were at the beginning, by entry; empty before
+        self._forget_objects()
+        _warn(self.entries, self._build()[1])
+
+    # ---- bodies
+
+    def _build(self) -> tuple[list[Built], dict[int, str]]:
+        """Let there be the bodies that the entries ask for, and no others.
+
+        Returns the new ones, and why joints are not moved, by entry. Raises ParameterError, where all is as it was, for
+        a file that cannot be read.
+        """
+        found = chains.found(self.entries)
+        wanted = {self._key(one): one for one in (*building.alone(self.entries, found.chains), *found.chains)}
+        new = {key: one for key, one in wanted.items() if key not in self._built}
+        matrices = {index: self._matrix(index) for one in new.values() for index in one.members()}
+        speeds = {index: self._speed(index) for index in matrices}
         try:
-            built = building.build(world, self._entries, self._chains, order.matrices(self._entries))
+            made = building.build(self._world, self.entries, new.values(), matrices)
         except ValueError as error:
             raise ParameterError(str(error)) from None
-        self._places, self._bases = built.places, built.chains
-        self._around = Around(world, look, self._name_of, self.follow)
-        self.nearest = Distances(self._around, self.floor).nearest
-        self.bodies = [self._body(index) for index in sorted(self._places)]  # of the shapes, as the file has them
+        gone = self._built.keys() - wanted.keys()
+        for key in gone:
+            self._remove(self._built.pop(key))
+        self.rebuilt += len(gone) + len(new)
+        self._built.update(zip(new, made))
+        self._places = {index: (one.body, link) for one in self._built.values() for index, link in one.links.items()}
         self._add_names()
-        self._began: dict[int, Matrix] = {}  # where the objects were at the beginning, by entry; empty before
-        self._tree = ObjectTree()
-        self.grip = Grip(world, self.things, floor.size)
-        self._forget_objects()
+        for one in made:
+            self._set_moving(one, speeds)
+        return made, found.reasons
 
-    def _body(self, index: int) -> SceneBody | LinkBody:
-        number, link = self._places[index]
-        if link == -1:
-            return SceneBody(self._world, number)
-        return LinkBody(self._world, number, link, self._entries[index].local)
+    def _key(self, chain: Chain) -> _Key:
+        versions = tuple(self.changed[index] for index in chain.members())
+        return chain.root, tuple(one[:3] for one in chain.hung), versions
+
+    def _matrix(self, index: int) -> Matrix:
+        """Return the world from the frame of an entry, of what is not there yet, too."""
+        if index in self.objects:
+            return self.objects[index].matrix()
+        entry = self.entries[index]
+        if entry.parent in self.tree:
+            return multiply(self.tree[self.tree.handle(entry.parent)].below(), entry.local)
+        above = next((other for other, one in self.entries.items() if entry.parent and one.name == entry.parent), None)
+        if above is None:  # it hangs on a vehicle, which comes after the scene
+            return entry.local
+        return multiply(multiply(self._matrix(above), building.motion(self.entries[above])), entry.local)
+
+    def _speed(self, index: int) -> tuple[Vector, Vector, float]:
+        """Return how fast an entry is that is about to have another body: m/s, rad/s, and along a joint."""
+        one = self.objects.get(index)
+        if isinstance(one, Joint):
+            return _AT_REST, _AT_REST, one.velocity_along
+        body = one.body if one is not None else None
+        if body is None:
+            return _AT_REST, _AT_REST, 0.0
+        _, _, linear, angular = body.state
+        return linear, angular, 0.0
+
+    def _set_moving(self, built: Built, speeds: Mapping[int, tuple[Vector, Vector, float]]) -> None:
+        root = built.chain.root
+        if root is not None and getattr(self.entries[root], "moves", False) and any(map(any, speeds[root][:2])):
+            self._world.set_velocity(built.body, *speeds[root][:2])
+        for hung in built.chain.hung:
+            joint, speed = self.entries[hung.joint], speeds[hung.joint][2]
+            if speed and isinstance(joint, JointParameters):
+                self._world.joints.put(built.body, built.links[hung.shape], joint.value, speed)
+
+    def _remove(self, gone: Built) -> None:
+        for hung in gone.chain.hung:
+            one = self.objects.get(hung.joint)
+            if isinstance(one, (Joint, ForceSensor)):
+                one.release()
+        self._world.remove(gone.body)
+        self._context.names.pop(gone.body, None)
+        for link in gone.links.values():
+            self._context.link_names.pop((gone.body, link), None)
+        for carried in (self._context.carried.shapes, self._context.carried.bases, self._carried_bases):
+            carried.pop(gone.body, None)
+        self.drag.forget(gone.body)
+        for one in self.objects.values():
+            if isinstance(one, ShapeObject):
+                one.forget_body(gone.body)
 
     def _add_names(self) -> None:
-        self._link_names = {place: self._entries[index].name for index, place in self._places.items()}
-        self._names[self.floor] = ("Floor", "Floor")
+        names, link_names = self._context.names, self._context.link_names
         for index, (number, link) in self._places.items():
-            name = self._entries[index].name
-            if link == -1 or number not in self._names:
-                self._names[number] = (self._called(index), name)
-
-    def _name_of(self, body: int, link: int) -> str:
-        """Return what scripts call a body's link (-1: its root), ''  for what they do not know."""
-        name = self._link_names.get((body, link))
-        return self._names.get(body, ("", ""))[1] if name is None else name
-
-    def _called(self, index: int) -> str:
-        """Return what a person calls an entry."""
-        return self._entries[index].name or f"objects/{index}"
+            name = link_names[number, link] = self.entries[index].name
+            if link == -1 or number not in names:
+                names[number] = (name, name)
 
     # ---- the tree
 
-    def name_objects(self, objects: ObjectTree) -> None:
-        """Let scripts find the objects that have a name, as they were at the beginning.
+    def name_objects(self) -> None:
+        """Let scripts find the objects, as they were at the beginning, in a tree without them.
 
         Raises ParameterError, with its place, for a name that is taken, or a parent that is not there.
         """
         self._forget_objects()
-        self._tree = self.grip.tree = objects
-        for index in order.parents_first(self._entries):
-            if self._entries[index].name:
-                self._objects[index] = self._add(objects, index)
-        self._hold_chains()
+        self._add_objects(self._built.values())
         if not self._began:
-            self._place_loose_ones()
-            self._began = {index: one.matrix() for index, one in self._objects.items()}
-        self.follow()
+            self._place_loose_ones(self.objects)
+            self._began = {index: one.matrix() for index, one in self.objects.items()}
+        self._follow()
+
+    def renew(self, change_tree: Callable[[], None] = lambda: None, bodies: bool = True) -> None:
+        """Let world and tree be what the entries say by now; `change_tree` is called when there are the new bodies.
+
+        `bodies`: those may have to be others. Raises ParameterError, where world and tree are as they were.
+        """
+        made = self._build()[0] if bodies else []
+        for index in (index for one in made for index in one.links):
+            one = self.objects.get(index)
+            if isinstance(one, ShapeObject):
+                one.embody(self._solid(index, self.entries[index].local))
+        for index in self.objects.keys() - self.entries.keys():
+            del self.objects[index], self.changed[index]
+            self.factors.pop(index, None)
+        change_tree()
+        for one in self.objects.values():
+            if isinstance(one, ShapeObject):
+                one.pass_carriers()
+        there = set(self.objects)
+        self._add_objects(made)
+        self._place_loose_ones(self.objects.keys() - there)
+        self._follow()
+
+    def exchange(self, index: int, handle: int, entry: KindParameters, place: Place) -> None:
+        """Make an object anew of an entry, in the place of the one that is there."""
+        made = entry.make(place, self._context)
+        before, self.objects[index] = self.objects[index], made
+        if isinstance(made, Joint) and isinstance(before, Joint):
+            made.turn = before.turn
+        self.tree.exchange(handle, made)
+
+    def paint(self, index: int, rgba: Sequence[float]) -> None:
+        """Show a shape in another color."""
+        body, link = self._places[index]
+        self._world.set_color(body, rgba, link)
 
     def _forget_objects(self) -> None:
-        self.grip.let_go_of_all()
-        for one in getattr(self, "_objects", {}).values():
-            if isinstance(one, Shape):
+        self.drag.let_go_of_all()
+        for one in getattr(self, "objects", {}).values():
+            if isinstance(one, ShapeObject):
                 one.release()
-        self._objects: dict[int, SceneObject] = {}  # by entry
-        self._hanging: dict[int, Carried] = {}  # static shapes that have a parent, by body
-        self._carried_bases: list[Carried] = []  # those of chains whose first joint has one
-        self.carries = False  # whether there is anything to `follow`: asked for in every step
+        self.objects: dict[int, SceneObject] = {}  # by entry
+        self._carried_bases: dict[int, CarriedBody] = {}  # those of chains whose first joint has a parent, by body
+        self._context.carried.shapes.clear()
+        self._context.carried.bases.clear()
 
-    def _add(self, objects: ObjectTree, index: int) -> SceneObject:
-        one = self._entries[index]
-        parent = self._parent(objects, index)
+    def _add_objects(self, made: Iterable[Built]) -> None:
+        """Let the tree have the objects that it has not, and the dynamics move the joints of new bodies."""
+        new = {index: one for index, one in self.entries.items() if index not in self.objects}
+        for index in building.parents_first(new):
+            self.objects[index] = self._add(index)
+        for built in made:
+            self._hold(built)
+
+    def _add(self, index: int) -> SceneObject:
+        one = self.entries[index]
+        parent = self._parent(index)
         gone = bool(one.parent) and parent is None  # a vehicle: it stays where it began
-        place = Place((one.name,), one.alias or one.name, parent, self._began[index] if gone else one.local)
-        added = self._object(index, place)
+        place = Place((one.name,), one.shown, parent, self._began[index] if gone else one.local)
+        if isinstance(one, KindParameters):
+            added = one.make(place, self._context)
+        else:
+            follow = self._context.carried.follow
+            added = ShapeObject(place, self._world, self._changed, follow, self._solid(index, place.local))
         try:
-            objects.insert(added)
+            self.tree.insert(added)
         except ValueError as error:
             raise ParameterError(str(error), ("objects", index, "name")) from None
         return added
 
-    def _parent(self, objects: ObjectTree, index: int) -> SceneObject | None:
-        name = self._entries[index].parent
+    def _solid(self, index: int, local: Matrix) -> ShapeInWorld:
+        one = self.entries[index]
+        assert isinstance(one, ObjectParameters), "only shapes have bodies"
+        number, link = self._places[index]
+        return ShapeInWorld(number, link, one.local if link != -1 else local, one.mass, one.static)
+
+    def _parent(self, index: int) -> SceneObject | None:
+        name = self.entries[index].parent
         if not name:
             return None
-        if name in objects:
-            return objects[objects.handle(name)]
+        if name in self.tree:
+            return self.tree[self.tree.handle(name)]
         if self._began:  # a vehicle that has gone
             return None
         raise ParameterError(
-            f"no object is named '{name}', the parent of '{self._entries[index].name}'; "
-            f"{near_names(name, objects.names)}",
+            f"no object is named '{name}', the parent of '{self.entries[index].name}'; "
+            f"{near_names(name, self.tree.names)}",
             ("objects", index, "parent"),
         )
 
-    def _object(self, index: int, place: Place) -> SceneObject:
-        one = self._entries[index]
-        if isinstance(one, KindParameters):
-            return one.make(place, self._around)
-        number, link = self._places[index]
-        if link != -1:
-            held = HeldShape(*place[:3], IDENTITY, self._body(index))
-            held.mass = getattr(one, "mass", 0.0)
-            return held
-        mass = one.mass if isinstance(one, ObjectParameters) else 0.0
-        return Shape(place, world=self._world, number=number, mass=mass, changed=self._changed, follow=self.follow)
-
-    def _changed(self, shape: Shape) -> None:
+    def _changed(self, shape: ShapeObject) -> None:
         """Follow what carries a shape from now on, or follow it no longer."""
-        if shape.name in self._tree:
-            self._tree.look_for_loose_ones()
+        if shape.name in self.tree:
+            self.tree.look_for_loose_ones()
         if shape.parent is None or not shape.is_static:
-            self._hanging.pop(shape.number, None)
+            self._context.carried.shapes.pop(shape.number, None)
         else:
-            self._hanging[shape.number] = shape.carried
-        self._look_what_is_carried()
+            self._context.carried.shapes[shape.number] = shape.carried
 
-    def _hold_chains(self) -> None:
-        """Let the dynamics move the joints of chains, and force sensors measure."""
-        for chain, body in zip(self._chains, self._bases):
-            for hung in chain.hung:
-                self._hold(self._objects[hung.joint], *self._places[hung.shape])
-            first = self._objects[chain.hung[0].joint]
-            if chain.root is None and first.parent is not None:
-                self._carried_bases.append(Carried(self._world, body, first.parent.below))
+    def _hold(self, built: Built) -> None:
+        """Let the dynamics move the joints of a chain, and force sensors measure."""
+        for hung in built.chain.hung:
+            one, link = self.objects[hung.joint], built.links[hung.shape]
+            if isinstance(one, ForceSensor):
+                one.hold(self._world, built.body, link)
+            elif isinstance(one, Joint):
+                one.drive = JointDrive(self._world.joints, built.body, link)
+                one.drive.limit(one.limits)
+                one.drive.command(one.control)
+        if built.chain.root is None:
+            first = self.objects[built.chain.hung[0].joint]
+            if first.parent is not None:
+                self._carried_bases[built.body] = CarriedBody(self._world, built.body, first.parent.below)
                 for above in bodies_above(first):
-                    self._world.solidity.let_pass(body, above)
-        self._look_what_is_carried()
+                    self._world.collision_filter.let_pass(built.body, above)
 
-    def _hold(self, one: SceneObject, body: int, link: int) -> None:
-        if isinstance(one, ForceSensor):
-            one.hold(self._world, body, link)
-        elif isinstance(one, Joint):
-            one.drive = JointDrive(self._world, body, link)
-            one.drive.limit(one.limits)
-            one.drive.command(one.control)
+    def _follow(self) -> None:
+        """Put what is carried where it is carried to, a chain that hangs on another one's link after that."""
 
-    def _place_loose_ones(self) -> None:
+        def depth(body: int) -> int:
+            return len(bodies_above(self.objects[first[body]]))
+
+        first = {built.body: built.chain.hung[0].joint for built in self._built.values() if built.chain.hung}
+        bases = self._carried_bases
+        self._context.carried.bases = {body: bases[body] for body in sorted(bases, key=depth)}
+        self._context.carried.follow()
+
+    def _place_loose_ones(self, added: Iterable[int]) -> None:
         """Put what hangs on vehicles where they are, now that they are there."""
-        for index, one in self._objects.items():
+        for index in added:
+            one = self.objects[index]
             if one.is_loose and one.parent is not None:
-                matrix = multiply(one.parent.below(), self._entries[index].local)
-                one.put(matrix)
+                one.put(multiply(one.parent.below(), self.entries[index].local))
 
-    # ---- what is carried
+    # ---- as it is now
 
-    def _look_what_is_carried(self) -> None:
-        self.carries = bool(self._hanging or self._carried_bases)
+    def now(self, index: int) -> dict[str, Any]:
+        """Return the keys of an entry that say where it is, what it hangs on, how a joint stands, what is static."""
+        one, entry = self.objects[index], self.entries[index]
+        values = place_of(one)
+        if isinstance(one, ShapeObject) and one.mass and not one.is_held:
+            is_other = isinstance(entry, ObjectParameters) and one.is_static != entry.static
+            values.update({"static": one.is_static} if is_other else {})
+        return values
 
-    def follow(self) -> None:
-        """Put every body without mass to where what carries it has gone."""
-        for base in self._carried_bases:
-            base.follow()
-        for shape in self._hanging.values():
-            shape.follow()
+    def write_down(self, indices: Iterable[int]) -> None:
+        """Let entries say where they are now."""
+        for index in indices:
+            now = self.now(index).items()
+            values = {key: tuple(value) if isinstance(value, list) else value for key, value in now}
+            self.entries[index] = self.entries[index].model_copy(update=values)
 
-    def remember(self) -> Callable[[], None]:
+    def write_down_joints(self) -> None:
+        """Let entries say where they are now, where joints may be about to hold others than they do."""
+        if any(isinstance(one, (JointParameters, ForceSensorParameters)) for one in self.entries.values()):
+            self.write_down(self.entries)
+
+    def parameters_now(self) -> SceneParameters:
+        """Return what a file would say of the scene as it is now."""
+        self.write_down(self.entries)
+        now = {"objects": list(self.entries.values()), "scripts": list(self.scripts.values())}
+        return self.parameters.model_copy(update=now)
+
+    def save_state(self) -> Callable[[], None]:
         """Return a function that puts bodies without mass back where the tree has them."""
+        kept = dict(self.entries)
 
-        def recall() -> None:
-            statics = [one.carried for one in self._objects.values() if isinstance(one, Shape)]
-            for one in (*self._carried_bases, *statics):
+        def restore() -> None:
+            self.entries.update({index: one for index, one in kept.items() if index in self.entries})
+            statics = [one.carried for one in self.objects.values() if isinstance(one, ShapeObject) and not one.is_held]
+            for one in (*self._carried_bases.values(), *statics):
                 one.renew()
 
-        return recall
+        return restore
 
     # ---- what it looks like
 
-    def objects_now(self) -> Mapping[int, SceneObject]:
-        """Return the objects that scripts find, by entry of the scene file."""
-        return self._objects
-
-    def bodies_by_entry(self) -> Mapping[int, SceneBody | LinkBody]:
-        """Return the bodies of the shapes, by entry of the scene file."""
-        return dict(zip(sorted(self._places), self.bodies))
-
     def things(self) -> dict[str, SceneObject]:
-        """Return what one can see and move, by name; a shape without one is called objects/ and its number."""
-        seen = {one.name: one for one in self._objects.values() if one.kind in ("shape", "dummy", "path")}
-        for index in self._places.keys() - self._objects.keys():
-            name = self._called(index)
-            seen.setdefault(name, SceneObject((name,), name, None, IDENTITY, self._body(index)))
-        return seen
+        """Return what one can see and move, by name."""
+        return {one.name: one for one in self.objects.values() if one.kind in ("shape", "dummy", "path")}
 
     def visuals(self) -> tuple[list[Visual], np.ndarray]:
         """Return how the objects look, the floor aside, and the poses world from visual, (N, 4, 4)."""
@@ -234,14 +356,14 @@ class Scene:
 
     def visual_names(self) -> list[str]:
         """Return whose each of the visuals is, as `things` calls it."""
-        names = {place: self._called(index) for index, place in self._places.items()}
-        return [names.get(place, "") for place in self._world.visual_places(self._numbers())]
+        names = {place: self.entries[index].name for index, place in self._places.items()}
+        return [names.get(place, "") for place in self._world.pictures.places(self._numbers())]
 
     def _numbers(self) -> list[int]:
         return list(dict.fromkeys(self._places[index][0] for index in sorted(self._places)))
 
 
-def _warn(entries: Sequence[object], reasons: Mapping[int, str]) -> None:
+def _warn(entries: Mapping[int, object], reasons: Mapping[int, str]) -> None:
     """Say in one line for each reason which joints the dynamics does not move."""
     for reason in sorted({*reasons.values()}):
         names = [getattr(entries[index], "name", "") for index, one in reasons.items() if one == reason]

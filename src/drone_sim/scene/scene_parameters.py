@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, TypeAdapter, ValidationError
 
-from drone_sim.config.errors import Problem
-from drone_sim.config.place import DatumParameters, MagneticField
+from drone_sim.config.errors import problems
 from drone_sim.config.types import (
     Checked,
+    DatumParameters,
     File,
     Finite,
+    MagneticField,
     ParameterError,
+    ParameterProblem,
     Switch,
     Within,
     named_in,
+    one_line,
     one_of,
     read_yaml,
-    readable_key,
 )
+from drone_sim.files import images, mesh_files
 from drone_sim.files.resources import resolve
+from drone_sim.mechanics.object_names import numbered
 from drone_sim.mechanics.object_tree import DEEPEST
+from drone_sim.message_text import shown
 from drone_sim.scene import attached_scripts
-from drone_sim.scene.attached_scripts import AttachedScripts
+from drone_sim.scene.attached_scripts import AttachedScriptParameters, AttachedScripts
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.kinds import KINDS
-from drone_sim.scene.object_parameters import SHAPES
-from drone_sim.wording import shown
+from drone_sim.scene.object_parameters import SHAPES, ObjectParameters
 
 MAX_OBJECTS = 1000
 WORLD = ("time_step", "sub_step", "gravity")  # what a scene file may say of these comes before the parameters
 BESIDE = ("drone", "vehicles", "weather", *WORLD)  # what a scene file holds besides the scene
+MAX_TRIANGLES = 500_000  # of all meshes of a scene, each counted as often as it stands there
+MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all its textures
+MAX_REACH = 1e5  # m, of a mesh from its own origin
 
 
 class FloorParameters(Checked):
@@ -45,9 +53,32 @@ class FloorParameters(Checked):
 
 
 if TYPE_CHECKING:
-    _Object = EntryParameters
+    EntryChoice = EntryParameters
 else:
-    _Object = one_of(*SHAPES, *KINDS, key="shape", or_key="kind")
+    EntryChoice = one_of(*SHAPES, *KINDS, key="shape", or_key="kind")
+
+
+_Value = TypeVar("_Value")
+_VREPS_WORDS = {"box": "Cuboid", "mesh": "Shape", "compound": "Shape", "urdf": "Shape"}
+_ENTRY: TypeAdapter[EntryParameters] = TypeAdapter(EntryChoice)
+_SCRIPT = TypeAdapter(AttachedScriptParameters)
+
+
+def entry_from(said: Mapping[str, Any]) -> EntryParameters:
+    """Return what an entry says, checked; without a `position` it is at its parent's. Raises ParameterError."""
+    return _checked(_ENTRY, EntryChoice, {"position": [0.0, 0.0, 0.0], **said})
+
+
+def script_from(said: Mapping[str, Any]) -> AttachedScriptParameters:
+    """Return what an entry of `scripts` says, checked. Raises ParameterError."""
+    return _checked(_SCRIPT, AttachedScriptParameters, said)
+
+
+def _checked(adapter: TypeAdapter[_Value], kind: Any, said: Mapping[str, Any]) -> _Value:
+    try:
+        return adapter.validate_python(said)
+    except ValidationError as error:
+        raise ParameterError(one_line([(None, one.text) for one in problems(error, kind)])) from None
 
 
 class SceneParameters(Checked):
@@ -56,14 +87,15 @@ class SceneParameters(Checked):
     datum: DatumParameters
     magnetic_field: MagneticField
     floor: FloorParameters
-    objects: Annotated[list[_Object], Field(max_length=MAX_OBJECTS)]
+    objects: Annotated[list[EntryChoice], Field(max_length=MAX_OBJECTS)]
     scripts: AttachedScripts
 
     def model_post_init(self, _context: Any) -> None:
-        """Check what concerns several objects at once."""
+        """Give a name to objects without one; check what concerns several objects at once."""
+        name_shapes(self.objects)
         entries = {}
         for index, one in enumerate(self.objects):
-            if one.name and one.name in entries:
+            if one.name in entries:
                 raise _refused(index, "name", one.name, "comes twice")
             entries[one.name] = index, one
         for index, one in enumerate(self.objects):
@@ -75,8 +107,20 @@ class SceneParameters(Checked):
         attached_scripts.check(self.scripts)
 
 
+def name_shapes(objects: list[EntryChoice]) -> None:
+    """Let shapes without a name be called as V-REP calls new ones: Cuboid, Cuboid0, Cuboid1, ..."""
+    taken = {one.name for one in objects}
+    free: dict[str, Iterator[str]] = {}
+    for index, one in enumerate(objects):
+        if not one.name and isinstance(one, ObjectParameters):
+            word = _VREPS_WORDS.get(one.shape, one.shape.capitalize())
+            names = free.setdefault(word, (other for other in numbered(word) if other not in taken))
+            name = next(names)
+            objects[index] = one.model_copy(update={"name": name, "alias": word if name != word else ""})
+
+
 def _refused(index: int, key: str, value: str, why: str) -> ParameterError:
-    return ParameterError(f"parameter scene/objects/{index}/{key} = '{value}': {why}", ("scene", "objects", index, key))
+    return ParameterError(why, ("objects", index, key), f"'{value}'")
 
 
 def _above(one: EntryParameters, entries: Mapping[str, tuple[int, EntryParameters]]) -> dict[str, None]:
@@ -97,7 +141,7 @@ def read(file: str) -> dict[str, Any]:
     try:
         path = resolve(file)
     except FileNotFoundError as error:
-        raise ParameterError(f"parameter scene_file = {shown(file)}: {error}") from None
+        raise ParameterError(str(error), ("scene_file",), shown(file)) from None
     return from_content(read_yaml(path), path.parent)
 
 
@@ -120,17 +164,17 @@ def find_files_beside(folder: Path, values: Mapping[str, Any]) -> None:
         _find_beside(folder, place)
 
 
-def problem_in_file(problem: Problem) -> Problem | None:
+def problem_in_file(problem: ParameterProblem) -> ParameterProblem | None:
     """Return a problem as the scene file has it, where they stand beside the drone; None for any other."""
     if problem.location[:1] in [(key,) for key in BESIDE]:
         return problem
     if problem.location[:1] != ("scene",):
         return None
-    location, text = problem.location[1:], problem.text.replace("parameter scene/", "parameter ", 1)
-    if len(location) == 1 and "unknown key" in text:
+    inner = problem._replace(location=problem.location[1:])
+    if len(inner.location) == 1 and inner.location[0] not in SceneParameters.model_fields:
         known = ", ".join(sorted([*SceneParameters.model_fields, *BESIDE]))
-        text = f"unknown key {readable_key(location)}; known are {known}"
-    return problem._replace(location=location, text=text)
+        return inner._replace(reason=f"unknown key; known are {known}")
+    return inner
 
 
 def _listed(objects: Any) -> list[Any]:
@@ -146,3 +190,36 @@ def _find_beside(folder: Path, place: Any) -> None:
             continue
         if isinstance(name, str) and name and not hasattr(name, "given"):  # an alias is the same mapping once more
             place[key] = named_in(folder, name)
+
+
+# ---- meshes, textures and URDFs, looked through and counted before anything is made of them
+
+
+def check_files(floor: FloorParameters, objects: Iterable[EntryParameters]) -> None:
+    """Raise ParameterError, in one line, for the first file of the scene that cannot be used."""
+    try:
+        shapes = [one for one in objects if isinstance(one, ObjectParameters)]
+        _check_textures({floor.texture, *(one.texture for one in shapes if one.texture)})
+        _check_meshes(shapes)
+    except ValueError as error:
+        raise ParameterError(" ".join(str(error).split())) from None
+
+
+def _check_textures(paths: set[str]) -> None:
+    pixels = 0
+    for path in sorted(paths):
+        height, width = images.read(path).shape[:2]
+        pixels += height * width
+        if pixels > MAX_PIXELS:
+            raise ValueError(f"texture {path}: with it, the scene's textures have more than {MAX_PIXELS} pixels")
+
+
+def _check_meshes(shapes: list[ObjectParameters]) -> None:
+    count = 0
+    for path, scale in (mesh for one in shapes for mesh in one.to_shape().meshes()):
+        count += mesh_files.triangles(path)
+        if count > MAX_TRIANGLES:
+            raise ValueError(f"mesh {path}: with it, the scene's meshes have more than {MAX_TRIANGLES} triangles")
+        reach = float(np.max(mesh_files.reach(path) * np.abs(scale)))
+        if reach > MAX_REACH:
+            raise ValueError(f"mesh {path}: reaches {reach:g} m from its origin; at most {MAX_REACH:g} m are allowed")

@@ -20,11 +20,17 @@ class GuardedScript:
         self._script = script
         self.failure: ScriptError | None = None
         self.idle, self.is_empty = script.idle, script.is_empty
+        self._calls = 0  # that have not returned
 
     @property
     def threaded(self) -> bool:
         """Whether it has a thread that has not ended."""
         return self.failure is None and self._script.threaded
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether it is being called, or has a thread that has not ended."""
+        return self._calls > 0 or self.threaded
 
     def call(self, phase: str) -> None:
         """Run a phase: init, actuation, sensing or cleanup."""
@@ -38,7 +44,7 @@ class GuardedScript:
         """Call a global function for another script, whose error it is where it fails. Raises ScriptError."""
         if self.failure is not None:
             raise ScriptError(name, self.failure.path, 0, "the script has failed, and is not called any more")
-        return self._script.call_function(name, arguments)
+        return self._called(self._script.call_function, name, arguments)
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message."""
@@ -48,7 +54,7 @@ class GuardedScript:
         """Call a function of the script with a request; return what it returns. Raises Unanswered where it fails."""
         if self.failure is None:
             try:
-                return self._script.answer(callback, request)
+                return self._called(self._script.answer, callback, request)
             except ScriptError as error:
                 self._fail(error)
         raise Unanswered(f"the script has failed, and is not called any more: {self.failure}")
@@ -57,16 +63,16 @@ class GuardedScript:
         """Fail where the script has no such function to call back."""
         self._attempt(self._script.check, callback)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now."""
-        failure, recall_script = self.failure, self._script.remember() if self.failure is None else None
+        failure, restore_script = self.failure, self._script.save_state() if self.failure is None else None
 
-        def recall() -> None:
+        def restore() -> None:
             self.failure = failure
-            if recall_script is not None:
-                recall_script()
+            if restore_script is not None:
+                restore_script()
 
-        return recall
+        return restore
 
     def close(self) -> None:
         """Free what the script holds; may be called twice."""
@@ -75,9 +81,16 @@ class GuardedScript:
     def _attempt(self, action: Callable[..., None], *arguments: Any) -> None:
         if self.failure is None:
             try:
-                action(*arguments)
+                self._called(action, *arguments)
             except ScriptError as error:
                 self._fail(error)
+
+    def _called(self, action: Callable[..., Any], *arguments: Any) -> Any:
+        self._calls += 1
+        try:
+            return action(*arguments)
+        finally:
+            self._calls -= 1
 
     def _fail(self, error: ScriptError) -> None:
         self.failure = error

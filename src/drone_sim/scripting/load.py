@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
 from drone_sim.files.resources import resolve
-from drone_sim.scripting import source_files
+from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import Api
-from drone_sim.scripting.api.turns import Turns
+from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.types import Callback
-from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.errors import ScriptError, read_source
 from drone_sim.scripting.python.helpers import BUILT_IN
 from drone_sim.scripting.python.script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
-from drone_sim.wording import near_names
 
 DEFAULT = "pilot"
 
@@ -48,43 +48,17 @@ class Script(Protocol):
     def check(self, callback: Callback) -> None:
         """Raise ScriptError where the script has no such function to call back."""
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now."""
 
     def close(self) -> None:
         """Free what the script holds; may be called twice."""
 
 
-class NoScript:
-    """What a drone has before a script is loaded."""
-
-    idle, is_empty, threaded = "", True, False
-
-    def call(self, _phase: str) -> None:
-        """Do nothing."""
-
-    def take_turn(self) -> None:
-        """Do nothing."""
-
-    def call_function(self, name: str, _arguments: list[Any]) -> Any:
-        """Raise ScriptError: there is none."""
-        raise ScriptError(name, "", 0, "no script is loaded")
-
-    def callback(self, _callback: Callback, _message: Any) -> None:
-        """Do nothing."""
-
-    def answer(self, _callback: Callback, _request: Any) -> Any:
-        """Do nothing, and return nothing."""
-
-    def check(self, _callback: Callback) -> None:
-        """Do nothing."""
-
-    def remember(self) -> Callable[[], None]:
-        """Return a function that does nothing."""
-        return lambda: None
-
-    def close(self) -> None:
-        """Do nothing."""
+@functools.cache
+def no_script() -> Script:
+    """Return what a drone has before a script is loaded: an empty one."""
+    return PythonScript("", b"", {}, TimeLimit(0.0), Turns())
 
 
 def script_path(script: str) -> str:
@@ -110,15 +84,11 @@ def load(script: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns
     """Load a child script, whose thread has those `turns`; raises ScriptError."""
     path = script_path(script)
     try:
-        source = source_files.read(path)
-    except (OSError, ValueError) as error:
-        raise ScriptError("load", path, 0, getattr(error, "strerror", None) or str(error)) from None
-    return _made(path, source, modules, limit, turns or Turns())
-
-
-def _made(path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns) -> Script:
+        source = read_source(path)
+    except ValueError as error:
+        raise ScriptError("load", path, 0, str(error)) from None
     if path.endswith(".py"):
-        return PythonScript(path, source, modules, limit, turns)
+        return PythonScript(path, source, modules, limit, turns or Turns())
     try:
         from drone_sim.scripting.lua.script import LuaScript  # whoever flies Python needs no lupa
 

@@ -17,26 +17,13 @@ _NEAR, _NEAR_WITHOUT_SYS = 0.75, 0.9  # of difflib's ratio
 _LONGEST = 60  # characters of a name that is looked at
 
 # What CoppeliaSim calls in one kind of script or another, and this simulator in none.
-_ELSEWHERE = frozenset(
-    _PREFIX + name
-    for name in (
-        *(
-            "nonSimulation",
-            "realTimeIdle",
-            "info",
-            "msg",
-            "event",
-            "data",
-            "ext",
-            "moduleEntry",
-        ),
-        *("beforeMainScript", "beforeSimulation", "afterSimulation", "suspend", "suspended", "resume"),
-        *("beforeInstanceSwitch", "afterInstanceSwitch", "beforeSave", "afterSave", "beforeCopy", "afterCopy"),
-        *("beforeDelete", "afterDelete", "afterCreate", "selChange", "userConfig", "addOnScriptRun"),
-        *("addOnScriptSuspend", "addOnScriptSuspended", "addOnScriptResume", "dyn", "dynCallback"),
-        *("joint", "jointCallback", "contact", "contactCallback", "vision", "visionCallback", "trigger"),
-    )
-)
+_OTHER_KINDS = """
+    nonSimulation realTimeIdle info msg event data ext moduleEntry beforeMainScript beforeSimulation afterSimulation
+    suspend suspended resume beforeInstanceSwitch afterInstanceSwitch beforeSave afterSave beforeCopy afterCopy
+    beforeDelete afterDelete afterCreate selChange userConfig addOnScriptRun addOnScriptSuspend addOnScriptSuspended
+    addOnScriptResume dyn dynCallback joint jointCallback contact contactCallback vision visionCallback trigger
+"""
+_ELSEWHERE = frozenset(_PREFIX + name for name in _OTHER_KINDS.split())
 
 
 def misspelt(functions: Collection[str]) -> Iterator[tuple[str, str]]:

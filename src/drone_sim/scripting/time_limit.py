@@ -57,7 +57,7 @@ _let_pass = ctypes.PyDLL(None).Py_IsInitialized  # for new frames, such as __exi
 _let_pass.argtypes, _let_pass.restype = 3 * (ctypes.py_object,), None
 
 
-class Stopped(BaseException):
+class ScriptStopped(BaseException):
     """Raised in a script that ran for too long; no Exception, so that `except Exception` lets it pass."""
 
 
@@ -194,7 +194,7 @@ class TimeLimit:
                 _timer.set(max(0.0, self.left()) + _LATER)
 
     def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a Python function; raises Stopped where it does not return in time."""
+        """Call a Python function; raises ScriptStopped where it does not return in time."""
         now = monotonic()
         self._deadline = now + self.seconds
         self.struck = False
@@ -220,7 +220,7 @@ class TimeLimit:
                 _seen[0] = 0.0
                 if self.struck or self._fired:
                     self._end_strike()
-        except Stopped:
+        except ScriptStopped:
             # It may have struck between the end of the function and the beginning of `finally`.
             self.armed = False
             self.hide()
@@ -231,14 +231,14 @@ class TimeLimit:
         """Drop an exception that is still on its way, and what the script traces with."""
         if sys.gettrace() is _let_pass:
             _set_trace(self._traced_by)
-        with contextlib.suppress(Stopped):
+        with contextlib.suppress(ScriptStopped):
             _let_it_come()
         while self._fired:
             try:
                 with self._firing:
                     self._fired = False
                     _raise_in_thread(self._thread, _NOTHING)
-            except Stopped:
+            except ScriptStopped:
                 continue
 
     def fire_if_late(self) -> None:
@@ -250,12 +250,12 @@ class TimeLimit:
             if self.armed and self.exceeded():
                 self.struck = True
                 self._deadline = monotonic() + _AGAIN
-                _raise_in_thread(self._thread, Stopped)
+                _raise_in_thread(self._thread, ScriptStopped)
             else:
                 self._fired = False
 
     def strike_if_late(self, frame: FrameType | None) -> None:
-        """Raise Stopped in a script that is late, and in the next line of each of its frames, such as a `finally`.
+        """Raise ScriptStopped in a script that is late, and in the next line of each of its frames, such as `finally`.
 
         Sets the timer again; the timer's handler calls it.
         """
@@ -266,11 +266,11 @@ class TimeLimit:
         if not self.struck:
             self.struck, self._traced_by = True, sys.gettrace()
         _set_trace(_let_pass)
-        insist = functools.partial(_insist, self._thread, Stopped)
+        insist = functools.partial(_insist, self._thread, ScriptStopped)
         while frame is not None and frame.f_code is not TimeLimit.run.__code__:
             frame.f_trace = insist
             frame = frame.f_back
-        raise Stopped
+        raise ScriptStopped
 
 
 class _Timer:

@@ -15,13 +15,13 @@ U0 falls in a straight line with the charge, from `full` to `empty` volts a cell
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple
 
 from drone_sim.config.types import Finite, Fraction, Name, ParameterError, Within
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.parameters import SensorParameters, Topic
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output
+from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic
 
 _DISCHARGING, _GOOD, _DEAD, _LIPO = 2, 1, 3, 3  # sensor_msgs/BatteryState: status, health, health, technology
 _HOUR = 3600.0  # s
@@ -53,10 +53,10 @@ class BatteryParameters(SensorParameters):
         """Raise ParameterError for periods that sub_step does not divide, or values that contradict each other."""
         super().check(sub_step)
         if self.empty > self.full:
-            raise ParameterError(f"empty = {self.empty:g}: must not be more than full = {self.full:g}", ("empty",))
+            raise ParameterError(f"must not be more than full = {self.full:g}", ("empty",), f"{self.empty:g}")
         if self.idle_power > self.hover_power:
             limit = f"must not be more than hover_power = {self.hover_power:g}"
-            raise ParameterError(f"idle_power = {self.idle_power:g}: {limit}", ("idle_power",))
+            raise ParameterError(limit, ("idle_power",), f"{self.idle_power:g}")
 
 
 class BatterySample(NamedTuple):
@@ -96,15 +96,9 @@ class Battery(Instrument):
         (measured,) = self._noise.add((voltage,))
         return BatterySample(measured, current, self._charge)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back the charge, too."""
-        base, charge = super().remember(), self._charge
-
-        def recall() -> None:
-            base()
-            self._charge = charge
-
-        return recall
+        return in_turn(super().save_state(), saved(self, "_charge"))
 
     def power(self) -> float:
         """Return what is drawn now, in W."""

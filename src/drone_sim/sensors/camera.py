@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Protocol
 
 import numpy as np
 
 from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.render.context import RendererUnavailable
-from drone_sim.render.intrinsics import Intrinsics
-from drone_sim.render.orthographic import Lens, Orthographic
+from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
 from drone_sim.render.renderer import Renderer
 from drone_sim.sensors.camera_parameters import CameraParameters
-from drone_sim.sensors.failing import Failure
-from drone_sim.sensors.sensor import Reading, Sensor
+from drone_sim.sensors.sensor import Failure, Reading, Sensor
 from drone_sim.shapes.visual import Visual
 
 _LOG = logging.getLogger(__name__)
@@ -26,9 +25,7 @@ TINY = "TinyRenderer"
 class Subject(Protocol):
     """What a picture is taken of."""
 
-    @property
-    def changes(self) -> int:
-        """Return another number than before whenever a picture of it may look different."""
+    changes: int  # another number than before whenever a picture of it may look different
 
     def visuals(self) -> list[Visual]:
         """Return everything that can be drawn."""
@@ -42,23 +39,32 @@ class Subject(Protocol):
         """Return RGB (height, width, 3) and depth (height, width), drawn without OpenGL."""
 
 
+class TurningBlades(Protocol):
+    """The blades of a vehicle's propellers, which turn in pictures alone."""
+
+    turned: bool  # by a script, since they were shown
+
+    def show(self) -> None:
+        """Turn them in the subject's pictures to where they are."""
+
+
 class Vision:
     """Takes pictures of a subject: with OpenGL where EGL is to be had, with the subject's own renderer elsewhere."""
 
-    def __init__(self, subject: Subject, samples: int = 0):
-        """Make the renderer when the first picture is asked for: not every run needs one.
+    def __init__(self, samples: int = 0):
+        """Make the renderer when the first picture is asked for, after `look_at`: not every run needs one.
 
         `samples` per pixel smooth the edges, as far as the renderer can.
         """
-        self._subject = subject
         self._samples = samples
         self._renderer: Renderer | None = None
         self._fallback = False
         self.pictures, self.seconds = 0, 0.0  # taken by now, and the real time that they took
 
-    def look_at(self, subject: Subject) -> None:
-        """Take the pictures of another subject from now on."""
-        self._subject = subject
+    def look_at(self, subject: Subject, blades: Collection[TurningBlades]) -> None:
+        """Take the pictures of this subject from now on, in which blades turn when somebody looks."""
+        self._subject, self._blades = subject, blades
+        self._shown = -1  # the subject's changes, when its blades were turned
 
     def picture(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
         """Return the picture from `pose` (4, 4), world from optical frame.
@@ -69,6 +75,7 @@ class Vision:
         if self._renderer is None and not self._fallback:
             self._open()
         began = time.perf_counter()
+        self._turn_blades()
         taken = self._drawn(kind, intrinsics, pose)
         self.pictures += 1
         self.seconds += time.perf_counter() - began
@@ -107,7 +114,15 @@ class Vision:
     @property
     def changes(self) -> int:
         """Return another number than before whenever a picture may look different."""
+        self._turn_blades()
         return self._subject.changes
+
+    def _turn_blades(self) -> None:
+        """Turn the blades, once for all cameras."""
+        if self._shown != self._subject.changes or any(one.turned for one in self._blades):
+            for one in self._blades:
+                one.show()
+            self._shown = self._subject.changes
 
     def close(self) -> None:
         """Free the renderer; may be called twice."""
@@ -128,15 +143,18 @@ class Camera(Sensor):
         super().__init__(parameters.every)
         self.kind = parameters.kind
         self.change(parameters)
-        self.watched: Callable[[], bool] = lambda: False
+        self.viewers: set[Callable[[], bool]] = set()  # each says whether it looks now
         self.shown = 0  # pictures, to those who look
         self.image: np.ndarray | None = None  # what those who look are shown; None while nobody does
         self.pose = pose
         self.failure: Failure = "ok"
-        # Carries pictures to those who look: takes a new one or None, returns what has come and its age (s).
-        self.over: Callable[[np.ndarray | None], tuple[float, np.ndarray | None]] | None = None
+        self.is_linked = False  # whether pictures come over a link, late or not at all
         self.age = 0.0  # s, of `image`
         self._vision = vision
+
+    def watched(self) -> bool:
+        """Tell whether anybody looks."""
+        return bool(self.viewers) and any(looks() for looks in self.viewers)
 
     def change(self, parameters: CameraParameters) -> None:
         """Look as often, and see as much, as these parameters say."""
@@ -156,24 +174,17 @@ class Camera(Sensor):
         """
         changes, pose = self._vision.changes, self.pose()
         if self.failure == "silent":
-            return self._dark()
+            shape = self.intrinsics.height, self.intrinsics.width
+            return np.zeros((*shape, 3), np.uint8) if self.kind == "color" else np.zeros(shape, np.float32)
         if self.failure == "frozen" and self._last is not None:
             return self._last[2]
         if self._last is None or self._last[:2] != (changes, pose):
             self._last = changes, pose, self.take()
         return self._last[2]
 
-    def _dark(self) -> np.ndarray:
-        shape = self.intrinsics.height, self.intrinsics.width
-        return np.zeros((*shape, 3), np.uint8) if self.kind == "color" else np.zeros(shape, np.float32)
-
-    def show(self, steps: int, image: np.ndarray | None) -> None:
-        """Let those who look see a picture, taken after so many steps; None is none."""
-        if self.failure == "silent":
-            image = None
-        if self.over is not None:
-            self.age, image = self.over(image)
-        self.image = image
+    def show(self, steps: int, image: np.ndarray | None, age: float = 0.0) -> None:
+        """Let those who look see a picture, which has come after so many steps, of some age (s); None is none."""
+        self.image, self.age = image, age
         if image is not None:
             self.shown += 1
             self.latest = Reading(steps, image)
@@ -183,13 +194,6 @@ class Camera(Sensor):
         self.image = self.latest = self._last = None
         self.age = 0.0
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back the last picture that was shown, and how it was taken."""
-        image, age, latest, last = self.image, self.age, self.latest, self._last
-        period, intrinsics = self.period, self.intrinsics
-
-        def recall() -> None:
-            self.period, self.intrinsics = period, intrinsics
-            self.image, self.age, self.latest, self._last = image, age, latest, last
-
-        return recall
+        return saved(self, "image", "age", "latest", "_last", "period", "intrinsics")

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from drone_sim.config.types import TOPIC, Checked, Finite, Name, Within
-from drone_sim.sensors.mount import MountParameters
+from drone_sim.sensors.sensor import MountParameters
 
 MAX_CAMERAS = 16
 MAX_PIXELS = 4096 * 4096  # of all cameras together

@@ -9,13 +9,13 @@ is missed, however short.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 from drone_sim.config.types import Name
 from drone_sim.mechanics.frames import Vector, cross, position, rotate_back
-from drone_sim.sensors.parameters import SensorParameters, Topic
-from drone_sim.sensors.sensor import Contact, Fields, Fitting, Instrument, Output, xyz
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
+from drone_sim.sensors.sensor import Contact, Fields, Fitting, Instrument, Output, SensorParameters, Topic, xyz
 
 _NEWTONS = 10.0  # of a marker's arrow, for each metre
 _ARROW, _ADD = 0, 0  # visualization_msgs/Marker
@@ -88,15 +88,9 @@ class Contacts(Instrument):
         force, torque = (rotate_back(pose, [sum(axis) for axis in zip(*vectors)]) for vectors in (forces, torques))
         return ContactsSample(tuple(contacts), force, torque)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back what it has seen since the last sample, too."""
-        base, own = super().remember(), (self._hardest, self._most)
-
-        def recall() -> None:
-            base()
-            self._hardest, self._most = own
-
-        return recall
+        return in_turn(super().save_state(), saved(self, "_hardest", "_most"))
 
     # ---- messages
 

@@ -14,7 +14,7 @@ with every contact, however seldom they are taken; with a sample in every sub-st
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 from drone_sim.config.types import Checked, Name
@@ -29,9 +29,9 @@ from drone_sim.mechanics.frames import (
     rotate_back,
     to_quaternion,
 )
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.parameters import SensorParameters, Topic
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, diagonal, xyz
+from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, diagonal, xyz
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
 _NOT_REPORTED = [-1.0, *([0.0] * 8)]  # a covariance whose first number is -1
@@ -124,17 +124,13 @@ class Imu(Instrument):
         x, y, z = position(axes)
         return _sum(linear, cross(angular, (x - place[0], y - place[1], z - place[2])), 1.0)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings it back, in the middle of a sample."""
-        base = super().remember()
-        own = self._velocity, self._axes, self._gained, self._turned, self._passed
+        own = saved(self, "_velocity", "_axes", "_gained", "_turned", "_passed")
+        return in_turn(super().save_state(), own, self._know_jumps)
 
-        def recall() -> None:
-            base()
-            self._velocity, self._axes, self._gained, self._turned, self._passed = own
-            self._jumps = self.carrier.jumps
-
-        return recall
+    def _know_jumps(self) -> None:
+        self._jumps = self.carrier.jumps
 
     # ---- messages
 

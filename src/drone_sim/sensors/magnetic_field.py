@@ -8,8 +8,7 @@ from typing import Any, Literal
 from drone_sim.config.types import Name
 from drone_sim.mechanics.frames import rotate_back
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.parameters import SensorParameters, Topic
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, diagonal, xyz
+from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, diagonal, xyz
 
 
 class MagneticFieldParameters(SensorParameters):

@@ -17,15 +17,17 @@ The Allan deviation over τ is density / sqrt(τ) of the white part, and bias_wa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from numpy.random import Generator
 from pydantic import Field
 
 from drone_sim.config.types import Checked, Finite, Within
+from drone_sim.mechanics.saved_state import Restore, saved
 
 _Amount = Annotated[Finite, Within(0, 1e6)]  # in the unit of what is measured; any of them left out is 0
+_Step = Annotated[Finite, Within(1e-15, 1e6, or_zero=True)]  # what is finer is lost in a float, or has no reciprocal
 _Time = Annotated[Finite, Within(1e-3, 1e9, or_zero=True)]
 
 
@@ -41,7 +43,7 @@ class NoiseParameters(Checked):
     bias: _Amount = _said("u, standard deviation of the constant bias")
     bias_walk: _Amount = _said("u/s/√Hz")
     bias_time: _Time = _said("s, in which what wanders forgets; 0: never")
-    quantisation: _Amount = _said("u, of a step")
+    quantisation: _Step = _said("u, of a step; 0: none")
     variance: Annotated[Finite, Within(0, 1e12)] | None = None  # u², what messages say; what the others come to if none
 
 
@@ -109,15 +111,9 @@ class Noise:
         step = self.parameters.quantisation
         return [round(one / step) * step for one in measured] if step else measured
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back bias and parameters; the random generator is the sensor's to restore."""
-        own, constant, bias = self.parameters, self._constant, self._bias  # never changed, only replaced
-
-        def recall() -> None:
-            self._be(own)
-            self._constant, self._bias = constant, bias
-
-        return recall
+        return saved(self, "parameters", "_white", "_spread", "_keep", "_walk", "_constant", "_bias")
 
 
 def _drawn(random: Generator, count: int) -> list[float]:

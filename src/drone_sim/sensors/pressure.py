@@ -17,8 +17,7 @@ from typing import Any, Literal, NamedTuple
 from drone_sim.config.types import Name
 from drone_sim.mechanics.frames import position
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.parameters import SensorParameters, Topic
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, xyz
+from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, xyz
 
 _SEA_LEVEL = 101325.0  # Pa
 _WARMTH, _LAPSE = 288.15, 0.0065  # K, K/m

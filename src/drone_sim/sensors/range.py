@@ -12,8 +12,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from drone_sim.config.types import Finite, Length, Name, ParameterError, Within
 from drone_sim.mechanics.frames import Vector, from_rpy, position, rotate_back, transform
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.parameters import SensorParameters, Topic
-from drone_sim.sensors.sensor import Fields, Fitting, Hit, Instrument, Output
+from drone_sim.sensors.sensor import Fields, Fitting, Hit, Instrument, Output, SensorParameters, Topic
 
 _RADIATION = {"ultrasound": 0, "infrared": 1}  # sensor_msgs/Range
 # V-REP's proximity sensors look along their z; as the vision sensors, with y up and x to the left.
@@ -44,7 +43,7 @@ class RangeParameters(SensorParameters):
         super().check(sub_step)
         if not self.min_range < self.max_range:
             raise ParameterError(
-                f"min_range = {self.min_range:g}: must be less than max_range = {self.max_range:g}", ("min_range",)
+                f"must be less than max_range = {self.max_range:g}", ("min_range",), f"{self.min_range:g}"
             )
 
 

@@ -9,20 +9,120 @@ of the kinds.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
+from pydantic import Field
 
-from drone_sim.config.place import DatumParameters
-from drone_sim.config.types import Checked
-from drone_sim.mechanics.frames import Matrix, Vector
+from drone_sim.config.types import (
+    TOPIC,
+    Angles,
+    Checked,
+    DatumParameters,
+    Finite,
+    Label,
+    Name,
+    ParameterError,
+    Point,
+    Within,
+)
+from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector, from_rpy, invert, multiply
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.state import State
 from drone_sim.sensors.noise import Noise, NoiseParameters
-from drone_sim.sensors.parameters import SensorParameters
+
+# An optical frame (z forward, x right, y down) in a frame with x forward, y left, z up: REP-103.
+_OPTICAL = from_rpy((0.0, 0.0, 0.0), (-math.pi / 2, 0.0, -math.pi / 2))
+
+
+class MountParameters(Checked):
+    """A place in the frame of an object ('' is the vehicle's root): metres; rad, roll, pitch, yaw.
+
+    Cameras look, and rays go, along its +x.
+    """
+
+    parent: Label = ""
+    position: Point
+    rpy: Angles
+
+    @property
+    def frame(self) -> Matrix:
+        """Parent from the mounted frame: x forward, y left, z up."""
+        return from_rpy(self.position, self.rpy)
+
+    @property
+    def optical(self) -> Matrix:
+        """Parent from the optical frame of a camera that is mounted so: z forward, x right, y down."""
+        return multiply(self.frame, _OPTICAL)
+
+
+Topic = Annotated[str, Field(pattern=TOPIC, max_length=128)]
+
+
+class SensorParameters(Checked):
+    """When a sensor samples, where it sits, and what it is called; cameras have parameters of their own."""
+
+    kind: str  # each kind names its own
+    rate: Annotated[Finite, Within(1e-3, 1e5)]  # Hz of simulated time; sub_step divides its period
+    topic: Topic  # in the vehicle's namespace
+    frame: Name  # of its messages
+    object: Name | None = None  # its name among the objects that a script finds; the sensor's own if left out
+    mount: MountParameters | None = None
+    latency: Annotated[Finite, Within(0, 60)] = 0.0  # s, whole sub-steps, from measuring to reading
+    seed: Annotated[int, Within(0, 2**63 - 1)] = 0
+
+    suffixes: ClassVar[tuple[str, ...]] = ("",)  # of the topics that it publishes, after `topic`
+    default_mount: ClassVar[Matrix] = IDENTITY  # the root from the sensor's frame, where nothing says anything else
+    from_object: ClassVar[Matrix] = IDENTITY  # the sensor's frame from that of the object that scripts find
+
+    def make(self, fitting: Fitting) -> Instrument:
+        """Return the instrument; `reset` comes before its first look."""
+        raise NotImplementedError
+
+    def period(self, sub_step: float) -> int:
+        """Return the sub-steps (of `sub_step` seconds) between two samples."""
+        return max(1, round(1 / (self.rate * sub_step)))
+
+    def check(self, sub_step: float) -> None:
+        """Raise ParameterError for a period or a latency that is no whole multiple of `sub_step` (s)."""
+        steps = self.period(sub_step)
+        if abs(steps * sub_step * self.rate - 1) > 1e-4:
+            raise ParameterError(
+                f"its period must be a whole multiple of sub_step = {sub_step:g} s; "
+                f"{1 / (steps * sub_step):.6g} Hz is near",
+                ("rate",),
+                f"{self.rate:g}",
+            )
+        if abs(round(self.latency / sub_step) * sub_step - self.latency) > 1e-6 * sub_step:
+            raise ParameterError(
+                f"must be a whole multiple of sub_step = {sub_step:g} s", ("latency",), f"{self.latency:g}"
+            )
+
+    def topics(self) -> Iterator[tuple[str, str]]:
+        """Yield what it publishes, and what each topic is."""
+        for suffix in self.suffixes:
+            yield f"{self.topic}{suffix}", suffix[1:] or self.kind
+
+    def placed(self, links: Mapping[str, Matrix]) -> tuple[str, Matrix]:
+        """Return the object that it hangs on ('' is the vehicle's root), and that from the sensor's frame.
+
+        It sits where `mount` says, or at the link of the URDF (given as root from link) that is named like its frame.
+        """
+        if self.mount is not None:
+            return self.mount.parent, self.mount.frame
+        return "", links.get(self.frame, self.default_mount)
+
+    def sensor_at(self, world_from_object: Matrix) -> Matrix:
+        """Return the world from the sensor's frame, given the object's pose."""
+        if self.from_object is IDENTITY:  # most often, and a fast sensor asks in every sub-step
+            return world_from_object
+        return multiply(world_from_object, invert(self.from_object))
+
 
 Fields = dict[str, Any]  # of a ROS message, by name; nested mappings and lists for its own messages
 
@@ -47,21 +147,12 @@ class Contact(NamedTuple):
 class Carrier(Protocol):
     """The vehicle, as its sensors see it: all of it as of the last sub-step."""
 
-    @property
-    def state(self) -> State:
-        """Pose and velocity of the root link."""
-
-    @property
-    def jumps(self) -> int:
-        """How often it has been put somewhere else, at rest; never counts down."""
-
-    @property
-    def mass(self) -> float:
-        """Mass in kg."""
-
-    @property
-    def gravity(self) -> float:
-        """Acceleration of free fall along z in m/s², negative downwards."""
+    state: State  # of the root link
+    jumps: int  # how often it has been put somewhere else, at rest; never counts down
+    mass: float  # kg
+    gravity: float  # acceleration of free fall along z in m/s², negative downwards
+    datum: DatumParameters  # where on the Earth the world's origin is
+    magnetic_field: Vector  # the Earth's in the world, in T
 
     @property
     def thrusts(self) -> Sequence[float]:
@@ -70,14 +161,6 @@ class Carrier(Protocol):
     @property
     def wind(self) -> Vector:
         """Velocity of the air where it is (m/s, world)."""
-
-    @property
-    def datum(self) -> DatumParameters:
-        """Where on the Earth the world's origin is."""
-
-    @property
-    def magnetic_field(self) -> Vector:
-        """The Earth's field in the world, in T."""
 
     def ray(self, start: Vector, end: Vector) -> Hit | None:
         """Return what a ray (m, world) meets first that is not the vehicle itself; None for nothing."""
@@ -128,7 +211,7 @@ class Sensor(ABC):
         """Begin anew, as at the start of a run."""
 
     @abstractmethod
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back all that the sensor is now; it may be called again and again."""
 
 
@@ -167,11 +250,6 @@ class Instrument(Sensor):
             noise.change(changed[paths[id(noise.parameters)]])
         self.parameters = parameters
 
-    @property
-    def frame(self) -> str:
-        """Name of the frame that its messages are in."""
-        return self.parameters.frame
-
     @abstractmethod
     def sample(self) -> Any:
         """Return the value of a sample taken now, noise included."""
@@ -194,33 +272,49 @@ class Instrument(Sensor):
         for noise in self._noises:
             noise.restart(self._random)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back noise, latency and readings."""
-        latest, readings, queue = self.latest, list(self.readings), list(self._queue)
-        random = self._random.bit_generator.state
-        noises = [noise.remember() for noise in self._noises]
-        parameters = self.parameters
-
-        def recall() -> None:
-            self.parameters = parameters
-            self.latest = latest
-            self.readings[:] = readings
-            self._queue = deque(queue)
-            self._random.bit_generator.state = random
-            for noise in noises:
-                noise()
-
-        return recall
+        own = saved(self, "parameters", "latest", "readings", "_queue")
+        return in_turn(own, saved(self._random.bit_generator, "state"), *(one.save_state() for one in self._noises))
 
     def header(self, reading: Reading) -> dict[str, Any]:
         """Return the header of a reading's message: when it was measured (s of simulated time), and in which frame."""
-        return {"stamp": reading.at * self.fitting.sub_step, "frame_id": self.frame}
+        return {"stamp": reading.at * self.fitting.sub_step, "frame_id": self.parameters.frame}
 
     def read(self) -> Fields | None:
         """Return the last reading as the fields of its first message; None before there is one."""
         if self.latest is None:
             return None
         return self.outputs[0].fields(self.latest.value, self.header(self.latest))
+
+
+# How sensors fail: they fall silent, or say the same thing over and over.
+Failure = Literal["ok", "silent", "frozen"]
+
+
+class Failing:
+    """Looks in place of an instrument, which goes on measuring: once sound again, its noise is what it would be."""
+
+    def __init__(self, instrument: Instrument, failure: Failure):
+        """Begin to fail; what is frozen before its first reading freezes with that."""
+        self._instrument = instrument
+        self._frozen = failure == "frozen"
+        self._last = instrument.latest
+
+    def look(self, count: int) -> None:
+        """Take part in a sub-step; of new readings none is left, or each is the last one once more."""
+        own = self._instrument
+        known = len(own.readings)
+        own.look(count)
+        new = own.readings[known:]
+        if not new:
+            return
+        del own.readings[known:]
+        if self._frozen:
+            value = (self._last or new[0]).value
+            own.readings += [Reading(one.at, value) for one in new]
+            self._last = own.readings[-1]
+        own.latest = self._last
 
 
 def _noises(model: Checked, above: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], NoiseParameters]]:

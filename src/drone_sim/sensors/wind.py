@@ -8,8 +8,7 @@ from typing import Any, Literal
 from drone_sim.config.types import Name
 from drone_sim.mechanics.frames import Vector
 from drone_sim.sensors.noise import NoiseParameters
-from drone_sim.sensors.parameters import SensorParameters, Topic
-from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, xyz
+from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic, xyz
 
 
 class WindParameters(SensorParameters):

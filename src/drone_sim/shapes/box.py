@@ -11,10 +11,7 @@ import trimesh
 from pydantic import Field
 
 from drone_sim.config.types import Length
-from drone_sim.shapes.bullet import Files, Geometry
-from drone_sim.shapes.primitive import Primitive
-from drone_sim.shapes.shape import ReportedShape, SceneShape
-from drone_sim.shapes.triangles import Triangles, corners_of
+from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles, corners_of
 
 
 def _unit_box() -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -12,32 +11,19 @@ from pydantic import Field
 
 from drone_sim.config.types import Length
 from drone_sim.mechanics.frames import from_rpy
-from drone_sim.shapes.bullet import Files, Geometry
-from drone_sim.shapes.primitive import Primitive
-from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.cylinder import Cylinder
+from drone_sim.shapes.shape import SECTIONS, DrawnShape, Primitive, Triangles, corners_of, outer
 from drone_sim.shapes.solid import Solid, round_solid
-from drone_sim.shapes.triangles import SECTIONS, Triangles, corners_of, outer
 
 
 @dataclass(frozen=True)
-class Capsule(SceneShape, ReportedShape):
+class Capsule(Cylinder):
     """A cylinder along its z axis with half a sphere on each end; `size` is radius and length without them, m."""
 
     word = "capsule"
     bullet_type = "GEOM_CAPSULE"
 
     size: Annotated[tuple[Length, Length], Field(description="2 numbers, [radius, length without the caps] in m")]
-
-    def for_bullet(self, files: Files, moves: bool) -> Geometry:
-        """Return a capsule, whose length PyBullet names in two ways."""
-        radius, length = self.size
-        return Geometry(self.bullet_type, {"radius": radius, "height": length}, {"radius": radius, "length": length})
-
-    @classmethod
-    def from_bullet(cls, dimensions: Sequence[float], file: str) -> Capsule:
-        """Return the capsule of this length and radius, which is PyBullet's order."""
-        length, radius = dimensions[:2]
-        return cls((radius, length))
 
     def triangles(self) -> tuple[Triangles]:
         """Return as many sections along the caps as around them."""
@@ -55,12 +41,13 @@ class Capsule(SceneShape, ReportedShape):
         volume = cylinder + ball
         return round_solid(volume, xx / volume, zz / volume)
 
+    def shared(self) -> tuple[DrawnShape, tuple[float, float, float]]:
+        """Return itself: scaled along z, its caps would not be round."""
+        return self, (1.0, 1.0, 1.0)
+
     def for_rviz(self) -> tuple[Primitive, ...]:
         """Return a cylinder and two spheres."""
         radius, length = self.size
         wide = 2 * radius
         ends = [from_rpy((0, 0, sign * length / 2), (0, 0, 0)) for sign in (-1, 1)]
-        return (
-            Primitive("cylinder", (wide, wide, length)),
-            *(Primitive("sphere", (wide, wide, wide), end) for end in ends),
-        )
+        return (*super().for_rviz(), *(Primitive("sphere", (wide, wide, wide), end) for end in ends))

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drone_sim.mechanics.frames import IDENTITY, Matrix
-from drone_sim.shapes.shape import SceneShape, Shape
-from drone_sim.shapes.triangles import Rgba
+from drone_sim.shapes.shape import Rgba, SceneShape, Shape
 
 MAX_PARTS = 200
 

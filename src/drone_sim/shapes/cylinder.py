@@ -11,11 +11,19 @@ import trimesh
 from pydantic import Field
 
 from drone_sim.config.types import Length
-from drone_sim.shapes.bullet import Files, Geometry
-from drone_sim.shapes.primitive import Primitive
-from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.shape import (
+    SECTIONS,
+    DrawnShape,
+    Files,
+    Geometry,
+    Primitive,
+    ReportedShape,
+    SceneShape,
+    Triangles,
+    corners_of,
+    outer,
+)
 from drone_sim.shapes.solid import Solid, round_solid
-from drone_sim.shapes.triangles import SECTIONS, Triangles, corners_of, outer
 
 
 @dataclass(frozen=True)
@@ -48,12 +56,12 @@ class Cylinder(SceneShape, ReportedShape):
         radius, length = self.size
         return round_solid(np.pi * radius**2 * length, radius**2 / 4 + length**2 / 12, radius**2 / 2)
 
-    def shared(self) -> tuple[Cylinder, tuple[float, float, float]]:
+    def shared(self) -> tuple[DrawnShape, tuple[float, float, float]]:
         """Return the cylinder of 1 m radius and 1 m length, and its own."""
         radius, length = self.size
         return Cylinder((1.0, 1.0)), (radius, radius, length)
 
-    def for_rviz(self) -> tuple[Primitive]:
+    def for_rviz(self) -> tuple[Primitive, ...]:
         """Return a cylinder by its diameters."""
         radius, length = self.size
         return (Primitive("cylinder", (2 * radius, 2 * radius, length)),)

@@ -8,30 +8,30 @@ from typing import NamedTuple
 import numpy as np
 
 from drone_sim.mechanics.frames import IDENTITY, Matrix
-from drone_sim.mechanics.inertia import Inertial, together
+from drone_sim.mechanics.inertia import Inertial, combined
 from drone_sim.shapes.compound import Part
 from drone_sim.shapes.shape import DrawnShape
 
 
-class Inertia(NamedTuple):
+class PrincipalInertia(NamedTuple):
     """Principal moments (kg m²), and the shape's frame from that of the centre of mass and the principal axes."""
 
     moments: tuple[float, float, float]
     frame: Matrix = IDENTITY
 
 
-def inertia_of(parts: Sequence[Part], mass: float) -> Inertia:
+def inertia_of(parts: Sequence[Part], mass: float) -> PrincipalInertia:
     """Return the inertia of a mass (kg) that fills some parts evenly; a mesh counts as its convex hull.
 
     Raises ValueError, in one line, for a mesh that cannot be read.
     """
     filled = [_of_unit_density(part) for part in parts]
     density = mass / sum(one.mass for one in filled)
-    whole = together([Inertial(density * one.mass, one.centre, density * one.inertia) for one in filled])
+    whole = combined([Inertial(density * one.mass, one.centre, density * one.inertia) for one in filled])
     return principal(whole.inertia, whole.centre)
 
 
-def principal(tensor: np.ndarray, centre: np.ndarray) -> Inertia:
+def principal(tensor: np.ndarray, centre: np.ndarray) -> PrincipalInertia:
     """Return an inertia tensor (3, 3) about a centre of mass (3,), both in a shape's frame, by its principal axes."""
     if np.abs(tensor - np.diag(np.diag(tensor))).max() <= 1e-6 * np.trace(tensor):
         moments, axes = np.diag(tensor), np.eye(3)
@@ -39,7 +39,7 @@ def principal(tensor: np.ndarray, centre: np.ndarray) -> Inertia:
         moments, axes = np.linalg.eigh(tensor)
         axes[:, 2] *= np.sign(np.linalg.det(axes))
     a, b, c = map(float, moments)
-    return Inertia((a, b, c), tuple(map(float, np.hstack([axes, np.reshape(centre, (3, 1))]).ravel())))
+    return PrincipalInertia((a, b, c), tuple(map(float, np.hstack([axes, np.reshape(centre, (3, 1))]).ravel())))
 
 
 def _of_unit_density(part: Part) -> Inertial:

@@ -12,10 +12,7 @@ from pydantic import Field
 from drone_sim.config.types import File, Finite, Within
 from drone_sim.files import mesh_files
 from drone_sim.files.mesh_files import WHITE
-from drone_sim.shapes.bullet import Files, Geometry
-from drone_sim.shapes.primitive import Primitive
-from drone_sim.shapes.shape import ReportedShape, SceneShape
-from drone_sim.shapes.triangles import Triangles
+from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles
 
 _Scale = Annotated[Finite, Within(1e-6, 1e6)]
 

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drone_sim.shapes.primitive import Primitive
-from drone_sim.shapes.shape import ReportedShape
-from drone_sim.shapes.triangles import Triangles
+from drone_sim.shapes.shape import Primitive, ReportedShape, Triangles
 
 _HALF_SIZE = 200.0  # m; a camera sees 100 m
 _SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * _HALF_SIZE

@@ -2,19 +2,109 @@
 
 Each shape is one frozen dataclass in a file of its own, which says what it is by its base classes; its fields are
 its keys in a scene file, where it stands in one.
+
+PyBullet, which only world/ knows, and rviz, which only ros/ knows, are told of it in words of theirs.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from xml.etree import ElementTree as Xml
 
-from drone_sim.shapes.bullet import Files, Geometry, UrdfFile
-from drone_sim.shapes.primitive import Primitive
+import numpy as np
+import trimesh
+
+from drone_sim.files.mesh_files import WHITE
+from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.shapes.solid import Solid, hull_of
-from drone_sim.shapes.triangles import Rgba, Triangles
+
+
+class Files(Protocol):
+    """Writes what PyBullet is to read: it is given no other files. Raises RuntimeError where the disk is full."""
+
+    def write(self, content: bytes, suffix: str) -> str:
+        """Write a file; return its path."""
+
+    def mesh(self, path: str, hull: bool = False) -> str:
+        """Write a mesh file once more, or what has the same convex `hull`; return its path.
+
+        Raises ValueError, in one line that names the file, for one that cannot be read.
+        """
+
+    def urdf(self, robot: Xml.Element) -> str:
+        """Write a URDF that urdf_files.read has checked, and its meshes; return its path. Raises what `mesh` does."""
+
+
+class Geometry(NamedTuple):
+    """A body of one link: its collision and its visual shape.
+
+    type: name of the constant for `shapeType`; collision, visual: the other arguments of createCollisionShape and
+    createVisualShape, which differ in their words; flags: name of the constant for the collision shape's, or none.
+    """
+
+    type: str
+    collision: Mapping[str, Any]
+    visual: Mapping[str, Any]
+    flags: str = ""
+
+
+class UrdfFile(NamedTuple):
+    """A body as a URDF says, which loadURDF reads, and the principal moments (kg m²) of each link, by its name.
+
+    In the file is a sphere's inertia, along the same axes: PyBullet takes moments that no solid has for 0.
+    """
+
+    path: str
+    moments: Mapping[str, tuple[float, float, float]]
+
+
+Corner = tuple[float, float, float]
+
+
+class Primitive(NamedTuple):
+    """One marker.
+
+    scale: along x, y, z; a cube, sphere or cylinder is of 1 m without it. local: the shape's frame from its own.
+    file: path of a "mesh". corners: of "triangles", three each, counter-clockwise seen from outside, m.
+    """
+
+    kind: Literal["cube", "sphere", "cylinder", "mesh", "triangles"]
+    scale: tuple[float, float, float]
+    local: Matrix = IDENTITY
+    file: str = ""
+    corners: tuple[Corner, ...] = ()
+
+
+Rgba = tuple[float, float, float, float]  # 0..1
+
+SECTIONS = 24  # of what is round, around its axis
+
+
+class Triangles(NamedTuple):
+    """One material's triangles, in the shape's frame.
+
+    corners: (m, 3, 3), m, counter-clockwise seen from outside; uv: (m, 3, 2), v upwards, or None; rgba: 0..1;
+    texture: (h, w, 3 or 4) uint8, top row first, or None.
+    """
+
+    corners: np.ndarray
+    uv: np.ndarray | None = None
+    rgba: Rgba = WHITE
+    texture: np.ndarray | None = None
+
+
+def corners_of(mesh: trimesh.Trimesh) -> np.ndarray:
+    """Return the corners (m, 3, 3) of a mesh's triangles."""
+    return np.asarray(mesh.vertices, dtype=np.float64)[np.asarray(mesh.faces)]
+
+
+def outer(radius: float) -> float:
+    """Return the circumradius of the polygon that has the area of the circle: silhouettes agree on average."""
+    angle = 2.0 * np.pi / SECTIONS
+    return float(radius * np.sqrt(angle / np.sin(angle)))
 
 
 class Shape(ABC):

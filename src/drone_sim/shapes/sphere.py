@@ -11,11 +11,8 @@ import trimesh
 from pydantic import Field
 
 from drone_sim.config.types import Length
-from drone_sim.shapes.bullet import Files, Geometry
-from drone_sim.shapes.primitive import Primitive
-from drone_sim.shapes.shape import ReportedShape, SceneShape
+from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles, corners_of
 from drone_sim.shapes.solid import Solid, round_solid
-from drone_sim.shapes.triangles import Triangles, corners_of
 
 _OUTER = 1.0029  # radius of the polyhedron of 1280 faces that has the volume of the unit sphere
 

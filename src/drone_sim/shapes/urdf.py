@@ -8,8 +8,7 @@ from xml.etree import ElementTree as Xml
 
 from drone_sim.config.types import File
 from drone_sim.files import urdf_files
-from drone_sim.shapes.bullet import Files, UrdfFile
-from drone_sim.shapes.shape import SceneShape
+from drone_sim.shapes.shape import Files, SceneShape, UrdfFile
 from drone_sim.shapes.urdf_inertials import complete_inertials
 
 

@@ -12,11 +12,10 @@ from drone_sim.shapes.box import Box
 from drone_sim.shapes.capsule import Capsule
 from drone_sim.shapes.compound import Part
 from drone_sim.shapes.cylinder import Cylinder
-from drone_sim.shapes.mass import Inertia, inertia_of, principal
+from drone_sim.shapes.mass import PrincipalInertia, inertia_of, principal
 from drone_sim.shapes.mesh import Mesh
-from drone_sim.shapes.shape import SceneShape
+from drone_sim.shapes.shape import WHITE, SceneShape
 from drone_sim.shapes.sphere import Sphere
-from drone_sim.shapes.triangles import WHITE
 
 _UNTOLD = 1.0  # kg, of a link that moves and says no mass; PyBullet takes it for that
 _ROUNDING = 1e-9  # of the largest moment
@@ -29,12 +28,9 @@ def complete_inertials(robot: Xml.Element) -> dict[str, tuple[float, float, floa
     it, else 1 kg. Raises ValueError, in one line, for a tensor with a negative moment, and for a mesh that cannot be
     read.
     """
-    held = {_child(joint) for joint in robot.findall("joint") if joint.get("type") == "fixed"}
+    fixed = (joint for joint in robot.findall("joint") if joint.get("type") == "fixed")
+    held = {joint.findall("child")[0].attrib["link"] for joint in fixed}
     return {name: _complete(link, name in held) for link in robot.findall("link") for name in [link.attrib["name"]]}
-
-
-def _child(joint: Xml.Element) -> str:
-    return joint.findall("child")[0].attrib["link"]
 
 
 def _complete(link: Xml.Element, held: bool) -> tuple[float, float, float]:
@@ -48,19 +44,19 @@ def _complete(link: Xml.Element, held: bool) -> tuple[float, float, float]:
     return inertia.moments
 
 
-def _told(link: Xml.Element) -> Inertia | None:
+def _told(link: Xml.Element) -> PrincipalInertia | None:
     """Return the inertia that a link says, None where it says none."""
     tensor = urdf.inertia_tensor(link)
     centre = frames.position(urdf.origin_of(link.find("inertial")))
     return principal(tensor, np.array(centre)) if tensor.any() else None
 
 
-def _evenly_filled(link: Xml.Element, mass: float) -> Inertia:
+def _evenly_filled(link: Xml.Element, mass: float) -> PrincipalInertia:
     """Return the inertia of a mass that fills what of a link collides, else what of it is seen."""
     parts = [*_parts(link, "collision")] or [*_parts(link, "visual")]
     if mass and parts:
         return inertia_of(parts, mass)
-    return Inertia((mass, mass, mass), urdf.origin_of(link.find("inertial")))
+    return PrincipalInertia((mass, mass, mass), urdf.origin_of(link.find("inertial")))
 
 
 def _parts(link: Xml.Element, kind: str) -> Iterator[Part]:
@@ -91,7 +87,7 @@ def _numbers(geometry: Xml.Element, attribute: str) -> list[float]:
     return [float(word) for word in geometry.attrib[attribute].split()]
 
 
-def _write(link: Xml.Element, mass: float, inertia: Inertia) -> None:
+def _write(link: Xml.Element, mass: float, inertia: PrincipalInertia) -> None:
     for told in link.findall("inertial"):
         link.remove(told)
     inertial = Xml.SubElement(link, "inertial")

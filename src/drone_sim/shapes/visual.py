@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from drone_sim.shapes.shape import DrawnShape
-from drone_sim.shapes.triangles import Rgba
+from drone_sim.shapes.shape import DrawnShape, Rgba
 
 GROUND = (0.47, 0.50, 0.44)  # colour of the bare ground around the floor
 

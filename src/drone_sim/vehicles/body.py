@@ -1,36 +1,49 @@
-"""A vehicle's body in the world: where it is, how it moves, what pushes it."""
+"""A vehicle's body in the world: where it is, how it moves, what pushes it, what it meets."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 
+from drone_sim.context import NOBODY, SimulationContext
 from drone_sim.forces.force import Force
+from drone_sim.forces.propellers import Propellers
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.state import Pose, State
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
-from drone_sim.world import World
+from drone_sim.sensors.sensor import Contact, Hit
 
 
 class Body:
-    """One rigid body; its frame is the URDF's root link."""
+    """One rigid body; its frame is the URDF's root link. It carries the sensors (sensors.sensor.Carrier)."""
 
     state: State  # after the last sub-step that was looked at, or move
     matrix: Matrix  # world from root link
+    propellers: Propellers  # that drive it, as long as the run lasts
 
-    def __init__(self, rigid: RigidBody, start: Pose, world: World):
+    def __init__(self, rigid: RigidBody, start: Pose, context: SimulationContext):
         """Put it into the world, at rest."""
         self.rigid = rigid
-        self.mass = rigid.mass
+        self.mass, self.gravity = rigid.mass, context.gravity
+        self.datum, self.magnetic_field = context.datum, context.magnetic_field
         self.jumps = 0  # how often it was put somewhere else
-        self.number = world.add_rigid_body(rigid, start)
-        self.inertial_from_root: Matrix = frames.invert(world.inertial_frame(self.number))
-        self._links = {name: (self._named(above), matrix) for name, (above, matrix) in rigid.parents.items()}
+        self.pushes = 0  # how often a script has pushed it
+        self._context = context
+        self._world = context.world
+        self.number = self._world.add_rigid_body(rigid, start)
+        self.inertial_from_root: Matrix = frames.invert(self._world.inertial_frame(self.number))
+        # Of each link of the URDF but the root: the one above, `base_link` for the root, and where it sits on it.
+        self.links = {name: (self._named(above), matrix) for name, (above, matrix) in rigid.parents.items()}
+        # Of each visual: the link that it belongs to, and where it sits on that.
+        self.visual_places = [(self._named(name), matrix) for name, matrix in rigid.visuals]
         self._start = start
-        self._world = world
-        self.air: Callable[[Vector], Vector] = lambda place: (0.0, 0.0, 0.0)  # its velocity (m/s, world) at a place
         self.reset()
+
+    def _named(self, link: str) -> str:
+        return link if link in self.rigid.parents else "base_link"
+
+    # ---- where it is
 
     def reset(self) -> None:
         """Return to the start, at rest, with nothing that pushes."""
@@ -41,9 +54,9 @@ class Body:
     def begin_on_floor(self) -> None:
         """Have its start on what is below, the floor's height where nothing is, and be there."""
         (x, y, z), turn = self._start
-        below = self._world.ray((x, y, z), (x, y, 0.0), ignoring=self.number)
+        below = self._world.queries.ray((x, y, z), (x, y, 0.0), ignoring=self.number)
         ground = z - below.distance if below else 0.0
-        self._start = Pose((x, y, z - self._world.lowest(self.number) + ground), turn)
+        self._start = Pose((x, y, z - self._world.queries.lowest(self.number) + ground), turn)
         self.reset()
 
     def begin_again(self) -> None:
@@ -63,36 +76,31 @@ class Body:
         self._world.set_pose(self.number, pose)
         self.refresh()
 
-    @property
-    def wind(self) -> Vector:
-        """Velocity of the air where it is (m/s, world)."""
-        return self.air(self.state.position)
-
-    @property
-    def links(self) -> dict[str, tuple[str, Matrix]]:
-        """Of each link of the URDF but the root: the one above, `base_link` for the root, and where it sits on it."""
-        return self._links
-
-    @property
-    def visual_places(self) -> list[tuple[str, Matrix]]:
-        """Of each visual: the link that it belongs to, and where it sits on that."""
-        return [(self._named(name), matrix) for name, matrix in self.rigid.visuals]
-
-    def _named(self, link: str) -> str:
-        return link if link in self.rigid.parents else "base_link"
-
-    def place_visuals(self, places: Mapping[int, Matrix]) -> None:
-        """Move some of its visuals, by index, to other places in the root link's frame: looks only."""
-        self._world.place_visuals(self.number, places)
-
     def restored(self) -> None:
         """Follow the world, which was put back to what it had been."""
         self.jumps += 1
         self.wrench = Wrench()
         self.refresh()
 
+    def place_visuals(self, places: Mapping[int, Matrix]) -> None:
+        """Move some of its visuals, by index, to other places in the root link's frame: looks only."""
+        self._world.place_visuals(self.number, places)
+
+    # ---- what pushes it
+
+    @property
+    def wind(self) -> Vector:
+        """Velocity of the air where it is (m/s, world)."""
+        return self._context.weather.at(self.state.position)
+
+    @property
+    def thrusts(self) -> Sequence[float]:
+        """Thrust of each propeller in N, in the last step."""
+        return self.propellers.thrusts
+
     def add_force(self, force: Vector, torque: Vector, point: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m, inertial frame), and a torque (N m, world)."""
+        self.pushes += 1
         self.wrench.add(force, torque, point)
 
     def apply(self, force: Force) -> None:
@@ -101,3 +109,16 @@ class Body:
         wrench = Wrench()
         force.add_to(wrench, self)
         self._world.apply(self.number, wrench)
+
+    # ---- what it meets
+
+    def ray(self, start: Vector, end: Vector) -> Hit | None:
+        """Return what a ray (m, world) meets first that is not the body itself; None for nothing."""
+        hit = self._world.queries.ray(start, end, ignoring=self.number)
+        return None if hit is None else Hit(hit.distance, self._context.name_of(hit.body), hit.normal)
+
+    def contacts(self) -> list[Contact]:
+        """Return what it touched in the last sub-step."""
+        names = self._context.names
+        touched = self._world.queries.contacts(self.number)
+        return [Contact(names.get(one.body, NOBODY)[0], one.point, one.normal, one.force) for one in touched]

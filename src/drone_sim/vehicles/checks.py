@@ -13,6 +13,11 @@ from drone_sim.vehicles.parameters import EquipmentParameters
 class Refused(ValueError):
     """A command is a mistake; the message names the field, the value and what is allowed."""
 
+    def __init__(self, message: str, field: str = ""):
+        """Take the message, and which of a command's fields it is about."""
+        super().__init__(message)
+        self.field = field
+
 
 def twist(linear: Sequence[float], angular: Sequence[float], parameters: EquipmentParameters) -> Twist:
     """Return the command (m/s, rad/s); raises Refused beyond cmd_vel_limits."""
@@ -36,10 +41,11 @@ def pose(
     limit = parameters.position_limit
     for axis, value, least in zip("xyz", position, (-limit, -limit, lowest)):
         if not least <= value <= limit:
-            raise Refused(f"position.{axis} = {value}: must lie within {least} and {limit} m")
+            raise Refused(f"position.{axis} = {value}: must lie within {least} and {limit} m", "position")
     length = math.sqrt(sum(value * value for value in orientation))
     if not 0.99 < length < 1.01:
-        raise Refused(f"orientation {tuple(orientation)}: must be a unit quaternion, its length is {length:.3g}")
+        said = f"must be a unit quaternion, its length is {length:.3g}"
+        raise Refused(f"orientation {tuple(orientation)}: {said}", "orientation")
     x, y, z, w = (value / length for value in orientation)
     return Pose((position[0], position[1], position[2]), (x, y, z, w))
 
@@ -47,4 +53,4 @@ def pose(
 def _check_within(kind: str, values: Sequence[float], limit: float, unit: str) -> None:
     for axis, value in zip("xyz", values):
         if not abs(value) <= limit:  # so written, it refuses NaN
-            raise Refused(f"{kind}.{axis} = {value}: must lie within +-{limit} {unit}")
+            raise Refused(f"{kind}.{axis} = {value}: must lie within +-{limit} {unit}", kind)

@@ -1,24 +1,28 @@
-"""What a vehicle is told on cmd_vel: obeyed at once, or when it comes over a slow link; held, for so long."""
+"""What a vehicle is told and asked, in the fields of the messages that do so, and what its script says of its state."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
-from drone_sim.mechanics.state import Twist
+from drone_sim.mechanics.clock import Clock
+from drone_sim.mechanics.saved_state import Restore, saved
+from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.vehicles.link import Link
+from drone_sim.vehicles.radio_link import RadioLink
 
 
 class Commands:
     """The command of one vehicle, which its scripts hear."""
 
-    def __init__(self, bus: MessageBus, timeout: float, time_step: float, time: Callable[[], float]):
-        """Take the bus of its script, cmd_vel_timeout (s; 0 for ever) and the step (s); `time` returns s."""
+    def __init__(self, bus: MessageBus, timeout: float, clock: Clock):
+        """Take the bus of its script, cmd_vel_timeout (s; 0 for ever) and the simulation's clock."""
         self._bus = bus
-        self.timeout, self._time_step = timeout, time_step
-        self._time = time
+        self.timeout = timeout
+        self._clock = clock
         self.listening: list[MessageBus] = []  # of scripts on its parts
-        self.link: Link[Twist] | None = None  # over which commands come; None for at once
+        self.link: RadioLink[Twist] | None = None  # over which commands come; None for at once
         self.begin()
 
     def begin(self) -> None:
@@ -36,30 +40,113 @@ class Commands:
         if self.link is None:
             self._obey(twist)
         else:
-            self.link.send(self._time(), twist)
+            self.link.send(self._clock.time, twist)
 
     def take(self) -> None:
         """Obey what has come over the link."""
-        came = self.link and self.link.receive(self._time())
+        came = self.link and self.link.receive(self._clock.time)
         if came:
             self._obey(came[1])
 
     def advance(self) -> None:
         """Grow a step older; one that is too old gives way to standing still."""
-        if self.timeout and self.age > self.timeout - self._time_step / 2 and self.now != Twist():
+        time_step = self._clock.time_step
+        if self.timeout and self.age > self.timeout - time_step / 2 and self.now != Twist():
             self._obey(Twist())
-        self.age += self._time_step
+        self.age += time_step
 
     def _obey(self, twist: Twist) -> None:
         self.now, self.age = twist, 0.0
         for bus in self.buses:
             bus.post("cmd_vel", twist)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back the command; what is under way is brought back by the faults."""
-        now, age, timeout = self.now, self.age, self.timeout
+        return saved(self, "now", "age", "timeout")
 
-        def recall() -> None:
-            self.now, self.age, self.timeout = now, age, timeout
 
-        return recall
+EMPTY, POSE = "std_msgs/Empty", "geometry_msgs/PoseStamped"
+RESET = "reset"
+REQUESTS = {RESET: EMPTY, "takeoff": EMPTY, "land": EMPTY, "home": EMPTY, "goto": POSE}  # topics, and their types
+
+
+class Empty(NamedTuple):
+    """std_msgs/Empty."""
+
+
+class Quaternion(NamedTuple):
+    """geometry_msgs/Quaternion."""
+
+    x: float
+    y: float
+    z: float
+    w: float
+
+
+class PoseFields(NamedTuple):
+    """geometry_msgs/Pose: m, and a unit quaternion."""
+
+    position: Vector3
+    orientation: Quaternion
+
+
+class PoseStamped(NamedTuple):
+    """geometry_msgs/PoseStamped, in the frame world, without its header."""
+
+    pose: PoseFields
+
+
+def request(pose: Pose | None = None) -> Any:
+    """Return the message that a script gets: of a pose (world), or an empty one."""
+    if pose is None:
+        return Empty()
+    return PoseStamped(PoseFields(Vector3(*pose.position), Quaternion(*pose.orientation)))
+
+
+_LOG = logging.getLogger(__name__)
+
+UNKNOWN = "unknown"
+LANDED, CRASHED = "landed", "crashed"  # in which no command moves it
+_TOPIC = "state"
+
+
+class FlightState:
+    """Hands requests to the scripts of a vehicle that offer to answer them."""
+
+    def __init__(self, commands: Commands):
+        """Take what knows the buses of its scripts."""
+        self._commands = commands
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what was asked in vain: another script may be there."""
+        self.is_flown = False  # by a child script, which is loaded
+        self._missing = ""
+        self._dropped: set[str] = set()
+
+    def __str__(self) -> str:
+        """Return the state, as a script says it; `unknown` where none does."""
+        for bus in self._commands.buses:
+            said = bus.said and bus.said.get(bus.resolve(_TOPIC))
+            if said:
+                return str(said.get("data", said) if isinstance(said, dict) else said)
+        return self._missing or UNKNOWN
+
+    def ask(self, topic: str, message: Any, before: Callable[[], None] = lambda: None) -> None:
+        """Call `before`, and leave the message for the next step; where no script listens, say so instead.
+
+        While the simulation is stopped, and has no script, nothing happens but a line for each topic and stop.
+        """
+        if not self.is_flown:
+            if topic not in self._dropped:
+                self._dropped.add(topic)
+                _LOG.warning("%s: nothing happens: the simulation is stopped; `start` it first", topic)
+            return
+        hearing = [bus for bus in self._commands.buses if bus.hears(topic)]
+        if hearing:
+            before()
+        elif not self._missing:
+            self._missing = f"{UNKNOWN}: the script does not subscribe to {topic}"
+            _LOG.warning("%s: nothing happens: the child script does not subscribe to it; `pilot` does", topic)
+        for bus in hearing:
+            bus.post(topic, message)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from drone_sim.config.changing import changed
+from drone_sim.config.errors import changed
 from drone_sim.forces.propellers import Propellers
+from drone_sim.mechanics.clock import Clock
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.state import Twist
 from drone_sim.sensors.camera import Camera
-from drone_sim.vehicles.fault_parameters import FaultParameters
 from drone_sim.vehicles.instruments import Instruments
-from drone_sim.vehicles.link import Link
+from drone_sim.vehicles.parameters import FaultParameters
+from drone_sim.vehicles.radio_link import RadioLink
 
 _COMMANDS, _PICTURES = 1000, 50  # that may be under way
 _STALE = 5.0  # s; a picture so old was under way when nobody looked any more
@@ -29,15 +30,15 @@ class Faults:
         parameters: FaultParameters,
         instruments: Instruments,
         cameras: Mapping[str, Camera],
-        time: Callable[[], float],
+        clock: Clock,
     ):
-        """Take the vehicle's name and what may fail; `begin` comes before anything else. `time` returns s."""
+        """Take the vehicle's name and what may fail; by which clock; `begin` comes before anything else."""
         self._vehicle = vehicle
         self._parameters = parameters
         self._instruments, self._cameras = instruments, cameras
-        self._time = time
-        self.commands: Link[Twist] | None = None  # over which they come; None for at once
-        self._images: dict[str, Link[np.ndarray]] = {}
+        self._clock = clock
+        self.commands: RadioLink[Twist] | None = None  # over which they come; None for at once
+        self._images: dict[str, RadioLink[np.ndarray]] = {}
 
     def begin(self, propellers: Propellers) -> None:
         """Be as at the start of a run, which has propellers of its own."""
@@ -57,42 +58,33 @@ class Faults:
         self._instruments.fail(now.sensors)
         for name, camera in self._cameras.items():
             camera.failure = now.sensors.get(name, "ok")
-        self._link()
-
-    def _link(self) -> None:
-        """Put links where there are none yet; one that has become perfect stays, for what is under way."""
-        now = self.now
+        # Links are put where there are none yet; one that has become perfect stays, for what is under way.
         if self.commands is None and not now.commands.is_perfect:
-            self.commands = Link(now.commands, self._seed("commands"), _COMMANDS)
+            self.commands = RadioLink(now.commands, self._seed("commands"), _COMMANDS)
         if not self._images and not now.images.is_perfect:
-            self._images = {name: Link(now.images, self._seed(name), _PICTURES) for name in self._cameras}
+            self._images = {name: RadioLink(now.images, self._seed(name), _PICTURES) for name in self._cameras}
         if self.commands is not None:
             self.commands.parameters = now.commands
         for link in self._images.values():
             link.parameters = now.images
-        for name, camera in self._cameras.items():
-            camera.over = partial(self._over, self._images[name]) if self._images else None
+        for camera in self._cameras.values():
+            camera.is_linked = bool(self._images)
 
     def _seed(self, stream: str) -> tuple[int, ...]:
         return (self.now.seed, *f"{self._vehicle}/{stream}".encode())
 
-    def _over(self, link: Link[np.ndarray], image: np.ndarray | None) -> tuple[float, np.ndarray | None]:
-        """Send a picture, if there is one; return the age (s) of the one that has come, and that."""
-        now = self._time()
+    def transmit(self, camera: str, image: np.ndarray | None) -> tuple[np.ndarray | None, float]:
+        """Send a picture, if there is one, over the camera's link; return the one that has come, and its age (s)."""
+        link, now = self._images.get(camera), self._clock.time
+        if link is None:
+            return image, 0.0
         if image is not None:
             link.send(now, image)
         came = link.receive(now)
-        return came if came is not None and came[0] < _STALE else (0.0, None)
+        return (came[1], came[0]) if came is not None and came[0] < _STALE else (None, 0.0)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Restore:
         """Return a function that brings back what is wrong now; propellers and sensors come back before."""
-        now, commands, images = self.now, self.commands, self._images
-        links = [link.remember() for link in (*([commands] if commands else ()), *images.values())]
-
-        def recall() -> None:
-            self.commands, self._images = commands, images
-            self._be(now)
-            for one in links:
-                one()
-
-        return recall
+        now, own = self.now, saved(self, "commands", "_images")
+        links = [*([self.commands] if self.commands else ()), *self._images.values()]
+        return in_turn(own, lambda: self._be(now), *(link.save_state() for link in links))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr
@@ -14,12 +14,14 @@ from drone_sim.config.types import (
     File,
     FileName,
     Finite,
+    Fraction,
     Gain,
     Label,
     Limits,
     MarginOrNone,
     Name,
     ParameterError,
+    Parts,
     ScriptValue,
     Within,
     merged,
@@ -27,18 +29,20 @@ from drone_sim.config.types import (
 from drone_sim.forces import ForceParameters
 from drone_sim.forces.propellers import PropellerParameters
 from drone_sim.mechanics.object_names import NO_SUFFIX
+from drone_sim.message_text import near_names
 from drone_sim.sensors import AnySensor
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters
-from drone_sim.sensors.together import check_together
-from drone_sim.vehicles.fault_parameters import FaultParameters
-from drone_sim.vehicles.object_places import ObjectPlace
-from drone_sim.vehicles.quadricopter_objects import OWN_NAMES
-from drone_sim.wording import near_names
+from drone_sim.sensors.sensor import Failure
+from drone_sim.sensors.validation import check_sensors
+from drone_sim.vehicles.quadricopter_objects import OWN_NAMES, ObjectPlace
+from drone_sim.vehicles.radio_link import LinkParameters
+from drone_sim.vehicles.types import TYPES
 
 UNPREFIXED = "drone"  # the name with which the only vehicle has frames without a prefix
 MAX_FORCES = 16
 MAX_SENSORS = 64
 MAX_SCRIPT_PARAMETERS = 256
+MAX_FAILURES = 80
 
 
 class TwistLimits(Checked):
@@ -74,6 +78,27 @@ class ControlParameters(Checked):
     Precovery: Gain
 
 
+class FaultParameters(Checked):
+    """What is wrong: `commands` and `images` are the radio link's two directions, `sensors` are cameras, too."""
+
+    propellers: Annotated[
+        tuple[Fraction, Fraction, Fraction, Fraction],
+        Parts(("front_left", "back_left", "back_right", "front_right")),
+        Field(description="4 numbers from 0 to 1, the share that each propeller still gives"),
+    ]
+    commands: LinkParameters
+    images: LinkParameters
+    sensors: Annotated[dict[Name, Failure], Field(max_length=MAX_FAILURES)]
+    seed: Annotated[int, Within(0, 2**63 - 1)]
+
+    def check(self, names: Collection[str]) -> None:
+        """Raise ParameterError for a sensor that is not among the names."""
+        for name in self.sensors:
+            if name not in names:
+                said = f"no such sensor or camera; {near_names(name, names)}" if names else "there are no sensors"
+                raise ParameterError(said, ("faults", "sensors", name))
+
+
 def _own(places: Mapping[str, ObjectPlace]) -> Mapping[str, ObjectPlace]:
     for name in places:
         if name not in OWN_NAMES:
@@ -81,12 +106,19 @@ def _own(places: Mapping[str, ObjectPlace]) -> Mapping[str, ObjectPlace]:
     return places
 
 
+def _type(name: str) -> str:
+    if name not in TYPES:
+        raise ValueError(f"no such type; {near_names(name, TYPES)}")
+    return name
+
+
 class PlaceParameters(Checked):
-    """Body and starting place of a vehicle; `tilt` is roll and pitch (rad).
+    """Type, body and starting place of a vehicle; `tilt` is roll and pitch (rad).
 
     `suffix` is that of its objects' names: -1 is none, 0 is #0, ...; left out, it is the next that is free.
     """
 
+    type: Annotated[str, AfterValidator(_type)]
     urdf: File
     position: Annotated[
         tuple[Coordinate, Coordinate, Annotated[Finite, Within(0, 1e5)]], Field(description="3 numbers, [x, y, z] in m")
@@ -123,7 +155,7 @@ class EquipmentParameters(Checked):
 
     def model_post_init(self, _context: Any) -> None:
         """Check what concerns several keys at once."""
-        check_together(self.cameras, self.sensors)
+        check_sensors(self.cameras, self.sensors)
         self.check_faults()
 
     def check_faults(self) -> None:
@@ -164,9 +196,7 @@ class VehicleParameters(EquipmentParameters, PlaceParameters):
 def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]) -> dict[str, Any]:
     """Return an entry of `vehicles` with what it leaves out, from the keys at the top. Raises ParameterError."""
     if "name" in entry:
-        raise ParameterError(
-            f"parameter vehicles/{name}/name: unknown key; the entry's own key is its name", ("vehicles", name, "name")
-        )
+        raise ParameterError("unknown key; the entry's own key is its name", ("vehicles", name, "name"))
     drone = everything.get("drone")
     base = {key: everything[key] for key in EquipmentParameters.model_fields if key in everything}
     place = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}

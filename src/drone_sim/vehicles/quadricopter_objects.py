@@ -21,13 +21,33 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from drone_sim.config.types import ParameterError
+from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Matrix
-from drone_sim.mechanics.object_tree import Body, ObjectTree
+from drone_sim.mechanics.frames import Matrix, from_rpy
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.scene_object import DynamicBody
 from drone_sim.sensors.camera_parameters import CameraParameters
-from drone_sim.sensors.parameters import SensorParameters
-from drone_sim.vehicles.object_places import NOWHERE_ELSE, ObjectPlace
+from drone_sim.sensors.sensor import SensorParameters
+
+
+class ObjectPlace(Checked):
+    """Another name, to which no suffix is added, alias, parent ('' is the world), and place (m, rad) in its frame."""
+
+    name: Label = ""
+    alias: Label = ""
+    parent: Label | None = None
+    position: Point | None = None
+    rpy: Angles | None = None
+
+    def local(self, default: Matrix) -> Matrix:
+        """Return the parent's frame from its own: as given, or the default."""
+        if self.position is None and self.rpy is None:
+            return default
+        return from_rpy(self.position or (0.0, 0.0, 0.0), self.rpy or (0.0, 0.0, 0.0))
+
+
+NOWHERE_ELSE = ObjectPlace()
+
 
 DRONE = "Drone"
 TARGET = "DronePosition"  # the green sphere
@@ -46,11 +66,6 @@ def respondable(number: int) -> str:
 def joint(number: int) -> str:
     """Return the name of the joint that turns the blades of propeller 1 to 4."""
     return f"Quadricopter_propeller_joint{number}"
-
-
-def _of_each_generation(name: str) -> list[str]:
-    """Return a name as V-REP 3.x has it, and as CoppeliaSim 4.0 to 4.2 have it where that is another."""
-    return list(dict.fromkeys((name, name.replace("Quadricopter_", "Quadcopter_"))))
 
 
 _PROPELLERS = [name(n) for n in (1, 2, 3, 4) for name in ("Quadricopter_propeller{}".format, respondable, joint)]
@@ -82,7 +97,7 @@ class QuadricopterObjects:
 
     def add(
         self,
-        body: Body,
+        body: DynamicBody,
         links: Mapping[str, Matrix],
         propellers: Sequence[Matrix],
         cameras: Mapping[str, CameraParameters],
@@ -116,7 +131,7 @@ class QuadricopterObjects:
         parent: str | None = None,
         local: Matrix = frames.IDENTITY,
         *,
-        body: Body | None = None,
+        body: DynamicBody | None = None,
         alias: str = "",
         also: Sequence[str] = (),
         kind: str = "",
@@ -126,7 +141,8 @@ class QuadricopterObjects:
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
         if place.parent is not None:
             above = place.parent or None
-        names = [f"{one}{self._suffix}" for called in (name, *also) for one in _of_each_generation(called)]
+        called = [one for given in (name, *also) for one in (given, given.replace("Quadricopter_", "Quadcopter_"))]
+        names = [f"{one}{self._suffix}" for one in dict.fromkeys(called)]  # V-REP 3.x's, and CoppeliaSim 4.0 to 4.2's
         if place.name and place.name not in names:
             names.append(place.name)
         alias = place.alias or alias or name
@@ -144,7 +160,8 @@ class QuadricopterObjects:
             raise ParameterError(f"sensor {name}: the URDF says where {sensor.frame} is; `mount` needs another frame")
         parent, matrix = sensor.placed(links)
         kind = "proximity_sensor" if sensor.kind == "range" else ""
-        self._mount(f"sensor {name}", sensor.object or name, parent or DRONE, sensor.object_in(matrix), kind)
+        local = frames.multiply(matrix, sensor.from_object)
+        self._mount(f"sensor {name}", sensor.object or name, parent or DRONE, local, kind)
 
     def _add_camera(self, links: Mapping[str, Matrix], camera: CameraParameters) -> None:
         said = f"camera frame {camera.frame}"

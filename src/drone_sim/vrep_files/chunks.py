@@ -7,13 +7,15 @@ passed over. Little-endian; a text is an i32 length and its bytes.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from drone_sim.vrep_files.errors import VrepFileError
+from drone_sim.mechanics.state import Pose
+from drone_sim.vrep_files.model import ORIGIN, VrepFileError
 
 _MARKERS = (b"EOO", b"NXT", b"EOF")
 _END = b"EOF"
@@ -187,3 +189,21 @@ def _chunks(data: bytes, must_end: bool = False) -> Iterator[Chunk | None]:
 def _shown(tag: bytes) -> str:
     text = tag.decode("latin-1")
     return text if text.isprintable() and text else repr(tag)
+
+
+def quaternion_first(seven: tuple[float, ...] | None, tag: str) -> Pose:
+    """Return an object's pose: w, x, y, z of a quaternion, then a position; ORIGIN for None. Raises VrepFileError."""
+    return ORIGIN if seven is None else _pose(seven[4:7], seven[:4], tag)
+
+
+def position_first(seven: tuple[float, ...] | None, tag: str) -> Pose:
+    """Return a mesh's pose: a position, then w, x, y, z of a quaternion; ORIGIN for None. Raises VrepFileError."""
+    return ORIGIN if seven is None else _pose(seven[:3], seven[3:7], tag)
+
+
+def _pose(position: tuple[float, ...], quaternion: tuple[float, ...], tag: str) -> Pose:
+    length = math.sqrt(sum(value * value for value in quaternion))
+    if not 0.9 < length < 1.1:
+        raise VrepFileError(f"{tag}: its quaternion has the length {length:.3g}, not 1")
+    w, x, y, z = (value / length for value in quaternion)
+    return Pose((position[0], position[1], position[2]), (x, y, z, w))

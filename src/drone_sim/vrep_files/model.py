@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from drone_sim.mechanics.state import Pose
+
+
+class VrepFileError(ValueError):
+    """A V-REP file is refused; the message is one line that says what is wrong, and where."""
+
+
+@contextmanager
+def within(where: str) -> Iterator[None]:
+    """Put the place before what is said of a file."""
+    try:
+        yield
+    except VrepFileError as error:
+        raise VrepFileError(f"{where}: {error}") from None
+
 
 Rgba = tuple[float, float, float, float]
 ORIGIN = Pose((0.0, 0.0, 0.0))
@@ -15,7 +31,7 @@ NOT_DYNAMIC, NOT_RESPONDABLE, INVISIBLE, WITHOUT_SCRIPTS = 0x20, 0x40, 0x100, 0x
 
 
 @dataclass(frozen=True)
-class Primitive:
+class VrepPrimitive:
     """A simple form: its word, full extents along x, y and z (m), and its place in the shape's frame."""
 
     word: str  # plane, disc, cuboid, spheroid, cylinder, cone, heightfield or capsule
@@ -24,17 +40,17 @@ class Primitive:
 
 
 @dataclass(frozen=True)
-class Mesh:
+class VrepMesh:
     """One surface of a shape: vertices (n, 3), m, in the shape's frame; faces (m, 3); colour 0..1."""
 
     vertices: np.ndarray
     faces: np.ndarray
     color: Rgba
-    primitive: Primitive | None = None
+    primitive: VrepPrimitive | None = None
 
 
 @dataclass(frozen=True)
-class Inertia:
+class VrepInertia:
     """Principal moments divided by the mass (m²), about a frame in the shape's."""
 
     pose: Pose
@@ -42,18 +58,18 @@ class Inertia:
 
 
 @dataclass(frozen=True)
-class Shape:
+class VrepShape:
     """What has a surface, and may have a mass (kg)."""
 
-    meshes: tuple[Mesh, ...]
+    meshes: tuple[VrepMesh, ...]
     mass: float
-    inertia: Inertia | None
+    inertia: VrepInertia | None
     is_dynamic: bool
     is_respondable: bool
 
 
 @dataclass(frozen=True)
-class Joint:
+class VrepJoint:
     """A joint along its z axis; its position (rad, m, or a pose), limits None where it is cyclic."""
 
     kind: str  # revolute, prismatic, spherical or screw
@@ -67,7 +83,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Dummy:
+class VrepDummy:
     """A frame; the handle of the dummy that it is linked to, -1 for none; the points of a path of 4.x.
 
     Each is x, y, z (m) and a quaternion x, y, z, w.
@@ -79,7 +95,7 @@ class Dummy:
 
 
 @dataclass(frozen=True)
-class Camera:
+class VrepCamera:
     """What looks along +z, +y up; the angle (rad) spans the larger side, the size (m) of an orthographic one too."""
 
     is_perspective: bool
@@ -91,7 +107,7 @@ class Camera:
 
 
 @dataclass(frozen=True)
-class ProximitySensor:
+class VrepProximitySensor:
     """What measures the distance along +z: kind pyramid, cylinder, disc, cone or ray; m and rad."""
 
     kind: str
@@ -109,17 +125,16 @@ class Other:
     kind: str
 
 
-Kind = Shape | Joint | Dummy | Camera | ProximitySensor | Other
+Kind = VrepShape | VrepJoint | VrepDummy | VrepCamera | VrepProximitySensor | Other
 
 
 @dataclass(frozen=True)
-class Script:
+class VrepScript:
     """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own."""
 
     object: int
     kind: str  # main, child or customization, or another's number
     text: str
-    is_threaded: bool = False
     is_enabled: bool = True
     language: str = "lua"
     parameters: tuple[tuple[str, str], ...] = ()
@@ -128,7 +143,7 @@ class Script:
 
 
 @dataclass(frozen=True)
-class SceneObject:
+class VrepObject:
     """An object: its handle in the file, its parent's (-1 for none), and its pose in the parent's frame."""
 
     handle: int
@@ -140,25 +155,23 @@ class SceneObject:
     is_model: bool = False
     model_flags: int = 0
     layers: int = 1
-    is_detectable: bool = True
     size_factor: float = 1.0
     parameters: tuple[tuple[str, str], ...] = ()  # of its script, since 4.0
-    children: list[SceneObject] = field(default_factory=list, compare=False, repr=False)  # filled by the reader
+    children: list[VrepObject] = field(default_factory=list, compare=False, repr=False)  # filled by the reader
 
     @property
-    def shape(self) -> Shape | None:
+    def shape(self) -> VrepShape | None:
         """What it is, where it is a shape."""
-        return self.of if isinstance(self.of, Shape) else None
+        return self.of if isinstance(self.of, VrepShape) else None
 
 
 @dataclass(frozen=True)
-class Settings:
+class VrepSettings:
     """What a file says of the world: steps (s), gravity (m/s²); None where it says nothing, as models do."""
 
     time_step: float | None = None
     dynamics_step: float | None = None
     gravity: tuple[float, float, float] | None = None
-    engine: str = ""
     visible_layers: int = 0x00FF
 
 
@@ -168,7 +181,6 @@ class VrepFile:
 
     version: int  # of its format
     program: str  # such as 3.6.1
-    objects: tuple[SceneObject, ...]  # a parent before its children
-    scripts: tuple[Script, ...]
-    settings: Settings
-    ignored: dict[str, int] = field(default_factory=dict)  # how many chunks of each tag that is passed over
+    objects: tuple[VrepObject, ...]  # a parent before its children
+    scripts: tuple[VrepScript, ...]
+    settings: VrepSettings

@@ -1,4 +1,4 @@
-"""Objects: what all have in common, and what joints, dummies, cameras and sensors have of their own."""
+"""Objects: what all have in common, and what joints, dummies, paths, cameras and sensors have of their own."""
 
 from __future__ import annotations
 
@@ -6,23 +6,51 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from drone_sim.vrep_files.chunks import Level, finite, level, levels
-from drone_sim.vrep_files.custom_data import read_path
-from drone_sim.vrep_files.errors import VrepFileError, within
-from drone_sim.vrep_files.meshes import Pools
+from drone_sim.vrep_files.chunks import Level, Texts, finite, level, levels, quaternion_first, unpack
 from drone_sim.vrep_files.model import (
     ORIGIN,
-    Camera,
-    Dummy,
-    Joint,
     Kind,
     Other,
-    ProximitySensor,
-    SceneObject,
+    VrepCamera,
+    VrepDummy,
+    VrepFileError,
+    VrepJoint,
+    VrepObject,
+    VrepProximitySensor,
+    within,
 )
-from drone_sim.vrep_files.poses import quaternion_first
 from drone_sim.vrep_files.scripts import read_parameters
-from drone_sim.vrep_files.shapes import read_shape
+from drone_sim.vrep_files.shapes import Pools, read_shape
+
+_BLOCK = "Cdt"  # name and content, each after its length
+_PATH = b"PATH"
+_POINT = 7 * 8  # bytes: position and quaternion x, y, z, w, as doubles
+_MOST_POINTS = 10_000
+
+
+def read_path(data: bytes | None) -> tuple[tuple[float, ...], ...]:
+    """Return the points of a path, in its frame, from the blocks of its object; none where it is no path.
+
+    Each is x, y, z (m) and a quaternion x, y, z, w.
+
+    Raises VrepFileError.
+    """
+    content = _block(data, _PATH)
+    count = len(content) // _POINT
+    if count > _MOST_POINTS:
+        raise VrepFileError(f"PATH: {count} points; at most {_MOST_POINTS} are read")
+    numbers = finite(unpack(f"<{7 * count}d", content, "PATH"), "PATH")
+    return tuple(numbers[at : at + 7] for at in range(0, 7 * count, 7))
+
+
+def _block(data: bytes | None, name: bytes) -> bytes:
+    for chunk in () if data is None else level(data).chunks:
+        if chunk.tag == _BLOCK:
+            parts = Texts(chunk.data, _BLOCK)
+            if parts.bytes() == name:
+                return parts.bytes()
+    return b""
+
 
 _JOINTS = {10: "revolute", 11: "prismatic", 12: "spherical"}
 _SENSORS = {30: "pyramid", 31: "cylinder", 32: "disc", 33: "cone", 34: "ray"}
@@ -33,11 +61,10 @@ _OTHERS = {
 _USED = {"pyramid": (0, 1, 2, 3), "cylinder": (0, 1, 6), "disc": (0, 1, 6, 8), "cone": (0, 1, 6, 8), "ray": (0, 1)}
 _DYNAMIC_MODE = 5
 _CYCLIC, _MOTOR, _POSITION_CONTROL = 0x01, 0x10, 0x20  # bits of a joint's `Va9`
-_DETECTABLE = 0x1F0
 SCRIPT = "SCT"
 
 
-def read_object(tag: str, data: bytes, pools: Pools) -> SceneObject:
+def read_object(tag: str, data: bytes, pools: Pools) -> VrepObject:
     """Return an object. Raises VrepFileError, which names it."""
     base, *more = levels(data, 3)
     handle, parent = base.integers("Ids", count=2) or (-1, -1)
@@ -46,18 +73,19 @@ def read_object(tag: str, data: bytes, pools: Pools) -> SceneObject:
         if handle < 0:
             raise VrepFileError("has no handle")
         sizes = base.numbers("_fa", "Sfa", 1)
-        own = more[0] if more else Level()
-        return SceneObject(
+        kind = _read(tag, more[0] if more else Level(), pools)
+        if isinstance(kind, VrepDummy):  # which is a path of 4.x, where it has points
+            kind = replace(kind, path=read_path(base.find("Cda")))
+        return VrepObject(
             handle=handle,
             parent=parent,
             name=name,
             alias=base.text("Ali"),
             pose=quaternion_first(base.numbers("_fq", "Cfq", 7), "_fq"),
-            of=_with_path(_read(tag, own, pools), base.find("Cda")),
+            of=kind,
             is_model=bool(base.bits("Va3", "Va2", "Var") & 1),
             model_flags=base.integer("Mpo") & ~0xF000,
             layers=base.integer("Lar", default=1, kind="H"),
-            is_detectable=bool(base.integer("Omp", default=_DETECTABLE) & _DETECTABLE),
             size_factor=1.0 if sizes is None else sizes[0],
             parameters=read_parameters(base.find("Lsp")),
         )
@@ -80,11 +108,6 @@ def _read(tag: str, own: Level, pools: Pools) -> Kind:
     return _READERS[tag](own) if tag in _READERS else Other(_OTHERS[tag])
 
 
-def _with_path(kind: Kind, custom_data: bytes | None) -> Kind:
-    """Return a dummy with its points, where it is a path as 4.x has them."""
-    return replace(kind, path=read_path(custom_data)) if isinstance(kind, Dummy) else kind
-
-
 def _joint(own: Level) -> Kind:
     kind = _JOINTS.get(own.integer("Jtt", default=10), "revolute")
     low, span = own.numbers("_mr", "Pmr", 2) or (0.0, 0.0)
@@ -93,7 +116,7 @@ def _joint(own: Level) -> Kind:
     lead = own.numbers("Sld", "", 1) or [math.tau * per_radian for per_radian in own.numbers("", "Jsp", 1) or (0.0,)]
     velocity, force = own.numbers("_mp", "Dmp", 2) or (0.0, 0.0)
     mode, (target,) = _mode(own), own.numbers("_tp", "Dtp", 1) or (0.0,)
-    return Joint(
+    return VrepJoint(
         kind="screw" if kind == "revolute" and lead[0] else kind,
         position=position[0],
         limits=None if own.bits("Va9") & _CYCLIC or kind == "spherical" else (low, low + span),
@@ -116,20 +139,20 @@ def _mode(own: Level) -> str:
 
 def _dummy(own: Level) -> Kind:
     size = own.numbers("_y2", "Dy2", 1) or (0.01,)
-    return Dummy(size[0], own.integer("Lli", default=-1))
+    return VrepDummy(size[0], own.integer("Lli", default=-1))
 
 
 def _vision_sensor(own: Level) -> Kind:
     size, angle, near, far = own.numbers("_cp", "Ccp", 4) or (1.0, math.pi / 3, 0.01, 10.0)
     width, height = own.integers("Res", count=2) or (32, 32)
-    return Camera(bool(own.bits("Va3", "Var") & 1), angle, size, near, far, (width, height))
+    return VrepCamera(bool(own.bits("Va3", "Var") & 1), angle, size, near, far, (width, height))
 
 
 def _camera(own: Level) -> Kind:
     size, angle = own.numbers("_p3", "Cp3", 2) or (1.0, math.pi / 3)
     near, far = own.numbers("_cp", "Ccp", 2) or (0.05, 500.0)
     perspective = bool(own.bits("Ca3") & 2) if own.find("Ca3") is not None else own.integer("Cpm", default=1) != 0
-    return Camera(perspective, angle, size, near, far)
+    return VrepCamera(perspective, angle, size, near, far)
 
 
 def _proximity_sensor(own: Level) -> Kind:
@@ -140,7 +163,7 @@ def _proximity_sensor(own: Level) -> Kind:
     # V-REP leaves what a kind does not need as it happens to be in memory.
     used = finite(tuple(number if index in _USED[kind] else 0.0 for index, number in enumerate(numbers)), "Ss3")
     offset, reach, x, y, _, _, radius, _, angle = used
-    return ProximitySensor(kind, offset, reach, (x, y), radius, angle)
+    return VrepProximitySensor(kind, offset, reach, (x, y), radius, angle)
 
 
 _READERS: dict[str, Callable[[Level], Kind]] = {

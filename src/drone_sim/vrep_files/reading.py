@@ -6,15 +6,54 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from drone_sim.files.resources import read_bytes
-from drone_sim.vrep_files.chunks import top
+from drone_sim.vrep_files.chunks import finite, level, singles, top, unpack
 from drone_sim.vrep_files.container import MAX_SIZE, open_container
-from drone_sim.vrep_files.errors import VrepFileError, within
-from drone_sim.vrep_files.meshes import Pools
-from drone_sim.vrep_files.model import SceneObject, Script, Settings, VrepFile
+from drone_sim.vrep_files.model import VrepFile, VrepFileError, VrepObject, VrepScript, VrepSettings, within
 from drone_sim.vrep_files.objects import SCRIPT, is_object, read_object, script_of
 from drone_sim.vrep_files.scripts import read_script
-from drone_sim.vrep_files.settings import with_dynamics, with_simulation
+from drone_sim.vrep_files.shapes import Pools
+
+_PRESET_STEPS = (0.2, 0.1, 0.05, 0.025, 0.01)  # s, of `Spi` 0 to 4
+_PRESETS = 5  # modes of the dynamics below this have a step of their own
+_PRESET_DYNAMICS_STEP = 0.005  # s
+
+
+def with_simulation(settings: VrepSettings, data: bytes) -> VrepSettings:
+    """Return the settings with what a `SIM` says. Raises VrepFileError."""
+    own = level(data)
+    preset = own.integer("Spi", default=-1)
+    step = own.numbers("_t3", "St3", 1)
+    if step is not None:
+        return replace(settings, time_step=step[0])
+    if 0 <= preset < len(_PRESET_STEPS):
+        return replace(settings, time_step=_PRESET_STEPS[preset])
+    micro = own.find("St2")
+    if micro is not None:
+        return replace(settings, time_step=unpack("<Q", micro, "St2")[0] / 1e6)
+    seconds = own.find("Sts")
+    if seconds is not None:
+        return replace(settings, time_step=finite(singles("<f", seconds, "Sts"), "Sts")[0])
+    return settings
+
+
+def with_dynamics(settings: VrepSettings, data: bytes) -> VrepSettings:
+    """Return the settings with what a `DYN` says. Raises VrepFileError."""
+    own = level(data)
+    width = "d" if own.find("_n3") is not None else "f"
+    found = own.find("_n3", "En3", "En2", "Eng")
+    if found is None:
+        return settings
+    _engine, x, y, z, mode = unpack(f"<i3{width}i", found, "_n3")
+    if own.find("_n3", "En3") is None:
+        mode += 1
+    gravity = finite((x, y, z) if width == "d" else tuple(float(str(np.float32(one))) for one in (x, y, z)), "_n3")
+    step = own.numbers("_tp", "Stp", 1)
+    seconds = step[0] if step is not None else _PRESET_DYNAMICS_STEP if mode < _PRESETS else None
+    return replace(settings, gravity=(gravity[0], gravity[1], gravity[2]), dynamics_step=seconds)
+
 
 SUFFIXES = (".ttt", ".ttm")
 MAX_OBJECTS = 20_000
@@ -37,10 +76,9 @@ def read_file(path: str | Path) -> VrepFile:
 def read(content: bytes) -> VrepFile:
     """Return what a file's bytes hold. Raises VrepFileError."""
     container = open_container(content)
-    pools, settings = Pools(), Settings()
-    objects: list[SceneObject] = []
-    scripts: list[Script] = []
-    ignored: Counter[str] = Counter()
+    pools, settings = Pools(), VrepSettings()
+    objects: list[VrepObject] = []
+    scripts: list[VrepScript] = []
     for tag, data in top(container.payload):
         if is_object(tag):
             objects.append(read_object(tag, data, pools))
@@ -54,15 +92,13 @@ def read(content: bytes) -> VrepFile:
         elif tag in _SETTINGS:
             with within(tag):
                 settings = _SETTINGS[tag](settings, data)
-        else:
-            ignored[tag] += 1
         if len(objects) > MAX_OBJECTS:
             raise VrepFileError(f"holds more than {MAX_OBJECTS} objects")
     program = f"{container.program // 10000}.{container.program // 100 % 100}.{container.program % 100}"
-    return VrepFile(container.version, program, _tree(objects), tuple(scripts), settings, dict(ignored))
+    return VrepFile(container.version, program, _tree(objects), tuple(scripts), settings)
 
 
-def _script_in(tag: str, data: bytes, one: SceneObject) -> list[Script]:
+def _script_in(tag: str, data: bytes, one: VrepObject) -> list[VrepScript]:
     """Return the script of a script object, which acts on the object's parent."""
     found = script_of(data) if tag == SCRIPT else None
     if found is None:
@@ -71,7 +107,7 @@ def _script_in(tag: str, data: bytes, one: SceneObject) -> list[Script]:
         return [replace(read_script(found, owner=one.parent), own_object=one.handle)]
 
 
-def _tree(objects: list[SceneObject]) -> tuple[SceneObject, ...]:
+def _tree(objects: list[VrepObject]) -> tuple[VrepObject, ...]:
     """Return the objects, a parent before its children, which it is given. Raises VrepFileError."""
     by_handle = {one.handle: one for one in objects}
     if len(by_handle) != len(objects):
@@ -85,7 +121,7 @@ def _tree(objects: list[SceneObject]) -> tuple[SceneObject, ...]:
             by_handle[one.parent].children.append(one)
         else:
             raise VrepFileError(f"object {one.name}: its parent {one.parent} is not in the file")
-    ordered: list[SceneObject] = []
+    ordered: list[VrepObject] = []
     for root in roots:
         _add_below(root, ordered, 0)
     if len(ordered) != len(objects):
@@ -95,7 +131,7 @@ def _tree(objects: list[SceneObject]) -> tuple[SceneObject, ...]:
     return tuple(ordered)
 
 
-def _add_below(one: SceneObject, ordered: list[SceneObject], depth: int) -> None:
+def _add_below(one: VrepObject, ordered: list[VrepObject], depth: int) -> None:
     if depth > _DEEPEST:
         raise VrepFileError(f"object {one.name}: hangs deeper than {_DEEPEST} objects below each other")
     ordered.append(one)

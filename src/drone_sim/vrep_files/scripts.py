@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from drone_sim.vrep_files.chunks import Texts, decoded, level
-from drone_sim.vrep_files.errors import VrepFileError
-from drone_sim.vrep_files.model import Script
+from drone_sim.vrep_files.model import VrepFileError, VrepScript
 
 _KINDS = {0: "main", 1: "child", 6: "customization"}
-_THREADED, _DISABLED, _OWN_MAIN = 1, 2, 8
+_DISABLED, _OWN_MAIN = 2, 8
 _MOST_PARAMETERS = 10_000
 
 
-def read_script(data: bytes, owner: int | None = None) -> Script:
+def read_script(data: bytes, owner: int | None = None) -> VrepScript:
     """Return a script; `owner` is the handle of the object that it acts on, None where the file says so itself.
 
     Raises VrepFileError.
@@ -24,11 +23,10 @@ def read_script(data: bytes, owner: int | None = None) -> Script:
     kind = _KINDS.get(number, f"of type {number}")
     language = own.text("Lne").lower()
     text = _plain_text(own.find("Ste") or b"")
-    return Script(
+    return VrepScript(
         object=on,
         kind=kind,
         text=text,
-        is_threaded=bool(switches & _THREADED),
         is_enabled=not switches & _DISABLED,
         language="python" if "python" in language or text.startswith("#python") else "lua",
         parameters=read_parameters(own.find("Prm")),

@@ -1,12 +1,141 @@
-"""Shapes: one mesh, or a compound of meshes and compounds, with mass and inertia."""
+"""Shapes: one mesh, or a compound of meshes and compounds, with mass and inertia.
+
+A mesh has vertices and faces, from pools that all shapes share or in place, a colour, and may have a simple form.
+"""
 
 from __future__ import annotations
 
-from drone_sim.vrep_files.chunks import Level, levels
-from drone_sim.vrep_files.errors import VrepFileError
-from drone_sim.vrep_files.meshes import Pools, read_mesh
-from drone_sim.vrep_files.model import Inertia, Mesh, Shape
-from drone_sim.vrep_files.poses import position_first
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drone_sim.mechanics.state import Pose
+from drone_sim.vrep_files.chunks import Level, finite, level, levels, position_first, unpack
+from drone_sim.vrep_files.model import Rgba, VrepFileError, VrepInertia, VrepMesh, VrepPrimitive, VrepShape
+
+MAX_TRIANGLES = 3_000_000  # of a file
+_WORDS = ("", "plane", "disc", "cuboid", "spheroid", "cylinder", "cone", "heightfield", "capsule")
+_NO_OPACITY = 4  # the bit of `Var` that says that `Trf` does not count
+_GREY: Rgba = (0.7, 0.7, 0.7, 1.0)
+_REST = (31, 8191, 2097151, 536870911)  # taken from a packed index with 0 to 3 bytes more
+
+
+@dataclass
+class Pools:
+    """Vertices and faces that stand once in a file, for all shapes that use them."""
+
+    vertices: list[np.ndarray] = field(default_factory=list)
+    faces: list[np.ndarray] = field(default_factory=list)
+    triangles: int = 0  # read so far, each mesh counted
+
+    def add(self, data: bytes) -> None:
+        """Take the pools of a `VIN`. Raises VrepFileError."""
+        for one in level(data).chunks:
+            if one.tag == "Ver":
+                self.vertices.append(_vertices(one.data))
+            elif one.tag == "Ind":
+                self.faces.append(_triples(np.frombuffer(one.data[: len(one.data) // 4 * 4], "<i4"), "Ind"))
+            elif one.tag == "In2":
+                self.faces.append(_packed(one.data))
+
+
+def read_mesh(outside: Level, inside: Level, pools: Pools) -> VrepMesh:
+    """Return the mesh of a wrapper's and a mesh's level. Raises VrepFileError."""
+    pose = position_first(inside.numbers("_pf", "Ppf", 7), "_pf")
+    turn = np.array(pose.matrix).reshape(3, 4)
+    vertices = _picked(inside, ("Vev", "Ver"), pools.vertices, _vertices)
+    faces = _picked(inside, ("Inv", "In2"), pools.faces, _packed)
+    pools.triangles += len(faces)
+    if pools.triangles > MAX_TRIANGLES:
+        raise VrepFileError(f"holds more than {MAX_TRIANGLES} triangles")
+    if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
+        raise VrepFileError("a face names a vertex that there is not")
+    return VrepMesh(vertices @ turn[:, :3].T + turn[:, 3], faces, _color(inside), _primitive(inside, pose))
+
+
+def _picked(
+    inside: Level, tags: tuple[str, str], pool: list[np.ndarray], read: Callable[[bytes], np.ndarray]
+) -> np.ndarray:
+    """Return an array from a pool, by the index under the first tag, or what is in place under the second."""
+    index = inside.integer(tags[0], default=-1)
+    if inside.find(tags[0]) is None:
+        data = inside.find(tags[1])
+        return np.zeros((0, 3), int) if data is None else read(data)
+    if not 0 <= index < len(pool):
+        raise VrepFileError(f"{tags[0]}: the file has no mesh {index}")
+    return pool[index]
+
+
+def _vertices(data: bytes) -> np.ndarray:
+    found = _triples(np.frombuffer(data[: len(data) // 4 * 4], "<f4"), "Ver").astype(float)
+    if not (np.abs(found) < 1e6).all():  # nor a NaN
+        raise VrepFileError("Ver: a vertex that is not finite, or 1000 km away")
+    return found
+
+
+def _triples(values: np.ndarray, tag: str) -> np.ndarray:
+    if len(values) % 3:
+        raise VrepFileError(f"{tag}: {len(values)} numbers, which are no triples")
+    return values.reshape(-1, 3)
+
+
+def _packed(data: bytes) -> np.ndarray:
+    """Return the faces of an `In2`: indices as differences, each of 1 to 4 bytes."""
+    count = unpack("<i", data, "In2")[0]
+    if not 0 <= count <= len(data) - 4:
+        raise VrepFileError(f"In2: {count} indices do not fit")
+    indices, at, index = [], 4, 0
+    for _ in range(count):
+        more = data[at] >> 6 if at < len(data) else 0
+        piece = data[at : at + 1 + more]
+        if len(piece) != 1 + more:
+            raise VrepFileError("In2: is cut")
+        difference = piece[0] & 63
+        for number, byte in enumerate(piece[1:]):
+            difference += byte << (6 + 8 * number)
+        index += difference - _REST[more]
+        indices.append(index)
+        at += 1 + more
+    return _triples(np.array(indices, dtype=np.int64), "In2")
+
+
+def _primitive(inside: Level, pose: Pose) -> VrepPrimitive | None:
+    data = inside.find("_pr", "Ppr")
+    if data is None:
+        return None
+    width = "d" if inside.find("_pr") is not None else "f"
+    kind, *size = unpack(f"<i3{width}", data, "_pr")
+    if not 0 < kind < len(_WORDS):
+        return None
+    x, y, z = finite(tuple(size), "_pr")
+    return VrepPrimitive(_WORDS[kind], (abs(x), abs(y), abs(z)), pose)
+
+
+def _color(inside: Level) -> Rgba:
+    data = inside.find("Cl0")
+    if data is None:
+        return _GREY
+    parts = level(data)
+    opacity = 1.0
+    if not parts.bits("Var") & _NO_OPACITY and parts.find("Trf") is not None:
+        opacity = min(1.0, max(0.0, finite(unpack("<f", parts.find("Trf") or b"", "Trf"), "Trf")[0]))
+    red, green, blue = (min(1.0, max(0.0, value)) for value in _rgb(parts))
+    return red, green, blue, opacity
+
+
+def _rgb(parts: Level) -> Sequence[float]:
+    """Return red, green and blue: ambient and diffuse light in one since `Cl3`, apart before."""
+    data = parts.find("Cl3")
+    if data is not None:
+        return finite(unpack("<3f", data, "Cl3"), "Cl3")
+    data = parts.find("Cl2", "Cls")
+    if data is None:
+        return _GREY[:3]
+    light = finite(unpack("<6f", data, "Cl2"), "Cl2")
+    diffuse = sum(light[3:]) / 3
+    return [(ambient + diffuse / 2) / 0.85 for ambient in light[:3]]
+
 
 _DEEPEST = 16  # compounds within compounds
 _MOST_MESHES = 20_000  # of a shape
@@ -14,16 +143,17 @@ _MESHES, _COMPOUNDS = ("Gst", "Geo"), ("Gsg", "Wrp")
 _NOT_STATIC, _RESPONDABLE = 0x80, 0x01
 
 
-def read_shape(own: Level, pools: Pools) -> Shape:
+def read_shape(own: Level, pools: Pools) -> VrepShape:
     """Return a shape from its class level. Raises VrepFileError."""
     mass, inertia, meshes = 1.0, None, []
     data = own.find("Ge2")
     for chunk in levels(data, 2)[0].chunks if data is not None else ():
         if chunk.tag in (*_MESHES, *_COMPOUNDS):
             wrapper = levels(chunk.data, 3)[0]
-            mass, inertia = _mass(wrapper), _inertia(wrapper)
+            mass = max(0.0, *(wrapper.numbers("_as", "Mas", 1) or (1.0,)))
+            inertia = _inertia(wrapper)
             meshes += _meshes(chunk.tag, chunk.data, pools, 0)
-    return Shape(
+    return VrepShape(
         meshes=tuple(meshes),
         mass=mass,
         inertia=inertia,
@@ -32,13 +162,13 @@ def read_shape(own: Level, pools: Pools) -> Shape:
     )
 
 
-def _meshes(tag: str, data: bytes, pools: Pools, depth: int) -> list[Mesh]:
+def _meshes(tag: str, data: bytes, pools: Pools, depth: int) -> list[VrepMesh]:
     if depth > _DEEPEST:
         raise VrepFileError(f"compounds within compounds, deeper than {_DEEPEST}")
     found = levels(data, 3)
     if tag in _MESHES:
         return [read_mesh(found[0], found[1] if len(found) > 1 else Level(), pools)]
-    meshes: list[Mesh] = []
+    meshes: list[VrepMesh] = []
     for part in (part for one in found for part in one.chunks if part.tag in (*_MESHES, *_COMPOUNDS)):
         meshes += _meshes(part.tag, part.data, pools, depth + 1)
         if len(meshes) > _MOST_MESHES:
@@ -46,14 +176,9 @@ def _meshes(tag: str, data: bytes, pools: Pools, depth: int) -> list[Mesh]:
     return meshes
 
 
-def _mass(wrapper: Level) -> float:
-    mass = wrapper.numbers("_as", "Mas", 1)
-    return 1.0 if mass is None else max(0.0, mass[0])
-
-
-def _inertia(wrapper: Level) -> Inertia | None:
+def _inertia(wrapper: Level) -> VrepInertia | None:
     numbers = wrapper.numbers("_ne", "Ine", 10)
     if numbers is None:
         return None
     a, b, c = (max(0.0, value) for value in numbers[7:])
-    return Inertia(position_first(numbers[:7], "_ne"), (a, b, c))
+    return VrepInertia(position_first(numbers[:7], "_ne"), (a, b, c))

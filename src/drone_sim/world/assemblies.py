@@ -5,6 +5,7 @@ Of all that PyBullet takes, a URDF alone has neither a limit of parts nor of lin
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import NamedTuple
 from xml.etree import ElementTree as Xml
@@ -14,14 +15,14 @@ import pybullet
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.mechanics.state import Pose
-from drone_sim.shapes.bullet import Geometry
 from drone_sim.shapes.compound import Part
-from drone_sim.shapes.mass import Inertia
-from drone_sim.world.own_files import OwnFiles
+from drone_sim.shapes.mass import PrincipalInertia
+from drone_sim.shapes.shape import Geometry
+from drone_sim.world.bullet_files import BulletFiles
 
 _NO_LIMIT = 1e9
 _FASTEST = 1e4  # rad/s or m/s of a joint; PyBullet's own limit is 100
-_NO_INERTIA = Inertia((0.0, 0.0, 0.0))
+_NO_INERTIA = PrincipalInertia((0.0, 0.0, 0.0))
 
 
 class Hinge(NamedTuple):
@@ -47,11 +48,11 @@ class Link(NamedTuple):
     parts: Sequence[Part]
     local: Matrix = IDENTITY
     mass: float = 0.0
-    inertia: Inertia = _NO_INERTIA
+    inertia: PrincipalInertia = _NO_INERTIA
     hinge: Hinge | None = None
 
 
-def create(client: int, files: OwnFiles, links: Sequence[Link], pose: Pose) -> tuple[int, list[int]]:
+def create(client: int, files: BulletFiles, links: Sequence[Link], pose: Pose) -> tuple[int, list[int]]:
     """Add an assembly with its first link's frame at a pose; return its body id, and PyBullet's number of each link.
 
     It stands still where its first link has no mass. Raises ValueError, in one line, for a file that cannot be read.
@@ -68,6 +69,8 @@ def create(client: int, files: OwnFiles, links: Sequence[Link], pose: Pose) -> t
         )
     except pybullet.error as error:
         raise ValueError(f"a body of {len(links)} links: PyBullet cannot make it ({error})") from None
+    finally:
+        os.unlink(path)  # or there would be one more file for every body that has come
     names = [pybullet.getJointInfo(body, number, client)[12] for number in range(len(links) - 1)]
     numbers = [-1, *(names.index(f"l{index}".encode()) for index in range(1, len(links)))]
     for link, number in zip(links, numbers):
@@ -91,7 +94,7 @@ def _settle(client: int, body: int, number: int, hinge: Hinge) -> None:
 # ---- as a URDF
 
 
-def _urdf(files: OwnFiles, links: Sequence[Link]) -> bytes:
+def _urdf(files: BulletFiles, links: Sequence[Link]) -> bytes:
     robot = Xml.Element("robot", name="assembly")
     for index, link in enumerate(links):
         _add_link(files, robot, index, link)
@@ -102,7 +105,7 @@ def _urdf(files: OwnFiles, links: Sequence[Link]) -> bytes:
     return Xml.tostring(robot)
 
 
-def _add_link(files: OwnFiles, robot: Xml.Element, index: int, link: Link) -> None:
+def _add_link(files: BulletFiles, robot: Xml.Element, index: int, link: Link) -> None:
     element = Xml.SubElement(robot, "link", name=f"l{index}")
     inertial = Xml.SubElement(element, "inertial")
     _add_origin(inertial, frames.multiply(link.local, link.inertia.frame))
@@ -123,7 +126,8 @@ def _add_link(files: OwnFiles, robot: Xml.Element, index: int, link: Link) -> No
 
 
 def _add_joint(robot: Xml.Element, index: int, hinge: Hinge) -> None:
-    joint = Xml.SubElement(robot, "joint", name=f"j{index}", type=_type(hinge))
+    kind = "continuous" if hinge.motion == "revolute" and hinge.limits is None else hinge.motion
+    joint = Xml.SubElement(robot, "joint", name=f"j{index}", type=kind)
     Xml.SubElement(joint, "parent", link=f"l{hinge.parent}")
     Xml.SubElement(joint, "child", link=f"l{index}")
     _add_origin(joint, hinge.local)
@@ -131,10 +135,6 @@ def _add_joint(robot: Xml.Element, index: int, hinge: Hinge) -> None:
     if hinge.limits is not None or hinge.motion == "prismatic":
         low, high = map(repr, hinge.limits or (-_NO_LIMIT, _NO_LIMIT))
         Xml.SubElement(joint, "limit", lower=low, upper=high, effort=repr(_NO_LIMIT), velocity=repr(_NO_LIMIT))
-
-
-def _type(hinge: Hinge) -> str:
-    return "continuous" if hinge.motion == "revolute" and hinge.limits is None else hinge.motion
 
 
 def _add_shape(element: Xml.Element, kind: str, place: Matrix, told: Geometry) -> Xml.Element:

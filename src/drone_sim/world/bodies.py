@@ -1,4 +1,4 @@
-"""Make PyBullet bodies of the objects of a scene that stand still, and of URDFs."""
+"""Make PyBullet bodies of the floor, of the objects of a scene that stand still, and of URDFs."""
 
 from __future__ import annotations
 
@@ -8,26 +8,41 @@ from typing import Any
 import pybullet
 
 from drone_sim.mechanics.state import Pose
-from drone_sim.shapes.bullet import Geometry, UrdfFile
-from drone_sim.shapes.shape import SceneShape
-from drone_sim.world.own_files import OwnFiles
+from drone_sim.shapes.shape import Geometry, SceneShape, UrdfFile
+from drone_sim.shapes.visual import GROUND
+from drone_sim.world.bullet_files import BulletFiles
+
+_TILE = 2.0  # m covered by one texture
+_THICKNESS = 0.1  # m, below z = 0
+_GROUND_REACH = 2000.0  # m from the origin, along either axis
+_BELOW = 1e-3  # m that the ground is drawn below the floor, for PyBullet's own renderer to tell them apart
 
 
-def create(client: int, files: OwnFiles, shape: SceneShape, pose: Pose, *, moves: bool, color: Sequence[float]) -> int:
+# Number of the collision and of the visual shape of what was made, by what it was made of: PyBullet frees neither when
+# a body goes.
+Made = dict[tuple[str, str], tuple[int, int]]
+
+
+def create(
+    client: int, files: BulletFiles, shape: SceneShape, pose: Pose, *, moves: bool, color: Sequence[float], made: Made
+) -> int:
     """Add an object without its texture; return its body id. Only a URDF `moves`, by its own masses.
 
-    Raises ValueError, in one line, for a file that cannot be read.
+    Whatever else is alike shares what is `made` of it. Raises ValueError, in one line, for a file that cannot be read.
     """
     position, orientation = pose
     try:
         told = shape.for_bullet(files, moves)
         if isinstance(told, UrdfFile):
             return _load(client, told, pose, moves)
-        solid = pybullet.createCollisionShape(physicsClientId=client, **_collision(told))
-        seen = pybullet.createVisualShape(
-            getattr(pybullet, told.type), rgbaColor=color, physicsClientId=client, **told.visual
-        )
-        return pybullet.createMultiBody(0, solid, seen, position, orientation, physicsClientId=client)
+        key = repr(told), repr(color)
+        if key not in made:
+            solid = pybullet.createCollisionShape(physicsClientId=client, **_collision(told))
+            seen = pybullet.createVisualShape(
+                getattr(pybullet, told.type), rgbaColor=color, physicsClientId=client, **told.visual
+            )
+            made[key] = solid, seen
+        return pybullet.createMultiBody(0, *made[key], position, orientation, physicsClientId=client)
     except pybullet.error as error:
         raise ValueError(f"{shape}: PyBullet cannot make it ({error})") from None
 
@@ -46,3 +61,46 @@ def _load(client: int, told: UrdfFile, pose: Pose, moves: bool) -> int:
 def _collision(told: Geometry) -> dict[str, Any]:
     flags = {"flags": getattr(pybullet, told.flags)} if told.flags else {}
     return {"shapeType": getattr(pybullet, told.type), **told.collision, **flags}
+
+
+# ---- the floor, and the ground around it
+
+
+def create_floor(client: int, files: BulletFiles, size: float, ground: bool) -> int:
+    """Add a square floor with its top at z = 0, `size` metres a side; return its body id.
+
+    With `ground`, bare ground surrounds it at the same height. It is of the same body, as its second visual shape:
+    every body costs a step some 4 % of its time, whether anything comes near it or not.
+    """
+    half, depth = size / 2, _THICKNESS / 2
+    boxes = [(half, half, 0.0, 0.0)]  # half lengths in x and y, and centre
+    seen = [(_mesh(size), (1.0, 1.0, 1.0, 1.0), 0.0)]
+    if ground:
+        reach, wide = _GROUND_REACH, (_GROUND_REACH - half) / 2
+        boxes += [(reach, wide, 0.0, half + wide), (reach, wide, 0.0, -half - wide)]
+        boxes += [(wide, half, half + wide, 0.0), (wide, half, -half - wide, 0.0)]
+        seen.append((_mesh(2 * reach), (*GROUND, 1.0), -_BELOW))
+    solid = pybullet.createCollisionShapeArray(
+        shapeTypes=[pybullet.GEOM_BOX] * len(boxes),
+        halfExtents=[[x, y, depth] for x, y, _, _ in boxes],
+        collisionFramePositions=[[x, y, -depth] for _, _, x, y in boxes],
+        physicsClientId=client,
+    )
+    visual = pybullet.createVisualShapeArray(
+        shapeTypes=[pybullet.GEOM_MESH] * len(seen),
+        fileNames=[files.write(mesh, ".obj") for mesh, _, _ in seen],
+        rgbaColors=[color for _, color, _ in seen],
+        visualFramePositions=[[0, 0, z] for _, _, z in seen],
+        physicsClientId=client,
+    )
+    return int(pybullet.createMultiBody(0, solid, visual, physicsClientId=client))
+
+
+def _mesh(size: float) -> bytes:
+    """Return a square whose texture repeats every _TILE metres, centred, as an OBJ file."""
+    half, reach = size / 2, size / 2 / _TILE
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    lines = [f"v {x * half} {y * half} 0" for x, y in corners]
+    lines += [f"vt {x * reach} {y * reach}" for x, y in corners]
+    lines += ["vn 0 0 1", "f 1/1/1 2/2/1 3/3/1", "f 1/1/1 3/3/1 4/4/1", ""]
+    return "\n".join(lines).encode()

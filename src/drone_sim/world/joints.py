@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import pybullet
 
 from drone_sim.mechanics.frames import Vector, cross, turned
+from drone_sim.mechanics.joint import FORCE, KINEMATIC, PASSIVE, POSITION, JointControl
 from drone_sim.mechanics.state import Pose, State, compose, inverse
 
 NO_LIMIT = 1e9  # rad or m
@@ -59,31 +61,14 @@ class Joints:
         ax, ay, az = cross(centre, (fx, fy, fz))
         return (-fx, -fy, -fz), (-tx - ax, -ty - ay, -tz - az)
 
-    def put(self, body: int, link: int, value: float) -> None:
-        """Put a joint somewhere, at rest."""
-        pybullet.resetJointState(body, link, value, 0, self._client)
+    def put(self, body: int, link: int, value: float, velocity: float = 0.0) -> None:
+        """Put a joint somewhere, at rest or moving."""
+        pybullet.resetJointState(body, link, value, velocity, self._client)
         self._changed()
 
-    def let_go(self, body: int, link: int) -> None:
-        """Let a joint turn freely."""
-        self._motor(body, link, pybullet.VELOCITY_CONTROL, force=0)
-
-    def go_to(self, body: int, link: int, target: float, max_force: float) -> None:
-        """Let a motor bring a joint to a position."""
-        self._motor(body, link, pybullet.POSITION_CONTROL, targetPosition=target, force=max_force)
-
-    def hold(self, body: int, link: int, value: float) -> None:
-        """Hold a joint where it has been put."""
-        self._motor(body, link, pybullet.POSITION_CONTROL, targetPosition=value, positionGain=1.0, force=_STIFF)
-
-    def run_at(self, body: int, link: int, velocity: float, max_force: float) -> None:
-        """Let a motor keep a joint at a velocity."""
-        self._motor(body, link, pybullet.VELOCITY_CONTROL, targetVelocity=velocity, force=max_force)
-
-    def push(self, body: int, link: int, force: float) -> None:
-        """Let a motor give a force, from now on in every sub-step: towards a velocity that is never reached."""
-        towards = _AT_ONCE if force >= 0 else -_AT_ONCE
-        self._motor(body, link, pybullet.VELOCITY_CONTROL, targetVelocity=towards, force=abs(force))
+    def motor(self, body: int, link: int, mode: int, **numbers: float) -> None:
+        """Let a joint's motor do what PyBullet calls so, from now on in every sub-step."""
+        pybullet.setJointMotorControl2(body, link, mode, physicsClientId=self._client, **numbers)
 
     def limit(self, body: int, link: int, limits: tuple[float, float] | None) -> None:
         """Let a joint have other limits, or none."""
@@ -94,5 +79,48 @@ class Joints:
         self._limits[body, link] = low, high
         pybullet.changeDynamics(body, link, jointLowerLimit=low, jointUpperLimit=high, physicsClientId=self._client)
 
-    def _motor(self, body: int, link: int, mode: int, **numbers: float) -> None:
-        pybullet.setJointMotorControl2(body, link, mode, physicsClientId=self._client, **numbers)
+
+class JointDrive:
+    """Moves a joint in the world, as mechanics.joint.Drive says; rad, m, N m, N."""
+
+    def __init__(self, joints: Joints, body: int, link: int):
+        """Take the joints of the world, the body in it, and the link below the joint."""
+        self._joints = joints
+        self._at = body, link
+        self._is_held = False
+
+    def state(self) -> tuple[float, float, float]:
+        """Return its position and velocity, and what its motor gave in the last sub-step."""
+        return self._joints.state(*self._at)
+
+    def put(self, value: float) -> None:
+        """Put it at a position, at rest."""
+        self._joints.put(*self._at, value)
+        if self._is_held:
+            self._hold(value)
+
+    def limit(self, limits: tuple[float, float] | None) -> None:
+        """Let it have other limits, or none."""
+        self._joints.limit(*self._at, limits)
+
+    def command(self, control: JointControl) -> None:
+        """Let its motor do what is told from now on."""
+        self._is_held = control.mode == KINEMATIC
+        if self._is_held:
+            self._hold(self.state()[0])
+        elif control.mode == POSITION:
+            self._joints.motor(
+                *self._at, pybullet.POSITION_CONTROL, targetPosition=control.position, force=control.max_force
+            )
+        else:
+            velocity, most = control.velocity, control.max_force
+            if control.mode == PASSIVE:
+                velocity, most = 0.0, 0.0
+            elif control.mode == FORCE:  # towards a velocity that is never reached
+                velocity, most = math.copysign(_AT_ONCE, control.force), abs(control.force)
+            self._joints.motor(*self._at, pybullet.VELOCITY_CONTROL, targetVelocity=velocity, force=most)
+
+    def _hold(self, value: float) -> None:
+        """Hold it where it has been put."""
+        mode = pybullet.POSITION_CONTROL
+        self._joints.motor(*self._at, mode, targetPosition=value, positionGain=1.0, force=_STIFF)

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pybullet
 
-from drone_sim.files.file_cache import identity_of
+from drone_sim.files.resources import identity_of
 from drone_sim.mechanics.frames import Matrix, from_quaternion, multiply
 from drone_sim.mechanics.state import Pose, compose
 from drone_sim.shapes import REPORTED_SHAPES
 from drone_sim.shapes.shape import DrawnShape
 from drone_sim.shapes.visual import Visual
+from drone_sim.world.bullet_files import BulletFiles
 
 _TYPES = {getattr(pybullet, name): shape for name, shape in REPORTED_SHAPES.items()}
 
@@ -32,7 +33,6 @@ class Pictures:
         self._client = client
         self._origin = origin
         self._floor = -1
-        self._shapes: dict[int, DrawnShape] = {}
         self._textures: dict[int, str] = {}
         self._looks: dict[int, Mapping[int, Sequence[tuple[DrawnShape, str]]]] = {}
         self._hidden: set[tuple[int, int]] = set()
@@ -44,12 +44,11 @@ class Pictures:
         self._floor = body
         self.set_texture(body, texture)
 
-    def set_shape(self, body: int, shape: DrawnShape) -> None:
-        """Say of what shape a body is: PyBullet tells only of those that it has a word for."""
-        self._shapes[body] = shape
-
     def set_looks(self, body: int, looks: Mapping[int, Sequence[tuple[DrawnShape, str]]]) -> None:
-        """Say of which shapes a body's links (-1: the root) are, in their order, and what image covers each, or ''."""
+        """Say of which shapes a body's links (-1: the root) are, in their order, and what image covers each, or ''.
+
+        PyBullet tells only of shapes that it has a word for.
+        """
         self._looks[body] = looks
 
     def hide(self, body: int, link: int) -> None:
@@ -77,7 +76,6 @@ class Pictures:
     def remove(self, body: int) -> None:
         """Forget all about a body: it is gone, and PyBullet may give its number to another."""
         self.forget(body)
-        self._shapes.pop(body, None)
         self._looks.pop(body, None)
         self._hidden = {one for one in self._hidden if one[0] != body}
         self._textures.pop(body, None)
@@ -114,23 +112,16 @@ class Pictures:
             links = {-1: root}
             for part in self._of(body):
                 if part.link not in links:
-                    links[part.link] = self._link(body, part.link)
+                    links[part.link] = from_quaternion(*pybullet.getLinkState(body, part.link, 0, 1, self._client)[4:6])
             local = np.tile(np.eye(4), (len(self._of(body)), 1, 1))
             local[:, :3] = np.reshape(
                 [multiply(links[part.link], part.local) for part in self._of(body)] or np.empty(0), (-1, 3, 4)
             )
             poses.append(local)
-            if self._stands(body):
+            mass = pybullet.getDynamicsInfo(body, -1, self._client)[0]
+            if mass == 0 and pybullet.getNumJoints(body, self._client) == 0:
                 self._standing[body] = local
         return np.concatenate(poses)
-
-    def _stands(self, body: int) -> bool:
-        mass = pybullet.getDynamicsInfo(body, -1, self._client)[0]
-        return mass == 0 and pybullet.getNumJoints(body, self._client) == 0
-
-    def _link(self, body: int, link: int) -> Matrix:
-        state = pybullet.getLinkState(body, link, 0, 1, self._client)
-        return from_quaternion(state[4], state[5])
 
     def _of(self, body: int) -> list[_Placed]:
         if body not in self._parts:
@@ -147,10 +138,7 @@ class Pictures:
             left = {link: list(looks) for link, looks in self._looks[body].items()}
             return [left[row[1]].pop(0) for row in rows]
         texture = self._textures.get(body, "")
-        return [(self._shapes.get(body) or self._reported(row), texture) for row in rows]
-
-    def _reported(self, row: Sequence[Any]) -> DrawnShape:
-        return _TYPES[row[2]].from_bullet(row[3], self._origin(row[4].decode()))
+        return [(_TYPES[row[2]].from_bullet(row[3], self._origin(row[4].decode())), texture) for row in rows]
 
     def _part(self, key: tuple[int, int], row: Sequence[Any], shape: DrawnShape, texture: str) -> _Placed:
         link, position, orientation, rgba = row[1], *row[5:8]
@@ -196,3 +184,29 @@ class Pictures:
         buffer = np.reshape(picture[3], (height, width))
         depth = np.where(buffer < 1, far * near / (far - (far - near) * buffer), np.nan)
         return color, depth.astype(np.float32)
+
+
+class Textures:
+    """Which image covers which body; PyBullet, whose window alone shows them, gets them when somebody looks."""
+
+    def __init__(self, client: int, files: BulletFiles):
+        """Begin with none."""
+        self._client = client
+        self._files = files
+        self._waiting: dict[int, tuple[str, int]] = {}
+
+    def cover(self, body: int, texture: str, visual: int = -1) -> None:
+        """Cover a visual shape of a body (-1: all of its root link's) with an image, '' for none."""
+        if texture:
+            self._waiting[body] = (texture, visual)
+
+    def show(self) -> None:
+        """Give PyBullet those that it has not got yet."""
+        while self._waiting:
+            body, (texture, visual) = self._waiting.popitem()
+            image = pybullet.loadTexture(self._files.texture(texture), physicsClientId=self._client)
+            pybullet.changeVisualShape(body, -1, visual, textureUniqueId=image, physicsClientId=self._client)
+
+    def forget(self, body: int) -> None:
+        """Forget a body that is gone."""
+        self._waiting.pop(body, None)

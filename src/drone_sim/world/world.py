@@ -20,18 +20,17 @@ from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.compound import parts_of
 from drone_sim.shapes.mass import inertia_of
-from drone_sim.shapes.shape import DrawnShape, SceneShape
-from drone_sim.shapes.triangles import WHITE, Rgba
+from drone_sim.shapes.shape import WHITE, DrawnShape, Rgba, SceneShape
 from drone_sim.shapes.urdf import Urdf
 from drone_sim.shapes.visual import Visual
-from drone_sim.world import assemblies, bodies, floor, probing
+from drone_sim.world import assemblies, bodies
 from drone_sim.world.assemblies import Link
-from drone_sim.world.beginning import Beginning
+from drone_sim.world.bullet_files import BulletFiles
+from drone_sim.world.collision_filter import CollisionFilter
+from drone_sim.world.initial_poses import InitialPoses
 from drone_sim.world.joints import Joints
-from drone_sim.world.own_files import OwnFiles
-from drone_sim.world.pictures import Pictures
-from drone_sim.world.solidity import Solidity
-from drone_sim.world.textures import Textures
+from drone_sim.world.pictures import Pictures, Textures
+from drone_sim.world.queries import Queries
 
 _changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -56,7 +55,7 @@ class World:
 
         Raises RuntimeError where `gui` finds no display.
         """
-        self._files = OwnFiles()
+        self._files = BulletFiles()
         self._client = (
             _ahead.pop() if _ahead and not gui else pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
         )
@@ -73,25 +72,30 @@ class World:
 
     def clear(self) -> None:
         """Remove everything."""
-        self.changes = next(_changes)
-        for number in self._snapshots:  # PyBullet would keep them
-            pybullet.removeState(number, physicsClientId=self._client)
-        self._snapshots.clear()
+        self._forget_snapshots()  # PyBullet would keep them
         pybullet.resetSimulation(physicsClientId=self._client)  # its first argument is another
         pybullet.setGravity(0, 0, self._gravity, self._client)
         pybullet.setTimeStep(self._sub_step, self._client)
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: dict[int, tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
-        self._beginning = Beginning(self._client)
+        self._initial_poses = InitialPoses(self._client)
         self._poses: tuple[int, np.ndarray] | None = None  # of all visuals, and the changes that they are of
         self._files.clear()
-        self._pictures = Pictures(self._client, self._files.origin)
+        self._made: bodies.Made = {}
+        self.pictures = Pictures(self._client, self._files.origin)
         self._textures = Textures(self._client, self._files)
         self.joints = Joints(self._client, self._look_anew)
-        self.solidity = Solidity(self._client, self._pictures.moved)
+        self.collision_filter = CollisionFilter(self._client, self.pictures.moved)
+        self.queries = Queries(self._client, self.collision_filter)
 
     def _look_anew(self) -> None:
         self.changes = next(_changes)
+
+    def _forget_snapshots(self) -> None:
+        self.changes = next(_changes)
+        for number in self._snapshots:
+            pybullet.removeState(number, physicsClientId=self._client)
+        self._snapshots.clear()
 
     def close(self) -> None:
         """Free the world; may be called twice."""
@@ -107,10 +111,10 @@ class World:
 
         Returns its body id.
         """
-        body = floor.create(self._client, self._files, size, ground)
+        body = bodies.create_floor(self._client, self._files, size, ground)
         self._cover(body, texture, visual=0)
         self._set_material(body)
-        self._pictures.set_floor(body, texture)
+        self.pictures.set_floor(body, texture)
         return body
 
     def add_object(
@@ -131,14 +135,14 @@ class World:
         if mass and not isinstance(shape, Urdf):
             parts = parts_of(shape, color)
             return self.add_assembly([Link(parts, mass=mass, inertia=inertia_of(parts, mass))], pose, [texture])[0]
-        body = bodies.create(self._client, self._files, shape, pose, moves=mass != 0, color=color)
+        body = bodies.create(self._client, self._files, shape, pose, moves=mass != 0, color=color, made=self._made)
         self._cover(body, texture)
         self._set_material(body)
         self.set_pose(body, pose)  # again, for PyBullet reads a URDF's pose in single precision
         if isinstance(shape, DrawnShape):
-            self._pictures.set_shape(body, shape)
-        if texture:
-            self._pictures.set_texture(body, texture)
+            self.pictures.set_looks(body, {-1: [(shape, texture)]})
+        elif texture:
+            self.pictures.set_texture(body, texture)
         return body
 
     def add_assembly(self, links: Sequence[Link], pose: Pose, textures: Sequence[str]) -> tuple[int, list[int]]:
@@ -155,12 +159,8 @@ class World:
             number: [(part.shape, texture) for part in link.parts if isinstance(part.shape, DrawnShape)]
             for number, link, texture in zip(numbers, links, textures)
         }
-        self._pictures.set_looks(body, looks)
+        self.pictures.set_looks(body, looks)
         return body, numbers
-
-    def hide(self, body: int, link: int = -1) -> None:
-        """Let a link (-1: the root) be in no picture."""
-        self._pictures.hide(body, link)
 
     def add_rigid_body(self, body: RigidBody, pose: Pose) -> int:
         """Add a merged URDF with its root link at `pose`, at rest; return its body id."""
@@ -180,27 +180,27 @@ class World:
 
     def remove(self, body: int) -> None:
         """Take a body out of the world."""
-        self.changes = next(_changes)
-        for number in self._snapshots:  # of other bodies than there will be
-            pybullet.removeState(number, physicsClientId=self._client)
-        self._snapshots.clear()
+        self._forget_snapshots()  # of other bodies than there will be
         pybullet.removeBody(body, self._client)
         del self._inertial_frames[body]
-        self._beginning.forget(body)
+        self._initial_poses.forget(body)
         self.joints.forget(body)
-        self.solidity.forget(body)
+        self.collision_filter.forget(body)
         self._textures.forget(body)
         self._centres.pop(body, None)
-        self._pictures.remove(body)
+        self.pictures.remove(body)
+        self._files.drop_old()
 
-    def set_color(self, body: int, rgba: Sequence[float]) -> None:
-        """Paint all of a body (0..1 each)."""
-        for link in range(-1, pybullet.getNumJoints(body, self._client)):
-            pybullet.changeVisualShape(body, link, rgbaColor=rgba, physicsClientId=self._client)
-        self._pictures.forget(body)
+    def set_color(self, body: int, rgba: Sequence[float], link: int | None = None) -> None:
+        """Paint a link of a body, or all of it (0..1 each)."""
+        everything = range(-1, pybullet.getNumJoints(body, self._client))
+        for one in everything if link is None else (link,):
+            pybullet.changeVisualShape(body, one, rgbaColor=rgba, physicsClientId=self._client)
+        self.pictures.forget(body)
         self.changes = next(_changes)
 
     def _set_material(self, number: int) -> None:
+        self._forget_snapshots()
         # V-REP's Bullet material: friction 1, no restitution, no damping (PyBullet's default damps).
         pybullet.changeDynamics(
             number,
@@ -254,36 +254,26 @@ class World:
         states = [self.state(body) for body in self._inertial_frames]
         return bool(np.isfinite([number for state in states for part in state for number in part]).all())
 
-    def overlaps(self) -> int:
-        """Return how many pairs of moving bodies have bounds that overlap."""
-        bounds, moves = [], []
-        for body in self._inertial_frames:
-            joints = pybullet.getNumJoints(body, self._client)
-            boxes = [pybullet.getAABB(body, link, self._client) for link in range(-1, joints)]
-            bounds.append((np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)))
-            moves.append(joints > 0 or pybullet.getDynamicsInfo(body, -1, self._client)[0] > 0)
-        low, high, moving = np.array(bounds)[:, 0], np.array(bounds)[:, 1], np.array(moves)
-        meet = (low[:, None] <= high[None]).all(axis=2)
-        return int(np.triu(meet & meet.T & moving[:, None] & moving, k=1).sum())
-
     def set_pose(self, body: int, pose: Pose) -> None:
         """Move a body's root link to `pose` and stop it."""
         inertial = self._inertial_frames[body][0]
         centre, turn = compose(pose, inertial)
         self.changes = next(_changes)
         self._centres.pop(body, None)
-        self._pictures.moved(body)
+        self.pictures.moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
+
+    def set_velocity(self, body: int, linear: Vector, angular: Vector) -> None:
+        """Let the frame of a body's root link move so fast (m/s, rad/s)."""
+        arm = turned(self.state(body).orientation, self._inertial_frames[body][0].position)
+        velocity = [one + more for one, more in zip(linear, cross(angular, arm))]
+        pybullet.resetBaseVelocity(body, velocity, angular, self._client)
 
     def part(self, body: int) -> None:
         """Take a body out of every contact, which Bullet would remember wherever it goes; it is far up then."""
         self.set_pose(body, Pose((0.0, 0.0, _FAR_UP)))
         pybullet.performCollisionDetection(self._client)
-
-    def lowest(self, body: int) -> float:
-        """Return the height (m) of the lowest point that may touch something, of a body without joints."""
-        return float(pybullet.getAABB(body, -1, self._client)[0][2])
 
     def advance(
         self, wrenches: Mapping[int, Wrench], sub_steps: int, between: Callable[[int], None] | None = None
@@ -329,22 +319,22 @@ class World:
         torque = wrench.torque_under(orientation)
         pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, self._client)
 
-    def keep_beginning(self) -> None:
+    def keep_initial_poses(self) -> None:
         """Remember where everything stands, at rest, for `begin_anew`."""
         for body in self._inertial_frames:
-            self.keep_beginning_of(body)
+            self.keep_initial_pose(body)
         self.begin_anew()  # so that the first time is like every other, to the last bit
 
-    def keep_beginning_of(self, body: int) -> None:
+    def keep_initial_pose(self, body: int) -> None:
         """Remember where a body stands, at rest, for `begin_anew`."""
-        self._beginning.keep(body)
+        self._initial_poses.keep(body)
 
     def begin_anew(self) -> None:
         """Put everything where it stood, at rest."""
         self.changes = next(_changes)
         self._centres.clear()
-        self._pictures.all_moved()
-        self._beginning.bring_back()
+        self.pictures.all_moved()
+        self._initial_poses.bring_back()
 
     def snapshot(self) -> int:
         """Remember the exact dynamic state, contacts included; return a number for `restore` and `forget`."""
@@ -356,8 +346,12 @@ class World:
         """Bring back what `snapshot` remembered, to the last bit."""
         self._centres.clear()
         self.changes = next(_changes)
-        self._pictures.all_moved()
+        self.pictures.all_moved()
         pybullet.restoreState(number, physicsClientId=self._client)
+
+    def has_snapshot(self, number: int) -> bool:
+        """Tell whether a snapshot is there: no body has come or gone since."""
+        return number in self._snapshots
 
     def forget(self, number: int) -> None:
         """Free a snapshot; `clear` frees them all."""
@@ -365,46 +359,24 @@ class World:
             self._snapshots.remove(number)
             pybullet.removeState(number, physicsClientId=self._client)
 
-    # ---- for sensors
-
-    def ray(self, start: Vector, end: Vector, ignoring: int = -1) -> probing.RayHit | None:
-        """Return the nearest body between two points (m), but for the one that is ignored; None where there is none."""
-        return probing.ray(self._client, start, end, ignoring)
-
-    def rays(self, ends: Sequence[tuple[Vector, Vector]], counts: Callable[[int, int], bool]) -> list[probing.Met]:
-        """Return what each of several rays (from, to, m) meets first of the bodies and links that count."""
-        return probing.rays(self._client, ends, counts)
-
-    def gaps(self, body: int, link: int, reach: float, counts: Callable[[int, int], bool]) -> list[probing.Gap]:
-        """Return the gaps between a body's link (-1: the root) and those others within `reach` (m) that count."""
-        return probing.gaps(self._client, body, link, reach, counts)
-
-    def contacts(self, body: int) -> list[probing.Touch]:
-        """Return where others pushed a body in the last sub-step."""
-        return probing.contacts(self._client, body)
-
     # ---- pictures
 
     def visuals(self, bodies: Sequence[int] | None = None) -> list[Visual]:
         """Return what can be drawn of these bodies, or of all, in the order of `visual_poses`."""
-        return self._pictures.visuals(self._inertial_frames if bodies is None else bodies)
-
-    def visual_places(self, bodies: Sequence[int]) -> list[tuple[int, int]]:
-        """Return body and link (-1: the root) of each of the `visuals` of these bodies."""
-        return self._pictures.places(bodies)
+        return self.pictures.visuals(self._inertial_frames if bodies is None else bodies)
 
     def visual_poses(self, bodies: Sequence[int] | None = None) -> np.ndarray:
         """Return the poses world from visual, (N, 4, 4), of these bodies, or of all."""
         if bodies is not None:
-            return self._pictures.poses({body: self._inertial_frames[body][1] for body in bodies})
+            return self.pictures.poses({body: self._inertial_frames[body][1] for body in bodies})
         if self._poses is None or self._poses[0] != self.changes:  # once for all cameras of a step
             everything = {body: backwards for body, (_, backwards) in self._inertial_frames.items()}
-            self._poses = self.changes, self._pictures.poses(everything)
+            self._poses = self.changes, self.pictures.poses(everything)
         return self._poses[1]
 
     def place_visuals(self, body: int, places: Mapping[int, Matrix]) -> None:
         """Move some of a body's visuals, by index, to other places in its root link's frame."""
-        if self._pictures.place(body, places):
+        if self.pictures.place(body, places):
             self.changes = next(_changes)
 
     def tiny_picture(
@@ -412,7 +384,7 @@ class World:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return RGB and depth of PyBullet's software renderer: see Pictures.tiny."""
         self._textures.show()
-        return self._pictures.tiny(camera, (width, height), vertical_fov, (near, far))
+        return self.pictures.tiny(camera, (width, height), vertical_fov, (near, far))
 
     def look_from_behind(self, position: Sequence[float], yaw: float) -> None:
         """Put the camera of PyBullet's window behind and above a place (m), looking along a yaw (rad)."""

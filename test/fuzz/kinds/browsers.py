@@ -11,7 +11,7 @@ from kinds.values import junk, mostly, mutated, texts
 # ---- HTTP
 
 _PATHS = st.one_of(
-    st.sampled_from(["/", "/scene/", "/wire", "/cockpit.js", "/?token=", "/?token=TOKEN", "//[", "/?token=%ff", "*"]),
+    st.sampled_from(["/", "/scene/", "/socket", "/cockpit.js", "/?token=", "/?token=TOKEN", "//[", "/?token=%ff", "*"]),
     st.sampled_from(["/scene/%2e%2e/x", "/scene/\x00", "/../../etc/passwd", "http://[/", "/?" + "&" * 4000]),
     texts,
 )

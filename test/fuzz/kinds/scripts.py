@@ -7,7 +7,7 @@ from case import Case
 from hypothesis import strategies as st
 
 _API = Path(__file__).parents[3] / "src" / "drone_sim" / "scripting" / "api"
-_PARTS = ("drawing", "matrices", "names", "objects", "script_calls", "scripts", "signals", "threads", "vision")
+_PARTS = ("drawings", "matrices", "names", "objects", "scene_objects", "scripts", "signals", "threads", "vision")
 _SOURCES = [_API / f"{part}.py" for part in _PARTS]
 # Read from the text, so that whoever only makes cases needs nothing of drone_sim.
 FUNCTIONS = sorted({name for path in _SOURCES for name in re.findall(r"^    def ([a-z]\w*)\(", path.read_text(), re.M)})

@@ -9,7 +9,7 @@ from drone_sim.grading.criteria.formation import Formation
 from drone_sim.grading.criteria.landed import Landed
 from drone_sim.grading.criteria.no_contact import NoContact
 from drone_sim.grading.criteria.overshoot import Overshoot
-from drone_sim.grading.criteria.path import Path
+from drone_sim.grading.criteria.path import PathFollowing
 from drone_sim.grading.criteria.reach import Reach
 from drone_sim.grading.criteria.rise_time import RiseTime
 from drone_sim.grading.criteria.settling_time import SettlingTime
@@ -26,7 +26,7 @@ KINDS = (
     Attitude,
     Drift,
     Reach,
-    Path,
+    PathFollowing,
     Formation,
     Landed,
     NoContact,

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
-
 from drone_sim.config.types import Finite, Within
-from drone_sim.grading.criteria.criterion import Criterion, figure, values_of
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import AtMostCriterion, FlightPart, figure
 from drone_sim.grading.result import Outcome
 
 
-class Attitude(Criterion):
+class Attitude(AtMostCriterion):
     """`at_most` is the angle (rad) between the vehicle's axis and the vertical, in whatever direction it leans."""
 
     kind: Literal["attitude"]
     at_most: Annotated[Finite, Within(0, 3.2)]
 
-    @property
-    def allowed(self) -> str:
-        """What passes."""
-        return f"at most {figure(self.at_most, 'rad')}"
+    unit = "rad"
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        tilt = values_of(flown, "tilt", part)
+    def _judged(self, part: FlightPart) -> Outcome:
+        tilt = part.column("tilt")
         worst = int(tilt.argmax())
-        most, at = float(tilt[worst]), float(flown.times[part][worst])
-        said = f"leaned by {figure(most, 'rad')} at {at:.2f} s; {self.allowed} are allowed"
-        return self._outcome(most <= self.at_most, said, most, "rad", at)
+        most, at = float(tilt[worst]), float(part.times[worst])
+        return self._compared(most, f"leaned by {figure(most, 'rad')} at {at:.2f} s", at)

@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from drone_sim.config.types import Point
-from drone_sim.grading.criteria.places import DistanceCriterion, places_of
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import DistanceCriterion, FlightPart
 from drone_sim.grading.result import Outcome
 
 
@@ -19,9 +18,9 @@ class Drift(DistanceCriterion):
     kind: Literal["drift"]
     place: Point | None = Field(default=None, alias="from")
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        places = places_of(flown, part)
+    def _judged(self, part: FlightPart) -> Outcome:
+        places = part.places()
         origin = places[0] if self.place is None else np.array(self.place)
         what = "where it began" if self.place is None else "its place"
         distances = np.linalg.norm(self._along(places - origin), axis=1)
-        return self._outcome_of(distances, flown.times[part], what)
+        return self._outcome_of(distances, part.times, what)

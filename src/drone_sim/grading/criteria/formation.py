@@ -7,8 +7,7 @@ from typing import Literal
 import numpy as np
 
 from drone_sim.config.types import Label, Point
-from drone_sim.grading.criteria.places import DistanceCriterion, places_of, poses_of
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import DistanceCriterion, FlightPart
 from drone_sim.grading.result import Outcome
 
 
@@ -28,8 +27,8 @@ class Formation(DistanceCriterion):
         """What it asks for."""
         return (self.to,)
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        poses = poses_of(flown, self.to, part)
+    def _judged(self, part: FlightPart) -> Outcome:
+        poses = part.poses(self.to)
         offsets = np.tile(self.offset, (len(poses), 1))
         if self.turns:
             x, y, z, w = poses[:, 3:7].T
@@ -37,6 +36,6 @@ class Formation(DistanceCriterion):
             ahead, aside, _ = self.offset
             offsets[:, 0] = np.cos(yaw) * ahead - np.sin(yaw) * aside
             offsets[:, 1] = np.sin(yaw) * ahead + np.cos(yaw) * aside
-        gaps = places_of(flown, part) - poses[:, :3] - offsets
+        gaps = part.places() - poses[:, :3] - offsets
         what = f"its place beside {self.to}" if any(self.offset) else self.to
-        return self._outcome_of(np.linalg.norm(self._along(gaps), axis=1), flown.times[part], what)
+        return self._outcome_of(np.linalg.norm(self._along(gaps), axis=1), part.times, what)

@@ -8,11 +8,10 @@ import numpy as np
 from pydantic import PlainValidator, TypeAdapter, ValidationError
 
 from drone_sim.config.types import Coordinate, Label
-from drone_sim.grading.criteria.criterion import Bound, Criterion, Missed, figure
-from drone_sim.grading.criteria.places import places_of, poses_of
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import Bound, Criterion, FlightPart, Missed, figure
+from drone_sim.grading.flight_record import FlightRecord
 from drone_sim.grading.result import Outcome
-from drone_sim.vehicles.flight_state import CRASHED, LANDED
+from drone_sim.vehicles.commands import CRASHED, LANDED
 
 _AT_REST = 0.1  # m/s
 _SETTLING = 0.5  # s; whoever is longer off the ground between two touches flies
@@ -43,8 +42,8 @@ class Landed(Criterion):
     softly: Bound | None = None
     stands_on: Label = ""
 
-    sees_touches = True
-    sees_states = True
+    needs_contacts = True
+    needs_states = True
 
     @property
     def allowed(self) -> str:
@@ -59,12 +58,12 @@ class Landed(Criterion):
         """What it asks for."""
         return (self.at,) if isinstance(self.at, str) else ()
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        end = float(flown.times[part][-1])
-        down = _touch_down(flown, end)
-        speed = float(flown.columns["speed"][np.searchsorted(flown.times, down) - 1])
-        self._check_ground(flown, end)
-        wrong, distance = [], self._distance(flown, part)
+    def _judged(self, part: FlightPart) -> Outcome:
+        flight, end = part.flight, part.end
+        down = _touch_down(flight, end)
+        speed = float(flight.columns["speed"][np.searchsorted(flight.times, down) - 1])
+        self._check_ground(flight, end)
+        wrong, distance = [], self._distance(part)
         if distance is not None and distance > self.within:
             wrong.append(f"{figure(self.within, 'm')} are allowed")
         if self.softly is not None and speed > self.softly:
@@ -78,43 +77,36 @@ class Landed(Criterion):
     def _there(self) -> str:
         return self.at if isinstance(self.at, str) else "its place"
 
-    def _distance(self, flown: Flown, part: np.ndarray) -> float | None:
+    def _distance(self, part: FlightPart) -> float | None:
         """Return how far it stands from where it should, None where that is no matter."""
         if self.at is None:
             return None
-        there = poses_of(flown, self.at, part)[-1, :2] if isinstance(self.at, str) else np.array(self.at)
-        return float(np.linalg.norm(places_of(flown, part)[-1, :2] - there))
+        there = part.poses(self.at)[-1, :2] if isinstance(self.at, str) else np.array(self.at)
+        return float(np.linalg.norm(part.places()[-1, :2] - there))
 
-    def _check_ground(self, flown: Flown, end: float) -> None:
-        if not self.stands_on or not flown.touches:
+    def _check_ground(self, flight: FlightRecord, end: float) -> None:
+        if not self.stands_on or not flight.contacts:
             return
-        under = sorted({one.what for one in flown.touches if end - _SETTLING <= one.at <= end})
+        under = sorted({one.what for one in flight.contacts if end - _SETTLING <= one.at <= end})
         if self.stands_on not in under:
             raise Missed(f"stands on {' and '.join(under) or 'nothing'}, not on {self.stands_on}")
 
 
-def _touch_down(flown: Flown, end: float) -> float:
+def _touch_down(flight: FlightRecord, end: float) -> float:
     """Return when (s) the vehicle touched down for the stay in which it is at `end`. Raises Missed."""
-    state = next((str(one.value) for one in reversed(flown.states) if one.at <= end), "")
+    state = next((str(one.value) for one in reversed(flight.states) if one.at <= end), "")
     if state == CRASHED:
         raise Missed("it has crashed, as its script says")
-    if not flown.touches and state == LANDED:  # of a flight that was only heard of
-        return next(one.at for one in reversed(flown.states) if one.at <= end)
-    last = int(np.searchsorted(flown.times, end, "right")) - 1
-    speed = float(flown.columns["speed"][last])
-    stay = _last_stay([one.at for one in flown.touches if one.at <= end + 1e-9])
-    if not stay or end - stay[-1] > _SETTLING:
-        raise Missed(f"is in the air at {end:.2f} s, {figure(float(flown.rows[last, 3]), 'm')} high")
+    if not flight.contacts and state == LANDED:  # of a flight that was only heard of
+        return next(one.at for one in reversed(flight.states) if one.at <= end)
+    last = int(np.searchsorted(flight.times, end, "right")) - 1
+    speed = float(flight.columns["speed"][last])
+    touches = [one.at for one in flight.contacts if one.at <= end + 1e-9]
+    stay = np.split(touches, np.flatnonzero(np.diff(touches) > _SETTLING) + 1)[-1]  # no flight is in between
+    if not len(stay) or end - stay[-1] > _SETTLING:
+        raise Missed(f"is in the air at {end:.2f} s, {figure(float(flight.rows[last, 3]), 'm')} high")
     if not speed <= _AT_REST:
         raise Missed(f"still moves with {figure(speed, 'm/s')} at {end:.2f} s; {figure(_AT_REST, 'm/s')} are allowed")
-    if stay[0] - flown.times[0] < _SETTLING:
+    if stay[0] - flight.times[0] < _SETTLING:
         raise Missed("never took off")
-    return stay[0]
-
-
-def _last_stay(touches: list[float]) -> list[float]:
-    """Return the last of these times (s, in order) that have no flight in between."""
-    for index in range(len(touches) - 1, 0, -1):
-        if touches[index] - touches[index - 1] > _SETTLING:
-            return touches[index:]
-    return touches
+    return float(stay[0])

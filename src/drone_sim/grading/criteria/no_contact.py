@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
 from drone_sim.config.types import Label
-from drone_sim.grading.criteria.criterion import Criterion
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import Criterion, FlightPart
 from drone_sim.grading.result import Outcome
 
 
@@ -19,16 +17,16 @@ class NoContact(Criterion):
     kind: Literal["no_contact"]
     allow: Annotated[list[Label], Field(max_length=100)] = Field(default_factory=list)
 
-    sees_touches = True
+    needs_contacts = True
 
     @property
     def allowed(self) -> str:
         """What passes."""
         return f"only {', '.join(self.allow)}" if self.allow else "nothing"
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        first, last = flown.times[part][[0, -1]]
-        found = [one for one in flown.touches if first <= one.at <= last and one.what not in self.allow]
+    def _judged(self, part: FlightPart) -> Outcome:
+        first, last = part.times[[0, -1]]
+        found = [one for one in part.flight.contacts if first <= one.at <= last and one.what not in self.allow]
         if not found:
             return self._outcome(True, "touched nothing that it may not", 0.0)
         what = sorted({one.what for one in found})

@@ -8,11 +8,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-
-from drone_sim.grading.criteria.criterion import Missed, figure
-from drone_sim.grading.criteria.steps import StepCriterion
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import FlightPart, Missed, figure
+from drone_sim.grading.criteria.step_response import StepCriterion
 from drone_sim.grading.result import Outcome
 
 _RISEN = 0.9  # of the step
@@ -23,16 +20,12 @@ class Overshoot(StepCriterion):
 
     kind: Literal["overshoot"]
 
-    @property
-    def allowed(self) -> str:
-        """What passes."""
-        return f"at most {figure(self.at_most, '%')}"
+    unit = "%"
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        times, share = self.response(flown, part)
+    def _judged(self, part: FlightPart) -> Outcome:
+        times, share = self.response(part)
         peak = int(share.argmax())
         if share[peak] < _RISEN:
             raise Missed(f"came to {figure(100 * float(share[peak]), '%')} of the step: there was nothing to overshoot")
         over = 100 * max(0.0, float(share[peak]) - 1)
-        said = f"went {figure(over, '%')} beyond; {self.allowed} are allowed"
-        return self._outcome(over <= self.at_most, said, over, "%", float(times[peak]) if over else None)
+        return self._compared(over, f"went {figure(over, '%')} beyond", float(times[peak]) if over else None)

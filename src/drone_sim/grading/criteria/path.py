@@ -8,16 +8,14 @@ import numpy as np
 from pydantic import Field
 
 from drone_sim.config.types import Fraction, Point
-from drone_sim.grading.criteria.criterion import figure
-from drone_sim.grading.criteria.places import DistanceCriterion, places_of, to_polyline
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import DistanceCriterion, FlightPart, figure, to_polyline
 from drone_sim.grading.result import Outcome
 
 MAX_CORNERS = 1000
 _SAMPLES = 400  # of the path, at which it is seen whether the vehicle has been there
 
 
-class Path(DistanceCriterion):
+class PathFollowing(DistanceCriterion):
     """`along` are the polyline's corners; `closed`: it goes back to the first.
 
     `covers` is the share of it that has to be flown: all that the vehicle has been within `at_most` of.
@@ -28,15 +26,15 @@ class Path(DistanceCriterion):
     closed: bool = False
     covers: Fraction = 0.0
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        places, corners = self._along(places_of(flown, part)), self._along(np.array(self.along))
+    def _judged(self, part: FlightPart) -> Outcome:
+        places, corners = self._along(part.places()), self._along(np.array(self.along))
         if self.closed:
             corners = np.vstack((corners, corners[:1]))
         covered = _covered(corners, places, self.at_most) if self.covers else 1.0
         if covered < self.covers:
             share, wanted = (figure(100 * one, "%") for one in (covered, self.covers))
             return self._outcome(False, f"flew {share} of the path; at least {wanted} is wanted")
-        return self._outcome_of(to_polyline(places, corners), flown.times[part], "the path")
+        return self._outcome_of(to_polyline(places, corners), part.times, "the path")
 
 
 def _covered(corners: np.ndarray, places: np.ndarray, radius: float) -> float:

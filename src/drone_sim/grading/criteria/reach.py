@@ -9,9 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from drone_sim.config.types import Point, Switch
-from drone_sim.grading.criteria.criterion import Bound, Criterion, figure
-from drone_sim.grading.criteria.places import places_of
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import Bound, Criterion, FlightPart, figure
 from drone_sim.grading.result import Outcome
 
 MAX_PLACES = 200
@@ -37,8 +35,8 @@ class Reach(Criterion):
         """What passes."""
         return f"all {len(self.places)} within {figure(self.within, 'm')}"
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        way, here = _way(flown, part), _Here(0, 0.0, 0.0)
+    def _judged(self, part: FlightPart) -> Outcome:
+        way, here = _way(part), _Here(0, 0.0, 0.0)
         last: float | None = None
         for number, place in enumerate(self.places):
             here = _first_within(way, here, np.array(place), self.within)
@@ -68,7 +66,7 @@ class _Here(NamedTuple):
     distance: float
 
 
-class _Way(NamedTuple):
+class _FlownWay(NamedTuple):
     """Rows of a flight: times (M,), places (M, 3), and from each the step (M, 3) to the next."""
 
     times: np.ndarray
@@ -80,17 +78,17 @@ class _Way(NamedTuple):
         return float(self.times[here.row] + here.share * (following - self.times[here.row]))
 
 
-def _way(flown: Flown, part: np.ndarray) -> _Way:
+def _way(part: FlightPart) -> _FlownWay:
     """Return the way in a part of a flight; where the vehicle was put elsewhere, it stays until it is there."""
-    places, times, speeds = places_of(flown, part), flown.times[part], flown.columns["speed"][part]
+    places, times, speeds = part.places(), part.times, part.flight.columns["speed"][part.rows]
     steps = np.zeros_like(places)
     steps[:-1] = np.diff(places, axis=0)
     could = _ALWAYS + _FARTHEST * np.maximum(speeds[:-1], speeds[1:]) * np.diff(times)
     steps[:-1][np.linalg.norm(steps[:-1], axis=1) > could] = 0
-    return _Way(times, places, steps)
+    return _FlownWay(times, places, steps)
 
 
-def _first_within(way: _Way, here: _Here, place: np.ndarray, radius: float) -> _Here:
+def _first_within(way: _FlownWay, here: _Here, place: np.ndarray, radius: float) -> _Here:
     """Return where the way, from here on, first comes within a radius of a place, or else nearest to it."""
     to, steps = place - way.places[here.row :], way.steps[here.row :]
     squares = (steps**2).sum(axis=1)

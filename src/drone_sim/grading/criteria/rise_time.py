@@ -8,11 +8,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-
-from drone_sim.grading.criteria.criterion import figure
-from drone_sim.grading.criteria.steps import StepCriterion, crossing
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import FlightPart, figure
+from drone_sim.grading.criteria.step_response import StepCriterion, crossing
 from drone_sim.grading.result import Outcome
 
 _LOW, _HIGH = 0.1, 0.9
@@ -25,17 +22,10 @@ class RiseTime(StepCriterion):
 
     is_lasting = False
 
-    @property
-    def allowed(self) -> str:
-        """What passes."""
-        return f"at most {figure(self.at_most, 's')}"
-
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        response = self.response(flown, part)
+    def _judged(self, part: FlightPart) -> Outcome:
+        response = self.response(part)
         began, ended = crossing(response, _LOW), crossing(response, _HIGH)
         if began is None or ended is None:
             most = figure(100 * float(response.share.max()), "%")
             return self._outcome(False, f"never rose to 90 % of the step, but to {most}")
-        rise = ended - began
-        said = f"rose in {figure(rise, 's')}; {self.allowed} are allowed"
-        return self._outcome(rise <= self.at_most, said, rise, "s", ended)
+        return self._compared(ended - began, f"rose in {figure(ended - began, 's')}", ended)

@@ -11,9 +11,8 @@ from typing import Annotated, Literal
 import numpy as np
 
 from drone_sim.config.types import Finite, Within
-from drone_sim.grading.criteria.criterion import figure
-from drone_sim.grading.criteria.steps import StepCriterion, between
-from drone_sim.grading.flown import Flown
+from drone_sim.grading.criteria.criterion import FlightPart, figure
+from drone_sim.grading.criteria.step_response import StepCriterion, between
 from drone_sim.grading.result import Outcome
 
 
@@ -23,13 +22,8 @@ class SettlingTime(StepCriterion):
     kind: Literal["settling_time"]
     band: Annotated[Finite, Within(1e-6, 1)] = 0.02
 
-    @property
-    def allowed(self) -> str:
-        """What passes."""
-        return f"at most {figure(self.at_most, 's')}"
-
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        response = self.response(flown, part)
+    def _judged(self, part: FlightPart) -> Outcome:
+        response = self.response(part)
         band = figure(100 * self.band, "%")
         outside = np.flatnonzero(np.abs(response.share - 1) > self.band)
         last = int(outside[-1]) if len(outside) else -1
@@ -39,5 +33,4 @@ class SettlingTime(StepCriterion):
         edge = 1 + self.band if last >= 0 and response.share[last] > 1 else 1 - self.band
         settled = float(response.times[0]) if last < 0 else between(response, last, edge)
         took = settled - self.after
-        said = f"settled within {band} in {figure(took, 's')}; {self.allowed} are allowed"
-        return self._outcome(took <= self.at_most, said, took, "s", settled)
+        return self._compared(took, f"settled within {band} in {figure(took, 's')}", settled)

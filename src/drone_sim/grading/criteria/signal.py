@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from drone_sim.config.types import Label, ParameterError, ScriptValue
-from drone_sim.grading.criteria.criterion import Bound, Criterion, Missed, figure
-from drone_sim.grading.flown import Flown, Said
+from drone_sim.grading.criteria.criterion import Bound, Criterion, FlightPart, Missed, figure
+from drone_sim.grading.flight_record import ValueChange
 from drone_sim.grading.result import Outcome
-from drone_sim.wording import shown
+from drone_sim.message_text import shown
 
 _Words = Annotated[str, Field(max_length=200)]
 
@@ -39,7 +39,7 @@ class Signal(Criterion):
         """Check that it is one of the two."""
         super().model_post_init(context)
         if bool(self.signal) == bool(self.topic):
-            raise ParameterError("signal: there must be a `signal` or a `topic`, and not both")
+            raise ParameterError("there must be a `signal` or a `topic`, and not both", ("signal",))
 
     @property
     def allowed(self) -> str:
@@ -56,19 +56,18 @@ class Signal(Criterion):
         """What it asks for."""
         return (self.topic,) if self.topic else ()
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
+    def _judged(self, part: FlightPart) -> Outcome:
         what = self.signal or self.topic
-        end = float(flown.times[part][-1])
-        heard = [one for one in flown.said.get(what, ()) if self.after - 1e-9 <= one.at <= end + 1e-9]
+        heard = [one for one in part.flight.values.get(what, ()) if self.after - 1e-9 <= one.at <= part.end + 1e-9]
         if not heard or heard[-1].value is None:
-            raise Missed(f"nothing was said by {what} until {end:.2f} s")
+            raise Missed(f"nothing was said by {what} until {part.end:.2f} s")
         said = self._inside(heard[-1])
         passed = _equal(said, self.equals, self.tolerance)
         sentence = f"{what} was {_readable(said)} from {heard[-1].at:.2f} s on; expected is {self.allowed}"
         is_number = isinstance(said, (int, float)) and not isinstance(said, bool)
         return self._outcome(passed, sentence, float(said) if is_number else None, "", heard[-1].at)
 
-    def _inside(self, heard: Said) -> Any:
+    def _inside(self, heard: ValueChange) -> Any:
         """Return a signal's value, or that of a field of a message. Raises Missed."""
         value = heard.value
         for name in self.field.split(".") if self.topic else ():

@@ -7,8 +7,8 @@ from typing import Any, Literal
 import numpy as np
 
 from drone_sim.config.types import ParameterError
-from drone_sim.grading.criteria.criterion import Column, Criterion, Figure, figure, values_of
-from drone_sim.grading.flown import UNITS, Flown
+from drone_sim.grading.criteria.criterion import Column, Criterion, Figure, FlightPart, figure
+from drone_sim.grading.flight_record import UNITS
 from drone_sim.grading.result import Outcome
 
 
@@ -24,9 +24,11 @@ class Stays(Criterion):
         """Refuse what everything, or nothing, is within."""
         super().model_post_init(context)
         if self.at_least is None and self.at_most is None:
-            raise ParameterError("at_most: missing; there must be an `at_least`, an `at_most`, or both")
+            raise ParameterError("missing; there must be an `at_least`, an `at_most`, or both", ("at_most",))
         if self.at_least is not None and self.at_most is not None and self.at_most < self.at_least:
-            raise ParameterError(f"at_most = {self.at_most:g}: must not be less than at_least = {self.at_least:g}")
+            raise ParameterError(
+                f"must not be less than at_least = {self.at_least:g}", ("at_most",), f"{self.at_most:g}"
+            )
 
     @property
     def allowed(self) -> str:
@@ -34,13 +36,13 @@ class Stays(Criterion):
         bounds = (("at least", self.at_least), ("at most", self.at_most))
         return " and ".join(f"{word} {figure(one, UNITS[self.of])}" for word, one in bounds if one is not None)
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
-        values, unit = values_of(flown, self.of, part), UNITS[self.of]
+    def _judged(self, part: FlightPart) -> Outcome:
+        values, unit = part.column(self.of), UNITS[self.of]
         below = np.full_like(values, -np.inf) if self.at_least is None else self.at_least - values
         above = np.full_like(values, -np.inf) if self.at_most is None else values - self.at_most
         beyond = np.maximum(below, above)
         worst = int(beyond.argmax())
-        value, at = float(values[worst]), float(flown.times[part][worst])
+        value, at = float(values[worst]), float(part.times[worst])
         span = f"from {figure(values.min(), unit)} to {figure(values.max(), unit)}"
         said = f"{self.of} was {span}; {self.allowed} is allowed"
         return self._outcome(beyond[worst] <= 0, said, value, unit, at)

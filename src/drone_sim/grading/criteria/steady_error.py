@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import numpy as np
-
 from drone_sim.config.types import Finite, Within
-from drone_sim.grading.criteria.criterion import Bound, Column, Criterion, Figure, figure, values_of
-from drone_sim.grading.flown import UNITS, Flown
+from drone_sim.grading.criteria.criterion import Bound, Column, Criterion, Figure, FlightPart, figure
+from drone_sim.grading.flight_record import UNITS
 from drone_sim.grading.result import Outcome
 
 
@@ -30,10 +28,10 @@ class SteadyError(Criterion):
         """What passes."""
         return f"at most {figure(self.at_most, UNITS[self.of])}"
 
-    def _judged(self, flown: Flown, part: np.ndarray) -> Outcome:
+    def _judged(self, part: FlightPart) -> Outcome:
         unit = UNITS[self.of]
-        last = part & (flown.times >= flown.times[part][-1] - self.over - 1e-9)
-        mean = float(values_of(flown, self.of, last).mean())
+        last = part.rows & (part.flight.times >= part.end - self.over - 1e-9)
+        mean = float(part._replace(rows=last).column(self.of).mean())
         error = abs(mean - self.to)
         said = (
             f"{self.of} was {figure(mean, unit)} in the mean, {figure(error, unit)} from {figure(self.to, unit)}; "

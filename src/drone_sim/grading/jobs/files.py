@@ -103,7 +103,7 @@ def _own_script(plan: Plan) -> Iterator[str]:
 
 def _values_of(plan: Plan, changes: Mapping[str, Any]) -> Iterator[Path]:
     """Give the files among the values of a plan's parameters: meshes, textures, scripts of the scene."""
-    named = changes if _has_text(changes) else {}
+    named = changes if any(True for _ in _texts(changes)) else {}
     parameters = plan.parameters(changes=named)
     for text in {*_texts({**vars(parameters), "script": ""}), *_texts(named)}:
         if "/" in text or "." in text:
@@ -111,10 +111,6 @@ def _values_of(plan: Plan, changes: Mapping[str, Any]) -> Iterator[Path]:
                 yield resolve(text)
             except FileNotFoundError:
                 continue
-
-
-def _has_text(changes: Mapping[str, Any]) -> bool:
-    return next(_texts(changes), None) is not None
 
 
 def _texts(value: Any) -> Iterator[str]:

@@ -1,25 +1,25 @@
-"""Many flights on Dask: its cluster in this process by default, or any scheduler.
+"""Many flights at a time: on threads of this process, or by any scheduler of Dask.
 
-A worker's thread flies one job after the other, each in a process of its own (see `process`): that a worker is only a
-thread here costs nothing, and it starts in no time. What a lost worker was flying, Dask gives to another.
+A worker's thread flies one job after the other, each in a process of its own (see `fork_server_client`): that a worker
+is only a thread here costs nothing, and it starts in no time. What a lost worker was flying, Dask gives to another.
 """
 
 from __future__ import annotations
 
 import contextlib
-import logging
 import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from drone_sim.command_line import format_error
 from drone_sim.grading import plan as plans
-from drone_sim.grading.flight import ungraded
-from drone_sim.grading.jobs.job import Job, contents_of, key_of
-from drone_sim.grading.jobs.process import Flight, Stopped, Warm
-from drone_sim.grading.jobs.settings import Batches, Limits
-from drone_sim.wording import shown
+from drone_sim.grading.jobs.fork_server_client import Cancelled, ForkServerClient
+from drone_sim.grading.jobs.job import Job, JobResult, contents_of, key_of, lost
+from drone_sim.grading.jobs.settings import BatchSettings, FlightLimits
+from drone_sim.message_text import shown
 
 _CONNECTING = 10.0  # s
 _LOST = "the workers that flew the script were lost, one after the other"
@@ -30,100 +30,91 @@ class PoolError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Orders:
+class FlightOptions:
     """How flights are flown."""
 
-    limits: Limits
-    batches: Batches
+    limits: FlightLimits
+    batches: BatchSettings
     sandboxed: bool = True
     tables: bool = False  # whether each flight's table is wanted
     patience: float = 60.0  # s that a scheduler may be without a worker
 
 
-Fly = Callable[[Sequence[Job]], Iterator[Flight]]
+Fly = Callable[[Sequence[Job]], Iterator[JobResult]]
 
 
 @contextlib.contextmanager
-def opened(orders: Orders, workers: int = 1, scheduler: str = "") -> Iterator[Fly]:
+def opened(options: FlightOptions, workers: int = 1, scheduler: str = "") -> Iterator[Fly]:
     """Give a function that flies: it gives the flights as they come, in any order, each job's once.
 
     On `workers` threads here, or by the scheduler at an address. At the end what is still flown is ended. Raises
-    PoolError; the function that, too, and what Warm.fly raises.
+    PoolError; the function that, too, and what ForkServerClient.fly raises.
     """
     if scheduler:
-        with _connected(scheduler, orders.patience) as client:
-            yield lambda jobs: _by_dask(jobs, orders, client)
+        with _connected(scheduler, options.patience) as client:
+            yield lambda jobs: _flown_by_dask(jobs, options, client)
     elif workers == 1:
-        with contextlib.closing(Warm(orders.limits, orders.sandboxed)) as warm:
-            yield lambda jobs: (warm.fly(job, orders.tables) for job in jobs)
+        with contextlib.closing(ForkServerClient(options.limits, options.sandboxed)) as server:
+            yield lambda jobs: (server.fly(job, options.tables) for job in jobs)
     else:
-        with _here(workers) as client:
-            yield lambda jobs: _by_dask(jobs, orders, client)
+        with _CLIENTS, ThreadPoolExecutor(workers) as executor:
+            try:
+                yield lambda jobs: _flown(jobs, options, executor, workers)
+            finally:
+                executor.shutdown(wait=False, cancel_futures=True)
+                _CLIENTS.stop()
+
+
+def _flown(
+    jobs: Sequence[Job],
+    options: FlightOptions,
+    executor: Executor,
+    workers: int,
+    killed: tuple[type[Exception], ...] = (),
+) -> Iterator[JobResult]:
+    """Fly in batches; those in which a worker was lost, by an error of a type `killed`, job by job."""
+    size = options.batches.size(len(jobs), max(1, workers))
+    alone: list[Job] = []  # one of them may be to blame
+    batches = {
+        executor.submit(fly_batch, batch, options): batch
+        for batch in (jobs[first : first + size] for first in range(0, len(jobs), size))
+    }
+    for future in as_completed(batches):
+        batch = batches.pop(future)
+        if future.cancelled():
+            raise PoolError("the scheduler of the flights is lost; what came of them by now is kept")
+        error = future.exception()
+        if error is None:
+            yield from future.result()
+        elif not isinstance(error, killed):
+            raise error
+        elif size == 1:
+            yield lost(batch[0], plans.read(batch[0].plan), _LOST)
+        else:
+            alone += batch
+    if alone:
+        each = options.batches.model_copy(update={"largest": 1})
+        yield from _flown(alone, replace(options, batches=each), executor, workers, killed)
 
 
 # ---- with Dask
 
 
-def _by_dask(jobs: Sequence[Job], orders: Orders, client: Any) -> Iterator[Flight]:
-    from distributed import KilledWorker, as_completed  # takes as long to import as five flights
+def _flown_by_dask(jobs: Sequence[Job], options: FlightOptions, client: Any) -> Iterator[JobResult]:
+    from distributed import KilledWorker
 
-    workers = sum(client.nthreads().values())
-    size = orders.batches.size(len(jobs), max(1, workers))
-    batches = {
-        client.submit(fly_batch, batch, orders, pure=False): batch
-        for batch in (jobs[first : first + size] for first in range(0, len(jobs), size))
-    }
-    completed = as_completed(batches, raise_errors=False)
-    for future in completed:
-        batch = batches.pop(future)
-        error = future.exception()
-        if error is None:
-            yield from future.result()
-        elif not isinstance(error, KilledWorker):
-            raise error
-        elif len(batch) == 1:
-            yield _lost(batch[0])
-        else:  # one of them may be to blame: each for itself
-            alone = {client.submit(fly_batch, [job], orders, pure=False): [job] for job in batch}
-            batches.update(alone)
-            completed.update(alone)
-        future.release()
-
-
-def _lost(job: Job) -> Flight:
-    return Flight(job, ungraded(plans.read(job.plan), job.script, job.seed, job.changes, _LOST), is_lost=True)
-
-
-@contextlib.contextmanager
-def _here(workers: int) -> Iterator[Any]:
-    """Give a client of a cluster in this process; at the end its flights are ended."""
-    from distributed import Client, LocalCluster
-
-    with (
-        _CREW,
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=False,
-            dashboard_address=None,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster) as client,
-        _CREW.ended(),
-    ):
-        yield client
+    return _flown(jobs, options, client.get_executor(pure=False), sum(client.nthreads().values()), (KilledWorker,))
 
 
 @contextlib.contextmanager
 def _connected(address: str, patience: float) -> Iterator[Any]:
     """Give a client of a scheduler that has a worker. Raises PoolError."""
-    from distributed import Client
+    from distributed import Client  # takes as long to import as five flights
 
     try:
         client = Client(address, timeout=_CONNECTING)
     except (OSError, ValueError, ImportError) as error:
-        said = " ".join(str(error).split())
+        said = format_error(error)
         raise PoolError(f"--scheduler {shown(address)}: no scheduler answers there ({said:.200})") from None
     with client:
         try:
@@ -137,30 +128,26 @@ def _connected(address: str, patience: float) -> Iterator[Any]:
 
 
 @dataclass
-class _Crew:
-    """The warm processes of this process's threads."""
+class _Clients:
+    """The fork servers of this process's threads, as their clients."""
 
     own: threading.local = field(default_factory=threading.local)
-    all: list[Warm] = field(default_factory=list)
+    all: list[ForkServerClient] = field(default_factory=list)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def warm(self, orders: Orders) -> Warm:
-        """Return the warm process of this thread."""
-        wanted = (orders.limits, orders.sandboxed)
-        if getattr(self.own, "wanted", None) != wanted or self.own.warm not in self.all:
-            self.own.wanted, self.own.warm = wanted, Warm(*wanted)
+    def of_thread(self, options: FlightOptions) -> ForkServerClient:
+        """Return that of this thread."""
+        wanted = (options.limits, options.sandboxed)
+        if getattr(self.own, "wanted", None) != wanted or self.own.client not in self.all:
+            self.own.wanted, self.own.client = wanted, ForkServerClient(*wanted)
             with self.lock:
-                self.all.append(self.own.warm)
-        return self.own.warm
+                self.all.append(self.own.client)
+        return self.own.client
 
-    @contextlib.contextmanager
-    def ended(self) -> Iterator[None]:
-        """At the end, let those who fly stop."""
-        try:
-            yield
-        finally:
-            for warm in self.all:
-                warm.stop()
+    def stop(self) -> None:
+        """Let those who fly stop."""
+        for client in self.all:
+            client.stop()
 
     def __enter__(self) -> None:
         """Begin."""
@@ -172,16 +159,16 @@ class _Crew:
                 self.all.pop().close()
 
 
-_CREW = _Crew()
+_CLIENTS = _Clients()
 
 
-def fly_batch(jobs: Sequence[Job], orders: Orders) -> list[Flight]:
+def fly_batch(jobs: Sequence[Job], options: FlightOptions) -> list[JobResult]:
     """Fly, in a worker. Raises PoolError where its files are others than those of whoever has sent the jobs."""
     _check(jobs)
-    warm = _CREW.warm(orders)
+    client = _CLIENTS.of_thread(options)
     try:
-        return [warm.fly(job, orders.tables) for job in jobs]
-    except Stopped:
+        return [client.fly(job, options.tables) for job in jobs]
+    except Cancelled:
         return []
 
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import ValidationError
-
-from drone_sim.config.errors import line_of, problems, told
-from drone_sim.config.types import Checked, Finite, ParameterError, Within, merged, read_yaml
+from drone_sim.config.errors import checked
+from drone_sim.config.types import Checked, Finite, Within, merged, read_yaml
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import package_path
 
 
-class Limits(Checked):
+class FlightLimits(Checked):
     """What one flight may take; see docs/grading.md."""
 
     seconds: Annotated[Finite, Within(1, 1e5)]  # s of processor time
@@ -37,7 +34,7 @@ class _Results(Checked):
     kept: Annotated[Finite, Within(0, 10000)]  # days
 
 
-class Batches(Checked):
+class BatchSettings(Checked):
     """How many flights a worker gets at a time."""
 
     largest: Annotated[int, Within(1, 1000)]
@@ -55,21 +52,13 @@ class _Workers(Checked):
 class Settings(Checked):
     """All of them."""
 
-    limits: Limits
+    limits: FlightLimits
     results: _Results
-    batches: Batches
+    batches: BatchSettings
     workers: _Workers
 
 
 def load(overrides: dict[str, Any] | None = None) -> Settings:
     """Return config/grading.yaml with `overrides`, of the same shape, laid over it. Raises ParameterError."""
     path = package_path() / "config" / "grading.yaml"
-    return _checked(merged(read_yaml(path), overrides or {}), path)
-
-
-def _checked(values: dict[str, Any], path: Path) -> Settings:
-    try:
-        return Settings.model_validate(values)
-    except ValidationError as error:
-        lines = yaml_files.lines(path)
-        raise ParameterError(told([(line_of(lines, one), one.text) for one in problems(error, Settings)], "")) from None
+    return checked(Settings, merged(read_yaml(path), overrides or {}), yaml_files.lines(path), str(path))

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
+from drone_sim.config.types import flattened
 from drone_sim.grading.result import Outcome, Result
 
 BUILT_IN = "(built-in)"
@@ -48,7 +49,8 @@ class ScriptResults:
     @property
     def failures(self) -> list[tuple[str, int]]:
         """Criteria that failed and in how many flights, the most frequent first."""
-        return Counter(name for one in self.flights for name in _failed(one)).most_common()
+        named = (pair for flight in self.flights for pair in named_outcomes(flight))
+        return Counter(name for name, outcome in named if not outcome.passed).most_common()
 
     @property
     def errors(self) -> list[str]:
@@ -71,7 +73,7 @@ def by_script(results: Iterable[Result]) -> list[ScriptResults]:
 
 def flight_label(result: Result) -> str:
     """Return what tells a flight from the others of its script: `seed 3`, and what was changed."""
-    changes = ", ".join(f"{key}={value}" for key, value in _flat(result.changes))
+    changes = ", ".join(f"{key}={value}" for key, value in flattened(result.changes))
     return f"seed {result.seed}{f', {changes}' if changes else ''}"
 
 
@@ -109,6 +111,13 @@ def criteria_of(results: Iterable[Result]) -> list[CriterionResults]:
     ]
 
 
+def in_columns(rows: Sequence[Sequence[str]], left: int = 0) -> list[str]:
+    """Return rows as lines, their columns two spaces apart, so many of them flush left."""
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    aligned = [str.ljust] * left + [str.rjust] * (len(widths) - left)
+    return ["  ".join(align(cell, width) for align, cell, width in zip(aligned, row, widths)) for row in rows]
+
+
 def number(value: float) -> str:
     """Return a figure as people read it: three digits that count, and no more zeros than needed."""
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
@@ -124,15 +133,11 @@ def figure(outcome: Outcome) -> str:
     return "" if outcome.value is None else f"{number(outcome.value)} {outcome.unit}".rstrip()
 
 
-def told(outcome: Outcome) -> str:
+def describe(outcome: Outcome) -> str:
     """Return how a criterion came out, in a sentence, with the time of a failure."""
     said = outcome.said or ", ".join(filter(None, (figure(outcome), outcome.allowed)))
     when = f"{outcome.at:.2f} s" if outcome.at is not None and not outcome.passed else ""
     return f"{said} (at {when})" if when and when not in said else said
-
-
-def _failed(result: Result) -> list[str]:
-    return [name for name, one in named_outcomes(result) if not one.passed]
 
 
 def _labels(scripts: Sequence[str]) -> dict[str, str]:
@@ -147,9 +152,3 @@ def _labels(scripts: Sequence[str]) -> dict[str, str]:
 
 def _is_only_one(end: str, scripts: Iterable[str]) -> bool:
     return sum(script == end or script.endswith(f"/{end}") for script in scripts) == 1
-
-
-def _flat(changes: object, above: str = "") -> list[tuple[str, object]]:
-    if not isinstance(changes, dict):
-        return [(above, changes)]
-    return [pair for key, value in changes.items() for pair in _flat(value, f"{above}.{key}" if above else str(key))]

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.files import writing
-from drone_sim.grading.outputs.by_script import ScriptResults, by_script, flight_label, named_outcomes, points, told
+from drone_sim.grading.outputs.by_script import ScriptResults, by_script, describe, flight_label, named_outcomes, points
 from drone_sim.grading.plan import Plan
-from drone_sim.grading.result import Outcome, Result
+from drone_sim.grading.result import Result
 
 _TEXT = "text"  # not html: what a script says is shown, never obeyed
 
@@ -30,6 +30,7 @@ def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
     if len(scripts) != 1:
         raise ValueError(f"Gradescope's results.json is of one script; these results are of {len(scripts)}")
     script = scripts[0]
+    names = dict.fromkeys(name for one in script.flights for name, _ in named_outcomes(one))
     return {
         "score": script.points,
         "output": _overview(plan, script),
@@ -37,7 +38,7 @@ def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
         "test_output_format": _TEXT,
         "test_name_format": _TEXT,
         "visibility": "visible",
-        "tests": [_test(number, name, script) for number, name in enumerate(_names(script), start=1)],
+        "tests": [_test(number, name, script) for number, name in enumerate(names, start=1)],
         "extra_data": {"plan": plan.name, "flights": len(script.flights), "passed": script.passed},
     }
 
@@ -53,10 +54,6 @@ def _overview(plan: Plan, script: ScriptResults) -> str:
     return "\n".join(lines)
 
 
-def _names(script: ScriptResults) -> list[str]:
-    return list(dict.fromkeys(name for one in script.flights for name, _ in named_outcomes(one)))
-
-
 def _test(number: int, name: str, script: ScriptResults) -> dict[str, Any]:
     outcomes = [(one, dict(named_outcomes(one)).get(name)) for one in script.flights]
     there = [outcome for _, outcome in outcomes if outcome is not None]
@@ -66,9 +63,9 @@ def _test(number: int, name: str, script: ScriptResults) -> dict[str, Any]:
         "score": sum(one.points for one in there) / len(script.flights),
         "max_score": max(one.of for one in there),
         "status": "passed" if all(one.passed for one in there) else "failed",
-        "output": "\n".join(_line(result, outcome) for result, outcome in outcomes if outcome is not None),
+        "output": "\n".join(
+            f"{flight_label(result)}: {'passed' if one.passed else 'FAILED'}: {describe(one)}"
+            for result, one in outcomes
+            if one is not None
+        ),
     }
-
-
-def _line(result: Result, outcome: Outcome) -> str:
-    return f"{flight_label(result)}: {'passed' if outcome.passed else 'FAILED'}: {told(outcome)}"

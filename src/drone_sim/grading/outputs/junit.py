@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from drone_sim.files import writing
-from drone_sim.grading.outputs.by_script import ScriptResults, by_script, flight_label, named_outcomes, told
+from drone_sim.grading.outputs.by_script import by_script, describe, flight_label, named_outcomes
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 
@@ -29,17 +29,13 @@ def text(plan: Plan, results: Sequence[Result]) -> str:
     """Return the file's text."""
     root = Element("testsuites", name=_xml(plan.name))
     for script in by_script(results):
-        _count(_add_suite(root, plan, script), script.flown)
+        suite = SubElement(root, "testsuite", name=_xml(f"{plan.name}: {script.label}"), skipped="0")
+        for result in script.flights:
+            _add_flight(suite, _xml(f"{plan.name}.{script.label.replace('.', '_')}"), result)
+        _count(suite, script.flown)
     _count(root, sum(one.flown for one in results))
     ElementTree.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
-
-
-def _add_suite(root: Element, plan: Plan, script: ScriptResults) -> Element:
-    suite = SubElement(root, "testsuite", name=_xml(f"{plan.name}: {script.label}"), skipped="0")
-    for result in script.flights:
-        _add_flight(suite, _xml(f"{plan.name}.{script.label.replace('.', '_')}"), result)
-    return suite
 
 
 def _add_flight(suite: Element, group: str, result: Result) -> None:
@@ -51,7 +47,7 @@ def _add_flight(suite: Element, group: str, result: Result) -> None:
     for name, outcome in named_outcomes(result):
         case = SubElement(suite, "testcase", classname=group, name=f"{flight}: {_xml(name)}", time="0.000")
         if not outcome.passed:
-            said = _xml(told(outcome) or "failed")
+            said = _xml(describe(outcome) or "failed")
             SubElement(case, "failure", type=_xml(outcome.kind), message=said).text = said
 
 

@@ -11,14 +11,15 @@ from typing import TextIO
 from drone_sim.grading.outputs.by_script import (
     ScriptResults,
     by_script,
+    describe,
     flight_label,
+    in_columns,
     named_outcomes,
     points,
-    told,
 )
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
-from drone_sim.wording import printable
+from drone_sim.message_text import printable
 
 WIDTH = 80  # columns, where the output is no terminal
 _SCRIPT = 28  # columns at most, of a script's name
@@ -65,12 +66,9 @@ def _script_lines(scripts: Sequence[ScriptResults], width: int, paint: _Paint) -
         return ["no flights"]
     name = min(_SCRIPT, max(6, *(len(printable(one.label)) for one in scripts)))
     rows = [(_fit(one.label, name), *_figures(one)) for one in scripts]
-    heads = ("script", "passed", "points", "worst (seed)")
-    widths = [max(len(heads[place]), *(len(row[place]) for row in rows)) for place in range(4)]
-    left = [True, False, False, False]
-    lines = [paint(_cut(f"{_row(heads, widths, left)}  failed in (flights)", width), _BOLD)]
-    for one, row in zip(scripts, rows):
-        start = _row(row, widths, left)
+    heads, *starts = in_columns([("script", "passed", "points", "worst (seed)"), *rows], left=1)
+    lines = [paint(_cut(f"{heads}  failed in (flights)", width), _BOLD)]
+    for one, start in zip(scripts, starts):
         line = _cut(f"{start}  {_trouble(one)}".rstrip(), width)
         lines.append(paint.verdict(line, one.passed == len(one.flights)))
     done = sum(one.passed == len(one.flights) for one in scripts)
@@ -94,12 +92,6 @@ def _trouble(one: ScriptResults) -> str:
     return "; ".join(filter(None, (*map(printable, one.errors[:1]), failures)))
 
 
-def _row(fields: Sequence[str], widths: Sequence[int], left: Sequence[bool]) -> str:
-    return "  ".join(
-        field.ljust(width) if is_left else field.rjust(width) for field, width, is_left in zip(fields, widths, left)
-    )
-
-
 # ---- a row per criterion
 
 
@@ -115,7 +107,7 @@ def _flight_lines(result: Result, flights: int, width: int, paint: _Paint) -> li
         verdict = paint.verdict("ok  " if outcome.passed else "FAIL", outcome.passed)
         start = f"{_fit(name, widest).ljust(widest)}  {points(outcome.points):>4}/{points(outcome.of):<4}  "
         room = width - 8 - len(start)
-        first, *others = textwrap.wrap(printable(told(outcome)), max(room, _SENTENCE)) or [""]
+        first, *others = textwrap.wrap(printable(describe(outcome)), max(room, _SENTENCE)) or [""]
         lines.append(f"  {verdict}  {start}{_cut(first, room)}".rstrip())
         lines += [f"{' ' * (8 + len(start))}{_cut(other, room)}" for other in others]
     lines.append(paint(f"{points(result.points)} of {points(result.of)} points", _BOLD))

@@ -6,32 +6,30 @@ import logging
 import threading
 import time
 from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rospy
 
-from drone_sim.ros.cockpit.flying.commanding import Commanding
-from drone_sim.ros.cockpit.flying.flying import Flying
-from drone_sim.ros.cockpit.found import Found, find
-from drone_sim.ros.cockpit.hearing import Hearing
-from drone_sim.ros.cockpit.panel.panel import Panel
-from drone_sim.ros.cockpit.panel.scenes import Scenes
-from drone_sim.ros.cockpit.panel.windows import Windows
-from drone_sim.ros.cockpit.scene.choice import Choice
-from drone_sim.ros.cockpit.scene.scene_view import SceneView
-from drone_sim.ros.cockpit.scene.sight import Sight
-from drone_sim.ros.cockpit.scene.sunlight import Sunlight
-from drone_sim.ros.cockpit.scripts.editing import Editing
-from drone_sim.ros.cockpit.scripts.happenings import Happenings
-from drone_sim.ros.cockpit.scripts.lessons import Lessons
-from drone_sim.ros.cockpit.scripts.shelf import Shelf
-from drone_sim.ros.cockpit.server.wire import Wire
-from drone_sim.ros.cockpit.serving import Serving
-from drone_sim.ros.cockpit.settings import Settings
-from drone_sim.ros.cockpit.simulator import FAILURES, Simulator
-from drone_sim.ros.node.master_watch import MasterWatch
-from drone_sim.ros.vehicle import frame_names
+from drone_sim.ros.cockpit.editor.backend import EditorBackend
+from drone_sim.ros.cockpit.editor.lessons import Lessons
+from drone_sim.ros.cockpit.editor.scene_files import SceneList
+from drone_sim.ros.cockpit.editor.script_store import ScriptStore
+from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
+from drone_sim.ros.cockpit.panel.cameras import ScriptWindows
+from drone_sim.ros.cockpit.panel.panel import Panel, SimulatorListener
+from drone_sim.ros.cockpit.scene.frames import Viewpoint
+from drone_sim.ros.cockpit.scene.handles import Selection
+from drone_sim.ros.cockpit.scene.scene_view import SceneView, Sunlight
+from drone_sim.ros.cockpit.server.page_server import PageServer
+from drone_sim.ros.cockpit.server.page_socket import PageSocket
+from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
+from drone_sim.ros.cockpit.topics import FoundTopics, find_topics
+from drone_sim.ros.core.master_watch import MasterWatch
+from drone_sim.ros.core.simulator import FAILURES, Simulator
+from drone_sim.vehicles.parameters import UNPREFIXED
 
 _WIDTH = 270  # pixels of the panel
 _HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
@@ -42,20 +40,21 @@ _ASKING = 2.0  # s between two questions to the master
 class Cockpit:
     """One page for one simulation. While no browser is open, it listens to nothing."""
 
-    def __init__(self, settings: Settings, serving: Serving):
-        """Fill what is served."""
-        self._simulator = Simulator(settings.simulator)
-        self._found = Found()
+    def __init__(self, server: PageServer, simulator: str, scripts: Path):
+        """Fill what `server` serves with the simulation of the node `simulator`; the user's `scripts` are a folder."""
+        self._simulator = Simulator(simulator)
+        self._topics = FoundTopics()
         self._view: SceneView | None = None
-        self._hearing: Hearing | None = None
+        self._listener: SimulatorListener | None = None
         self._asked, self._has_master = 0.0, True
-        self._commanding = Commanding()
-        self._sight, self._choice = Sight(), Choice()
-        flying = Flying(self._commanding.send)
-        shelf, lessons = Shelf(settings.scripts), Lessons()
-        editing = Editing(shelf, lessons, self._simulator, Happenings(self._simulator.node))
-        self._wire = Wire(flying, {**editing.answers, "let go": self._let_go, "spare": self._spare})
-        self._server = serving.server
+        self._commands = CommandPublisher()
+        self._viewpoint, self._selection = Viewpoint(), Selection()
+        held = HeldCommands(self._commands.send)
+        store, lessons = ScriptStore(scripts), Lessons()
+        editor = EditorBackend(store, lessons, self._simulator, TimelinePlayer(self._simulator.node))
+        windows = {name: partial(self._ask_windows, name) for name in ("windows", "answer", "camera")}
+        self._socket = PageSocket(held, {**editor.answers, **windows, "let go": self._let_go, "spare": self._spare})
+        self._server = server.server
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._server.scene.set_up_direction("+z")
         self._server.scene.set_background_image(_sky())
@@ -63,14 +62,13 @@ class Cockpit:
         panel = self._server.gui.main_panel
         panel.dock_right()
         panel.set_width(_WIDTH)
-        scenes = Scenes(settings.scripts)
+        scenes = SceneList(scripts)
         self._panel = Panel(
-            self._server.gui, self._simulator, self._commanding, scenes, self._sight, self._choice, self._wire
+            self._server.gui, self._simulator, self._commands, scenes, self._viewpoint, self._selection, self._socket
         )
-        self._windows = Windows(self._simulator.node, self._panel.cameras, self._wire)
-        self._wire.answer_also(self._windows.answers)
-        serving.begin(self._wire.serve, lessons.picture)
-        threading.Thread(target=flying.watch, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
+        self._windows = ScriptWindows(self._simulator.node, self._panel.cameras, self._socket)
+        server.begin(self._socket.serve, lessons.picture)
+        threading.Thread(target=held.run, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
 
     def run(self) -> None:
         """Show what is new, again and again."""
@@ -87,7 +85,8 @@ class Cockpit:
         if now - self._asked > _ASKING:
             self._asked = now
             self._ask_master()
-        wanted = self._found.namespace if clients else ""
+        self._panel.clear_old_message()
+        wanted = self._topics.namespace if clients else ""
         if (self._view.namespace if self._view else "") != wanted:
             self._open(wanted)
         if self._view is None:
@@ -99,11 +98,11 @@ class Cockpit:
             self._sun.cast(self._panel.shadows.value)
             self._view.show(clients.keys())
         self._panel.offer_objects(self._view.objects.names)
-        vehicle = self._commanding.vehicle
-        prefix = frame_names.prefix(vehicle, is_alone=self._found.namespace.strip("/") == vehicle)
-        self._panel.offer_sights(self._sight.choices(self._view.frames, prefix))
+        vehicle = self._commands.vehicle
+        prefix = _frame_prefix(vehicle, is_alone=self._topics.namespace.strip("/") == vehicle)
+        self._panel.offer_viewpoints(self._viewpoint.choices(self._view.frames, prefix))
         if not (self._view.handles.held or self._view.objects.held):  # or the eyes would run after the mouse
-            self._sight.follow(clients.values(), self._view.frames, prefix)
+            self._viewpoint.follow(clients.values(), self._view.frames, prefix)
         for one in (self._panel.plots, self._panel.tuning):
             one.follow(vehicle)
             one.show()
@@ -112,11 +111,11 @@ class Cockpit:
 
     def _open(self, namespace: str) -> None:
         """Show another simulation, '' for none."""
-        for one in (self._view, self._hearing):
+        for one in (self._view, self._listener):
             if one is not None:
                 one.close()
-        self._view = SceneView(self._server.scene, namespace, self._sun, self._choice) if namespace else None
-        self._hearing = Hearing(self._simulator.node, self._panel, self._wire) if namespace else None
+        self._view = SceneView(self._server.scene, namespace, self._sun, self._selection) if namespace else None
+        self._listener = SimulatorListener(self._simulator.node, self._panel, self._socket) if namespace else None
         self._panel.cameras.rest(not namespace)
         self._windows.listen(bool(namespace))
         if not namespace:
@@ -124,8 +123,11 @@ class Cockpit:
             self._panel.sensor.show(listening=False)
             self._panel.tuning.follow("")
 
+    def _ask_windows(self, what: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        return self._windows.answers[what](message)
+
     def _let_go(self, _message: Mapping[str, Any]) -> Mapping[str, Any]:
-        self._choice.name = ""
+        self._selection.name = ""
         return {}
 
     def _spare(self, _message: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -136,20 +138,26 @@ class Cockpit:
     def _ask_master(self) -> None:
         try:
             below = rospy.get_namespace()  # another simulator may fly in another one
-            self._found = find([one for one in rospy.get_published_topics() if one[0].startswith(below)])
+            self._topics = find_topics([one for one in rospy.get_published_topics() if one[0].startswith(below)])
             scene = str(self._simulator.parameter("scene_file", ""))
             self._tell_of_master(True)
         except FAILURES:  # another master may come
-            self._found, scene = Found(), ""
+            self._topics, scene = FoundTopics(), ""
             self._tell_of_master(False)
-        if not self._found.namespace:
-            self._panel.show_state("no simulation")
-        self._panel.offer(self._found, scene)
+        if not self._topics.namespace:
+            self._panel.show_status("no simulation")
+        self._panel.offer(self._topics, scene)
 
     def _tell_of_master(self, answers: bool) -> None:
         if answers != self._has_master:
             self._has_master = answers
             self._panel.say("the ROS master is there again" if answers else "no ROS master answers: waiting for one")
+
+
+def _frame_prefix(vehicle: str, is_alone: bool) -> str:
+    """Return what the names of a vehicle's frames begin with, by the namespace of its topics, such as `a/drone`."""
+    above, slash, name = vehicle.rpartition("/")
+    return f"{above}{slash}" if is_alone and name == UNPREFIXED else f"{vehicle}/"
 
 
 def _is_not_repeated(record: logging.LogRecord) -> bool:

@@ -1,43 +1,25 @@
-"""The ROS master, and what it knows of."""
+"""The ROS master, what it knows of, and what the simulator says of itself, where it runs."""
 
 from __future__ import annotations
 
-import http.client
 import os
+import threading
+import time
 import xmlrpc.client
 from collections.abc import Iterator
 from typing import Any
 from urllib.parse import urlsplit
 
-from drone_sim.ros.doctor.line import HINT, OK, WRONG, Line
-from drone_sim.ros.doctor.network import MASTER, PATIENCE, addresses
+from drone_sim.ros.core.network import FAILURES, MASTER, answers, call, check_master_uri
+from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 
-_ME = "/drone_sim_doctor"
+_DIAGNOSTICS = 4.0  # s; it speaks once a second
+_MARKS = {0: OK, 1: HINT}
+_APART = 1.0  # s, between this machine's clock and that of the simulator
 _ENOUGH = 5  # nodes that do not answer: each takes its time
 _START = "`roslaunch drone_sim drone.launch` starts one"
-FAILURES = (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError)
 
 Graph = dict[str, list[str]]  # nodes by topic, or by service
-
-
-class _Transport(xmlrpc.client.Transport):
-    """Gives up after a while."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = PATIENCE
-        return connection
-
-
-def asked(uri: str, call: str, *arguments: Any) -> Any:
-    """Return what a master, or a node, answers to a call of ROS's XML-RPC API. Raises one of FAILURES."""
-    answer = getattr(xmlrpc.client.ServerProxy(uri, transport=_Transport()), call)(_ME, *arguments)
-    if not isinstance(answer, list) or len(answer) != 3:
-        raise ValueError("no answer of ROS's")
-    code, said, value = answer
-    if code != 1:
-        raise ValueError(str(said))
-    return value
 
 
 class Master:
@@ -54,32 +36,24 @@ class Master:
     def found(self) -> Iterator[Line]:
         """Is it there?"""
         try:
-            there = urlsplit(self.uri)
-            host, port = there.hostname, there.port or 80
-        except ValueError:  # of the port
-            host, port = None, 0
-        if not host or urlsplit(self.uri).scheme != "http":
-            yield Line(WRONG, "master", f"ROS_MASTER_URI = '{self.uri}' must be like {MASTER}")
+            check_master_uri(self.uri)
+        except ValueError as error:
+            yield Line(WRONG, "master", str(error))
             return
-        try:
-            addresses(host)
-        except OSError:
-            yield Line(WRONG, "master", f"ROS_MASTER_URI = '{self.uri}': the host '{host}' is not known")
-            return
-        yield self._asked(port)
+        yield self._asked()
 
-    def _asked(self, port: int) -> Line:
+    def _asked(self) -> Line:
+        port = urlsplit(self.uri).port or 80
         try:
-            graph = asked(self.uri, "getSystemState")
+            graph = call(self.uri, "getSystemState")
             self.published, self.subscribed, self.services = (dict(one) for one in graph)
         except ConnectionRefusedError:
             return Line(HINT, "master", f"none at {self.uri}: {_START}")
         except FAILURES as error:
             why = f"HTTP {error.errcode}" if isinstance(error, xmlrpc.client.ProtocolError) else str(error)
             said = f"port {port} of {self.uri} does not answer as a master ({why or type(error).__name__})"
-            return Line(
-                WRONG, "master", f"{said}: end what listens there, or `export ROS_MASTER_URI=` with another port"
-            )
+            cure = "end what listens there, or `export ROS_MASTER_URI=` with another port"
+            return Line(WRONG, "master", f"{said}: {cure}")
         self.there = True
         return Line(OK, "master", f"at {self.uri}, with {len(self.nodes())} nodes")
 
@@ -93,7 +67,7 @@ class Master:
         if not self.there:
             return
         try:
-            simulated = asked(self.uri, "getParam", "/use_sim_time")
+            simulated = call(self.uri, "getParam", "/use_sim_time")
         except FAILURES:
             simulated = False
         tellers = self.published.get("/clock", [])
@@ -116,9 +90,7 @@ class Master:
         """Are there nodes that have gone without a word?"""
         gone = 0
         for node in self.nodes() if self.there else ():
-            try:
-                asked(asked(self.uri, "lookupNode", node), "getPid")
-            except FAILURES:
+            if not answers(self.uri, node):
                 gone += 1
                 cure = "`rosnode cleanup` removes it, if it is not just another machine that cannot be reached"
                 yield Line(HINT, "nodes", f"{node} is registered and does not answer: {cure}")
@@ -133,6 +105,54 @@ class Master:
                 cure = f"start it with cmd_vel:={heard[0]}" if heard else "no drone is there to hear it"
                 yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which nobody hears: {cure}")
 
-    def simulators(self) -> list[str]:
-        """Return the names of the nodes that are ours."""
-        return sorted({node for name, nodes in self.services.items() if name.endswith("/save_scene") for node in nodes})
+
+def simulator(master: Master) -> Iterator[Line]:
+    """Listen to its diagnostics."""
+    if not master.there:
+        return
+    nodes = sorted({node for name, nodes in master.services.items() if name.endswith("/save_scene") for node in nodes})
+    if not nodes:
+        yield Line(HINT, "simulator", "does not run: `roslaunch drone_sim drone.launch`")
+    for node in nodes:
+        message = _wait_for_diagnostics(node)
+        if message is None:
+            yield Line(
+                WRONG, "simulator", f"{node} says nothing on /diagnostics in {_DIAGNOSTICS:g} s: end it, and start anew"
+            )
+            continue
+        yield from _diagnosed(node, message)
+
+
+def _wait_for_diagnostics(node: str) -> Any:
+    """Return the first of its messages, or None where none comes in time."""
+    import rospy
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    if not rospy.core.is_initialized():
+        rospy.init_node("drone_sim_doctor", anonymous=True, disable_signals=True, disable_rostime=True)
+    heard: list[Any] = []
+    came = threading.Event()
+
+    def take(message: Any) -> None:
+        if not heard and any(one.name.startswith(f"{node[1:]}: ") for one in message.status):
+            heard.append(message)
+            came.set()
+
+    subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, take)
+    came.wait(_DIAGNOSTICS)
+    subscriber.unregister()
+    return heard[0] if heard else None
+
+
+def _diagnosed(node: str, message: Any) -> Iterator[Line]:
+    simulated = False
+    for one in message.status:
+        what = one.name.removeprefix(f"{node[1:]}: ")
+        yield Line(_MARKS.get(one.level, WRONG), what, one.message)
+        simulated |= any(pair.key == "stamps" and pair.value.startswith("simulated") for pair in one.values)
+    apart = time.time() - message.header.stamp.to_sec()
+    if not simulated and abs(apart) > _APART:
+        said = (
+            f"the clocks here and of {node} are {apart:.1f} s apart: transforms and pictures will not fit; run chrony"
+        )
+        yield Line(HINT, "clock", said)

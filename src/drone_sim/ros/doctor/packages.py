@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from xml.etree import ElementTree as Xml
 
 from drone_sim.files.resources import package_path, python_path
-from drone_sim.ros.doctor.line import HINT, OK, WRONG, Line
+from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 from drone_sim.ros.doctor.probe import FLIGHT, RENDERER
 
 PATIENCE = 60.0  # s, for all of it; two are usual
@@ -20,7 +20,8 @@ _WITHOUT = {  # what still works where a module is missing
     "matplotlib": "`fly --plot` does not work",
     "tqdm": "`fly` does not work",
 }
-_TOLD = {"numpy": "numpy", "cv2": "OpenCV", "pybullet": "PyBullet", "pydantic": "pydantic", "lupa": "lupa"}
+_SLOW = "pictures will come from PyBullet's TinyRenderer, at a few frames per second"
+_VERSIONS = {"numpy": "numpy", "cv2": "OpenCV", "pybullet": "PyBullet", "pydantic": "pydantic", "lupa": "lupa"}
 
 
 def modules() -> dict[str, str]:
@@ -38,10 +39,13 @@ def packages() -> Iterator[Line]:
     for name, text in failed.items():
         yield _missing(name, keys[name], text)
     if not failed:
-        versions = ", ".join(f"{told} {_version(name, tried[name][1])}" for name, told in _TOLD.items())
+        versions = ", ".join(f"{told} {_version(name, tried[name][1])}" for name, told in _VERSIONS.items())
         yield Line(OK, "packages", f"all {len(keys)} that package.xml names; {versions}")
-    yield from _drawing(*tried[RENDERER])
-    yield _flying(*tried[FLIGHT])
+    state, said = tried[RENDERER]
+    cure = f"{_SLOW}; `apt install libegl1 libgl1-mesa-dri`, or a driver that has EGL"
+    yield Line(OK, "pictures", said) if state == "ok" else Line(HINT, "pictures", f"{said}; {cure}")
+    state, said = tried[FLIGHT]
+    yield Line(OK, "flight", said) if state == "ok" else Line(WRONG, "flight", f"no test flight: {said}")
 
 
 def _missing(module: str, key: str, why: str) -> Line:
@@ -61,18 +65,6 @@ def _version(module: str, own: str) -> str:
         return own or metadata.version(distribution)
     except metadata.PackageNotFoundError:
         return "of some version"
-
-
-def _drawing(state: str, text: str) -> Iterator[Line]:
-    if state == "ok":
-        yield Line(OK, "pictures", text)
-        return
-    slow = "pictures will come from PyBullet's TinyRenderer, at a few frames per second"
-    yield Line(HINT, "pictures", f"{text}; {slow}; `apt install libegl1 libgl1-mesa-dri`, or a driver that has EGL")
-
-
-def _flying(state: str, text: str) -> Line:
-    return Line(OK if state == "ok" else WRONG, "flight", text if state == "ok" else f"no test flight: {text}")
 
 
 def results(names: Sequence[str]) -> dict[str, tuple[str, str]]:

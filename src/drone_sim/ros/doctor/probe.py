@@ -39,7 +39,7 @@ def _flight() -> str:
     try:
         for _ in range(_STEPS):
             simulation.step()
-        height, seconds = simulation.drone.state.position[2], simulation.time
+        height, seconds = simulation.drone.body.state.position[2], simulation.time
     finally:
         simulation.close()
     if not abs(height - _HEIGHT) < _ERROR:

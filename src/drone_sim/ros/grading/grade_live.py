@@ -20,20 +20,20 @@ import rosgraph
 import rospy
 import yaml
 
+from drone_sim.command_line import FAILED, Parser, status_of
 from drone_sim.files import writing
 from drone_sim.grading import flight
 from drone_sim.grading import plan as plans
-from drone_sim.grading.flown import Flown
-from drone_sim.grading.outputs import as_json, gradescope, html, junit, table
+from drone_sim.grading.flight_record import FlightRecord
+from drone_sim.grading.outputs import as_json, gradescope, junit, table
+from drone_sim.grading.outputs.html import report
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
-from drone_sim.offline.command_line import FAILED, Parser, status_of
-from drone_sim.ros.grading.hearing import Hearing
-from drone_sim.ros.grading.sending import Sender, entries_of, steps_late
-from drone_sim.ros.grading.simulator import Simulator, Unfit
-from drone_sim.ros.node.paths import from_shell
-from drone_sim.ros.node.signals import end_on_signals
-from drone_sim.ros.node.starting import init_node, reported
+from drone_sim.ros.core.shutdown import end_on_signals
+from drone_sim.ros.core.startup import from_shell, init_node, reported
+from drone_sim.ros.grading.flight_listener import FlightListener
+from drone_sim.ros.grading.simulator import GradedSimulator, Mismatch, lookup
+from drone_sim.ros.grading.timeline_sender import TimelineSender, entries_of, steps_late
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene_parameters import find_files_beside
 
@@ -71,7 +71,7 @@ def _graded(options: argparse.Namespace) -> Result:
     """Raises ValueError and OSError, in one line."""
     plan = plans.read(from_shell(options.plan))
     if options.html:
-        html.check(options.html)
+        report.check(options.html)
     for file in filter(None, (options.csv, options.json, options.junit, options.gradescope)):
         writing.check(file)
     result, flown = grade(plan, options.seed, options.node, options.simulator, options.patience)
@@ -79,37 +79,35 @@ def _graded(options: argparse.Namespace) -> Result:
         file = Path(options.csv or f"{folder}/flight.csv")
         if flown is not None:
             flight.write(flown.rows, file)
-        _write(options, plan, result, file if flown is not None else None)
+        for write, path in (
+            (as_json.write, options.json),
+            (gradescope.write, options.gradescope),
+            (junit.write, options.junit),
+            (junit.write, options.rostest),
+        ):
+            if path:
+                write(plan, [result], path)
+        if options.html:
+            report.write(plan, [result], lambda _: file if flown is not None else None, options.html)
     table.show(plan, [result])
     return result
 
 
-def _write(options: argparse.Namespace, plan: Plan, result: Result, flown: Path | None) -> None:
-    if options.json:
-        as_json.write(plan, [result], options.json)
-    if options.gradescope:
-        gradescope.write(plan, [result], options.gradescope)
-    for file in filter(None, (options.junit, options.rostest)):
-        junit.write(plan, [result], file)
-    if options.html:
-        html.write(plan, [result], lambda _: flown, options.html)
-
-
-def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> tuple[Result, Flown | None]:
+def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> tuple[Result, FlightRecord | None]:
     """Fly once, and return the result and the flight.
 
-    `node` is the one that flies, which is waited for, '' where the simulator's script does. Raises Unfit and
+    `node` is the one that flies, which is waited for, '' where the simulator's script does. Raises Mismatch and
     ParameterError where the plan cannot be graded on this simulator; what goes wrong later is in the result.
     """
-    there = Simulator(simulator, patience)
+    there = GradedSimulator(simulator, patience)
     parameters = there.fit(plan)
     live = _Live(plan, seed, there, parameters)
-    there.wait(live.is_connected, f"{there.name} lacks topics of the plan's vehicles: launch it in the plan's scene")
+    there.wait(live.is_connected, f"{there.node} lacks topics of the plan's vehicles: launch it in the plan's scene")
     if node:
-        there.wait(lambda: _is_node(node), f"no node {node}")
+        there.wait(lambda: lookup("lookupNode", rospy.resolve_name(f"/{node.strip('/')}")), f"no node {node}")
     error = live.fly()
     script = node or parameters.script
-    flown = live.hearing.flown(plan.duration)
+    flown = live.listener.flown(plan.duration)
     if flown is None:
         return flight.ungraded(plan, script, seed, {}, error or "nothing was heard of the flight"), None
     late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), flown.rows, parameters.time_step)
@@ -123,18 +121,18 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
 class _Live:
     """One flight through topics."""
 
-    def __init__(self, plan: Plan, seed: int, simulator: Simulator, parameters: Parameters):
-        """Advertise and subscribe. Raises Unfit."""
+    def __init__(self, plan: Plan, seed: int, simulator: GradedSimulator, parameters: Parameters):
+        """Advertise and subscribe. Raises Mismatch."""
         self._simulator, self._duration, self._scene = simulator, plan.duration, parameters.scene_file
         self._over = threading.Event()
         self._started = False
         wanted = plan.parameters(seed)
-        self._sender = Sender(entries_of(plan.timeline_of(wanted), wanted, parameters), parameters)
-        self.hearing = Hearing(plan, parameters, self._follow)
+        self._sender = TimelineSender(entries_of(plan.timeline_of(wanted), wanted, parameters), parameters)
+        self.listener = FlightListener(plan, parameters, self._follow)
 
     def is_connected(self) -> bool:
         """Whether the simulator hears all that is said, and the other way round."""
-        return self._sender.is_heard and self.hearing.is_connected()
+        return self._sender.is_heard and self.listener.is_connected()
 
     def _follow(self, now: float) -> None:
         """Send what is due after a step that ended at this time (s)."""
@@ -148,7 +146,7 @@ class _Live:
         try:
             self._simulator.stop()
             time.sleep(_LAST)  # what was sent before is not of this flight
-            self.hearing.clear()
+            self.listener.clear()
             self._started = True
             self._simulator.start(self._scene)
             ended = self._wait()
@@ -157,7 +155,7 @@ class _Live:
                 return ended
             time.sleep(_LAST)
             self._simulator.stop()
-        except Unfit as error:
+        except Mismatch as error:
             return str(error)
         return ended or self._simulator.error
 
@@ -165,28 +163,20 @@ class _Live:
         """Wait for the end; return what came before it."""
         last, since = -1.0, time.monotonic()
         while not self._over.wait(_LOOK):
-            now = self.hearing.time
-            self.hearing.look_for_topics()
+            now = self.listener.time
+            self.listener.look_for_topics()
             if now != last:
                 last, since = now, time.monotonic()
             waited = time.monotonic() - since
             if rospy.is_shutdown():
                 return f"ended from outside at {now:.2f} s"
-            if self.hearing.went_back:
+            if self.listener.went_back:
                 return "somebody else has started the simulation anew"
             if self._simulator.state == "stopped" and waited > _SILENT:  # it may be told late that it flies
                 return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
             if waited > _STANDS:
                 return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
         return ""
-
-
-def _is_node(name: str) -> bool:
-    try:
-        rosgraph.Master(rospy.get_name()).lookupNode(rospy.resolve_name(f"/{name.strip('/')}"))
-    except (rosgraph.MasterError, OSError):
-        return False
-    return True
 
 
 # ---- arguments
@@ -217,19 +207,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--patience", metavar="S", type=float, default=_PATIENCE, help="real seconds to wait for both (default: 30)"
     )
-    parser.add_argument(
-        "--write-config",
-        type=_from_here,
-        metavar="OUT.yaml",
-        help="write the plan's config, for config:= of drone.launch, and end",
-    )
-    parser.add_argument("--csv", type=_from_here, metavar="OUT.csv", help="write the flight's table, as `fly --csv`")
-    parser.add_argument("--json", type=_from_here, metavar="OUT.json", help="write everything, for programs")
-    parser.add_argument("--junit", type=_from_here, metavar="OUT.xml", help="write JUnit XML")
-    parser.add_argument(
-        "--gradescope", type=_from_here, metavar="results.json", help="write the results for Gradescope"
-    )
-    parser.add_argument("--html", type=_from_here, metavar="DIR", help="write a report for the browser")
+    for option, metavar, said in (
+        ("--write-config", "OUT.yaml", "write the plan's config, for config:= of drone.launch, and end"),
+        ("--csv", "OUT.csv", "write the flight's table, as `fly --csv`"),
+        ("--json", "OUT.json", "write everything, for programs"),
+        ("--junit", "OUT.xml", "write JUnit XML"),
+        ("--gradescope", "results.json", "write the results for Gradescope"),
+        ("--html", "DIR", "write a report for the browser"),
+    ):
+        parser.add_argument(option, type=_from_here, metavar=metavar, help=said)
     parser.add_argument("--rostest", metavar="OUT.xml", help=argparse.SUPPRESS)
     return parser
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from diagnostic_updater import DiagnosticStatusWrapper, Updater
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from drone_sim.ros.node.inbox import Inbox
+from drone_sim.ros.core.inbox import Inbox
 from drone_sim.run.diagnosis.finding import ERROR, Finding
 
 PERIOD = 1.0  # s of real time
@@ -23,12 +21,12 @@ _BUSY = "simulation"  # the finding that says that there is no answer
 class Diagnostics(threading.Thread):
     """Asks the simulation's thread for what it finds, between two steps, and publishes it; a daemon thread.
 
-    While nobody listens the steps know nothing of it. The updater's own `update` is not used: it asks the master for
-    its period, and fails where that has gone.
+    While nobody listens the steps know nothing of it. diagnostic_updater is of no use here: it asks the master for its
+    period, and fails where that has gone; it has a stamp of its own, and tells of what is new at once, before the rest.
     """
 
     def __init__(self, look: Callable[[], list[Finding]], stamp: Callable[[], rospy.Time], inbox: Inbox):
-        """Advertise. `look` and `stamp` are called in the simulation's thread."""
+        """Advertise. `look` and `stamp` are called in the simulation's thread, which empties `inbox`."""
         super().__init__(name="diagnostics", daemon=True)
         self._look, self._stamp, self._inbox = look, stamp, inbox
         self._ended = threading.Event()
@@ -36,7 +34,8 @@ class Diagnostics(threading.Thread):
         self._answered = threading.Event()
         self._answered.set()
         self._asked = 0.0  # s, of the monotonic clock
-        self._updater = _Updater()
+        self._stamped = rospy.Time()
+        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
         rospy.on_shutdown(self.close)
 
     def close(self) -> None:
@@ -46,11 +45,13 @@ class Diagnostics(threading.Thread):
     def run(self) -> None:
         """Publish until it is closed."""
         while not self._ended.wait(PERIOD):
-            if not self._updater.publisher.get_num_connections():
+            if not self._publisher.get_num_connections():
                 continue
             self._ask()
             try:
-                self._publish()
+                message = DiagnosticArray(status=[_status(one) for one in self._findings.values()])
+                message.header.stamp = self._stamped
+                self._publisher.publish(message)
             except rospy.ROSException:  # the node ends, and has closed the topic
                 return
 
@@ -69,48 +70,13 @@ class Diagnostics(threading.Thread):
     def _answer(self) -> None:
         try:
             self._findings = {one.name: one for one in self._look()}
-            self._updater.stamp = self._stamp()
+            self._stamped = self._stamp()
         except Exception as error:  # a flight does not end because it could not be described
             self._findings = {_BUSY: Finding(_BUSY, ERROR, f"cannot be diagnosed: {error!r}", {})}
         self._answered.set()
 
-    def _publish(self) -> None:
-        findings = self._findings
-        names = {one.name for one in self._updater.tasks}
-        for name in names - findings.keys():
-            self._updater.removeByName(name)
-        for name in findings:  # in this order
-            if name not in names:
-                self._updater.add(name, self._status)
-        self._updater.force_update()
 
-    def _status(self, status: DiagnosticStatusWrapper) -> DiagnosticStatusWrapper:
-        found = self._findings.get(status.name)
-        if found is None:  # a vehicle that has gone meanwhile
-            status.summary(DiagnosticStatus.STALE, "not there any more")
-            return status
-        status.summary(found.level, found.message[:_LONGEST])
-        for key, value in found.values.items():
-            status.add(key, value[:_LONGEST])
-        return status
-
-
-class _Updater(Updater):
-    """Stamps like everything else of a step, and tells of what is new with all the rest."""
-
-    stamp = rospy.Time()
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setHardwareID("none")  # so the updater's own documentation wants it
-
-    def addedTaskCallback(self, _task: Any) -> None:
-        pass
-
-    def publish(self, statuses: list[DiagnosticStatus]) -> None:
-        node = rospy.get_name()[1:]
-        for one in statuses:
-            one.name = f"{node}: {one.name}"
-        message = DiagnosticArray(status=statuses)
-        message.header.stamp = self.stamp
-        self.publisher.publish(message)
+def _status(found: Finding) -> DiagnosticStatus:
+    values = [KeyValue(key, value[:_LONGEST]) for key, value in found.values.items()]
+    name = f"{rospy.get_name()[1:]}: {found.name}"
+    return DiagnosticStatus(found.level, name, found.message[:_LONGEST], "none", values)  # no hardware

@@ -2,7 +2,7 @@
 
 Parameters (private): every key of config/drone.yaml.
 Topics, in the namespace of each vehicle: see ros/vehicle; for rviz: see ros/rviz; services: services.py.
-/clock is published with use_sim_time: see step_time.py; /diagnostics: see diagnostics.py.
+/clock is published with use_sim_time: see ros/core/publishing.py; /diagnostics: see diagnostics.py.
 Frames: see ros/vehicle/transforms.py.
 """
 
@@ -12,40 +12,44 @@ import contextlib
 import gc
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import rospy
 from std_msgs.msg import String
 
 from drone_sim.mechanics.frames import position, to_euler
-from drone_sim.remote import outside
-from drone_sim.ros.node import namesake
+from drone_sim.remote.remote_api import start_server
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.master_watch import MasterWatch
+from drone_sim.ros.core.publishing import StepTime
+from drone_sim.ros.core.shutdown import Shutdown
+from drone_sim.ros.core.startup import init_node, release_name, reported
+from drone_sim.ros.core.validation import parameters_of, use_sim_time
 from drone_sim.ros.node.diagnostics import Diagnostics
-from drone_sim.ros.node.ending import Ending
-from drone_sim.ros.node.given import read_parameters, use_sim_time
-from drone_sim.ros.node.inbox import Inbox
-from drone_sim.ros.node.launch_arguments import check_launch_arguments
-from drone_sim.ros.node.master_watch import MasterWatch
-from drone_sim.ros.node.others import check_others
 from drone_sim.ros.node.services import Services
-from drone_sim.ros.node.starting import init_node, reported
-from drone_sim.ros.node.step_time import StepTime
+from drone_sim.ros.node.start_checks import check_launch_arguments, check_others
 from drone_sim.ros.node.windows import WindowTopics
-from drone_sim.ros.rviz.handles import Handles
+from drone_sim.ros.rviz.drawing_markers import DrawingMarkers
+from drone_sim.ros.rviz.flight_markers import CommandMarkers, HeightMarkers, PathMarkers, StateText
+from drone_sim.ros.rviz.force_markers import ForceMarkers
+from drone_sim.ros.rviz.marker_topics import namespace
 from drone_sim.ros.rviz.object_handles import ObjectHandles
-from drone_sim.ros.rviz.rviz_view import RvizView
-from drone_sim.ros.vehicle.fleet_topics import FleetTopics
-from drone_sim.ros.vehicle.script_topics import RosBackend
+from drone_sim.ros.rviz.rviz_meshes import RvizMeshes
+from drone_sim.ros.rviz.scene_markers import SceneMarkers, VehicleMarkers
+from drone_sim.ros.rviz.surroundings_markers import SurroundingsMarkers
+from drone_sim.ros.rviz.vehicle_handles import VehicleHandles
+from drone_sim.ros.vehicle.script_backend import RosBackend
 from drone_sim.ros.vehicle.tuning_server import TuningServer
+from drone_sim.ros.vehicle.vehicle_topics import FleetTopics
 from drone_sim.run.diagnosis.diagnosis import Diagnosis
 from drone_sim.run.guardian import Guardian
-from drone_sim.run.pace import Pace, period
-from drone_sim.run.pacing import Beat, Pacer
+from drone_sim.run.pacing import Beat, Pace, Pacer, period
 from drone_sim.run.parameters import Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.scripting.load import script_path
 from drone_sim.vehicles.vehicle import Vehicle
 
 _NAME = "drone_sim"
@@ -56,7 +60,7 @@ class Node:
     """Steps the simulation in the thread that calls `run`, and no other."""
 
     def __init__(self, parameters: Parameters):
-        """Build the scene and advertise. Raises what Simulation raises."""
+        """Build the scene that `parameters` say, and advertise. Raises what Simulation raises."""
         self._parameters = parameters
         logging.getLogger("drone_sim").handlers = [_ToRosout()]
         drawings = Drawings()
@@ -72,17 +76,28 @@ class Node:
         self._time = StepTime(self.simulation, use_sim_time())
         self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
         self.player = Player(self.simulation, self._step_and_show, self._state.publish, self._time.simulated)
-        self._inbox = Inbox()
-        self._outside = outside.let_in(parameters.remote_api, self.player, backend)
+        self._outside = start_server(parameters.remote_api, self.player, backend)
         self._pacer = Pacer(period(parameters), sleep=self._outside.wait)
-        if self._outside.address:
-            self._inbox.sleep_by(self._outside.wait, self._outside.wake)
+        others = self._outside  # who are to be heard while the inbox waits
+        self._inbox = Inbox(sleep=others.wait, wake=others.wake) if others.address else Inbox()
         self._topics = FleetTopics(self.simulation, self._inbox, self._time.stamp)
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._windows = WindowTopics(self.simulation, self._inbox)
-        self._handles = Handles(self.simulation, self._inbox), ObjectHandles(self.simulation, self._inbox)
-        self._view = RvizView(self.simulation, self.player, drawings)
+        self._meshes = RvizMeshes()
+        self._rviz = (  # each is made only while somebody listens to it
+            VehicleHandles(self.simulation, self._inbox),
+            ObjectHandles(self.simulation, self._inbox),
+            SurroundingsMarkers(self.simulation, self._meshes),
+            SceneMarkers(self.simulation, self._meshes),
+            VehicleMarkers(self.simulation, self._meshes),
+            DrawingMarkers(namespace(self.simulation), drawings),
+            PathMarkers(self.simulation),
+            HeightMarkers(self.simulation),
+            CommandMarkers(self.simulation),
+            ForceMarkers(self.simulation),
+            StateText(self.simulation, self.player),  # the last one: `show` waits for its topic
+        )
         diagnosis = Diagnosis(
             self.player,
             self._pacer,
@@ -119,12 +134,12 @@ class Node:
         self._pacer.restart()
         while not over():
             began = time.monotonic()
-            if self._goes():
+            if self._is_running():
                 steps += self._wait(over) and self.step()
                 seconds += time.monotonic() - began
             else:
-                self._stand()
-                self._count_anew()
+                self._idle()
+                self._reset_pacing()
         flown = steps * self._parameters.time_step
         factor = f"{flown / seconds:.2f} times real time" if seconds else "no time"
         late = f"{self._pacer.overruns} late steps, by {self._pacer.worst * 1e3:.0f} ms at most"
@@ -137,17 +152,17 @@ class Node:
             self._pacer.restart()
         if self._pacer.is_far:  # at such a pace, who asks for something is not to wait for the step
             self._inbox.wait(_SOON)
-            self._take_in()
+            self._process_requests()
             return False
         late = self._pacer.wait(over)
         if late:
             rospy.logwarn_throttle(5, f"step late by {late * 1e3:.0f} ms ({self._pacer.overruns} so far)")
         return True
 
-    def _goes(self) -> bool:
+    def _is_running(self) -> bool:
         return self.player.playing and not self._outside.holds
 
-    def _count_anew(self) -> None:
+    def _reset_pacing(self) -> None:
         """Let no step be late that came late because the simulation stood."""
         if self.player.playing and not self.player.begun:
             self._pacer.excuse()
@@ -156,14 +171,14 @@ class Node:
 
     def step(self) -> bool:
         """Take what has come in, run one step, publish it under one stamp; return whether a step was run."""
-        self._take_in()
-        return self._goes() and self.player.step()
+        self._process_requests()
+        return self._is_running() and self.player.step()
 
     def _first(self) -> list[Vehicle]:
         """Return the first vehicle, if one flies."""
         return list(self.simulation.vehicles.values())[:1]
 
-    def _take_in(self) -> None:
+    def _process_requests(self) -> None:
         self._inbox.empty()
         self._outside.serve()
 
@@ -171,15 +186,15 @@ class Node:
         self._time.begin()
         self.simulation.step()
         self._show()
-        self._topics.publish_readings(self._time.stamp)
+        self._topics.publish_readings()
         self._time.end(at_once=self.player.paused)  # who asks for single steps is told of each
 
-    def _stand(self) -> None:
+    def _idle(self) -> None:
         """Paused, stopped or held from outside: wait for something to do, and show what it changed."""
-        self._inbox.wait(self._left())
+        self._inbox.wait(self._until_shown())
         self._time.begin()
         self._inbox.empty()
-        if self._goes() or self._left():
+        if self._is_running() or self._until_shown():
             return
         if self._time.simulated:
             self._show_at_the_same_time()
@@ -187,7 +202,7 @@ class Node:
             self.simulation.look()
             self._show()
 
-    def _left(self) -> float:
+    def _until_shown(self) -> float:
         return self._beat.left(self.simulation.world.changes != self._shown)
 
     def _is_of_a_camera(self, topic: str) -> bool:
@@ -203,44 +218,43 @@ class Node:
     def _show(self) -> None:
         self._topics.follow()
         self._show_state()
-        self._topics.publish_transforms(self._time.stamp)
+        self._topics.publish_transforms()
         self._show_to_eyes()
 
     def _show_at_the_same_time(self) -> None:
-        """Show what has changed under a stamp used before: transforms, of which tf2 takes one, to newcomers."""
+        """Show what has changed under a stamp used before: transforms, of which tf2 takes one, to new subscribers."""
         self._topics.follow()
         self._time.end(at_once=True)
-        self._time.tell_newcomers()
-        if self._topics.tell_newcomers(self._time.stamp) or self.simulation.world.changes != self._shown:
+        self._time.tell_new_subscribers()
+        if self._topics.tell_new_subscribers() or self.simulation.world.changes != self._shown:
             self.simulation.look()
             self._show_state()
         self._show_to_eyes()
 
     def _show_state(self) -> None:
-        self._topics.publish_state(self._time.stamp)
+        self._topics.publish_state()
         self._shown = self.simulation.world.changes
 
     def _show_to_eyes(self) -> None:
-        self._topics.publish_command(self._time.stamp)
-        for handles in self._handles:
-            handles.update()
-        self._view.update()
+        self._topics.publish_command()
+        for one in self._rviz:
+            one.update()
         self._windows.update(self._time.stamp)
         if self._parameters.gui:
-            for track in [vehicle.track for vehicle in self._first()]:
+            for track in [vehicle.track.matrix() for vehicle in self._first()]:
                 self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
         self._beat.restart()
 
-    def descriptions(self) -> list[str]:
-        """Return the names of the parameters that hold the vehicles' URDFs."""
-        return [rospy.resolve_name(f"{name}/robot_description") for name in list(self.simulation.vehicles)]
+    def descriptions(self) -> Iterable[str]:
+        """Return the names of the parameters that hold the vehicles' URDFs; any thread may call it."""
+        return self._topics.descriptions
 
     def close(self) -> None:
         """Run the script's cleanup, remove what rviz read, and free the world. Raises ScriptError."""
         self._diagnostics.close()
         self._outside.close()
         self._services.close()
-        self._view.close()
+        self._meshes.close()
         self.simulation.close()
 
 
@@ -256,22 +270,23 @@ def main(guardian: Guardian) -> int:
     # The time of messages is the simulation's; hearing its own /clock would cost the node half of its speed.
     if not init_node(_NAME, others_wait=True, disable_signals=True, disable_rostime=True):
         return 1
-    ending = Ending(guardian)
+    shutdown = Shutdown(guardian)
     nodes = []
 
     def run() -> None:
         check_launch_arguments()
-        parameters = read_parameters()
+        parameters = parameters_of(rospy.get_name())
+        script_path(parameters.script)  # none there ends the node; an error in one that is there stops the flight
         check_others([one.name for one in parameters.fleet], use_sim_time())
         nodes.append(Node(parameters))
         MasterWatch(nodes[0].descriptions).start()
-        namesake.let_others()
-        nodes[0].run(ending.asked)
+        release_name()
+        nodes[0].run(shutdown.asked)
 
     status = reported(_NAME, run)
     for node in nodes:
         status = reported(_NAME, node.close) or status
-    ending.complete()
+    shutdown.complete()
     return status
 
 

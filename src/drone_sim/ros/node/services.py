@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import rospy
-from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
+from std_srvs.srv import SetBool, Trigger
 
 from drone_sim.files.resources import locate, package_path
-from drone_sim.ros.node.inbox import Inbox
-from drone_sim.ros.node.paths import from_shell
-from drone_sim.ros.node.vehicles_parameter import VehiclesParameter
-from drone_sim.run.parameters import ParameterError
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.startup import MASTER_GONE, from_shell
+from drone_sim.run.parameters import ParameterError, Parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Snapshot
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import script_path
 
+_VEHICLES = "~vehicles"
 _HOME = Path("~/.ros/drone_sim/scene.yaml")
 
 
@@ -29,7 +32,10 @@ class Services:
     """
 
     def __init__(self, player: Player, inbox: Inbox, follow: Callable[[], None]):
-        """Advertise. `follow` lets the topics follow vehicles that have come or gone."""
+        """Advertise what is done with `player` by the thread that empties `inbox`.
+
+        `follow` lets the topics follow vehicles that have come or gone.
+        """
         self._player = player
         self._inbox = inbox
         self._follow = follow
@@ -38,20 +44,14 @@ class Services:
         self._snapshot: Snapshot | None = None
         jobs = ("start", "stop", "restart", "step", "save_scene", "load_scene", "set_vehicles", "snapshot", "restore")
         for name in jobs:
-            rospy.Service(f"~{name}", Trigger, self._trigger(getattr(self, name)))
-        rospy.Service("~pause", SetBool, self._on_pause)
-
-    def _trigger(self, job: Callable[[], str]) -> Callable[[TriggerRequest], TriggerResponse]:
-        return lambda _request: TriggerResponse(*self._answer(job))
+            rospy.Service(f"~{name}", Trigger, partial(self._answer, getattr(self, name)))
+        rospy.Service("~pause", SetBool, lambda request: self._answer(lambda: player.pause(request.data)))
 
     def close(self) -> None:
         """Leave the parameters as they were given."""
         self._vehicles.close()
 
-    def _on_pause(self, request: SetBoolRequest) -> SetBoolResponse:
-        return SetBoolResponse(*self._answer(lambda: self._player.pause(request.data)))
-
-    def _answer(self, job: Callable[[], str]) -> tuple[bool, str]:
+    def _answer(self, job: Callable[[], str], _request: Any = None) -> tuple[bool, str]:
         try:
             answer = self._inbox.ask(job)
             rospy.logdebug(answer)
@@ -107,9 +107,9 @@ class Services:
 
     def set_vehicles(self) -> str:
         """Let those fly that the parameter `vehicles` says; who was there and still is flies on."""
-        came, went = self._player.simulation.set_vehicles(self._vehicles.read())
+        added, removed = self._player.simulation.set_vehicles(self._vehicles.read())
         self._follow()
-        told = [f"{', '.join(names)} {verb}" for names, verb in ((came, "came"), (went, "went")) if names]
+        told = [f"{', '.join(names)} {verb}" for names, verb in ((added, "added"), (removed, "removed")) if names]
         return "; ".join(told) or "all are as they were"
 
     def snapshot(self) -> str:
@@ -118,15 +118,61 @@ class Services:
         if self._snapshot is not None:
             simulation.forget(self._snapshot)
         self._snapshot = simulation.snapshot()
-        return f"remembered t = {self._player.simulation.time:.2f} s"
+        return f"snapshot at t = {self._player.simulation.time:.2f} s"
 
     def restore(self) -> str:
         """Bring it back."""
         if self._snapshot is None:
             raise ValueError("no snapshot has been taken")
         self._player.simulation.restore(self._snapshot)
-        return f"back at t = {self._player.simulation.time:.2f} s"
+        return f"restored t = {self._player.simulation.time:.2f} s"
 
 
 def _scene_parameter() -> str:
     return from_shell(str(rospy.get_param("~scene_file", "")))
+
+
+class VehiclesParameter:
+    """The private parameter `vehicles`, for people to change.
+
+    It holds an entry for each that flies, as long as nobody else has written it. rosparam, as roslaunch, leaves out
+    empty entries and lays the others over what is there: an entry laid over a number, or over nothing, would be alone.
+    """
+
+    def __init__(self) -> None:
+        """Take what was given."""
+        self._given = self._written = rospy.get_param(_VEHICLES, None)
+
+    def tell(self, parameters: Parameters) -> None:
+        """Say who flies: what a scene file does not say, which comes before the parameter."""
+        try:
+            self._write(_sendable(parameters.vehicle_entries) or self._given)
+        except (TypeError, OverflowError) as error:  # of XML-RPC: such as a seed of more than 32 bits
+            rospy.logwarn(f"the parameter {rospy.resolve_name(_VEHICLES)} cannot say who flies: {error}")
+
+    def read(self) -> Any:
+        """Return what it holds."""
+        return rospy.get_param(_VEHICLES, {})
+
+    def close(self) -> None:
+        """Put back what was given: the next simulator of this name may be given another drone."""
+        with contextlib.suppress(*MASTER_GONE, OSError):
+            self._write(self._given)
+
+    def _write(self, value: Any) -> None:
+        if value == self._written or rospy.get_param(_VEHICLES, None) != self._written:
+            return
+        if value is None:
+            rospy.delete_param(_VEHICLES)
+        else:
+            rospy.set_param(_VEHICLES, value)
+        self._written = value
+
+
+def _sendable(value: Any) -> Any:
+    """Return a value of YAML without null, which parameters cannot hold."""
+    if isinstance(value, dict):
+        return {str(key): _sendable(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_sendable(one) for one in value]
+    return "none" if value is None else value

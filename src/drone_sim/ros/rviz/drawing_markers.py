@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Point, Vector3
-from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_sim.ros.vehicle.messages import WORLD_FRAME
+from drone_sim.ros.core.message_conversion import WORLD_FRAME
+from drone_sim.ros.rviz.marker_topics import fan, new_marker
 from drone_sim.run.pacing import Throttle
 from drone_sim.scripting.api.drawings import DrawingObject, Drawings, Item
 
@@ -32,7 +31,7 @@ class DrawingMarkers:
     """Shows drawing objects, each as one marker."""
 
     def __init__(self, drone: str, drawings: Drawings):
-        """Advertise where all that flies has its topics: see marker_topic.namespace."""
+        """Advertise below `drone`, where all that flies has its topics, what `drawings` hold."""
         self._drawings = drawings
         self._throttle = Throttle(_PERIOD)
         self._shown = 0
@@ -50,16 +49,12 @@ class DrawingMarkers:
 
 
 def _marker(handle: int, drawn: DrawingObject) -> Marker:
-    marker = Marker(type=_KINDS.get(drawn.kind, Marker.TRIANGLE_LIST), ns="drawing", id=handle, frame_locked=True)
-    marker.header.frame_id = WORLD_FRAME
-    marker.pose.orientation.w = 1.0
-    marker.color = ColorRGBA(*drawn.rgba)
-    if marker.type == Marker.TRIANGLE_LIST:
-        scale = 1.0
-    else:
-        scale = drawn.size * (_PIXEL if drawn.kind in ("points", "lines", "linestrip") else 1.0)
-    marker.scale = Vector3(scale, scale, scale)
-    marker.points = [Point(*point) for item in drawn.in_world() for point in _points(drawn, item)]
+    kind = _KINDS.get(drawn.kind, Marker.TRIANGLE_LIST)
+    scale = drawn.size * (_PIXEL if drawn.kind in ("points", "lines", "linestrip") else 1.0)
+    points = [point for item in drawn.in_world() for point in _points(drawn, item)]
+    scales = [1.0 if kind == Marker.TRIANGLE_LIST else scale] * 3
+    marker = new_marker(kind, drawn.rgba, scales, points, ns="drawing")
+    marker.header.frame_id, marker.id, marker.frame_locked = WORLD_FRAME, handle, True
     return marker
 
 
@@ -77,11 +72,7 @@ def _polygon(item: Item, radius: float, corners: int) -> list[Sequence[float]]:
     up = np.cross(normal, aside)
     angles = 2 * np.pi * np.arange(corners) / corners
     rim: Any = (middle + np.outer(np.cos(angles), aside) + np.outer(np.sin(angles), up)).tolist()
-    centre: Any = middle.tolist()
-    triangles: list[Sequence[float]] = []
-    for one, other in zip(rim, [*rim[1:], rim[0]]):
-        triangles += [centre, one, other]
-    return triangles
+    return fan(middle.tolist(), rim)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

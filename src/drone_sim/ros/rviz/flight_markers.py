@@ -1,4 +1,4 @@
-"""How high the drone is, what it is told to do, how it fares, in rviz: `view/height`, `view/command`, `view/state`."""
+"""How high, commanded and in what state vehicles are, where they flew: `view/height`, `/command`, `/state`, `/path`."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from visualization_msgs.msg import Marker
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.state import State, Twist
-from drone_sim.ros.rviz.marker_topic import EYES, WORDS, MarkerTopic, beside, namespace, new_marker
+from drone_sim.ros.rviz.marker_topics import WORDS, FleetMarkers, band, beside, fan, new_marker
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.flight_state import UNKNOWN
+from drone_sim.vehicles.commands import UNKNOWN
 from drone_sim.vehicles.vehicle import Vehicle
 
 _ABOVE_FLOOR = 0.004  # m, so that the shadow is not hidden by it
@@ -35,79 +35,72 @@ _BLUE = (0.0, 0.30, 0.95, 1.0)
 _AWAY = 0.3  # m, from the drone's middle: what is about the drone must not hide it
 _HALF, _WIDE, _HEAD = 0.018, 0.065, 0.12  # m: half the width of an arrow and of its head, and the head's length
 _TEXT_ABOVE, _TEXT_SIZE = 0.34, 0.042  # m
+_PATH_PERIOD = 0.1  # s of real time
+_PATH_SPACING = 0.05  # m between two points
+_PATH_LENGTH = 1500  # points; the oldest go
+_PATH_WIDTH = 0.012  # m
+_ORANGE = (1.0, 0.42, 0.0, 1.0)
+_Seen = tuple[list[int], Vector]
 
 
-class HeightMarkers:
+class HeightMarkers(FleetMarkers):
     """A soft shadow straight below, and a plumb line with a tick for every half metre."""
 
-    def __init__(self, simulation: Simulation):
-        """Advertise."""
-        self._simulation = simulation
-        self._topic = MarkerTopic(f"{namespace(simulation)}/view/height", EYES)
-        self._shown: list[State] = []
+    name = "height"
 
-    def update(self) -> None:
-        """Publish where a vehicle has moved, if anybody listens."""
-        vehicles = self._simulation.vehicles.values()
-        states = [vehicle.state for vehicle in vehicles]
-        if states != self._shown and self._topic.due():
-            self._shown = states
-            self._topic.show([marker for vehicle in vehicles for marker in _below(vehicle)])
+    def _look(self, vehicle: Vehicle) -> State:
+        return vehicle.body.state
+
+    def _draw(self, vehicle: Vehicle, seen: State) -> Sequence[Marker | None]:
+        height = seen.position[2]
+        line = beside(vehicle, _plumb_line(round(height, _MILLIMETRES)))
+        return [_shadow(seen), line] if height > 0 else [None, None]
 
 
-class CommandMarkers:
+class CommandMarkers(FleetMarkers):
     """An arrow for the velocity that is commanded, and one around the vehicle for the turn."""
 
-    def __init__(self, simulation: Simulation):
-        """Advertise."""
-        self._simulation = simulation
-        self._topic = MarkerTopic(f"{namespace(simulation)}/view/command", EYES)
-        self._shown: list[_Told | None] = []
+    name = "command"
 
-    def update(self) -> None:
-        """Publish commands and places where they have changed, if anybody listens."""
-        vehicles = self._simulation.vehicles.values()
-        seen = [_told(vehicle) for vehicle in vehicles]
-        if seen != self._shown and self._topic.due():
-            self._shown = seen
-            self._topic.show([marker for vehicle in vehicles for marker in _commanded(vehicle)])
+    def _look(self, vehicle: Vehicle) -> tuple[Twist, frames.Matrix, State] | None:
+        """Return what its arrows are made of, None where it has none."""
+        command, moves = vehicle.commands.now, any((*vehicle.commands.now.linear, vehicle.commands.now.angular[2]))
+        return (command, vehicle.track.matrix(), vehicle.body.state) if moves else None
+
+    def _draw(self, vehicle: Vehicle, _seen: Any) -> Sequence[Marker | None]:
+        command, track = vehicle.commands.now, vehicle.track.matrix()
+        markers = [_arrow(command, track), _turn(command, track)]
+        return [beside(vehicle, marker) if marker else None for marker in markers]
 
 
-_Told = tuple[Twist, frames.Matrix, State]
-
-
-def _told(vehicle: Vehicle) -> _Told | None:
-    """Return what its arrows are made of, None where it has none."""
-    command = vehicle.command
-    return (command, vehicle.track, vehicle.state) if any((*command.linear, command.angular[2])) else None
-
-
-class StateText:
+class StateText(FleetMarkers):
     """The vehicle's flight state, the simulated time, height and speed, above each."""
 
+    name = "state"
+
     def __init__(self, simulation: Simulation, player: Player):
-        """Advertise."""
-        self._simulation = simulation
+        """Advertise for the vehicles of `simulation`, which `player` may have paused."""
+        super().__init__(simulation)
         self._player = player
-        self._topic = MarkerTopic(f"{namespace(simulation)}/view/state", EYES)
         self._words = Throttle(WORDS)
         self._texts: dict[str, str] = {}
-        self._shown: list[tuple[str, State]] = []
 
     def update(self) -> None:
         """Publish texts and places where they have changed, if anybody listens."""
-        if not self._topic.due():
-            return
-        vehicles = self._simulation.vehicles.values()
-        if self._words.passes():
-            self._texts = {vehicle.name: self._say(vehicle) for vehicle in vehicles}
-        seen = [(self._texts.get(vehicle.name, ""), vehicle.state) for vehicle in vehicles]
-        if seen != self._shown:
-            self._shown = seen
-            self._topic.show([_text(vehicle, text) for vehicle, (text, _) in zip(vehicles, seen)])
+        if self._topic.watched and self._words.passes():
+            self._texts = {name: self._say(vehicle) for name, vehicle in self._simulation.vehicles.items()}
+        super().update()
+
+    def _look(self, vehicle: Vehicle) -> tuple[str, State]:
+        return self._texts.get(vehicle.name, ""), vehicle.body.state
+
+    def _draw(self, vehicle: Vehicle, seen: tuple[str, State]) -> Sequence[Marker | None]:
+        marker = new_marker(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
+        marker.text, marker.pose.position.z = seen[0], _TEXT_ABOVE
+        return [beside(vehicle, marker)]
 
     def _say(self, vehicle: Vehicle) -> str:
-        simulation, state = self._simulation, vehicle.state
+        simulation, state = self._simulation, vehicle.body.state
         if not simulation.running:
             return "stopped"
         said = str(vehicle.flight_state)
@@ -118,37 +111,17 @@ class StateText:
         return f"{who}{doing}  {simulation.time:.1f} s\nheight {state.position[2]:.2f} m  speed {speed:.2f} m/s"
 
 
-def _text(vehicle: Vehicle, text: str) -> Marker:
-    marker = new_marker(Marker.TEXT_VIEW_FACING, _INK, (0, 0, _TEXT_SIZE))
-    marker.text, marker.pose.position.z = text, _TEXT_ABOVE
-    return beside(vehicle, marker)
-
-
-def _below(vehicle: Vehicle) -> list[Marker | None]:
-    state = vehicle.state
-    height = state.position[2]
-    return [_shadow(state), beside(vehicle, _plumb_line(round(height, _MILLIMETRES)))] if height > 0 else [None, None]
-
-
-def _commanded(vehicle: Vehicle) -> list[Marker | None]:
-    markers = [_arrow(vehicle.command, vehicle.track), _turn(vehicle.command, vehicle.track)]
-    return [beside(vehicle, marker) if marker else None for marker in markers]
-
-
 def _shadow(state: State) -> Marker:
     """Return a disc on the floor, dark in the middle, wider and paler with the height."""
     x, y, height = state.position
     radius = round(_SHADOW[0] + _SHADOW[1] * height, _MILLIMETRES)
     angles = [2 * math.pi * number / _RIM for number in range(_RIM)]
     rim = [(math.cos(angle), math.sin(angle), 0.0) for angle in angles]
-    points: list[Sequence[float]] = []
-    for one, other in zip(rim, [*rim[1:], rim[0]]):
-        points += [(0.0, 0.0, 0.0), one, other]
-    marker = new_marker(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), points)
+    points = fan((0.0, 0.0, 0.0), rim)
+    marker = new_marker(Marker.TRIANGLE_LIST, (0, 0, 0, 0.99), (radius, radius, 1), points, ns="shadow")
     dark = _DARK * (_SHADOW[0] / radius) ** 0.5
     marker.colors = [ColorRGBA(0, 0, 0, dark), ColorRGBA(0, 0, 0, 0), ColorRGBA(0, 0, 0, 0)] * _RIM
     marker.pose.position = Point(x, y, _ABOVE_FLOOR)
-    marker.ns = "shadow"
     return marker
 
 
@@ -158,9 +131,7 @@ def _plumb_line(height: float) -> Marker:
     for number in range(1, min(_TICKS, math.ceil(height / _TICK))):
         half, z = (0.05 if number % 2 else 0.1), number * _TICK - height
         points += [(-half, 0.0, z), (half, 0.0, z), (0.0, -half, z), (0.0, half, z)]
-    marker = new_marker(Marker.LINE_LIST, _INK, (_THIN, 0, 0), points)
-    marker.ns = "plumb line"
-    return marker
+    return new_marker(Marker.LINE_LIST, _INK, (_THIN, 0, 0), points, ns="plumb line")
 
 
 def _arrow(command: Twist, base: frames.Matrix) -> Marker | None:
@@ -195,11 +166,79 @@ def _flat(middle: np.ndarray, aside: np.ndarray, tip: np.ndarray) -> Marker:
     rviz's own arrows are dark when they are seen from behind.
     """
     left, right = middle + _HALF * aside, middle - _HALF * aside
-    points: list[Sequence[float]] = []
-    for one, other, next_one, next_other in zip(*(side.tolist() for side in (left, right, left[1:], right[1:]))):
-        points += [one, other, next_other, one, next_other, next_one]
-    head: Any = np.array([middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip]).tolist()
-    points += head
+    head = np.array([middle[-1] + _WIDE * aside[-1], middle[-1] - _WIDE * aside[-1], tip])
+    points: list[Any] = [*band(list(left), list(right)), *head]
     marker = new_marker(Marker.TRIANGLE_LIST, _BLUE, (1, 1, 1), points)
     marker.colors = [marker.color] * len(points)  # lights it from everywhere
     return marker
+
+
+class PathMarkers(FleetMarkers):
+    """Shows the flights since the last start, load or stop as lines, drawn while somebody listens."""
+
+    name, period = "path", _PATH_PERIOD
+
+    def __init__(self, simulation: Simulation):
+        """Advertise for the vehicles of `simulation`."""
+        super().__init__(simulation)
+        self._run = -1
+        self._paths: dict[str, _Path] = {}
+
+    def update(self) -> None:
+        """Follow the vehicles, and publish what is new, if anybody listens."""
+        vehicles = self._simulation.vehicles
+        if self._run != self._simulation.run or not self._topic.watched:
+            self._paths = {} if self._run != self._simulation.run else self._paths
+            self._run = self._simulation.run
+            for path in self._paths.values():
+                path.interrupt()
+        if not self._topic.watched:
+            return
+        self._paths = {name: self._paths.get(name) or _Path() for name in vehicles}
+        for name, vehicle in vehicles.items():
+            self._paths[name].follow(vehicle)
+        seen = [path.seen for path in self._paths.values()]
+        if seen != self._shown and self._topic.due():
+            self._shown = seen
+            lines = [line for path in self._paths.values() for line in path.lines() if len(line) > 1]
+            drawn = [new_marker(Marker.LINE_STRIP, _ORANGE, (_PATH_WIDTH, 0, 0), line) for line in lines]
+            self._topic.show([Marker(action=Marker.DELETEALL), *drawn])
+
+
+class _Path:
+    """Where one vehicle has flown. Where it was put somewhere else, a line ends and another begins."""
+
+    def __init__(self) -> None:
+        self._lines: list[list[Vector]] = []
+        self._jumps: int | None = None  # None where nobody has looked for a while
+        self._place: Vector = (0.0, 0.0, 0.0)
+
+    @property
+    def seen(self) -> _Seen:
+        """What changes when it looks different."""
+        return [len(line) for line in self._lines], self._place
+
+    def lines(self) -> list[list[Vector]]:
+        """Return its lines, the last of them to where the vehicle is now."""
+        return [*self._lines[:-1], [*self._lines[-1], self._place]]
+
+    def interrupt(self) -> None:
+        """Begin another line the next time."""
+        self._jumps = None
+
+    def follow(self, vehicle: Vehicle) -> None:
+        """Keep where it is, where that is some way from the last point."""
+        self._place = vehicle.body.state.position
+        if vehicle.body.jumps != self._jumps:
+            self._lines = [line for line in self._lines if len(line) > 1]
+            self._lines.append([self._place])
+        elif math.dist(self._place, self._lines[-1][-1]) > _PATH_SPACING:
+            self._lines[-1].append(self._place)
+            self._shorten()
+        self._jumps = vehicle.body.jumps
+
+    def _shorten(self) -> None:
+        if sum(map(len, self._lines)) > _PATH_LENGTH:
+            del self._lines[0][0]
+            if not self._lines[0]:
+                del self._lines[0]

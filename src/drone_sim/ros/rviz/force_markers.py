@@ -15,11 +15,10 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.frames import Vector, cross
 from drone_sim.mechanics.state import State
-from drone_sim.ros.rviz.line_arrows import arrow, star
-from drone_sim.ros.rviz.marker_topic import EYES, MarkerTopic, beside, namespace, new_marker
-from drone_sim.ros.vehicle import frame_names
+from drone_sim.ros.core.message_conversion import BASE_LINK, frame
+from drone_sim.ros.rviz.marker_topics import FleetMarkers, beside, new_marker
 from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.sensor import Contact
 from drone_sim.vehicles.vehicle import Vehicle
@@ -35,9 +34,14 @@ _CROSS = 0.045  # m, half a side of a lost propeller's
 _ABOVE, _ASIDE, _TEXT_SIZE = 0.5, 0.16, 0.042  # m: the wind is drawn over the words of `view/state`
 _GREEN, _RED = (0.05, 0.55, 0.15, 1.0), (0.85, 0.08, 0.05, 1.0)
 _TEAL, _PURPLE = (0.0, 0.45, 0.55, 1.0), (0.75, 0.0, 0.6, 1.0)
+# An arrow of lines, which rviz turns to who looks and lights from everywhere; not so its own arrows.
+_HEAD = 0.045  # m, how far back its barbs reach
+_SHARE = 0.4  # of a short arrow
+_SPREAD = 0.5  # how far aside they reach, for each metre back
+_CORNERS: tuple[Vector, ...] = ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, 1))
 
 
-class _Felt(NamedTuple):
+class _ActingForces(NamedTuple):
     """What acts on a vehicle."""
 
     state: State
@@ -47,37 +51,30 @@ class _Felt(NamedTuple):
     contacts: tuple[Contact, ...]
 
 
-class ForceMarkers:
+class ForceMarkers(FleetMarkers):
     """Arrows for what the propellers give, for the wind, and for what the vehicle touches; drawn for who listens.
 
     Contacts are those of the step's last sub-step: they are read from the world after it, which changes nothing there.
     """
 
+    name = "forces"
+
     def __init__(self, simulation: Simulation):
-        """Advertise."""
-        self._simulation = simulation
-        self._topic = MarkerTopic(f"{namespace(simulation)}/view/forces", EYES)
-        self._touched = _Touched(simulation)
-        self._shown: list[_Felt] = []
+        """Advertise for the vehicles of `simulation`."""
+        super().__init__(simulation)
+        self._touched = _StepContacts(simulation)
 
-    def update(self) -> None:
-        """Publish what has changed, if anybody listens."""
-        if not self._topic.due():
-            return
-        vehicles = self._simulation.vehicles.values()
-        felt = [self._felt(vehicle) for vehicle in vehicles]
-        if felt != self._shown:
-            self._shown = felt
-            gravity = self._simulation.parameters.gravity
-            self._topic.show([one for pair in zip(vehicles, felt) for one in drawn(*pair, gravity)])
-
-    def _felt(self, vehicle: Vehicle) -> _Felt:
+    def _look(self, vehicle: Vehicle) -> _ActingForces:
         law = vehicle.propulsion.law
-        wind = vehicle.body.wind if self._simulation.shared.weather.is_felt else None
-        return _Felt(vehicle.state, tuple(law.thrusts), law.effectiveness, wind, self._touched.by(vehicle))
+        wind = vehicle.body.wind if self._simulation.context.weather.is_felt else None
+        return _ActingForces(vehicle.body.state, tuple(law.thrusts), law.effectiveness, wind, self._touched.by(vehicle))
+
+    def _draw(self, vehicle: Vehicle, seen: _ActingForces) -> Sequence[Marker | None]:
+        scale = metres_per_newton(vehicle.body.mass, self._simulation.parameters.gravity)
+        return [_thrusts(vehicle, seen, scale), *_wind(vehicle, seen.wind), *_contacts(seen.contacts, scale)]
 
 
-class _Touched:
+class _StepContacts:
     """What vehicles touched in the last step. One that was put elsewhere since then touches nothing yet."""
 
     def __init__(self, simulation: Simulation):
@@ -88,17 +85,11 @@ class _Touched:
         now = self._simulation.run, self._simulation.steps
         seen, jumps = self._seen.get(vehicle.name, (None, 0))
         if seen != now:
-            jumps = vehicle.jumps
+            jumps = vehicle.body.jumps
             self._seen[vehicle.name] = now, jumps
-        if not self._simulation.steps or jumps != vehicle.jumps:
+        if not self._simulation.steps or jumps != vehicle.body.jumps:
             return ()
-        return tuple(vehicle.instruments.carrier.contacts())
-
-
-def drawn(vehicle: Vehicle, felt: _Felt, gravity: float) -> list[Marker | None]:
-    """Return the markers of one vehicle: always as many, None for what is not there. `gravity` in m/s²."""
-    scale = metres_per_newton(vehicle.body.mass, gravity)
-    return [_thrusts(vehicle, felt, scale), *_wind(vehicle, felt.wind), *_contacts(felt.contacts, scale)]
+        return tuple(vehicle.body.contacts())
 
 
 def metres_per_newton(mass: float, gravity: float) -> float:
@@ -106,21 +97,22 @@ def metres_per_newton(mass: float, gravity: float) -> float:
     return HOVER / (mass * (abs(gravity) or _EARTH) / 4)
 
 
-def _thrusts(vehicle: Vehicle, felt: _Felt, scale: float) -> Marker | None:
+def _thrusts(vehicle: Vehicle, felt: _ActingForces, scale: float) -> Marker | None:
     """Return the arrows of all propellers; red where one is weak, a cross where it is lost."""
     points: list[Vector] = []
     colors: list[ColorRGBA] = []
     for link, thrust, share in zip(vehicle.propulsion.rotors.links, felt.thrusts, felt.effectiveness):
         place, way = frames.position(link), _times(round(scale * thrust, _FINE), (link[2], link[6], link[10]))
         lines = arrow(place, way) if abs(scale * thrust) > _SHORTEST else []
-        lines += [] if share else star(place, _CROSS)
+        corners = [] if share else _CORNERS  # whose diagonals are a cross from wherever it is seen
+        lines += [_sum(place, _times(reach, corner)) for corner in corners for reach in (-_CROSS, _CROSS)]
         points += lines
         colors += [ColorRGBA(*(_GREEN if share == 1 else _RED))] * len(lines)
     if not points:
         return None
-    marker = _named("thrust", new_marker(Marker.LINE_LIST, _GREEN, (_WIDTH, 0, 0), points))
+    marker = new_marker(Marker.LINE_LIST, _GREEN, (_WIDTH, 0, 0), points, ns="thrust")
     marker.colors = colors
-    marker.header.frame_id, marker.frame_locked = frame_names.base_link(vehicle.parameters), True
+    marker.header.frame_id, marker.frame_locked = frame(vehicle.parameters, BASE_LINK), True
     return marker
 
 
@@ -130,12 +122,12 @@ def _wind(vehicle: Vehicle, wind: Vector | None) -> list[Marker | None]:
         return [None, None]
     speed = math.hypot(*wind)
     x, y, z = _times(-_ASIDE / (speed or 1.0), wind)  # the words are where it comes from
-    text = new_marker(Marker.TEXT_VIEW_FACING, _TEAL, (0, 0, _TEXT_SIZE))
+    text = new_marker(Marker.TEXT_VIEW_FACING, _TEAL, (0, 0, _TEXT_SIZE), ns="wind")
     text.text = f"wind {speed:.1f} m/s"
     text.pose.position = Point(x, y, z + _ABOVE)
     lines = arrow((0.0, 0.0, _ABOVE), _times(WIND, wind)) if WIND * speed > _SHORTEST else []
-    shaft = beside(vehicle, new_marker(Marker.LINE_LIST, _TEAL, (_WIDTH, 0, 0), lines)) if lines else None
-    return [shaft and _named("wind", shaft), _named("wind", beside(vehicle, text))]
+    shaft = new_marker(Marker.LINE_LIST, _TEAL, (_WIDTH, 0, 0), lines, ns="wind")
+    return [beside(vehicle, shaft) if lines else None, beside(vehicle, text)]
 
 
 def _contacts(contacts: Sequence[Contact], scale: float) -> list[Marker | None]:
@@ -147,15 +139,33 @@ def _contacts(contacts: Sequence[Contact], scale: float) -> list[Marker | None]:
         length = scale * math.hypot(*one.force)
         if length > _SHORTEST:
             lines += arrow(one.point, _times(scale * min(1.0, LONGEST / length), one.force))
-    points = new_marker(Marker.SPHERE_LIST, _PURPLE, [_POINT] * 3, [one.point for one in contacts])
-    forces = new_marker(Marker.LINE_LIST, _PURPLE, (_WIDTH, 0, 0), lines) if lines else None
-    return [_named("contacts", points), forces and _named("contacts", forces)]
+    points = new_marker(Marker.SPHERE_LIST, _PURPLE, [_POINT] * 3, [one.point for one in contacts], ns="contacts")
+    forces = new_marker(Marker.LINE_LIST, _PURPLE, (_WIDTH, 0, 0), lines, ns="contacts")
+    return [points, forces if lines else None]
+
+
+def arrow(start: Vector, way: Vector) -> list[Vector]:
+    """Return the lines of an arrow from `start` along `way`, which is not 0 (m), point by point.
+
+    They are its shaft and four barbs, each of which begins at the tip.
+    """
+    length = math.hypot(*way)
+    x, y, z = ahead = way[0] / length, way[1] / length, way[2] / length
+    across = cross(ahead, (1.0, 0.0, 0.0) if abs(x) < 0.9 else (0.0, 1.0, 0.0))
+    aside = _times(1 / math.hypot(*across), across)
+    tip = _sum(start, way)
+    back = min(_HEAD, _SHARE * length)
+    neck = _sum(tip, (-back * x, -back * y, -back * z))
+    points = [start, tip]
+    for direction in (aside, cross(ahead, aside)):
+        for reach in (_SPREAD * back, -_SPREAD * back):
+            points += [tip, _sum(neck, _times(reach, direction))]
+    return points
 
 
 def _times(factor: float, vector: Vector) -> Vector:
     return factor * vector[0], factor * vector[1], factor * vector[2]
 
 
-def _named(name: str, marker: Marker) -> Marker:
-    marker.ns = name
-    return marker
+def _sum(one: Vector, other: Vector) -> Vector:
+    return one[0] + other[0], one[1] + other[1], one[2] + other[2]

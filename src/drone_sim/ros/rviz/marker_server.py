@@ -1,19 +1,22 @@
-"""Handles that slide level, rise and turn, as rviz knows them: interactive markers."""
+"""Handles that slide level, rise and turn, as rviz knows them: interactive markers; and who holds which of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+import time
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rospy
-from geometry_msgs.msg import Point, Pose, Quaternion
+from geometry_msgs.msg import Quaternion
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer
-from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, Marker
+from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, InteractiveMarkerFeedback, Marker
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
-from drone_sim.ros.vehicle.messages import WORLD_FRAME
+from drone_sim.ros.core.message_conversion import WORLD_FRAME
 
+PATIENCE = 1.0  # s; while a handle is held, rviz says so every 0.25 s
 _UPRIGHT = Quaternion(0, 2**-0.5, 0, 2**-0.5)  # a control acts along, about, or across its x axis: turned to z
 
 
@@ -57,6 +60,30 @@ def level(matrix: Matrix) -> Matrix:
     return frames.from_rpy(frames.position(matrix), (0, 0, frames.to_rpy(matrix)[2]))
 
 
-def pose_message(matrix: Matrix) -> Pose:
-    """Return a pose in the world as ROS says it."""
-    return Pose(Point(*frames.position(matrix)), Quaternion(*frames.to_quaternion(matrix)))
+class HeldHandles:
+    """The handles that clients hold; one of which nothing has been heard for PATIENCE has let go, or has died.
+
+    Any thread may call all of it.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        """Begin with none; take a monotonic clock."""
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._heard: dict[tuple[str, str], float] = {}  # by handle and client, s
+
+    def on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
+        """Take what a client tells of a handle; who has not taken one cannot hold it."""
+        held = feedback.marker_name, feedback.client_id
+        with self._lock:
+            if feedback.event_type == InteractiveMarkerFeedback.MOUSE_UP:
+                self._heard.pop(held, None)
+            elif feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN or held in self._heard:
+                self._heard[held] = self._clock()
+
+    def names(self) -> set[str]:
+        """Return the handles that are held."""
+        with self._lock:
+            since = self._clock() - PATIENCE
+            self._heard = {one: heard for one, heard in self._heard.items() if heard > since}
+            return {name for name, _ in self._heard}

@@ -11,17 +11,16 @@ from typing import Any
 
 import yaml
 
+from drone_sim.command_line import Parser, status_of
 from drone_sim.config.types import Checked
 from drone_sim.files import writing
 from drone_sim.mechanics import frames
-from drone_sim.offline.command_line import Parser, status_of
-from drone_sim.ros.tools.bag_flights import PUSH, STATE, TWIST, BagFlight, BagSteps
-from drone_sim.ros.tools.bags import Bag, BagRefused, Heard
-from drone_sim.ros.vehicle.conditions import read_changes
-from drone_sim.ros.vehicle.messages import WORLD_FRAME
+from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz, xyzw
+from drone_sim.ros.core.validation import read_changes
+from drone_sim.ros.tools.bags import PUSH, STATE, TWIST, Bag, BagError, BagFlight, BagSteps, RecordedMessage
 from drone_sim.run import parameters
 from drone_sim.vehicles.checks import Refused
-from drone_sim.vehicles.requests import EMPTY, POSE, REQUESTS
+from drone_sim.vehicles.commands import EMPTY, POSE, REQUESTS
 
 _NAME = "bag_commands"
 _NEAR = 2  # steps, by which the recorder may have heard of a command earlier or later than the simulator
@@ -48,7 +47,7 @@ def _write(options: argparse.Namespace) -> None:
         entries = sorted(_entries(bag, flight), key=lambda one: one["at"])
         begins = next((one.message.data for one in bag.read(f"{flight.namespace}/state", STATE)), "")
     if not entries:
-        raise BagRefused(f"{options.bag}: nothing was commanded in it on {flight.namespace}/cmd_vel and the like")
+        raise BagError(f"{options.bag}: nothing was commanded in it on {flight.namespace}/cmd_vel and the like")
     landed = " --set start=landed" if begins == "landed" else ""
     lines = [yaml.safe_dump(one, default_flow_style=True, sort_keys=False, width=math.inf) for one in entries]
     writing.write(options.timeline, f"# fly --commands{landed}\n{''.join(f'- {line}' for line in lines)}")
@@ -56,7 +55,7 @@ def _write(options: argparse.Namespace) -> None:
 
 
 def _entries(bag: Bag, flight: BagFlight) -> Iterator[_Action]:
-    """Yield the entries of the timeline. Raises BagRefused."""
+    """Yield the entries of the timeline. Raises BagError."""
     steps = flight.steps()
     yield from _twists(bag.read(f"{flight.namespace}/cmd_vel", TWIST), steps)
     states = [(steps.row_after(one.at) - 1, one.message.data) for one in bag.read(f"{flight.namespace}/state", STATE)]
@@ -69,11 +68,11 @@ def _entries(bag: Bag, flight: BagFlight) -> Iterator[_Action]:
                 yield {"at": steps.time(row), **action}
 
 
-def _twists(messages: Iterator[Heard], steps: BagSteps) -> Iterator[_Action]:
+def _twists(messages: Iterator[RecordedMessage], steps: BagSteps) -> Iterator[_Action]:
     """Yield twists at the step that obeyed them, as far as the commands in force tell it."""
     before: tuple[float, ...] = ()
     for heard in messages:
-        linear, angular = _xyz(heard.message.linear), _xyz(heard.message.angular)
+        linear, angular = xyz(heard.message.linear), xyz(heard.message.angular)
         if _finite(*linear, *angular):
             now, row = (*linear, angular[2]), steps.row_after(heard.at)
             if now != before:
@@ -86,42 +85,35 @@ def _twists(messages: Iterator[Heard], steps: BagSteps) -> Iterator[_Action]:
 # ---- messages as actions of a timeline; None for one that the simulator refused
 
 
-def _asking(topic: str) -> Callable[[Any], _Action | None]:
-    return lambda _message: {topic: {}}
+def _request(topic: str, _message: Any) -> _Action:
+    return {topic: {}}
 
 
-def _pose(kind: str) -> Callable[[Any], _Action | None]:
-    def read(message: Any) -> _Action | None:
-        turn, place = message.pose.orientation, _xyz(message.pose.position)
-        quaternion = (turn.x, turn.y, turn.z, turn.w)
-        if not _in_world(message) or not _finite(*place, *quaternion) or abs(math.hypot(*quaternion) - 1) > 0.01:
-            return None
-        rpy = frames.to_rpy(frames.from_quaternion((0, 0, 0), quaternion))
-        return {kind: {"position": [*place], "rpy": [*rpy]}}
-
-    return read
+def _pose(kind: str, message: Any) -> _Action | None:
+    place, quaternion = xyz(message.pose.position), xyzw(message.pose.orientation)
+    if not _in_world(message) or not _finite(*place, *quaternion) or abs(math.hypot(*quaternion) - 1) > 0.01:
+        return None
+    rpy = frames.to_rpy(frames.from_quaternion((0, 0, 0), quaternion))
+    return {kind: {"position": [*place], "rpy": [*rpy]}}
 
 
 def _push(message: Any) -> _Action | None:
-    force, torque = _xyz(message.wrench.force), _xyz(message.wrench.torque)
+    force, torque = xyz(message.wrench.force), xyz(message.wrench.torque)
     if not _in_world(message) or not _finite(*force, *torque):
         return None
     return {"push": {"force": [*force], "torque": [*torque], "duration": 0.2}}  # config/drone.yaml's
 
 
 def _wind(message: Any) -> _Action | None:
-    wind = _xyz(message.vector)
+    wind = xyz(message.vector)
     return {"weather": {"wind": [*wind]}} if _in_world(message) and _finite(*wind) else None
 
 
-def _change(kind: str) -> Callable[[Any], _Action | None]:
-    def read(message: Any) -> _Action | None:
-        try:
-            return {kind: read_changes(message, _allowed()[kind])}
-        except Refused:
-            return None
-
-    return read
+def _change(kind: str, message: Any) -> _Action | None:
+    try:
+        return {kind: read_changes(message, _allowed()[kind])}
+    except Refused:
+        return None
 
 
 @functools.cache
@@ -131,18 +123,14 @@ def _allowed() -> dict[str, Checked]:
 
 
 _READ: dict[str, tuple[str, Callable[[Any], _Action | None]]] = {  # by topic: its kind of message, and what reads it
-    **{topic: (kind, _asking(topic)) for topic, kind in REQUESTS.items() if kind == EMPTY},
-    "goto": (POSE, _pose("goto")),
-    "set_pose": (POSE, _pose("pose")),
+    **{topic: (kind, functools.partial(_request, topic)) for topic, kind in REQUESTS.items() if kind == EMPTY},
+    "goto": (POSE, functools.partial(_pose, "goto")),
+    "set_pose": (POSE, functools.partial(_pose, "pose")),
     "push": (PUSH, _push),
     "set_wind": ("geometry_msgs/Vector3Stamped", _wind),
-    "weather": ("diagnostic_msgs/KeyValue", _change("weather")),
-    "faults": ("diagnostic_msgs/KeyValue", _change("faults")),
+    "weather": ("diagnostic_msgs/KeyValue", functools.partial(_change, "weather")),
+    "faults": ("diagnostic_msgs/KeyValue", functools.partial(_change, "faults")),
 }
-
-
-def _xyz(vector: Any) -> tuple[float, float, float]:
-    return vector.x, vector.y, vector.z
 
 
 def _finite(*values: float) -> bool:

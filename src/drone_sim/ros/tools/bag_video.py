@@ -9,12 +9,11 @@ from contextlib import closing
 
 import numpy as np
 
+from drone_sim.command_line import Parser, status_of
 from drone_sim.offline import video
-from drone_sim.offline.command_line import Parser, status_of
-from drone_sim.offline.hud import Flight
+from drone_sim.offline.hud import HudState
 from drone_sim.ros.tools import pictures
-from drone_sim.ros.tools.bag_flights import ODOMETRY, STATE, BagFlight
-from drone_sim.ros.tools.bags import Bag, Heard
+from drone_sim.ros.tools.bags import ODOMETRY, STATE, Bag, BagFlight, RecordedMessage
 
 _NAME = "video"
 _IMAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
@@ -37,20 +36,23 @@ def _film(options: argparse.Namespace) -> None:
     video.check(options.video)
     with closing(Bag(options.bag)) as bag:
         topic = bag.named(options.topic, bag.topics(*_IMAGES), "image topic")
-        flight = _flight(bag, topic)
+        vehicle = topic.split("/")[1]  # in whose namespace the pictures are
+        flight = _FlightOverlay(bag, vehicle) if f"/{vehicle}/odom" in bag.topics(ODOMETRY) else None
         rate = _rate(bag, topic)
+        damaged: list[str] = []
         with video.writing_to(options.video, rate) as made:
-            for stamp, picture, times in _timed(bag, topic, rate):
+            for stamp, picture, times in _timed(bag, topic, rate, damaged):
                 made.add(picture, flight.at(stamp) if flight else None, times)
     without = "" if flight else "; no odometry of its drone was recorded, and nothing is written over it"
+    without += f"; {len(damaged)} are left out: {damaged[0]}" if damaged else ""
     print(f"{_NAME}: wrote {options.video} of {topic}: {made}{without}", flush=True)
 
 
-class _Flown:
+class _FlightOverlay:
     """What is shown of the drone at a moment."""
 
     def __init__(self, bag: Bag, vehicle: str):
-        """Read it. Raises BagRefused."""
+        """Read it. Raises BagError."""
         self._flight = BagFlight(bag, vehicle)
         states = bag.topics(STATE)
         own = [name for name in states if name == f"/{vehicle}/state"]
@@ -59,19 +61,13 @@ class _Flown:
         self._times = np.array([one.at for one in heard])
         self._states = [str(one.message.data)[:40] for one in heard]
 
-    def at(self, stamp: float) -> Flight:
+    def at(self, stamp: float) -> HudState:
         """Return what is shown as of a stamp (s)."""
         last = int(np.searchsorted(self._times, stamp, "right")) - 1
-        return Flight.of(self._flight.row_at(stamp), self._states[last] if last >= 0 else "")
+        return HudState.of(self._flight.row_at(stamp), self._states[last] if last >= 0 else "")
 
 
-def _flight(bag: Bag, topic: str) -> _Flown | None:
-    """Return the flight of the vehicle in whose namespace a topic is, if it was recorded."""
-    vehicle = topic.split("/")[1]
-    return _Flown(bag, vehicle) if f"/{vehicle}/odom" in bag.topics(ODOMETRY) else None
-
-
-def _stamp(heard: Heard) -> float:
+def _stamp(heard: RecordedMessage) -> float:
     return float(heard.message.header.stamp.to_sec()) or heard.at
 
 
@@ -83,8 +79,11 @@ def _rate(bag: Bag, topic: str) -> float:
     return round(min(max(rate, _SLOWEST), video.MAX_RATE), 2)
 
 
-def _timed(bag: Bag, topic: str, rate: float) -> Iterator[tuple[float, np.ndarray, int]]:
-    """Yield each picture with its stamp (s), and for how many pictures of a steady rate it is to be seen."""
+def _timed(bag: Bag, topic: str, rate: float, damaged: list[str]) -> Iterator[tuple[float, np.ndarray, int]]:
+    """Yield each picture with its stamp (s), and for how many pictures of a steady rate it is to be seen.
+
+    Pictures that cannot be read are left out, and why is added to `damaged`. Raises ValueError where all are.
+    """
     heard = bag.read(topic, bag.kinds[topic])
     this = next(heard, None)
     start, shown = _stamp(this) if this else 0.0, 0
@@ -97,9 +96,12 @@ def _timed(bag: Bag, topic: str, rate: float) -> Iterator[tuple[float, np.ndarra
             try:
                 picture = pictures.decode(this.message)
             except ValueError as error:
-                raise ValueError(f"{topic}: {error}") from None
-            yield _stamp(this), picture, times
-            shown += times
+                damaged.append(str(error))
+            else:
+                yield _stamp(this), picture, times
+                shown += times
         if following and _stamp(following) > until:  # what was cut out is not made up for
             start += _stamp(following) - until
         this = following
+    if damaged and not shown:
+        raise ValueError(f"{topic}: {damaged[0]}")

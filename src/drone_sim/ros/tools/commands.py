@@ -1,17 +1,70 @@
-"""The command that the keys change, and which one is in force. Neither a terminal nor ROS is needed."""
+"""From the bytes that a terminal sends to keys, the command that they change, and which one is in force.
+
+Neither a terminal nor ROS is needed.
+"""
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable
 from typing import NamedTuple
 
-from drone_sim.ros.tools import keys
+UP, DOWN, LEFT, RIGHT, BACKSPACE, ESCAPE, UNKNOWN = "up", "down", "left", "right", "backspace", "escape", "unknown"
+KEY_PATIENCE = 0.5  # s, for what may follow an ESC; a slow line sends a sequence in pieces
 
+# ECMA-48: ESC [ parameters final, or ESC O final. The Linux console adds ESC [ [ final, and Alt an ESC before a key.
+_WHOLE = re.compile(rb"\x1b+(?:\[\[.|\[[0-?]*[ -/]*[@-Z\\-~]|O[0-9;]*[@-~]|[^\x1b\[O])", re.DOTALL)
+_BEGINNING = re.compile(rb"\x1b+(?:\[\[?|\[[0-?]*[ -/]*|O[0-9;]*)?")
+_ARROW = re.compile(rb"\x1b+[\[O][0-9;]*([ABCD])")
+_ARROWS = {b"A": UP, b"B": DOWN, b"C": RIGHT, b"D": LEFT}
+_CHARACTER = re.compile(rb"[\xc0-\xff][\x80-\xbf]*|.", re.DOTALL)  # UTF-8
+_PLAIN = {b"\x7f": BACKSPACE, b"\x08": BACKSPACE}
 _STEP = 0.1  # m/s, per key press
 _TURN_STEP = 0.2  # rad/s, per key press
 _PATIENCE = 0.5  # s, until what was sent should be in force
+
+
+class KeyDecoder:
+    """Takes bytes as they come, in pieces of any size, and tells the keys: a character, or one of the names above."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic):
+        """Take a monotonic clock."""
+        self._clock = clock
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget what has begun."""
+        self._bytes = b""
+        self._came = self._clock()
+
+    def feed(self, data: bytes) -> list[str]:
+        """Return the keys that are complete with `data`, which may be empty; call it at least now and then.
+
+        An ESC after which nothing comes for KEY_PATIENCE is the key itself; another beginning of a sequence is dropped.
+        """
+        keys = []
+        if data:
+            self._bytes += data
+            self._came = self._clock()
+        while self._bytes and not _BEGINNING.fullmatch(self._bytes):
+            keys.append(self._take())
+        if self._bytes and self._clock() - self._came >= KEY_PATIENCE:
+            keys.append(UNKNOWN if self._bytes.strip(b"\x1b") else ESCAPE)
+            self._bytes = b""
+        return keys
+
+    def _take(self) -> str:
+        found = _WHOLE.match(self._bytes) or _BEGINNING.match(self._bytes) or _CHARACTER.match(self._bytes)
+        assert found
+        taken, self._bytes = found.group(), self._bytes[found.end() :]
+        if taken.startswith(b"\x1b"):
+            arrow = _ARROW.fullmatch(taken)
+            return _ARROWS[arrow.group(1)] if arrow else UNKNOWN
+        if taken in _PLAIN:
+            return _PLAIN[taken]
+        return taken.decode() if taken.isascii() and taken.decode().isprintable() else UNKNOWN
 
 
 class Command(NamedTuple):
@@ -40,10 +93,10 @@ class Command(NamedTuple):
 
 
 _KEYS = {
-    keys.UP: (_STEP, 0, 0, 0),
-    keys.DOWN: (-_STEP, 0, 0, 0),
-    keys.LEFT: (0, _STEP, 0, 0),
-    keys.RIGHT: (0, -_STEP, 0, 0),
+    UP: (_STEP, 0, 0, 0),
+    DOWN: (-_STEP, 0, 0, 0),
+    LEFT: (0, _STEP, 0, 0),
+    RIGHT: (0, -_STEP, 0, 0),
     "u": (0, 0, _STEP, 0),
     "d": (0, 0, -_STEP, 0),
     "e": (0, 0, 0, _TURN_STEP),

@@ -23,7 +23,7 @@ _NAME = 128  # bytes
 _GET_NAME = 0x80006A13 + (_NAME << 16)  # JSIOCGNAME
 
 
-class Pad(NamedTuple):
+class JoyState(NamedTuple):
     """How axes (-1 to 1, +1 to the left and up) and buttons stand."""
 
     axes: tuple[float, ...] = ()
@@ -49,15 +49,15 @@ class Gamepad:
     """An open gamepad."""
 
     def __init__(self, device: str):
-        """Open it. Raises OSError."""
+        """Open `device`, such as /dev/input/js0. Raises OSError."""
         self.device = device
         self._file = os.open(device, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         self._axes: list[float] = []
         self._buttons: list[bool] = []
         self._rest = b""
-        self.name = self._told_name()
+        self.name = self._read_name()
 
-    def _told_name(self) -> str:
+    def _read_name(self) -> str:
         told = bytearray(_NAME)
         with contextlib.suppress(OSError):
             fcntl.ioctl(self._file, _GET_NAME, told)
@@ -72,23 +72,20 @@ class Gamepad:
         """Close it."""
         os.close(self._file)
 
-    def read(self) -> Iterator[Pad]:
+    def read(self) -> Iterator[JoyState]:
         """Yield how it stood after each event that has come. Raises OSError when it has been unplugged."""
         try:
-            data = self._rest + self._more()
+            read = os.read(self._file, _READ)
         except BlockingIOError:
             return
+        if not read:
+            raise OSError(errno.ENODEV, os.strerror(errno.ENODEV), self.device)
+        data = self._rest + read
         whole = len(data) - len(data) % _EVENT.size
         self._rest = data[whole:]
         for _, value, kind, number in _EVENT.iter_unpack(data[:whole]):
             self._take(value, kind & ~_IS_INITIAL, number)
-            yield Pad(tuple(self._axes), tuple(self._buttons))
-
-    def _more(self) -> bytes:
-        data = os.read(self._file, _READ)
-        if not data:
-            raise OSError(errno.ENODEV, os.strerror(errno.ENODEV), self.device)
-        return data
+            yield JoyState(tuple(self._axes), tuple(self._buttons))
 
     def _take(self, value: int, kind: int, number: int) -> None:
         if kind == _AXIS:

@@ -17,21 +17,17 @@ from typing import Any
 
 import rospy
 from sensor_msgs.msg import Joy
-from std_msgs.msg import Empty
 
-from drone_sim.ros.node.ending import Ending
-from drone_sim.ros.node.paths import from_shell
-from drone_sim.ros.node.starting import init_node, reported
-from drone_sim.ros.tools import gamepad, joy_parameters
+from drone_sim.ros.core.shutdown import run_tool
+from drone_sim.ros.core.startup import from_shell
+from drone_sim.ros.tools import gamepad
 from drone_sim.ros.tools.commands import Command
-from drone_sim.ros.tools.gamepad import Gamepad, Pad
-from drone_sim.ros.tools.joy_parameters import JoyParameters
-from drone_sim.ros.tools.pilot import Pilot
+from drone_sim.ros.tools.gamepad import Gamepad, JoyState
+from drone_sim.ros.tools.joy_commands import JoyCommands, JoyParameters, load_joy
 from drone_sim.ros.tools.teleop import Teleop
 
 _NAME = "joy_teleop"
 _LOOKING = 1.0  # s, between two looks for a gamepad
-_BUTTONS = ("takeoff", "land", "reset")
 _OTHERS = ("drone", "simulator")  # private parameters that Teleop reads
 
 
@@ -39,9 +35,9 @@ class JoyTeleop:
     """Reads a gamepad and commands, until somebody ends it."""
 
     def __init__(self, parameters: JoyParameters, teleop: Teleop):
-        """Listen to the topic; take what sends the commands."""
+        """Listen to the topic; take the parameters of joy.yaml, and the teleop that sends the commands."""
         self._parameters, self._teleop = parameters, teleop
-        self._pilot = Pilot(parameters)
+        self._pilot = JoyCommands(parameters)
         self._gamepad: Gamepad | None = None
         self._looked = -math.inf
         self._missed = ""  # a device that has been told of
@@ -49,9 +45,7 @@ class JoyTeleop:
         self._messages: queue.SimpleQueue[Joy] = queue.SimpleQueue()
         self._flew = False
         self._due = 0.0
-        names = ((name, f"{teleop.drone}/{name}") for name in _BUTTONS)
-        self._publishers = {name: rospy.Publisher(topic, Empty, queue_size=1) for name, topic in names}
-        self._topic = rospy.Subscriber("joy", Joy, self._hear, queue_size=10)
+        self._topic = rospy.Subscriber("joy", Joy, self._on_joy, queue_size=10)
 
     def run(self, over: Callable[[], bool]) -> None:
         """Fly until it is over."""
@@ -60,7 +54,8 @@ class JoyTeleop:
             self._look_for_gamepad()
             for pad in self._states(max(0.0, self._due - time.monotonic())):
                 for name in self._pilot.see(pad):
-                    self._ask_for(name)
+                    heard = self._teleop.ask_for(name)
+                    rospy.loginfo(f"{_NAME}: {name}{'' if heard else f': {self._teleop.said}'}")
                 self._command()
             self._watch_topic()
             self._command()
@@ -80,19 +75,13 @@ class JoyTeleop:
         if not self._teleop.send(command):
             rospy.logwarn_throttle(5, f"{_NAME}: {self._teleop.said}")
 
-    def _ask_for(self, name: str) -> None:
-        publisher = self._publishers[name]
-        listened = publisher.get_num_connections() > 0
-        rospy.loginfo(f"{_NAME}: {name}{'' if listened else f': nobody listens on {publisher.resolved_name}'}")
-        publisher.publish(Empty())
-
     # ---- where it comes from
 
-    def _hear(self, message: Joy) -> None:
+    def _on_joy(self, message: Joy) -> None:
         if self._gamepad is None:
             self._messages.put(message)
 
-    def _states(self, seconds: float) -> Iterable[Pad]:
+    def _states(self, seconds: float) -> Iterable[JoyState]:
         """Wait so long at most; return how the gamepad stood after each thing that happened."""
         if self._gamepad is None:
             with contextlib.suppress(queue.Empty):
@@ -145,34 +134,27 @@ class JoyTeleop:
         rospy.loginfo(f"{_NAME}: {self._gamepad.name} on {self._gamepad.device}")
 
 
-def _pad(message: Joy) -> Pad:
+def _pad(message: Joy) -> JoyState:
     axes = (value if math.isfinite(value) else 0.0 for value in message.axes[:256])
-    return Pad(tuple(max(-1.0, min(1.0, value)) for value in axes), tuple(map(bool, message.buttons[:256])))
+    return JoyState(tuple(max(-1.0, min(1.0, value)) for value in axes), tuple(map(bool, message.buttons[:256])))
 
 
 def _parameters() -> JoyParameters:
     given: dict[str, Any] = {key: value for key, value in rospy.get_param("~", {}).items() if key not in _OTHERS}
     if isinstance(given.get("config"), str):
         given["config"] = from_shell(given["config"])
-    return joy_parameters.load(given)
+    return load_joy(given)
+
+
+def _fly(over: Callable[[], bool]) -> None:
+    parameters, teleop = _parameters(), Teleop()
+    try:
+        JoyTeleop(parameters, teleop).run(over)
+    finally:
+        teleop.stop()
+        rospy.loginfo(f"{_NAME}: {teleop.farewell}")
 
 
 def main() -> int:
     """Run the node until a signal comes; return its exit status."""
-    # Its time is the person's, who must be able to stop the drone while /clock stands still.
-    if not init_node(_NAME, anonymous=True, disable_signals=True, disable_rostime=True):
-        return 1
-    ending = Ending()
-    teleops = []
-
-    def run() -> None:
-        parameters = _parameters()
-        teleops.append(Teleop())
-        JoyTeleop(parameters, teleops[0]).run(ending.asked)
-
-    status = reported(_NAME, run)
-    for teleop in teleops:
-        teleop.stop()
-        rospy.loginfo(f"{_NAME}: {teleop.farewell}")
-    ending.complete()
-    return status
+    return run_tool(_NAME, _fly)

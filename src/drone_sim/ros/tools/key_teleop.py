@@ -16,23 +16,21 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from drone_sim.ros.node.ending import Ending
-from drone_sim.ros.node.starting import init_node, reported
-from drone_sim.ros.tools import keys
-from drone_sim.ros.tools.keys import KeyDecoder
+from drone_sim.ros.core.shutdown import run_tool
+from drone_sim.ros.tools.commands import ESCAPE, KeyDecoder
 from drone_sim.ros.tools.teleop import Teleop
 
 _NAME = "key_teleop"
 _PERIOD = 0.1  # s between read-outs
 _CONNECTING = 1.0  # s at most, before the first key counts
-_LEAVE = (keys.ESCAPE, "q")
+_LEAVE = (ESCAPE, "q")
 # Ctrl-C, Ctrl-\ and Ctrl-Z among them: a command would hold while nobody is at the keys.
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 _INPUT_FLAGS = 0  # where they stand in what termios tells
 
 HELP = (
     "UP / DOWN     forward / backward      s          start / stop the simulation",
-    "LEFT / RIGHT  left / right            p          pause / go on",
+    "LEFT / RIGHT  left / right            p          pause / resume",
     "e / r         turn left / right       backspace  restart",
     "u / d         up / down               t / l / x  take off / land / reset the drone",
     "space         stop the drone          q, ESC     stop the drone and leave",
@@ -43,7 +41,7 @@ class Screen:
     """Reads keys and shows the read-out, until somebody wants to leave or the terminal is gone."""
 
     def __init__(self, teleop: Teleop, over: Callable[[], bool]):
-        """Take what does the work, and what tells that it is over."""
+        """Take the teleop that does the work, and what tells that it is over."""
         self._teleop, self._over = teleop, over
         self._decoder = KeyDecoder()
         self._terminal = sys.stdin.fileno()
@@ -114,13 +112,16 @@ def _ignore_control_s(terminal: int) -> None:
     termios.tcsetattr(terminal, termios.TCSANOW, settings)
 
 
-def _fly(teleop: Teleop, over: Callable[[], bool]) -> None:
+def _fly(over: Callable[[], bool]) -> None:
     """Show the screen until it is left in any way, and stop the drone."""
+    teleop = Teleop()
     try:
         with contextlib.suppress(curses.error):  # there is no terminal any more to leave
             curses.wrapper(Screen(teleop, over).run)
     finally:
         teleop.stop()
+        rest_of_line = (curses.tigetstr("el") or b"").decode()  # what was typed before it began stands there
+        print(f"\r{rest_of_line}{_NAME}: {teleop.farewell}", flush=True)
 
 
 def main() -> int:
@@ -133,16 +134,4 @@ def main() -> int:
     except curses.error as error:
         print(f"{_NAME}: TERM = '{os.environ.get('TERM', '')}': {error}", file=sys.stderr)
         return 1
-    # rospy's own handlers would close the topics before the last stop is sent, and its time may stand still.
-    if not init_node(_NAME, anonymous=True, disable_signals=True, disable_rostime=True):
-        return 1
-    ending = Ending(numbers=_SIGNALS)
-    teleop = Teleop()
-    status = reported(_NAME, lambda: _fly(teleop, ending.asked))
-    rest_of_line = (curses.tigetstr("el") or b"").decode()  # what was typed before it began stands there
-    try:
-        print(f"\r{rest_of_line}{_NAME}: {teleop.farewell}", flush=True)
-    except OSError:  # the terminal is gone
-        status = 1
-    ending.complete()
-    return status
+    return run_tool(_NAME, _fly, _SIGNALS)

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
-from drone_sim.offline.command_line import Parser, status_of
-from drone_sim.offline.plot_sensors import Series
-from drone_sim.offline.recording import Recording
+from drone_sim.command_line import Parser, status_of
+from drone_sim.message_text import shown
+from drone_sim.offline.recording import read_table
 from drone_sim.offline.timeline import Timeline
-from drone_sim.wording import shown
 
 _NAME = "plot_flight"
 _TABLES, _BAG = (".csv", ".txt"), ".bag"
@@ -38,24 +37,12 @@ def _draw(options: argparse.Namespace) -> None:
 
     out = options.plot or f"{flight.stem}.png"
     plot.check(out)
-    read = _read_bag(options.flight, options.vehicle) if ending == _BAG else _read_table(options.flight)
-    plot.save(out, *read)
+    if ending != _BAG:
+        plot.save(out, read_table(options.flight), Timeline((), 1.0), ())
+    else:
+        from drone_sim.ros.tools.bags import Bag, BagFlight  # needs ROS, which a table does not
+
+        with closing(Bag(options.flight)) as bag:
+            one = BagFlight(bag, options.vehicle)
+            plot.save(out, one.recording(), one.timeline(), one.sensors())
     print(f"{_NAME}: wrote {out}", flush=True)
-
-
-_Read = tuple[Recording, Timeline, Sequence[Series]]
-
-
-def _read_table(path: str) -> _Read:
-    from drone_sim.offline import tables
-
-    return tables.read(path), Timeline((), 1.0), ()
-
-
-def _read_bag(path: str, vehicle: str | None) -> _Read:
-    from drone_sim.ros.tools.bag_flights import BagFlight  # needs ROS, which a table does not
-    from drone_sim.ros.tools.bags import Bag
-
-    with closing(Bag(path)) as bag:
-        flight = BagFlight(bag, vehicle)
-        return flight.recording(), flight.timeline(), flight.sensors()

@@ -21,12 +21,10 @@ import rosgraph
 import roslib.packages
 import rospkg
 
-from drone_sim.offline.command_line import Parser, status_of
-from drone_sim.ros.node.paths import from_shell
+from drone_sim.command_line import Parser, status_of
+from drone_sim.ros.core.startup import ask_master, from_shell
 
 _NAME = "record"
-_PERIOD = 0.1  # s, between two questions to the master
-_PATIENCE = 5.0  # s, for a simulator that is just being started
 _LARGE = r"sensor_msgs/(Image|PointCloud2?)|visualization_msgs/.*|dynamic_reconfigure/.*|theora_image_transport/.*"
 _IMAGES = r"sensor_msgs/(CompressedImage|CameraInfo)"  # a twentieth of the raw ones
 _OF_OTHERS = ("/rosout_agg", "/clock")  # said twice; told by `rosbag play --clock`, and in the times of all messages
@@ -82,22 +80,12 @@ def _file(folder: str) -> Path:
 
 def _kinds(simulator: str) -> dict[str, str]:
     """Wait for the simulator, and return all topics with their kinds. Raises OSError without a master."""
-    master = rosgraph.Master(f"/{_NAME}")
-    began, said = time.monotonic(), False
-    try:
-        while not _is_there(master, f"{simulator}/{_LAST_SERVICE}"):
-            time.sleep(_PERIOD)
-            if not said and time.monotonic() - began > _PATIENCE:
-                said = True
-                print(f"{_NAME}: waits for {simulator}, which does not run yet", file=sys.stderr, flush=True)
+
+    def ask(master: rosgraph.Master) -> dict[str, str] | None:
+        try:
+            master.lookupService(f"{simulator}/{_LAST_SERVICE}")
+        except rosgraph.MasterError:  # not yet
+            return None
         return dict(master.getTopicTypes())
-    except (OSError, rosgraph.MasterException) as error:
-        raise OSError(f"the ROS master at {rosgraph.get_master_uri()} does not answer: {error}") from None
 
-
-def _is_there(master: rosgraph.Master, service: str) -> bool:
-    try:
-        master.lookupService(service)
-    except rosgraph.MasterError:  # not yet
-        return False
-    return True
+    return ask_master(_NAME, ask, f"{simulator}, which does not run yet")

@@ -12,25 +12,26 @@ import re
 import signal
 import sys
 import threading
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
 import rosgraph
+import rospkg
 import rospy
+from roslib.packages import find_node
 from tf2_msgs.msg import TFMessage
 
+from drone_sim.command_line import FAILED, Parser, status_of
 from drone_sim.files import writing
-from drone_sim.files.resources import package_path
-from drone_sim.offline.command_line import FAILED, Parser, status_of
-from drone_sim.ros.node.paths import from_shell
-from drone_sim.ros.tools import viewer
-from drone_sim.ros.vehicle import frame_names
+from drone_sim.files.resources import cache_path, package_path
+from drone_sim.ros.core.message_conversion import first_frame
+from drone_sim.ros.core.startup import ask_master, from_shell
 
 _NAME = "show"
-_PERIOD = 0.1  # s, between two questions to the master
-_PATIENCE = 5.0  # s, after which it says that it waits
+INSTEAD = "`roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
+_RVIZ = "rviz"  # which need not be there: Debian testing has none
+_PATIENCE = 5.0  # s, for the frame that rviz follows
 _TOPIC = "/view/state"  # that the simulator advertises for rviz: the last one
 _ALONE, _FIRST, _SIMULATOR = "drone", "drone1", "drone_sim"  # as the files of the package name them
 _NAMES = re.compile(rf"\b{_FIRST}\b|(?<=/)(?:{_ALONE}|{_SIMULATOR})(?=/)|(?<= ){_SIMULATOR}(?=/first$)", re.MULTILINE)
@@ -48,9 +49,9 @@ def main() -> int:
     parser.add_argument("--simulator", metavar="NODE", default=_SIMULATOR, help="(default: %(default)s)")
     options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
     remappings = [one for one in sys.argv[1:] if ":=" in one]
-    rviz = viewer.rviz()
+    rviz = find_rviz()
     if rviz is None:
-        print(f"{_NAME}: rviz is not installed: {viewer.INSTEAD}", file=sys.stderr, flush=True)
+        print(f"{_NAME}: rviz is not installed: {INSTEAD}", file=sys.stderr, flush=True)
         return 0 if any(one.startswith("__log:=") for one in remappings) else FAILED
     return status_of(_NAME, lambda: _show(rviz, options, remappings))
 
@@ -73,7 +74,7 @@ def _fitting(simulator: str) -> Path:
     template = package_path() / "rviz" / ("drone.rviz" if alone else "fleet.rviz")
     if all(name == given for name, given in names.items()):
         return template
-    made = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "drone_sim" / "rviz" / template.name
+    made = cache_path() / "rviz" / template.name
     made.parent.mkdir(parents=True, exist_ok=True)
     writing.write(made, renamed(template.read_text(encoding="utf-8"), names))
     return made
@@ -100,24 +101,17 @@ def _as_dock(title: str) -> str:
 
 def _topics_of(simulator: str) -> str:
     """Wait for the simulator, and return the namespace of its topics for rviz. Raises OSError without a master."""
-    master = rosgraph.Master(f"/{_NAME}")
-    began, told = time.monotonic(), False
-    try:
-        while True:
-            for topic, nodes in master.getSystemState()[0]:
-                if topic.endswith(_TOPIC) and f"/{simulator}" in nodes:
-                    return str(topic)[: -len(_TOPIC)].strip("/")
-            if not told and time.monotonic() - began > _PATIENCE:
-                print(f"{_NAME}: waits for the node /{simulator}", file=sys.stderr, flush=True)
-                told = True
-            time.sleep(_PERIOD)
-    except (OSError, rosgraph.MasterException) as error:
-        raise OSError(f"the ROS master at {rosgraph.get_master_uri()} does not answer: {error}") from None
+
+    def ask(master: rosgraph.Master) -> str | None:
+        own = (topic for topic, nodes in master.getSystemState()[0] if f"/{simulator}" in nodes)
+        return next((str(topic)[: -len(_TOPIC)].strip("/") for topic in own if topic.endswith(_TOPIC)), None)
+
+    return ask_master(_NAME, ask, f"the node /{simulator}")
 
 
 def _first_vehicle(simulator: str) -> str:
     """Return the name of the vehicle, one of several, that the view follows, '' for none. Raises OSError."""
-    first = frame_names.first(simulator)
+    first = first_frame(simulator)
     found: list[str] = []
     come = threading.Event()
 
@@ -134,3 +128,12 @@ def _first_vehicle(simulator: str) -> str:
     if not in_time:
         raise OSError(f"nobody broadcasts the frame {first}")
     return found[-1]
+
+
+def find_rviz() -> str | None:
+    """Return the file of rviz, None where it is not installed."""
+    try:
+        found: list[str] = find_node(_RVIZ, _RVIZ)
+    except rospkg.ResourceNotFound:
+        return None
+    return found[0] if found else None

@@ -18,10 +18,9 @@ import rosgraph
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
-from drone_sim.ros.node.ending import Ending
-from drone_sim.ros.node.starting import init_node, reported
+from drone_sim.message_text import near_names
+from drone_sim.ros.core.shutdown import run_tool
 from drone_sim.ros.tools import pictures
-from drone_sim.wording import near_names
 
 _NAME = "view"
 _KINDS = {"sensor_msgs/Image": Image, "sensor_msgs/CompressedImage": CompressedImage}
@@ -37,27 +36,27 @@ class Topic:
     """One image topic: its last picture, or why there is none."""
 
     def __init__(self, name: str):
-        """Begin without a publisher."""
+        """Take its name; begin without a publisher."""
         self.name = name
         self.why = "waiting for a publisher"
         self.shown: np.ndarray | None = None
         self._message: Any = None
-        self._subscriber: rospy.Subscriber | None = None
+        self.subscriber: rospy.Subscriber | None = None  # once somebody has published it
         self._said = False
         self._since = time.monotonic()
 
     def look_for(self, published: dict[str, str]) -> None:
         """Subscribe if somebody publishes; say, once, that nobody does or that it is no image."""
         kind = published.get(self.name)
-        if self._subscriber is None and kind in _KINDS:
+        if self.subscriber is None and kind in _KINDS:
             self.why = "waiting for a picture"
             self._since = time.monotonic()
-            self._subscriber = rospy.Subscriber(self.name, _KINDS[kind], self._keep, queue_size=1, buff_size=_BUFFER)
-        elif self._subscriber is None and (kind or time.monotonic() - self._since > _PATIENCE):
+            self.subscriber = rospy.Subscriber(self.name, _KINDS[kind], self._keep, queue_size=1, buff_size=_BUFFER)
+        elif self.subscriber is None and (kind or time.monotonic() - self._since > _PATIENCE):
             images = [name for name, one in published.items() if one in _KINDS]
             there = near_names(self.name, images) if images else "there are no image topics"
             self._say(f"is a {kind}, no image; {there}" if kind else f"nobody publishes it; {there}")
-        elif self._subscriber and self.shown is None and time.monotonic() - self._since > _PATIENCE:
+        elif self.subscriber and self.shown is None and time.monotonic() - self._since > _PATIENCE:
             self._say(f"is published, but no picture came in {_PATIENCE:g} s; is the simulation paused?")
 
     def _say(self, why: str) -> None:
@@ -65,11 +64,6 @@ class Topic:
             self._said = True
             self.why = why
             print(f"{_NAME}: {self.name}: {why}", file=sys.stderr, flush=True)
-
-    @property
-    def found(self) -> bool:
-        """Whether somebody has published it."""
-        return self._subscriber is not None
 
     @property
     def hopeless(self) -> bool:
@@ -108,7 +102,7 @@ class Viewer:
     """Follows topics until somebody ends it; the thread that calls `show` owns the window."""
 
     def __init__(self, topics: list[str], asked: Callable[[], bool]):
-        """Begin to listen; `asked` tells whether it is time to end."""
+        """Begin to listen to `topics`; `asked` tells whether it is time to end."""
         self.topics = [Topic(rospy.resolve_name(topic)) for topic in topics]
         self._asked_to_end, self._closed = asked, False
         self._asked = -math.inf
@@ -118,7 +112,7 @@ class Viewer:
         time.sleep(_PERIOD)
         if time.monotonic() - self._asked > _ASKING:
             self._asked = time.monotonic()
-            seeking = not all(topic.found for topic in self.topics)
+            seeking = not all(topic.subscriber for topic in self.topics)
             published = dict(rospy.get_published_topics()) if seeking else {}
             for topic in self.topics:
                 topic.look_for(published)
@@ -188,16 +182,13 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args(rosgraph.myargv(sys.argv)[1:])
 
 
+def _run(arguments: argparse.Namespace, over: Callable[[], bool]) -> None:
+    viewer = Viewer(arguments.topics, over)
+    window = None if arguments.png else _window()
+    viewer.show(window) if window else viewer.save(arguments.png or _FILE)
+
+
 def main() -> int:
     """Run until the window is closed or a signal comes; return the exit status."""
     arguments = _arguments()
-    # Its time is the person's, who looks on while /clock stands still.
-    if not init_node(_NAME, anonymous=True, disable_signals=True, disable_rostime=True):
-        return 1
-    ending = Ending()
-    viewer = Viewer(arguments.topics, ending.asked)
-    window = None if arguments.png else _window()
-    file = arguments.png or _FILE
-    status = reported(_NAME, lambda: viewer.show(window) if window else viewer.save(file))
-    ending.complete()
-    return status
+    return run_tool(_NAME, lambda over: _run(arguments, over))

@@ -2,36 +2,51 @@
 
 from __future__ import annotations
 
+import threading
+from collections import deque
+from typing import Any
+
+import cv2
 import numpy as np
 import rospy
 from cv_bridge import CvBridge
-from sensor_msgs.msg import CameraInfo, Image
+from dynamic_reconfigure.server import Server
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
 
-from drone_sim.ros.node.newcomers import Newcomers
-from drone_sim.ros.node.step_time import Stamp
-from drone_sim.ros.vehicle import frame_names, messages
-from drone_sim.ros.vehicle.compression import CompressedPublisher
+from drone_sim.config.fields import ParameterField
+from drone_sim.ros.core import message_conversion
+from drone_sim.ros.core.publishing import NewSubscribers, Stamp
+from drone_sim.ros.vehicle.tuning_server import described
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.vehicles.parameters import VehicleParameters
 
 _ENCODINGS = {"color": "rgb8", "depth": "32FC1"}
+_COMPRESSION = {
+    "format": ParameterField(("format",), str, choices=("jpeg", "png"), said="compression format"),
+    "jpeg_quality": ParameterField(("jpeg_quality",), int, low=1, high=100, said="JPEG quality in percent"),
+    "png_level": ParameterField(("png_level",), int, low=1, high=9, said="PNG compression level"),
+}
+_DEFAULTS = {"format": "jpeg", "jpeg_quality": 80, "png_level": 9}
 
 
 class CameraOutput:
     """One camera: `<topic>`, `<topic>/compressed` (colour), and camera_info in the same namespace."""
 
-    def __init__(self, vehicle: VehicleParameters, camera: Camera, parameters: CameraParameters, newcomers: Newcomers):
-        """Advertise in the vehicle's namespace; the camera takes pictures only while somebody listens.
+    def __init__(
+        self, vehicle: VehicleParameters, camera: Camera, parameters: CameraParameters, new_subscribers: NewSubscribers
+    ):
+        """Advertise in the vehicle's namespace, by the camera's parameters; `new_subscribers` notes who listens.
 
-        `newcomers` notes who begins to.
+        The camera takes pictures only while somebody does.
         """
         topic = f"{vehicle.name}/{parameters.topic}"
-        self._frame = frame_names.frame(vehicle, parameters.frame)
+        self._frame = message_conversion.frame(vehicle, parameters.frame)
         info_topic = topic.rpartition("/")[0] + "/camera_info"  # image_transport's rule
         self._bridge = CvBridge()
-        self._image = rospy.Publisher(topic, Image, subscriber_listener=newcomers, queue_size=1)
-        self._compressed = CompressedPublisher(topic, newcomers) if parameters.kind == "color" else None
+        self._image = rospy.Publisher(topic, Image, subscriber_listener=new_subscribers, queue_size=1)
+        self._compressed = CompressedPublisher(topic, new_subscribers) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
         self.follow(camera)
 
@@ -39,11 +54,11 @@ class CameraOutput:
         """Publish what this camera sees from now on; it has taken the place of the last one."""
         self._camera = camera
         self._describe()
-        camera.watched = self._watched
+        camera.viewers.add(self._watched)
 
     def _describe(self) -> None:
         self._intrinsics = self._camera.intrinsics
-        self._info = messages.camera_info(self._intrinsics, self._frame)
+        self._info = message_conversion.camera_info(self._intrinsics, self._frame)
 
     def close(self) -> None:
         """Advertise no more."""
@@ -53,7 +68,8 @@ class CameraOutput:
 
     def _watched(self) -> bool:
         compressed = self._compressed
-        return self._image.get_num_connections() > 0 or bool(compressed and compressed.get_num_connections())
+        listened = self._image.get_num_connections() > 0
+        return listened or (compressed is not None and compressed.publisher.get_num_connections() > 0)
 
     def publish(self, stamp: Stamp) -> None:
         """Publish what the camera sees, and the model that belongs to it, stamped with when it was taken.
@@ -61,20 +77,77 @@ class CameraOutput:
         Over a link both come together, or neither; of a silent camera nothing comes.
         """
         camera = self._camera
-        is_there = camera.image is not None or (camera.over is None and camera.failure != "silent")
+        is_there = camera.image is not None or (not camera.is_linked and camera.failure != "silent")
         if is_there and self._info_publisher.get_num_connections():
             if self._intrinsics is not camera.intrinsics:
                 self._describe()
             self._info.header.stamp = stamp(camera.age)
             self._info_publisher.publish(self._info)
-        if camera.image is not None:
-            self._publish_image(stamp(camera.age), camera.image)
-
-    def _publish_image(self, stamp: rospy.Time, image: np.ndarray) -> None:
-        frame = self._frame
+        if camera.image is None:
+            return
+        header = Header(stamp=stamp(camera.age), frame_id=self._frame)
         if self._image.get_num_connections():
-            message = self._bridge.cv2_to_imgmsg(image, _ENCODINGS[self._camera.kind])
-            message.header.stamp, message.header.frame_id = stamp, frame
-            self._image.publish(message)
+            self._image.publish(self._bridge.cv2_to_imgmsg(camera.image, _ENCODINGS[camera.kind], header))
         if self._compressed is not None:
-            self._compressed.publish(stamp, frame, image)
+            self._compressed.publish(header, camera.image)
+
+
+class CompressedPublisher:
+    """Publishes `<base>/compressed` as image_transport's C++ plugin does: formats, and parameters beside it.
+
+    A thread of its own encodes: PNG at the plugin's default level takes longer than a step. Pictures that come
+    while it is busy are left out, but for the latest.
+    """
+
+    def __init__(self, base: str, new_subscribers: NewSubscribers):
+        """Advertise, and open the dynamic_reconfigure server at `<base>/compressed`; `new_subscribers` notes them."""
+        topic = rospy.resolve_name(f"{base}/compressed")
+        self.publisher = rospy.Publisher(topic, CompressedImage, subscriber_listener=new_subscribers, queue_size=1)
+        self._settings: dict[str, Any] = {}
+        self._server = Server(described(_COMPRESSION, _DEFAULTS), self._keep, topic)
+        self._waiting: deque[tuple[Header, np.ndarray]] = deque(maxlen=1)
+        self._came = threading.Event()
+        self._open = True
+        threading.Thread(target=self._work, name=f"{topic} encoder", daemon=True).start()
+
+    def _keep(self, settings: dict[str, Any], _level: int) -> dict[str, Any]:
+        if settings["format"] not in ("jpeg", "png"):
+            rospy.logwarn(f"compressed/format = '{settings['format']}': must be jpeg or png; jpeg is used")
+            settings["format"] = "jpeg"
+        self._settings = settings
+        return settings
+
+    def unregister(self) -> None:
+        """Advertise no more."""
+        self._open = False
+        self._came.set()
+        for publisher in (self.publisher, self._server.descr_topic, self._server.update_topic):
+            publisher.unregister()
+        self._server.set_service.shutdown()
+
+    def publish(self, header: Header, image: np.ndarray) -> None:
+        """Have an RGB picture (height, width, 3) encoded and published if somebody listens; it must not change."""
+        if self.publisher.get_num_connections():
+            self._waiting.append((header, image))
+            self._came.set()
+
+    def _work(self) -> None:
+        while self._open:
+            self._came.wait()
+            self._came.clear()
+            while self._waiting:
+                message = _encoded(*self._waiting.popleft(), self._settings)
+                try:
+                    self.publisher.publish(message)
+                except rospy.ROSException:  # the node ends, and has closed the topic
+                    return
+
+
+def _encoded(header: Header, image: np.ndarray, settings: dict[str, Any]) -> CompressedImage:
+    message = CompressedImage(header=header, format=f"rgb8; {settings['format']} compressed bgr8")
+    if settings["format"] == "png":
+        extension, options = ".png", (cv2.IMWRITE_PNG_COMPRESSION, settings["png_level"])
+    else:
+        extension, options = ".jpg", (cv2.IMWRITE_JPEG_QUALITY, settings["jpeg_quality"])
+    message.data = cv2.imencode(extension, cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)[1].tobytes()
+    return message

@@ -1,4 +1,4 @@
-"""What a vehicle publishes after each step, pictures aside; a message that nobody listens to is not made."""
+"""What a vehicle and its sensors publish after each step, pictures aside; what nobody listens to is not made."""
 
 from __future__ import annotations
 
@@ -10,28 +10,34 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float32MultiArray, String
 
-from drone_sim.ros.node.newcomers import Newcomers
-from drone_sim.ros.vehicle import frame_names, messages
+from drone_sim.ros.core import message_conversion
+from drone_sim.ros.core.message_conversion import BASE_LINK, TRACK_BASE, fill, frame, message_class
+from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.run.pacing import Throttle
+from drone_sim.sensors.sensor import Instrument, SensorParameters
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 _EYES = 1 / 30  # s of real time, between two messages that are for eyes
+_READINGS_QUEUE = 100  # messages: half a second at 200 Hz, which come ten at a time
 
 
 class VehicleOutputs:
     """Odometry, command, propellers, joint states and flight state of one vehicle."""
 
-    def __init__(self, parameters: VehicleParameters, newcomers: Newcomers):
-        """Advertise in the vehicle's namespace; `newcomers` notes who begins to listen to odometry."""
+    def __init__(self, parameters: VehicleParameters, new_subscribers: NewSubscribers):
+        """Advertise in the namespace of the vehicle with these parameters.
+
+        `new_subscribers` notes who begins to listen to odometry.
+        """
         name = parameters.name
-        self._base_link, self._track_base = frame_names.base_link(parameters), frame_names.track_base(parameters)
-        self._odometry = rospy.Publisher(f"{name}/odom", Odometry, subscriber_listener=newcomers, queue_size=10)
+        self._base_link, self._track_base = frame(parameters, BASE_LINK), frame(parameters, TRACK_BASE)
+        self._odometry = rospy.Publisher(f"{name}/odom", Odometry, subscriber_listener=new_subscribers, queue_size=10)
         self._command = rospy.Publisher(f"{name}/command", TwistStamped, queue_size=10)
         self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=10)
         self._joints = rospy.Publisher(f"{name}/joint_states", JointState, queue_size=10)
         self._flight_state = rospy.Publisher(f"{name}/state", String, queue_size=10, latch=True)
-        self._told = ""
+        self._published_state = ""
         self._eyes = Throttle(_EYES)
 
     def close(self) -> None:
@@ -42,21 +48,60 @@ class VehicleOutputs:
     def publish_state(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
         """Publish the state, under what `stamp` returns."""
         if self._odometry.get_num_connections():
-            self._odometry.publish(messages.odometry(stamp(), vehicle.state, self._base_link))
+            self._odometry.publish(message_conversion.odometry(stamp(), vehicle.body.state, self._base_link))
         if self._propellers.get_num_connections():
             stamp()  # /clock before the message
-            self._propellers.publish(messages.propellers(vehicle.particle_velocities))
+            self._propellers.publish(message_conversion.propellers(vehicle.propulsion.particle_velocities))
         state = str(vehicle.flight_state)
-        if state != self._told:
-            self._told = state
+        if state != self._published_state:
+            self._published_state = state
             self._flight_state.publish(state)
 
     def publish_joints(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
         """Publish the blades' angles, as often as eyes need them."""
         if self._joints.get_num_connections() and self._eyes.passes():
-            self._joints.publish(messages.joint_states(stamp(), vehicle.blade_angles))
+            self._joints.publish(message_conversion.joint_states(stamp(), vehicle.propulsion.blades.angles))
 
     def publish_command(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
         """Publish the command in force, under what `stamp` returns; it may change while the simulation stands."""
         if self._command.get_num_connections():
-            self._command.publish(messages.command(stamp(), vehicle.command, self._track_base))
+            self._command.publish(message_conversion.command(stamp(), vehicle.commands.now, self._track_base))
+
+
+class SensorOutput:
+    """One sensor: a topic for each of its outputs; a message that nobody listens to is not made."""
+
+    def __init__(self, vehicle: VehicleParameters, sensor: Instrument):
+        """Advertise in the vehicle's namespace what the sensor reads.
+
+        Raises ValueError for a message that is not installed.
+        """
+        own: SensorParameters = sensor.parameters
+        self._frame = frame(vehicle, own.frame)
+        self._publishers = {
+            one.suffix: rospy.Publisher(
+                f"{vehicle.name}/{own.topic}{one.suffix}", message_class(one.kind), queue_size=_READINGS_QUEUE
+            )
+            for one in sensor.outputs
+        }
+        self.follow(sensor)
+
+    def follow(self, sensor: Instrument) -> None:
+        """Publish what this sensor reads from now on; it has the place, and the parameters, of the last one."""
+        self._sensor = sensor
+
+    def close(self) -> None:
+        """Advertise no more."""
+        for publisher in self._publishers.values():
+            publisher.unregister()
+
+    def publish(self, stamp: Stamp, now: float) -> None:
+        """Publish the readings of a step that ended at `now` (s of simulated time), each as of when it was measured."""
+        sensor = self._sensor
+        heard = [one for one in sensor.outputs if self._publishers[one.suffix].get_num_connections()]
+        for reading in sensor.readings if heard else ():
+            measured = sensor.header(reading)["stamp"]
+            header = {"stamp": stamp(now - measured), "frame_id": self._frame}
+            for output in heard:
+                publisher = self._publishers[output.suffix]
+                publisher.publish(fill(publisher.data_class(), output.fields(reading.value, header), output.kind))

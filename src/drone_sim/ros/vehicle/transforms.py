@@ -9,8 +9,8 @@ from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from drone_sim.mechanics import frames
-from drone_sim.ros.node.newcomers import Newcomers
-from drone_sim.ros.vehicle import frame_names, messages
+from drone_sim.ros.core.message_conversion import BASE_LINK, TRACK_BASE, WORLD_FRAME, first_frame, frame, transform
+from drone_sim.ros.core.publishing import NewSubscribers
 from drone_sim.run.pacing import Throttle
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -22,27 +22,26 @@ class Transforms:
 
     world -> base_link, Track_base, cameras with a `mount`; the links hang on each other as the URDF says, and sensors
     on what carries them. What does not move on base_link is told once, by /tf_static; so is the frame that rviz
-    follows, Track_base of the first vehicle, whatever that is called, or `world`. What they are called: frame_names.py.
+    follows, Track_base of the first vehicle, whatever that is called, or `world`.
     """
 
     def __init__(self) -> None:
         """Advertise."""
-        self._newcomers = Newcomers()
-        self._moving = rospy.Publisher("/tf", TFMessage, subscriber_listener=self._newcomers, queue_size=100)
+        self._new_subscribers = NewSubscribers()
+        self._moving = rospy.Publisher("/tf", TFMessage, subscriber_listener=self._new_subscribers, queue_size=100)
         self._fixed = rospy.Publisher("/tf_static", TFMessage, queue_size=10, latch=True)
         self._eyes = Throttle(_EYES)
 
-    def tell_fixed(self, vehicles: Collection[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
+    def publish_static(self, vehicles: Collection[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
         """Say where the links are that do not move, under what `stamp` returns; of vehicles that are new, or gone."""
         now = stamp()
-        first = next((frame_names.track_base(one.parameters) for one in vehicles), messages.WORLD_FRAME)
-        told = [messages.transform(now, first, frame_names.first(rospy.get_name()), frames.IDENTITY)]
+        first = next((frame(one.parameters, TRACK_BASE) for one in vehicles), WORLD_FRAME)
+        told = [transform(now, first, first_frame(rospy.get_name()), frames.IDENTITY)]
         for one in vehicles:
             told += [_link(now, one, name) for name in one.body.links if name not in one.body.rigid.blade_joints]
-            own = one.parameters
             told += [
-                messages.transform(now, frame_names.base_link(own), frame_names.frame(own, frame), matrix)
-                for frame, matrix in one.instruments.fixed_frames.items()
+                transform(now, frame(one.parameters, BASE_LINK), frame(one.parameters, name), matrix)
+                for name, matrix in one.instruments.fixed_frames.items()
             ]
         self._fixed.publish(TFMessage(told))
 
@@ -50,38 +49,33 @@ class Transforms:
         """Publish all that moves under what `stamp` returns: tf2 takes but one for each stamp."""
         if not self._moving.get_num_connections():
             return
-        self._newcomers.forget()
+        self._new_subscribers.take()  # what is published reaches them all
         now = stamp()
         self._moving.publish(TFMessage([one for vehicle in vehicles for one in _moving(now, vehicle)]))
         if self._eyes.passes():
             self._moving.publish(TFMessage([one for vehicle in vehicles for one in _turning(now, vehicle)]))
 
-    def tell_newcomers(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
+    def tell_new_subscribers(self, vehicles: Iterable[Vehicle], stamp: Callable[[], rospy.Time]) -> None:
         """Tell those who have not heard what moves under the stamp that there is already."""
-        for tell in self._newcomers.take():
+        for tell in self._new_subscribers.take():
             now = stamp()
             tell(TFMessage([one for vehicle in vehicles for one in (*_moving(now, vehicle), *_turning(now, vehicle))]))
 
 
 def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
-    own, world = vehicle.parameters, messages.WORLD_FRAME
-    return [
-        messages.transform(now, world, frame_names.base_link(own), vehicle.matrix),
-        messages.transform(now, world, frame_names.track_base(own), vehicle.track),
-        *(
-            messages.transform(now, world, frame_names.frame(own, camera.frame), vehicle.optical(camera))
-            for camera in own.cameras.values()
-            if camera.mount is not None  # the URDF does not know them
-        ),
-        *(
-            messages.transform(now, world, frame_names.frame(own, frame), pose())
-            for frame, pose in vehicle.instruments.moving_frames.items()
-        ),
-    ]
+    own = vehicle.parameters
+    places = {
+        BASE_LINK: vehicle.body.matrix,
+        TRACK_BASE: vehicle.track.matrix(),
+        # The URDF does not know cameras with a mount.
+        **{one.frame: vehicle.optical(one) for one in own.cameras.values() if one.mount is not None},
+        **{name: matrix() for name, matrix in vehicle.instruments.moving_frames.items()},
+    }
+    return [transform(now, WORLD_FRAME, frame(own, name), matrix) for name, matrix in places.items()]
 
 
 def _turning(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
-    angles = vehicle.blade_angles
+    angles = vehicle.propulsion.blades.angles
     return [
         _link(now, vehicle, link, angles.get(joint, 0.0)) for link, joint in vehicle.body.rigid.blade_joints.items()
     ]
@@ -92,5 +86,4 @@ def _link(now: rospy.Time, vehicle: Vehicle, name: str, angle: float = 0.0) -> T
     parent, matrix = vehicle.body.links[name]
     if angle:
         matrix = frames.multiply(matrix, frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angle)))
-    own = vehicle.parameters
-    return messages.transform(now, frame_names.frame(own, parent), frame_names.frame(own, name), matrix)
+    return transform(now, frame(vehicle.parameters, parent), frame(vehicle.parameters, name), matrix)

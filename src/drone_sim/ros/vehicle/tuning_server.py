@@ -7,61 +7,60 @@ declares a parameter, and asks the master twice for each of them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any
 
 import rospy
 from dynamic_reconfigure.encoding import encode_config, encode_description
 from dynamic_reconfigure.msg import Config, ConfigDescription
 from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest, ReconfigureResponse
 
-from drone_sim.config.leaves import Leaf
-from drone_sim.ros.node.inbox import Inbox
-from drone_sim.vehicles.tuning_message import TOPIC
+from drone_sim.config.fields import ParameterField
+from drone_sim.config.types import ParameterError
+from drone_sim.hosting.tuning import TOPIC, Tuning
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.run.pacing import Pace
 
 _GROUPS = ("control", "weather", "faults", "cameras", "sensors", "script_parameters")
 _TYPES = {float: "double", int: "int", bool: "bool", str: "str"}
 
 
-class Tunable(Protocol):
-    """Something of which values may be changed while it runs."""
-
-    @property
-    def known(self) -> Mapping[str, Leaf]:
-        """What may be changed now, by name."""
-
-    def values(self) -> dict[str, Any]:
-        """Return what holds now, by name."""
-
-    def change(self, changes: Mapping[str, Any]) -> None:
-        """Let other values hold, by name: all, or none. Raises ParameterError."""
-
-
 class TuningServer:
     """`set_parameters`, `parameter_descriptions` and `parameter_updates` in a namespace."""
 
-    def __init__(self, namespace: str, tuning: Tunable, inbox: Inbox, rest: str = "limits"):
-        """Advertise, and say what there is; `rest` is the group of what has none of its own."""
-        self._tuning, self._inbox, self._rest = tuning, inbox, rest
+    def __init__(
+        self,
+        namespace: str,
+        tuning: Tuning | Pace,
+        inbox: Inbox,
+        rest: str = "limits",
+        tuned: Callable[[], None] = lambda: None,
+    ):
+        """Advertise in `namespace`, and say what there is of `tuning`, whose thread empties `inbox`.
+
+        `rest` is the group of what has none of its own; `tuned` is called in that thread after a change, before whoever
+        asked for it hears of it.
+        """
+        self._tuning, self._inbox, self._rest, self._tuned = tuning, inbox, rest, tuned
         name = self._name = rospy.resolve_name(namespace)
         self._description, self._updates = (
             rospy.Publisher(f"{name}/{topic}", kind, queue_size=1, latch=True)
             for topic, kind in (("parameter_descriptions", ConfigDescription), (TOPIC, Config))
         )
-        self._known: dict[str, Leaf] = {}
+        self._known: dict[str, ParameterField] = {}
         self._said: dict[str, Any] = {}
         self._config = Config()
         self.follow(tuning)
         self._service = rospy.Service(f"{name}/set_parameters", Reconfigure, self._set)
 
-    def follow(self, tuning: Tunable) -> None:
+    def follow(self, tuning: Tuning | Pace) -> None:
         """Be the server of this from now on; say what has changed since."""
         self._tuning = tuning
         known, values = dict(tuning.known), tuning.values()
         if known != self._known:
             self._known = known
-            self._description.publish(encode_description(_described(known, values, self._rest)))
+            self._description.publish(encode_description(described(known, values, self._rest)))
         if values != self._said:
             self._say(values)
 
@@ -85,7 +84,8 @@ class TuningServer:
         try:
             self._inbox.ask(lambda: self._change(changes))
         except (ValueError, TimeoutError) as error:
-            rospy.logwarn(f"{self._name} refused, nothing is changed: {str(error).removeprefix('parameter ')}")
+            said = error.text if isinstance(error, ParameterError) else error
+            rospy.logwarn(f"{self._name} refused, nothing is changed: {said}")
         return ReconfigureResponse(self._config)
 
     def _change(self, changes: Mapping[str, Any]) -> str:
@@ -93,37 +93,34 @@ class TuningServer:
             self._tuning.change(changes)
         finally:
             self._say(self._tuning.values())  # also what was refused: a slider goes back
+            self._tuned()
         return ""
 
 
-def _described(known: Mapping[str, Leaf], values: Mapping[str, Any], rest: str) -> SimpleNamespace:
-    """Return what a module that is generated of a .cfg file holds, as far as the encoding reads it."""
-    groups: dict[str, list[dict[str, Any]]] = {}
+def described(known: Mapping[str, ParameterField], values: Mapping[str, Any], rest: str = "") -> SimpleNamespace:
+    """Return what a module that is generated of a .cfg file holds, as far as encoding and library read it.
+
+    Made at run time: a .cfg file would make the package useless without a build. `rest` is the group of what has none
+    of its own, '' for none.
+    """
+    groups: dict[str, list[dict[str, Any]]] = {"": []}
     for name, one in known.items():
-        groups.setdefault(_group(one) or rest, []).append(_parameter(name, one))
-    whole = {"name": "Default", "type": "", "id": 0, "parent": 0, "parameters": []}
+        first = str(one.location[0])
+        groups.setdefault(first if first in _GROUPS else rest, []).append(_parameter(name, one))
+    whole = {"name": "Default", "type": "", "id": 0, "parent": 0, "parameters": groups.pop("")}
     parts = [
         {"name": group, "type": "", "id": number, "parent": 0, "parameters": parameters, "groups": []}
         for number, (group, parameters) in enumerate(groups.items(), start=1)
     ]
     return SimpleNamespace(
         config_description={**whole, "groups": parts},
-        min={name: _bound(one, one.low) for name, one in known.items()},
-        max={name: _bound(one, one.high) for name, one in known.items()},
+        min={name: "" if one.kind is str else one.low for name, one in known.items()},
+        max={name: "" if one.kind is str else one.high for name, one in known.items()},
         defaults=dict(values),
     )
 
 
-def _group(leaf: Leaf) -> str:
-    first = str(leaf.location[0])
-    return first if first in _GROUPS else ""
-
-
-def _bound(leaf: Leaf, bound: Any) -> Any:
-    return "" if leaf.kind is str else bound
-
-
-def _parameter(name: str, leaf: Leaf) -> dict[str, Any]:
+def _parameter(name: str, leaf: ParameterField) -> dict[str, Any]:
     kind = _TYPES[leaf.kind]
     words = [{"name": one, "type": kind, "value": one, "description": ""} for one in leaf.choices]
     choice = str({"enum": words, "enum_description": leaf.said}) if words else ""

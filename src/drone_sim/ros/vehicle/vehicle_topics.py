@@ -1,105 +1,159 @@
-"""Everything that one vehicle hears and publishes."""
+"""Everything that vehicles hear and publish, as they come and go."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from typing import Any
+from xml.etree import ElementTree as Xml
 
 import rospy
 
-from drone_sim.ros.node.inbox import Inbox
-from drone_sim.ros.node.newcomers import Newcomers
-from drone_sim.ros.node.step_time import Stamp
+from drone_sim.files.resources import read_bytes
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.ros.vehicle.cameras import CameraOutput
-from drone_sim.ros.vehicle.description import set_description
 from drone_sim.ros.vehicle.inputs import VehicleInputs
-from drone_sim.ros.vehicle.outputs import VehicleOutputs
-from drone_sim.ros.vehicle.sensors import SensorOutput
+from drone_sim.ros.vehicle.outputs import SensorOutput, VehicleOutputs
+from drone_sim.ros.vehicle.transforms import Transforms
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.run.diagnosis.command_log import CommandLog
 from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
+
+_LARGEST_URDF = 4 * 2**20  # bytes
 
 
 class VehicleTopics:
     """The topics in the namespace of one vehicle, which may be another object after every start."""
 
     def __init__(self, simulation: Simulation, vehicle: Vehicle, inbox: Inbox):
-        """Advertise, subscribe, and set its robot_description."""
-        self.vehicle = vehicle
-        self._inputs = VehicleInputs(simulation, vehicle.parameters, inbox)
-        self._newcomers = Newcomers()
-        self._outputs = VehicleOutputs(vehicle.parameters, self._newcomers)
-        self._cameras = {
-            name: CameraOutput(vehicle.parameters, camera, vehicle.parameters.cameras[name], self._newcomers)
+        """Advertise, subscribe, and set the vehicle's robot_description; the thread of `simulation` empties `inbox`."""
+        self._simulation = simulation
+        self.vehicle, parameters = vehicle, vehicle.parameters
+        self.inputs = VehicleInputs(simulation, parameters, inbox)
+        self.new_subscribers = NewSubscribers()  # to pictures or state
+        self.outputs = VehicleOutputs(parameters, self.new_subscribers)
+        self.cameras = {
+            name: CameraOutput(parameters, camera, parameters.cameras[name], self.new_subscribers)
             for name, camera in vehicle.cameras.items()
         }
-        self._sensors = {
-            name: SensorOutput(vehicle.parameters, sensor) for name, sensor in vehicle.instruments.by_name.items()
-        }
-        self._tuning = _tuning_server(vehicle, inbox)
-        set_description(vehicle.parameters)
-
-    @property
-    def command_log(self) -> CommandLog:
-        """What has come in."""
-        return self._inputs.log
-
-    def fits(self, vehicle: Vehicle) -> bool:
-        """Whether these would be the topics of this vehicle, too."""
-        return vehicle.parameters == self.vehicle.parameters
+        self.sensors = {name: SensorOutput(parameters, one) for name, one in vehicle.instruments.by_name.items()}
+        self._tuning: TuningServer | None = None
+        if rospy.resolve_name(vehicle.name) == rospy.get_name():  # the node's own server is there
+            rospy.logwarn(f"vehicle {vehicle.name} cannot be tuned in flight: it has the name of the node")
+        else:
+            tuning = simulation.child_scripts[vehicle.name].tuning
+            self._tuning = TuningServer(vehicle.name, tuning, inbox, tuned=lambda: self.inputs.follow(self.vehicle))
+        _set_description(parameters)
 
     def follow(self, vehicle: Vehicle) -> None:
         """Serve this vehicle from now on."""
         self.vehicle = vehicle
         for name, camera in vehicle.cameras.items():
-            self._cameras[name].follow(camera)
+            self.cameras[name].follow(camera)
         for name, sensor in vehicle.instruments.by_name.items():
-            self._sensors[name].follow(sensor)
+            self.sensors[name].follow(sensor)
         self.show_tuning()
 
     def show_tuning(self) -> None:
-        """Say what holds now of what may be tuned, where that is news."""
+        """Say what holds now of what may be tuned, where that is news, and check commands against it."""
+        self.inputs.follow(self.vehicle)
         if self._tuning is not None:
-            self._tuning.follow(self.vehicle.tuning)
+            self._tuning.follow(self._simulation.child_scripts[self.vehicle.name].tuning)
 
     def close(self) -> None:
         """Hear and publish no more."""
-        self._inputs.close()
-        self._outputs.close()
-        if self._tuning is not None:
-            self._tuning.close()
-        for camera in self._cameras.values():
-            camera.close()
-        for sensor in self._sensors.values():
-            sensor.close()
-
-    def have_newcomers(self) -> bool:
-        """Tell, once, whether somebody has begun to listen to pictures or state."""
-        return bool(self._newcomers.take())
-
-    def publish_state(self, stamp: Stamp) -> None:
-        """Publish pictures and state."""
-        for camera in self._cameras.values():
-            camera.publish(stamp)
-        self._outputs.publish_state(self.vehicle, stamp)
-
-    def publish_readings(self, stamp: Stamp, now: float) -> None:
-        """Publish what the sensors read in a step that ended at `now` (s of simulated time)."""
-        for sensor in self._sensors.values():
-            sensor.publish(stamp, now)
-
-    def publish_joints(self, stamp: Callable[[], rospy.Time]) -> None:
-        """Publish what becomes transforms elsewhere, too."""
-        self._outputs.publish_joints(self.vehicle, stamp)
-
-    def publish_command(self, stamp: Callable[[], rospy.Time]) -> None:
-        """Publish the command in force."""
-        self._outputs.publish_command(self.vehicle, stamp)
+        parts: list[Any] = [self.inputs, self.outputs, self._tuning, *self.cameras.values(), *self.sensors.values()]
+        for one in filter(None, parts):
+            one.close()
 
 
-def _tuning_server(vehicle: Vehicle, inbox: Inbox) -> TuningServer | None:
-    """Return what tunes a vehicle, None for one in whose namespace the node's own server is."""
-    if rospy.resolve_name(vehicle.name) != rospy.get_name():
-        return TuningServer(vehicle.name, vehicle.tuning, inbox)
-    rospy.logwarn(f"vehicle {vehicle.name} cannot be tuned in flight: it has the name of the node")
-    return None
+class FleetTopics:
+    """Topics for every vehicle of a simulation, and their frames."""
+
+    def __init__(self, simulation: Simulation, inbox: Inbox, stamp: Stamp):
+        """Advertise for the vehicles of `simulation`, whose thread empties `inbox`.
+
+        `stamp` returns that of what is sent now.
+        """
+        self._simulation = simulation
+        self._inbox = inbox
+        self._stamp = stamp
+        self._topics: dict[str, VehicleTopics] = {}
+        self._transforms = Transforms()
+        self._era = self._tunings = -1
+        self.descriptions: tuple[str, ...] = ()  # names of the parameters that hold the URDFs; any thread may read it
+        self.follow()
+
+    def follow(self) -> None:
+        """Advertise for vehicles that have come, and no more for those that have gone; say what has been tuned."""
+        simulation = self._simulation
+        if self._era != simulation.era:
+            self._follow_vehicles()
+        elif self._tunings != simulation.context.tunings:
+            for topics in self._topics.values():
+                topics.show_tuning()
+        self._tunings = simulation.context.tunings
+
+    def _follow_vehicles(self) -> None:
+        self._era = self._simulation.era
+        vehicles = self._simulation.vehicles
+        for name, topics in list(self._topics.items()):
+            if name not in vehicles or topics.vehicle.parameters != vehicles[name].parameters:
+                del self._topics[name]
+                topics.close()
+        for name, vehicle in vehicles.items():
+            if name in self._topics:
+                self._topics[name].follow(vehicle)
+            else:
+                self._topics[name] = VehicleTopics(self._simulation, vehicle, self._inbox)
+        self.descriptions = tuple(rospy.resolve_name(f"{name}/robot_description") for name in vehicles)
+        self._transforms.publish_static(vehicles.values(), self._stamp)
+        # rospy's topics hold on to themselves, and each has a descriptor (epoll) open until the collector comes by.
+        gc.collect()
+
+    def command_logs(self) -> dict[str, CommandLog]:
+        """Return what has come in, by vehicle."""
+        return {name: topics.inputs.log for name, topics in self._topics.items()}
+
+    def publish_state(self) -> None:
+        """Publish pictures and state of every vehicle."""
+        for topics in self._topics.values():
+            for camera in topics.cameras.values():
+                camera.publish(self._stamp)
+            topics.outputs.publish_state(topics.vehicle, self._stamp)
+
+    def publish_readings(self) -> None:
+        """Publish what the sensors of every vehicle read in the step that has just been."""
+        for topics in self._topics.values():
+            for sensor in topics.sensors.values():
+                sensor.publish(self._stamp, self._simulation.time)
+
+    def publish_transforms(self) -> None:
+        """Publish what is or becomes transforms: tf2 takes but one for each stamp."""
+        for topics in self._topics.values():
+            topics.outputs.publish_joints(topics.vehicle, self._stamp)
+        self._transforms.publish(self._simulation.vehicles.values(), self._stamp)
+
+    def tell_new_subscribers(self) -> bool:
+        """Tell transforms to those who have not heard them; return whether somebody waits for pictures or state."""
+        self._transforms.tell_new_subscribers(self._simulation.vehicles.values(), self._stamp)
+        return any([topics.new_subscribers.take() for topics in self._topics.values()])
+
+    def publish_command(self) -> None:
+        """Publish the commands in force; they may change while the simulation stands."""
+        for topics in self._topics.values():
+            topics.outputs.publish_command(topics.vehicle, self._stamp)
+
+
+def _set_description(parameters: VehicleParameters) -> None:
+    """Set the parameter `robot_description` in the namespace of a vehicle: its URDF, without inertias.
+
+    Who only computes poses needs none, and KDL warns of a root link that has one.
+    """
+    robot = Xml.fromstring(read_bytes(parameters.urdf, _LARGEST_URDF))
+    for link in robot.iter("link"):
+        for inertial in link.findall("inertial"):
+            link.remove(inertial)
+    rospy.set_param(f"{parameters.name}/robot_description", Xml.tostring(robot, encoding="unicode"))

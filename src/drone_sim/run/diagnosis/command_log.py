@@ -28,10 +28,9 @@ class Refusal(NamedTuple):
 class CommandLog:
     """What has come in for one vehicle since it is there. Any thread may write, and any may read."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic):
-        """Begin empty; take a monotonic clock (s)."""
-        self.clock = clock
-        self.senders: Callable[[], list[str]] = list  # returns who is connected, and could command
+    def __init__(self, clock: Callable[[], float] = time.monotonic, senders: Callable[[], list[str]] = list):
+        """Begin empty; take a monotonic `clock` (s), and what returns the `senders` that are connected."""
+        self.clock, self.senders = clock, senders
         self.taken: dict[str, Taken] = {}  # by topic
         self.refused: dict[str, Refusal] = {}
         self._lock = threading.Lock()

@@ -12,13 +12,10 @@ _FRESH = 3.0  # s of real time; what is older says nothing of now
 Key = tuple[str, str]  # a vehicle, and one of its cameras
 
 
-class Counts(NamedTuple):
-    """As they are at a moment."""
+class Since(NamedTuple):
+    """What there has been since a run began, or between two looks at both of which it flew."""
 
-    at: float  # s of real time
-    run: int
-    state: str
-    asked: float  # the real-time factor
+    seconds: float  # of real time
     steps: int
     late: int  # steps
     pictures: int
@@ -27,16 +24,13 @@ class Counts(NamedTuple):
     clipped: Mapping[str, int]  # steps in which a vehicle's propellers were at a limit
 
 
-class Since(NamedTuple):
-    """What has been between two looks of the same run, at both of which it flew."""
+class Counts(NamedTuple):
+    """What is counted, at a moment, and in which state."""
 
-    seconds: float  # of real time
-    steps: int
-    late: int
-    pictures: int
-    drawing: float
-    shown: Mapping[Key, int]  # of the cameras that were looked at all the time
-    clipped: Mapping[str, int]
+    run: int
+    state: str
+    asked: float  # the real-time factor
+    since: Since  # any moment; seconds count from anywhere
 
 
 def count(player: Player, pacer: Pacer, at: float) -> Counts:
@@ -50,11 +44,8 @@ def count(player: Player, pacer: Pacer, at: float) -> Counts:
         if one.watched()
     }
     vision = simulation.vision
-    return Counts(
-        at=at,
-        run=simulation.run,
-        state=player.state,
-        asked=simulation.parameters.real_time_factor,
+    since = Since(
+        seconds=at,
         steps=simulation.steps,
         late=pacer.overruns,
         pictures=vision.pictures,
@@ -62,22 +53,22 @@ def count(player: Player, pacer: Pacer, at: float) -> Counts:
         shown=shown,
         clipped={name: vehicle.propulsion.law.clipped for name, vehicle in vehicles.items()},
     )
+    return Counts(simulation.run, player.state, simulation.parameters.real_time_factor, since)
 
 
 def between(before: Counts | None, now: Counts) -> Since | None:
     """Return what has been in between; None where nothing can be said of it."""
-    if before is None or before.run != now.run or not 0 < now.at - before.at < _FRESH:
+    if before is None or before[:3] != now[:3] or now.state != "flying":
         return None
-    if before.asked != now.asked:
-        return None
-    if (before.state, now.state) != ("flying", "flying") or now.steps < before.steps:  # a snapshot came back
+    old, new = before.since, now.since
+    if not 0 < new.seconds - old.seconds < _FRESH or new.steps < old.steps:  # a snapshot came back
         return None
     return Since(
-        seconds=now.at - before.at,
-        steps=now.steps - before.steps,
-        late=now.late - before.late,
-        pictures=now.pictures - before.pictures,
-        drawing=now.drawing - before.drawing,
-        shown={key: now.shown[key] - before.shown[key] for key in now.shown if key in before.shown},
-        clipped={name: now.clipped[name] - before.clipped.get(name, 0) for name in now.clipped},
+        seconds=new.seconds - old.seconds,
+        steps=new.steps - old.steps,
+        late=new.late - old.late,
+        pictures=new.pictures - old.pictures,
+        drawing=new.drawing - old.drawing,
+        shown={key: new.shown[key] - old.shown[key] for key in new.shown if key in old.shown},
+        clipped={name: new.clipped[name] - old.clipped.get(name, 0) for name in new.clipped},
     )

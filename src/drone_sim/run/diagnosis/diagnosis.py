@@ -1,18 +1,96 @@
-"""One look at everything."""
+"""One look at everything: at the pace, at the cameras, at each vehicle."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from importlib import metadata
 
-from drone_sim.run.diagnosis.cameras import cameras
+from drone_sim.message_text import shown
 from drone_sim.run.diagnosis.command_log import CommandLog
-from drone_sim.run.diagnosis.counts import Counts, between, count
-from drone_sim.run.diagnosis.finding import Finding
-from drone_sim.run.diagnosis.pace import pace
+from drone_sim.run.diagnosis.counts import Counts, Since, between, count
+from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, finding
 from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis
 from drone_sim.run.pacing import Pacer
 from drone_sim.run.player import Player
+from drone_sim.run.simulation import Simulation
+from drone_sim.sensors.camera import TINY
+
+_ENOUGH = 0.9  # of the nominal rate, and of the pace that is asked for
+_FEW = 2  # pictures that fall into this look or the next
+_LATE = 0.1  # of the steps; a few are late on any busy computer
+
+
+def cameras(simulation: Simulation, since: Since | None) -> Finding:
+    """Look at what draws, at how long a picture takes, and at the rate of each camera that somebody looks at."""
+    renderer, values, problems = simulation.vision.renderer, {}, []
+    values["renderer"] = f"PyBullet's {TINY}" if renderer == TINY else renderer or "none yet: nobody has looked"
+    drawn = since.pictures if since else 0
+    mean = f"{since.drawing / drawn * 1e3:.1f} ms" if since and drawn else "not known"
+    values["frame time"] = mean
+    if renderer == TINY:
+        said = f"PyBullet's slow {TINY} draws, for there is no EGL: ask `rosrun drone_sim doctor`"
+        problems.append(Problem(WARN, said))
+    for (vehicle, name), count_shown in (since.shown if since else {}).items():
+        assert since is not None
+        rate = count_shown / since.seconds
+        nominal = _nominal(simulation, vehicle, name, since)
+        values[f"{vehicle}/{name}"] = f"{rate:.1f} of {nominal:.1f} Hz"
+        if count_shown + _FEW < _ENOUGH * nominal * since.seconds:
+            problems.append(Problem(WARN, f"{vehicle}/{name} comes at {rate:.1f} of {nominal:.1f} Hz"))
+    watched = [key for vehicle in simulation.vehicles.values() for key, one in vehicle.cameras.items() if one.watched()]
+    values["looked at"] = f"{len(watched)} of {sum(len(one.cameras) for one in simulation.vehicles.values())} cameras"
+    fine = f"{len(watched)} looked at; time of a picture: {mean}" if watched else "nobody looks"
+    return finding("cameras", fine, problems, values)
+
+
+def _nominal(simulation: Simulation, vehicle: str, name: str, since: Since) -> float:
+    """Return the pictures in a second of real time that there should be."""
+    parameters = simulation.parameters
+    every = simulation.vehicles[vehicle].parameters.cameras[name].every
+    if not parameters.real_time_factor:  # as fast as it can
+        return since.steps / every / since.seconds
+    return parameters.real_time_factor / (parameters.time_step * every)
+
+
+def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool) -> Finding:
+    """Look at state, script errors, real-time factor and late steps; at `simulated_time`, whether /clock goes on."""
+    simulation = player.simulation
+    asked = simulation.parameters.real_time_factor
+    factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
+    problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
+    if simulated_time and not player.playing:
+        problems.append(Problem(WARN, f"{player.state}: /clock stands still, and whoever sleeps in ROS time sleeps on"))
+    if factor is not None and asked and factor < _ENOUGH * asked:
+        problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {asked:g} are asked for"))
+    if since and since.late > _LATE * since.steps:
+        problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps came late"))
+    late = f"{since.late} of the last {since.steps}, " if since else ""
+    values = {
+        "state": player.state,
+        "script error": player.why_stopped,
+        "simulated time": f"{simulation.time:.2f} s",
+        "run": f"number {simulation.run}; every start and every stop begins another",
+        "vehicles": ", ".join(simulation.vehicles),
+        "real-time factor": f"{factor:.2f}" if factor is not None else "not known",
+        "real-time factor asked for": f"{asked:g}" if asked else "as fast as it can",
+        "late steps": f"{late}{pacer.overruns} in all, by {pacer.worst * 1e3:.0f} ms at most",
+        "stamps": "simulated time, told by /clock" if simulated_time else "real time",
+        "scene": shown(simulation.parameters.scene_file) if simulation.parameters.scene_file else "of the parameters",
+        "PyBullet": f"{_PYBULLET}, {'with its window' if simulation.parameters.gui else 'without a window'}",
+    }
+    speed = f" at {factor:.2f} times real time" if factor is not None else ""
+    return finding("simulation", f"{player.state}{speed}", problems, values)
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "of unknown version"
+
+
+_PYBULLET = _version("pybullet")
 
 
 class Diagnosis:

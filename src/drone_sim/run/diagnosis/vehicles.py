@@ -11,7 +11,7 @@ from drone_sim.run.diagnosis.finding import ERROR, WARN, Finding, Problem, findi
 from drone_sim.run.player import Player
 from drone_sim.scripting import load
 from drone_sim.sensors.sensor import Contact
-from drone_sim.vehicles.flight_state import CRASHED, LANDED
+from drone_sim.vehicles.commands import CRASHED, LANDED
 from drone_sim.vehicles.vehicle import Vehicle
 
 COMMAND = "cmd_vel"
@@ -34,7 +34,7 @@ class VehicleDiagnosis:
         self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
         self._now = log.clock()
         self._tilt = tilt(vehicle)
-        self._contacts = vehicle.instruments.carrier.contacts()
+        self._contacts = vehicle.body.contacts()
 
     def finding(self) -> Finding:
         """Return what was found."""
@@ -67,7 +67,7 @@ class VehicleDiagnosis:
         taken, state = self._log.taken.get(COMMAND), str(self._vehicle.flight_state)
         if state == CRASHED:
             return [Problem(WARN, "crashed: `reset` puts it back where it began")]
-        if state == LANDED and taken is not None and self._vehicle.command != Twist() and self._player.playing:
+        if state == LANDED and taken is not None and self._vehicle.commands.now != Twist() and self._player.playing:
             return [Problem(WARN, f"landed: commands of {taken.sender} do not move it; `takeoff` first")]
         return []
 
@@ -86,7 +86,7 @@ class VehicleDiagnosis:
 
     def _cannot(self) -> list[Problem]:
         problems = []
-        since, command = self._since, self._vehicle.command
+        since, command = self._since, self._vehicle.commands.now
         if since and since.steps and since.clipped[self._vehicle.name] > _SHARE * since.steps:
             problems.append(Problem(WARN, f"propellers at their limit in {self._clipped()}"))
         wanted = math.hypot(*command.linear)
@@ -103,7 +103,7 @@ class VehicleDiagnosis:
         if not any(bus.hears(COMMAND) for bus in vehicle.commands.buses):
             return [Problem(WARN, f"commands come in, but the child script does not subscribe to {COMMAND}")]
         gone = taken.sender not in self._log.senders()
-        if gone and vehicle.command != Twist() and not vehicle.parameters.cmd_vel_timeout:
+        if gone and vehicle.commands.now != Twist() and not vehicle.parameters.cmd_vel_timeout:
             said = f"flies on by the last command of {taken.sender}, which has gone"
             return [Problem(WARN, f"{said}: send a zero one, or set cmd_vel_timeout")]
         return []
@@ -122,26 +122,26 @@ class VehicleDiagnosis:
     def _values(self) -> dict[str, str]:
         vehicle, log = self._vehicle, self._log
         taken, refused = log.taken.get(COMMAND), log.last_refusal()
-        limits = vehicle.parameters.propellers.velocity_limits
+        limits, timeout = vehicle.parameters.propellers.velocity_limits, vehicle.parameters.cmd_vel_timeout
         return {
             "state": self._player.state,
             "flight state": str(vehicle.flight_state),
-            "command": _shown(vehicle.command),
+            "command": _shown(vehicle.commands.now),
             "command came": self._ago(taken.at) if taken else "never",
             "command sender": taken.sender if taken else "nobody",
             "connected commanders": ", ".join(log.senders()) or "nobody",
-            "command held for": f"{vehicle.parameters.cmd_vel_timeout:g} s" if self._forgets() else "ever",
+            "command held for": f"{timeout:g} s" if timeout > 0 else "ever",
             "refused": f"{sum(one.times for one in log.refused.values())}",
             "last refused": f"{refused.topic} of {refused.sender}, {self._ago(refused.at)}" if refused else "",
             "why refused": refused.why if refused else "",
-            "propellers": f"{numbers(vehicle.particle_velocities)} m/s",
+            "propellers": f"{numbers(vehicle.propulsion.particle_velocities)} m/s",
             "propeller limits": f"{numbers(limits)} m/s" if limits else "none",
             "propellers at a limit": self._clipped(),
             "tilt": f"{math.degrees(self._tilt):.1f} degrees",
-            "position": f"{numbers(vehicle.state.position)} m",
+            "position": f"{numbers(vehicle.body.state.position)} m",
             "speed": f"{self._speed():.2f} m/s",
             "contacts": ", ".join(_names(self._contacts)) or "none",
-            "put elsewhere": f"{vehicle.jumps} times",
+            "put elsewhere": f"{vehicle.body.jumps} times",
             "script": str(vehicle.parameters.script or self._player.simulation.script or load.DEFAULT),
             "frame": f"{self._frames_below}{vehicle.parameters.frame_prefix}base_link, in world",
         }
@@ -149,11 +149,8 @@ class VehicleDiagnosis:
     def _ago(self, at: float) -> str:
         return f"{self._now - at:.1f} s ago"
 
-    def _forgets(self) -> bool:
-        return self._vehicle.parameters.cmd_vel_timeout > 0
-
     def _speed(self) -> float:
-        return math.hypot(*self._vehicle.state.linear_velocity)
+        return math.hypot(*self._vehicle.body.state.linear_velocity)
 
     def _clipped(self) -> str:
         since = self._since
@@ -162,7 +159,7 @@ class VehicleDiagnosis:
 
 def tilt(vehicle: Vehicle) -> float:
     """Return the angle (rad) between a vehicle's z axis and the vertical."""
-    return math.acos(max(-1.0, min(1.0, vehicle.matrix[10])))
+    return math.acos(max(-1.0, min(1.0, vehicle.body.matrix[10])))
 
 
 def _names(contacts: list[Contact]) -> list[str]:

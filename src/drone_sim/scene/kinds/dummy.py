@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 from drone_sim.config.types import Length
+from drone_sim.context import SimulationContext
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene.kinds.kind import Around, KindParameters, Place
+from drone_sim.scene.kinds.kind import KindParameters, Place
 
 
 class DummyParameters(KindParameters):
@@ -15,7 +16,7 @@ class DummyParameters(KindParameters):
     kind: Literal["dummy"]
     size: Length = 0.01
 
-    def make(self, place: Place, around: Around) -> SceneObject:
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the frame."""
         return Dummy(place, self.size)
 

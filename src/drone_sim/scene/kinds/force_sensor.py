@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
+from drone_sim.context import SimulationContext
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene.kinds.kind import Around, KindParameters, Place
+from drone_sim.scene.kinds.kind import KindParameters, Place
 from drone_sim.world import World
 
 _NOTHING = (0.0, 0.0, 0.0)
@@ -17,7 +18,7 @@ class ForceSensorParameters(KindParameters):
 
     kind: Literal["force_sensor"]
 
-    def make(self, place: Place, around: Around) -> SceneObject:
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the sensor, which holds nothing yet."""
         return ForceSensor(*place, kind="force_sensor")
 
@@ -31,6 +32,15 @@ class ForceSensor(SceneObject):
         """Hold a link of a body in the world."""
         self._held = world, body, link
         world.joints.measure(body, link)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether something hangs on it in the dynamics."""
+        return self._held is not None
+
+    def release(self) -> None:
+        """Hold nothing any more."""
+        self._held = None
 
     def read(self) -> tuple[Vector, Vector]:
         """Return force (N) and torque (N m), as of the last sub-step, by which what hangs on it acts; its own frame."""

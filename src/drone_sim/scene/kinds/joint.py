@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from drone_sim.config.types import Coordinate, Finite, ParameterError, Within
-from drone_sim.mechanics.joint import FORCE, POSITION, VELOCITY, Control, Joint
+from drone_sim.context import SimulationContext
+from drone_sim.mechanics.joint import FORCE, POSITION, VELOCITY, Joint, JointControl
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene.kinds.kind import Around, KindParameters, Place
+from drone_sim.scene.kinds.kind import KindParameters, Place
 
 _Value = Annotated[Finite, Within(-1e5, 1e5)]  # rad or m
 _Force = Annotated[Finite, Within(0, 1e9)]  # N m or N
@@ -46,14 +47,14 @@ class JointParameters(KindParameters):
         super().model_post_init(context)
         low, high = self.limits or (-math.inf, math.inf)
         if not low <= self.value <= high:
-            raise ParameterError(f"value = {self.value:g}: must be within the limits, {low:g} to {high:g}")
+            raise ParameterError(f"must be within the limits, {low:g} to {high:g}", ("value",), f"{self.value:g}")
         if self.type == "spherical" and (self.limits is not None or self.value):
             raise ParameterError("limits, value: a spherical joint has none; setSphericalJointMatrix turns it")
 
     @property
-    def control(self) -> Control:
+    def control(self) -> JointControl:
         """What moves it at the beginning."""
-        return Control(
+        return JointControl(
             self.mode,
             position=self.target if self.mode == POSITION else self.value,
             velocity=self.target if self.mode == VELOCITY else 0.0,
@@ -61,6 +62,6 @@ class JointParameters(KindParameters):
             max_force=self.max_force,
         )
 
-    def make(self, place: Place, around: Around) -> SceneObject:
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the joint, not moved by the dynamics yet."""
         return Joint(*place, motion=self.type, limits=self.limits, value=self.value, control=self.control)

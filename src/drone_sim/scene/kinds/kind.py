@@ -3,37 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from drone_sim.config.types import Label, Point
-from drone_sim.mechanics.frames import Matrix
+from drone_sim.context import SimulationContext
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.render.orthographic import Lens
 from drone_sim.scene.entry import EntryParameters, Place
-from drone_sim.world import World
 
-__all__ = ["Around", "KindParameters", "Look", "Place"]
-
-Look = Callable[[str, Lens, Matrix], np.ndarray]
-
-
-@dataclass(frozen=True)
-class Around:
-    """What is around an object: the world, what takes pictures of it, and what scripts call a link of a body.
-
-    `look` takes "color" or "depth", a camera, and the pose world from its optical frame; see sensors.camera.Vision.
-    `follow` puts everything to where its parent has gone.
-    """
-
-    world: World
-    look: Look
-    name_of: Callable[[int, int], str]
-    follow: Callable[[], None]
+__all__ = ["KindParameters", "Place"]
 
 
 class KindParameters(EntryParameters):
@@ -44,5 +23,5 @@ class KindParameters(EntryParameters):
     kind: str
 
     @abstractmethod
-    def make(self, place: Place, around: Around) -> SceneObject:
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the object."""

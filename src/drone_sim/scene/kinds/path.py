@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from drone_sim.config.types import Finite, ParameterError, Point, Switch
+from drone_sim.context import SimulationContext
 from drone_sim.mechanics.path import Path
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.scene.kinds.kind import Around, KindParameters, Place
+from drone_sim.scene.kinds.kind import KindParameters, Place
 
 MAX_POINTS = 10_000
 Turn = tuple[Finite, Finite, Finite, Finite]
@@ -32,11 +33,11 @@ class PathParameters(KindParameters):
         super().model_post_init(context)
         if self.turns and len(self.turns) != len(self.points):
             raise ParameterError(
-                f"turns: {len(self.turns)} of them for {len(self.points)} points: must be one for each"
+                f"{len(self.turns)} of them for {len(self.points)} points: must be one for each", ("turns",)
             )
         if any(abs(math.hypot(*one) - 1.0) > 1e-3 for one in self.turns):
-            raise ParameterError("turns: the numbers x, y, z, w of each must have a length of 1")
+            raise ParameterError("the numbers x, y, z, w of each must have a length of 1", ("turns",))
 
-    def make(self, place: Place, around: Around) -> SceneObject:
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the path."""
         return Path(*place, self.points, self.closed, self.turns)

@@ -12,14 +12,15 @@ from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 from drone_sim.config.types import Finite, Length, ParameterError, Within
+from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.volume import Spot, Volume
 from drone_sim.scene.bodies import bodies_above
-from drone_sim.scene.kinds.kind import Around, KindParameters, Place
+from drone_sim.scene.kinds.kind import KindParameters, Place
 from drone_sim.world import World
-from drone_sim.world.probing import Met
+from drone_sim.world.queries import Met
 
 _CLOSER = 5  # times that the best ray's surroundings are looked at
 _SHRINKS = 3.0  # by which the part that is looked at is smaller each time
@@ -42,14 +43,14 @@ class ProximitySensorParameters(KindParameters):
         super().model_post_init(context)
         needed = _NEEDS.get(self.type)
         if needed is not None and not getattr(self, needed):
-            raise ParameterError(f"{needed} = 0: a {self.type} needs one that is greater")
+            raise ParameterError(f"a {self.type} needs one that is greater", (needed,), "0")
         widest = _WIDEST.get(self.type, math.inf)
         if self.angle > widest:
-            raise ParameterError(f"angle = {self.angle:g}: that of a {self.type} is at most {widest:.4g} rad")
+            raise ParameterError(f"that of a {self.type} is at most {widest:.4g} rad", ("angle",), f"{self.angle:g}")
 
-    def make(self, place: Place, around: Around) -> SceneObject:
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the sensor."""
-        return ProximitySensor(place, Volume(self.type, self.range, self.offset, self.angle, self.radius), around)
+        return ProximitySensor(place, Volume(self.type, self.range, self.offset, self.angle, self.radius), context)
 
 
 class Detection(NamedTuple):
@@ -64,29 +65,29 @@ class Detection(NamedTuple):
 class ProximitySensor(SceneObject):
     """Looks when it is asked; it does not see the bodies that carry it."""
 
-    def __init__(self, place: Place, volume: Volume, around: Around):
-        """Take where it is, what it looks through, and what is around it."""
+    def __init__(self, place: Place, volume: Volume, context: SimulationContext):
+        """Take where it is, what it looks through, and what the simulation shares."""
         super().__init__(*place, kind="proximity_sensor")
         self.volume = volume
-        self._around = around
+        self._context = context
 
     def detect(self, wanted: Callable[[str], bool] = lambda _: True) -> Detection | None:
         """Return the nearest point of an object whose name is wanted; None where there is none."""
-        around = self._around
-        around.follow()
+        context = self._context
+        context.carried.follow()
         own = bodies_above(self)
-        return self._nearest(lambda body, link: body not in own and wanted(around.name_of(body, link)))
+        return self._nearest(lambda body, link: body not in own and wanted(context.name_of(body, link)))
 
     def _nearest(self, counts: Callable[[int, int], bool]) -> Detection | None:
         matrix, volume, step = self.matrix(), self.volume, self.volume.step
-        seek = _Seek(self._around.world, matrix, volume, counts)
+        seek = _Seek(self._context.world, matrix, volume, counts)
         best = min([*seek.along(volume.spots()), *seek.inside()], default=None)
         if best is None:
             return None
         for _ in range(_CLOSER if step else 0):
             best = min([best, *seek.along(volume.spots_around(volume.spot(best.point), step))])
             step /= _SHRINKS
-        name = self._around.name_of(best.body, best.link)
+        name = self._context.name_of(best.body, best.link)
         return Detection(best.distance, best.point, name, frames.rotate_back(matrix, best.normal))
 
 
@@ -110,14 +111,14 @@ class _Seek(NamedTuple):
         """Return what rays meet."""
         rays = [self.volume.ray(spot) for spot in spots]
         ends = [(frames.transform(self.matrix, start), frames.transform(self.matrix, end)) for start, end in rays]
-        return [self._found(met) for met in self.world.rays(ends, self.counts)]
+        return [self._found(met) for met in self.world.queries.rays(ends, self.counts)]
 
     def inside(self) -> list[_Found]:
         """Return the points of bodies that are nearest to the sensor and lie inside."""
         if self.volume.type in ("ray", "disc"):
             return []
         origin, reach = frames.position(self.matrix), self.volume.reach
-        found = [self._found(met) for met in self.world.solidity.nearest_points(origin, reach, self.counts)]
+        found = [self._found(met) for met in self.world.queries.nearest_points(origin, reach, self.counts)]
         return [one for one in found if self.volume.holds(one.point)]
 
     def _found(self, met: Met) -> _Found:

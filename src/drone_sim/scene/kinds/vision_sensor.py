@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from drone_sim.config.types import Finite, Length, ParameterError, Within
+from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.render.intrinsics import Intrinsics
-from drone_sim.render.orthographic import Lens, Orthographic
-from drone_sim.scene.kinds.kind import Around, KindParameters, Place
+from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
+from drone_sim.scene.kinds.kind import KindParameters, Place
 
 MAX_SIDE = 2048  # px
 _OPTICAL = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # from V-REP's axes: y down, x right
@@ -36,29 +36,30 @@ class VisionSensorParameters(KindParameters):
         """Refuse planes between which there is nothing."""
         super().model_post_init(context)
         if not self.near < self.far:
-            raise ParameterError(f"near = {self.near:g}: must be less than far = {self.far:g}")
+            raise ParameterError(f"must be less than far = {self.far:g}", ("near",), f"{self.near:g}")
 
-    def make(self, place: Place, around: Around) -> SceneObject:
+    def make(self, place: Place, context: SimulationContext) -> SceneObject:
         """Return the camera."""
-        return VisionSensor(place, self, around)
+        return VisionSensor(place, self, context)
 
 
 class VisionSensor(SceneObject):
     """Takes pictures when it is asked."""
 
-    def __init__(self, place: Place, parameters: VisionSensorParameters, around: Around):
-        """Take where it is, what it is like, and what is around it."""
+    def __init__(self, place: Place, parameters: VisionSensorParameters, context: SimulationContext):
+        """Take where it is, what it is like, and what the simulation shares."""
         super().__init__(*place, kind="vision_sensor")
         self.width, self.height = parameters.width, parameters.height
         self.near, self.far = parameters.near, parameters.far
         self.angle = parameters.fov  # rad, of the larger side
         self.orthographic_size = parameters.size  # m, of the larger side; None where it is perspective
-        self._around = around
+        self._context = context
 
     def picture(self, kind: str) -> np.ndarray:
         """Return what it sees: "color" or "depth", as sensors.camera.Vision has it. Raises ValueError."""
-        self._around.follow()
-        return self._around.look(kind, self._lens(), frames.multiply(self.matrix(), _OPTICAL))
+        self._context.carried.follow()
+        pose = np.reshape((*frames.multiply(self.matrix(), _OPTICAL), 0, 0, 0, 1), (4, 4))
+        return self._context.vision.picture(kind, self._lens(), pose)
 
     def _lens(self) -> Lens:
         larger = max(self.width, self.height)

@@ -15,7 +15,7 @@ class Image(NamedTuple):
     frame_id: str
 
 
-class Sender(Protocol):
+class MessageSender(Protocol):
     """One advertised topic of a backend."""
 
     def publish(self, message: Any) -> None:
@@ -51,7 +51,7 @@ class Backend(Protocol):
         A message is an object with the fields as attributes (rospy's own will do), or a mapping.
         """
 
-    def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> Sender:
+    def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> MessageSender:
         """Advertise a topic of any installed type."""
 
     def time(self) -> float:
@@ -79,5 +79,5 @@ class Backend(Protocol):
         gets the response. Raises ValueError also for a name that is none, or that this process offers already.
         """
 
-    def advertise_image(self, topic: str, queue: int) -> Sender:
-        """Advertise a sensor_msgs/Image; its Sender takes Image tuples."""
+    def advertise_image(self, topic: str, queue: int) -> MessageSender:
+        """Advertise a sensor_msgs/Image; its MessageSender takes Image tuples."""

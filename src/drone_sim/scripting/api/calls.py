@@ -1,22 +1,99 @@
-"""How a script's calls reach the API: every mistake becomes one line that names the function."""
+"""The functions of the script API: how one is declared, and how calls reach it.
+
+A function is declared where it is written, once for Lua, Python, the remote API and docs/api.md, by what its module is
+called and by which generations of V-REP have it under which names:
+
+    @sim("5", getInt32Parameter="34")
+    def getInt32Param(self, parameter: int) -> int:
+        ...
+
+Its arguments, as annotated, are what an error's message expects; its docstring is what the page says, where the class
+that it stands in is a section.
+"""
 
 from __future__ import annotations
 
 import inspect
 import itertools
+import sys
 import traceback
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import isfinite
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
+from drone_sim.scripting.api.types import WrongValue
 from drone_sim.scripting.api.unknown import not_there
-from drone_sim.scripting.errors import UnknownName
 
 Function = Callable[..., Any]
+_Method = TypeVar("_Method", bound=Function)
+_FLAT = {"sim": "sim", "simROS": "simExtRosInterface_", "simUI": "simExtCustomUI_"}  # what names of 3.x begin with
 _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError)
 _SHOWN = 60  # characters of a value
 _MOST = 13  # values
 _LONGEST = 1000  # characters of an error's message
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What a function is in the API.
+
+    names: what scripts call it, its own name first, and for each the generations of V-REP that have it: 3 for 3.x, 4
+    for 4.0 to 4.2, 5 for 4.3 and later, such as "45"; none has what is drone_sim's own.
+    """
+
+    module: str
+    names: Mapping[str, str]
+
+
+class Module:
+    """Declares the functions of one module of the API, which hold a Declaration from then on."""
+
+    def __init__(self, name: str):
+        """`name`: what scripts call it."""
+        self._name = name
+
+    def __call__(self, generations: str = "345", **others: str) -> Callable[[_Method], _Method]:
+        """Declare a function by the generations that have it under its own name, and under which others."""
+
+        def declare(function: _Method) -> _Method:
+            names = {function.__name__: generations, **others}
+            function.declaration = Declaration(self._name, names)  # type: ignore[attr-defined]
+            return function
+
+        return declare
+
+    def add(self, to: type, function: Function, name: str, doc: str, generations: str = "345", **others: str) -> None:
+        """Declare a function that was made, not written, as a method of a class: its name, docstring, and names."""
+        function.__name__, function.__qualname__, function.__doc__ = name, f"{to.__name__}.{name}", doc
+        setattr(to, name, self(generations, **others)(function))
+
+
+sim, simROS = Module("sim"), Module("simROS")
+
+
+def declaration_of(function: Function) -> Declaration | None:
+    """Return how a function was declared, None where it was not."""
+    return getattr(function, "declaration", None)
+
+
+def functions_of(*parts: object) -> dict[str, Function]:
+    """Return the functions that were declared in the classes of some objects, under each of their names."""
+    found: dict[str, Function] = {}
+    for part in parts:
+        for attribute in dir(type(part)):
+            declaration = declaration_of(getattr(type(part), attribute))
+            if declaration is not None:
+                found.update(dict.fromkeys(declaration.names, getattr(part, attribute)))
+    return found
+
+
+def flat_name(module: str, name: str) -> str:
+    """Return what a function of a module is called in 3.x: simGetObjectPosition, simExtRosInterface_publish."""
+    return _FLAT.get(module, f"{module}_") + (f"{name[:1].upper()}{name[1:]}" if module == "sim" else name)
+
+
+class UnknownName(AttributeError):
+    """A script asked for a function or constant that the API does not have."""
 
 
 class Api:
@@ -27,16 +104,16 @@ class Api:
         name: str,
         functions: Mapping[str, Function],
         constants: Mapping[str, Any],
-        remember: Callable[[], Callable[[], None]] | None = None,
+        save_state: Callable[[], Callable[[], None]] | None = None,
     ):
-        """Take what it is called, and what it has.
+        """`name`: what scripts call it; `functions` and `constants`: what it has.
 
-        `remember` returns what brings back what a script has set in it, and that is nowhere else.
+        `save_state` returns what brings back what a script has set in it, and that is nowhere else.
         """
         self.__dict__.update(constants)
         self.__dict__.update(functions)
         # Kept out of sight: whatever else is an attribute is the script's to use.
-        self.__dict__["_api"] = (name, dict(functions), dict(constants), remember)
+        self.__dict__["_api"] = (name, dict(functions), dict(constants), save_state)
 
     def __getattr__(self, name: str) -> Any:
         """Raise UnknownName, with the near names; called for what is not there."""
@@ -50,20 +127,10 @@ def contents(api: Api) -> tuple[str, dict[str, Function], dict[str, Any]]:
     return name, functions, constants
 
 
-def remember(apis: Iterable[Api]) -> list[Callable[[], None]]:
+def save_state(apis: Iterable[Api]) -> list[Callable[[], None]]:
     """Return functions that bring back what a script has set in its APIs."""
-    remembering = (api.__dict__["_api"][3] for api in apis)
-    return [one() for one in remembering if one is not None]
-
-
-def public_functions(parts: Iterable[object]) -> dict[str, Function]:
-    """Return the public methods of some objects, by name."""
-    return {
-        name: getattr(part, name)
-        for part in parts
-        for name in dir(part)
-        if not name.startswith("_") and callable(getattr(part, name))
-    }
+    saving = (api.__dict__["_api"][3] for api in apis)
+    return [one() for one in saving if one is not None]
 
 
 def mistake(error: BaseException, apis: Iterable[Api]) -> str | None:
@@ -101,6 +168,12 @@ def explain(name: str, function: Function, arguments: Sequence[Any], error: Exce
     return f"{name}: {reason}: got ({came}), expected ({_expected(signature)})"
 
 
+def most_values(function: Function) -> int:
+    """Return how many values a function takes at most."""
+    kinds = [one.kind for one in inspect.signature(function).parameters.values()]
+    return sys.maxsize if inspect.Parameter.VAR_POSITIONAL in kinds else len(kinds)
+
+
 def _expected(signature: inspect.Signature) -> str:
     """Return 'handle: Handle, relativeTo: Handle = -1'."""
     shown = []
@@ -135,30 +208,3 @@ def _shown(value: Any, depth: int) -> str:
         some = itertools.islice(value.items(), _MOST) if depth < 2 else ()
         return "{" + ", ".join(f"{show(key, 2)}: {show(item, depth + 1)}" for key, item in some) + "}"
     return repr(value)
-
-
-class WrongValue(TypeError):
-    """A value is of the wrong kind; the message says what is expected instead."""
-
-
-def numbers(values: Sequence[float], count: int) -> tuple[float, ...]:
-    """Return `count` finite numbers; raises WrongValue."""
-    if type(values) is list and len(values) == count:  # most often what another call returned
-        try:
-            total = sum(values)
-        except TypeError:
-            total = None
-        if type(total) is float and isfinite(total):
-            return tuple(values)
-    expected = f"{count} numbers are expected" if count != 1 else "a number is expected"
-    try:
-        found = tuple(map(float, values))
-    except OverflowError:  # a whole number beyond all floats
-        raise WrongValue("finite numbers are expected") from None
-    except (TypeError, ValueError):
-        raise WrongValue(expected) from None
-    if len(found) != count:
-        raise WrongValue(f"{expected}, not {len(found)}")
-    if not isfinite(sum(found)):
-        raise WrongValue("finite numbers are expected")
-    return found

@@ -4,51 +4,85 @@ from __future__ import annotations
 
 import copy
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.path import Path
-from drone_sim.scripting.api.calls import Function, WrongValue
+from drone_sim.message_text import near_names
+from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.custom_values import CustomData
-from drone_sim.scripting.api.host import Host
-from drone_sim.scripting.api.types import Handle, Name
-from drone_sim.wording import near_names
+from drone_sim.scripting.api.script_values import MOST_BYTES, refuse_if_too_large
+from drone_sim.scripting.api.types import Handle, Name, WrongValue
 
+_MOST = 10_000  # values of all objects
+_LONGEST_NAME = 200  # characters
 _SCENE, _APP = CONSTANTS["handle_scene"], CONSTANTS["handle_app"]
 _CUSTOM = "customData."
 _PATHS = ("PATH", "PATHCTRLPTS")  # tags of CoppeliaSim's own
 _PROPERTIES = (_CUSTOM, "signal.")
-_PROPERTY_KINDS = (
-    *("Bool", "Int", "Float", "String", "Buffer", "Table", "Vector2", "Vector3", "Quaternion", "Pose", "Color"),
-    *("FloatArray", "IntArray", "Long"),
-)
+_PROPERTY_KINDS = "Bool Int Float String Buffer Table Vector2 Vector3 Quaternion Pose Color FloatArray IntArray Long"
+_GETTERS, _SETTERS = ({f"{verb}{kind}Property": "5" for kind in _PROPERTY_KINDS.split()} for verb in ("get", "set"))
+
+
+class CustomData:
+    """Values by object and name, for the scripts of all vehicles."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self.values: dict[tuple[int, str], Any] = {}
+
+    def clear(self) -> None:
+        """Forget all of them, as at the beginning of a run."""
+        self.values.clear()
+
+    def save_state(self) -> Callable[[], None]:
+        """Return a function that brings the present values back."""
+        kept = copy.deepcopy(self.values)
+
+        def restore() -> None:
+            self.values = copy.deepcopy(kept)
+
+        return restore
+
+    def set(self, handle: int, name: str, value: Any) -> None:
+        """Keep a value, or forget it where it is None or ''. Raises WrongValue, ValueError."""
+        if not isinstance(name, str):
+            raise WrongValue("the name of a value is a string")
+        if len(name) > _LONGEST_NAME:
+            raise ValueError(f"the name of a value has at most {_LONGEST_NAME} characters, not {len(name)}")
+        refuse_if_too_large(value)
+        if value is None or (isinstance(value, (str, bytes)) and not value):
+            self.values.pop((handle, name), None)
+            return
+        if (handle, name) not in self.values and len(self.values) >= _MOST:
+            raise ValueError(f"{_MOST} values are there already: forget some")
+        size = sum(len(one) for one in self.values.values() if isinstance(one, (str, bytes)))
+        if isinstance(value, (str, bytes)) and size + len(value) > MOST_BYTES:
+            raise ValueError(f"custom data may hold {MOST_BYTES} bytes together")
+        self.values[handle, name] = copy.deepcopy(value)
+
+    def names(self, handle: int) -> list[str]:
+        """Return the names of an object's values."""
+        return [name for one, name in self.values if one == handle]
 
 
 class CustomDataFunctions:
-    """The functions on custom data, and the properties customData.… and signal.…."""
+    """Custom data, strings and tables under a name that scripts leave on objects, and properties (4.7)."""
 
-    def __init__(self, host: Host, data: CustomData):
-        """Take the drone whose objects they are, and where the values are kept."""
-        self._objects = host.objects
+    def __init__(self, objects: ObjectTree, data: CustomData):
+        """`data` is what scripts have left on the `objects`."""
+        self._objects = objects
         self._data = data
 
-    def functions(self) -> dict[str, Function]:
-        """Return what a script may call, by name."""
-        found = {name: getattr(self, name) for name in dir(self) if not name.startswith("_") and name != "functions"}
-        for kind in _PROPERTY_KINDS:
-            found[f"set{kind}Property"] = self.setProperty
-            found[f"get{kind}Property"] = self.getProperty
-        return found
-
+    @sim("345", writeCustomBufferData="5", writeCustomStringData="5")
     def writeCustomDataBlock(self, handle: Handle, tag: Name, data: Any) -> None:
         """Leave a string under a tag on an object, or on sim.handle_scene; '' forgets it."""
         if not isinstance(data, (str, bytes, type(None))):
             raise WrongValue("a string is expected")
         self._data.set(self._target(handle), _CUSTOM + tag, data)
 
-    writeCustomStringData = writeCustomBufferData = writeCustomDataBlock
-
+    @sim("345", readCustomBufferData="5", readCustomStringData="5")
     def readCustomDataBlock(self, handle: Handle, tag: Name) -> Any:
         """Return the string under a tag; nothing where there is none.
 
@@ -61,39 +95,43 @@ class CustomDataFunctions:
         found = self._objects[handle] if handle >= 0 else None
         return struct.pack(f"<{len(found.table)}d", *found.table) if isinstance(found, Path) else None
 
-    readCustomStringData = readCustomBufferData = readCustomDataBlock
-
+    @sim("345", readCustomDataTags="5")
     def readCustomDataBlockTags(self, handle: Handle) -> list[str]:
         """Return the tags of an object."""
         names = self._data.names(self._target(handle))
         return [name.removeprefix(_CUSTOM) for name in names if name.startswith(_CUSTOM)]
 
-    readCustomDataTags = readCustomDataBlockTags
-
+    @sim("5")
     def writeCustomTableData(self, handle: Handle, tag: Name, data: Any, _options: Any = None) -> None:
         """Leave a table under a tag on an object; {} forgets it."""
         self._data.set(self._target(handle), _CUSTOM + tag, data or None)
 
+    @sim("5")
     def readCustomTableData(self, handle: Handle, tag: Name, _options: Any = None) -> Any:
         """Return the table under a tag; an empty one where there is none."""
         return copy.deepcopy(self._data.values.get((self._target(handle), _CUSTOM + tag), {}))
 
+    @sim("345")
     def persistentDataWrite(self, tag: Name, data: Any, _options: int = 0) -> None:
         """Leave a string under a tag until the simulation stops; '' forgets it."""
         self.writeCustomDataBlock(_APP, tag, data)
 
+    @sim("345")
     def persistentDataRead(self, tag: Name) -> Any:
         """Return a string that persistentDataWrite left; nothing where there is none."""
         return self.readCustomDataBlock(_APP, tag)
 
+    @sim("345")
     def getPersistentDataTags(self) -> list[str]:
         """Return the tags that persistentDataWrite left something under."""
         return self.readCustomDataBlockTags(_APP)
 
+    @sim("5", **_SETTERS)
     def setProperty(self, handle: Handle, name: Name, value: Any, _options: Any = None) -> None:
         """Set a property customData.… or signal.… of an object, or of sim.handle_scene."""
         self._data.set(self._target(handle), _known(name), value)
 
+    @sim("5", **_GETTERS)
     def getProperty(self, handle: Handle, name: Name, options: Mapping[str, Any] | None = None) -> Any:
         """Return a property customData.… or signal.…; nothing for none with the option noError."""
         target = self._target(handle)
@@ -103,6 +141,7 @@ class CustomDataFunctions:
             return None
         raise ValueError(f"no property '{name}'; {near_names(name, self._data.names(target))}")
 
+    @sim("5")
     def removeProperty(self, handle: Handle, name: Name, _options: Any = None) -> None:
         """Forget a property customData.… or signal.…."""
         self._data.set(self._target(handle), _known(name), None)

@@ -1,4 +1,4 @@
-"""What a script draws: drawing objects, each a kind of item (points, lines, spheres, ...) and the items so far."""
+"""`sim`: what a script draws: drawing objects, each with a kind of item (points, lines, spheres, ...)."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.object_tree import WORLD, ObjectTree
+from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.ignored import Ignored
+from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers, numbers
 
 MOST = 2000  # items of one object: as many as can be sent to rviz ten times a second beside the flight
 
@@ -36,6 +41,8 @@ _CYCLIC = CONSTANTS["drawing_cyclic"]
 _SEEN_THROUGH = {CONSTANTS["drawing_50percenttransparency"]: 0.5, CONSTANTS["drawing_25percenttransparency"]: 0.75}
 
 Item = tuple[float, ...]
+_IGNORED = "there is nothing to draw on; accepted and ignored"
+_GREY = (0.5, 0.5, 0.5)
 
 
 @dataclass(frozen=True)
@@ -48,7 +55,7 @@ class DrawingObject:
 
     kind: str
     size: float
-    rgba: tuple[float, float, float, float]
+    rgba: Item
     items: deque[Item]
     cyclic: bool
     tolerance: float
@@ -85,13 +92,7 @@ class Drawings:
         return self._last_handle
 
     def make(
-        self,
-        kind: int,
-        size: float,
-        tolerance: float,
-        most: int,
-        color: Item,
-        frame: Callable[[], Matrix] | None = None,
+        self, kind: int, size: float, tolerance: float, most: int, color: Item, frame: Callable[[], Matrix] | None
     ) -> int:
         """Add an object that holds up to `most` items, and return its handle.
 
@@ -103,21 +104,11 @@ class Drawings:
         turned = kind & _KIND in _TURNED
         if kind & _KIND not in _KINDS and not turned:
             raise ValueError(f"no drawing object has the type {kind}; known are sim.drawing_{', '.join(_NUMBERS)}")
-        alpha = math.prod(part for flag, part in _SEEN_THROUGH.items() if kind & flag)
-        rgba = (color[0], color[1], color[2], alpha)
+        name = _TURNED[kind & _KIND] if turned else _KINDS[kind & _KIND]
+        rgba = (*color[:3], math.prod(part for flag, part in _SEEN_THROUGH.items() if kind & flag))
         items: deque[Item] = deque(maxlen=min(max(1, most), MOST))
-        handle = self.new_handle()
-        self.objects[handle] = DrawingObject(
-            _TURNED[kind & _KIND] if turned else _KINDS[kind & _KIND],
-            size,
-            rgba,
-            items,
-            bool(kind & _CYCLIC),
-            max(0.0, tolerance),
-            frame,
-            turned,
-            bool(kind & _LOCAL),
-        )
+        handle, cyclic, local = self.new_handle(), bool(kind & _CYCLIC), bool(kind & _LOCAL)
+        self.objects[handle] = DrawingObject(name, size, rgba, items, cyclic, max(0.0, tolerance), frame, turned, local)
         self.changes += 1
         return handle
 
@@ -149,17 +140,17 @@ class Drawings:
         del self.objects[handle]
         self.changes += 1
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that brings back what is drawn now."""
         kept, last = _copied(self.objects), self._last_handle
 
-        def recall() -> None:
+        def restore() -> None:
             self._last_handle = last
             self.objects.clear()
             self.objects.update(_copied(kept))
             self.changes += 1
 
-        return recall
+        return restore
 
     def clear(self) -> None:
         """Remove every object, as at the beginning of a run."""
@@ -186,3 +177,56 @@ def _moved(matrix: Matrix, item: Item, has_normal: bool) -> Item:
 
 def _copied(objects: dict[int, DrawingObject]) -> dict[int, DrawingObject]:
     return {handle: replace(drawn, items=drawn.items.copy()) for handle, drawn in objects.items()}
+
+
+class DrawingFunctions:
+    """Drawing objects, which rviz shows; where nobody shows them they are accepted and ignored, said once."""
+
+    def __init__(self, drawings: Drawings, objects: ObjectTree, ignored: Ignored):
+        """`drawings` is where to draw, `objects` may carry it; `ignored` says that something is ignored."""
+        self._drawings = drawings
+        self._objects = objects
+        self._ignored = ignored
+
+    @sim("345")
+    def addDrawingObject(
+        self,
+        objectType: int,
+        size: Number,
+        duplicateTolerance: Number = 0.0,
+        parent: Handle = WORLD,
+        maxItemCount: int = 1,
+        color: ThreeNumbers | None = None,
+        *_shine: Any,
+    ) -> int:
+        """Make a drawing object that holds up to `maxItemCount` items; return its handle.
+
+        `size` is in px for points and lines, else in m. A parent carries the items: where they are drawn in the world
+        they go with it.
+        """
+        rgb = numbers(color, 3) if color else _GREY
+        above = None if parent == WORLD else self._objects[parent]
+        if not self._drawings.shown:
+            self._ignored.say("addDrawingObject", _IGNORED)
+            return self._drawings.new_handle()
+        if maxItemCount > MOST:
+            self._ignored.say("addDrawingObject", f"{maxItemCount} items are too many: {MOST} are kept")
+        extent, tolerance = numbers((size, duplicateTolerance), 2)
+        return self._drawings.make(
+            int(objectType), extent, tolerance, int(maxItemCount), rgb, above.matrix if above else None
+        )
+
+    @sim("345")
+    def addDrawingObjectItem(self, handle: Handle, item: Numbers | None = None) -> None:
+        """Draw one more item, its points one after the other (m, world); without an item, remove all of them."""
+        values = None if item is None else numbers(item, len(item))
+        if self._drawings.shown:
+            self._drawings.add(handle, values)
+        else:
+            self._ignored.say("addDrawingObjectItem", _IGNORED)
+
+    @sim("345")
+    def removeDrawingObject(self, handle: Handle) -> None:
+        """Remove a drawing object."""
+        if self._drawings.shown:
+            self._drawings.remove(handle)

@@ -1,25 +1,80 @@
-"""`sim`: what the dynamics know of an object: masses, whether it moves, and parameters that say so."""
+"""`sim`: what the dynamics know of an object, and parameters of objects: getObjectInt32Param and the others.
+
+A motor that is switched on without control runs at the target velocity, with control it goes to the target position, as
+V-REP 3.x has it.
+"""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.inertia import Inertia, turned
-from drone_sim.mechanics.object_tree import SceneObject
-from drone_sim.scripting.api.calls import WrongValue, numbers
+from drone_sim.mechanics.joint import KINEMATIC, PASSIVE, POSITION, VELOCITY, Joint
+from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.message_text import near_names
+from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Host, Surroundings
-from drone_sim.scripting.api.ignored import Ignored
-from drone_sim.scripting.api.object_parameters import readable, settable
-from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers
-from drone_sim.wording import near_names
+from drone_sim.scripting.api.host import Functions
+from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers, WrongValue, numbers
+from drone_sim.scripting.api.vision import Eye
 
+Getters = Mapping[str, Callable[[], float]]
+Setters = Mapping[str, Callable[[float], None]]
 _NONE = Inertia((0.0,) * 9, frames.IDENTITY)
 _EVERYTHING = (CONSTANTS["handle_all"], CONSTANTS["handle_scene"])
 _WHOLE = ("objintparam_", "shapeintparam_", "jointintparam_", "visionintparam_", "proxintparam_")
 _FLOAT = ("objfloatparam_", "shapefloatparam_", "jointfloatparam_", "visionfloatparam_")
+
+
+@runtime_checkable
+class Freezable(Protocol):
+    """A shape of the scene that the dynamics may leave alone for a while."""
+
+    @property
+    def is_static(self) -> bool:
+        """Whether it does."""
+
+    def set_static(self, static: bool) -> None:
+        """Let it. Raises ValueError."""
+
+
+def readable(found: SceneObject) -> Getters:
+    """Return what can be read of an object."""
+    if isinstance(found, Joint):
+        control = found.control
+        return {
+            "jointintparam_motor_enabled": lambda: control.mode not in (KINEMATIC, PASSIVE),
+            "jointintparam_ctrl_enabled": lambda: control.mode == POSITION,
+            "jointfloatparam_velocity": lambda: found.velocity_along,
+            "jointfloatparam_upper_limit": lambda: found.limits[1] if found.limits else 0.0,
+        }
+    if isinstance(found, Eye):
+        return {
+            "visionintparam_resolution_x": lambda: found.width,
+            "visionintparam_resolution_y": lambda: found.height,
+            "visionfloatparam_near_clipping": lambda: found.near,
+            "visionfloatparam_far_clipping": lambda: found.far,
+            "visionfloatparam_perspective_angle": lambda: found.angle,
+        }
+    return {"shapeintparam_static": lambda: found.is_static} if isinstance(found, Freezable) else {}
+
+
+def settable(found: SceneObject) -> Setters:
+    """Return what can be set of an object."""
+    if isinstance(found, Joint) and found.control.mode != KINEMATIC:
+        mode = found.control.mode
+        with_control = POSITION if mode == POSITION else VELOCITY
+        without_control = VELOCITY if mode == POSITION else mode
+        return {
+            "jointintparam_motor_enabled": lambda on: found.change(mode=with_control if on else PASSIVE),
+            "jointintparam_ctrl_enabled": lambda on: found.change(mode=POSITION if on else without_control),
+        }
+    if isinstance(found, Freezable) and not getattr(found, "is_held", False):
+        return {"shapeintparam_static": lambda static: found.set_static(bool(static))}
+    return {}
 
 
 @runtime_checkable
@@ -30,16 +85,10 @@ class Massive(Protocol):
         """Return how its mass lies in it, None where it has none."""
 
 
-class Dynamics:
-    """The functions on the dynamics of objects."""
+class Dynamics(Functions):
+    """What the dynamics know of an object: masses, whether it moves, and parameters that say so."""
 
-    def __init__(self, host: Host, surroundings: Surroundings, ignored: Ignored):
-        """Take the drone whose objects they are, the masses (kg) by name, and what says that something is ignored."""
-        self._objects = host.objects
-        self._masses = surroundings.masses
-        self._inertias = surroundings.inertias
-        self._ignored = ignored
-
+    @sim("345")
     def resetDynamicObject(self, handle: Handle) -> None:
         """Let the body that carries an object (sim.handle_all: every body) begin anew where it is, at rest."""
         handles = list(self._objects) if handle in _EVERYTHING else [handle]
@@ -48,15 +97,18 @@ class Dynamics:
             if not getattr(one, "is_held", False):  # those go with what they hang on
                 one.put(one.matrix())
 
+    @sim("45")
     def isDynamicallyEnabled(self, handle: Handle) -> bool:
         """Return whether the dynamics move an object, or what carries it."""
         return _carrier(self._objects[handle]) is not None
 
+    @sim("45")
     def getShapeMass(self, handle: Handle) -> float:
         """Return the mass of a shape in kg; 0 where the dynamics do not move it."""
         found = self._objects[handle]
-        return float(getattr(found, "mass", 0.0)) or self._masses().get(found.name, 0.0)
+        return float(getattr(found, "mass", 0.0)) or self._surroundings.masses().get(found.name, 0.0)
 
+    @sim("345")
     def getShapeMassAndInertia(
         self, handle: Handle, transform: TwelveNumbers | None = None
     ) -> tuple[float, list[float], list[float]]:
@@ -71,6 +123,7 @@ class Dynamics:
         tensor = list(map(float, turned(inertia, place).ravel()))
         return self.getShapeMass(handle), tensor, list(frames.position(place))
 
+    @sim("")
     def getShapeInertia(self, handle: Handle) -> tuple[Numbers, TwelveNumbers]:
         """Return the inertia of a shape about its centre of mass (kg m², 9 numbers), and in which frame that is (4.x).
 
@@ -84,15 +137,21 @@ class Dynamics:
     def _inertia(self, handle: int) -> Inertia | None:
         """Return how the mass of a shape lies in it, None where there is none."""
         found = self._objects[handle]
-        return found.inertia() if isinstance(found, Massive) else self._inertias().get(found.name)
+        return found.inertia() if isinstance(found, Massive) else self._surroundings.inertias().get(found.name)
 
     # ---- parameters of objects
 
+    @sim("5", getObjectIntParam="")
     def getObjectInt32Param(self, handle: Handle, parameter: int) -> int:
-        """Return what object_parameters.py has of an object, or what any object has; 0 for others.
+        """Return a parameter of an object, 0 for one that is not known here.
 
-        Those are sim.shapeintparam_static (0 or 1), _respondable and sim.objintparam_visibility_layer.
+        Those of any object are sim.shapeintparam_static (0 or 1), _respondable and sim.objintparam_visibility_layer.
         """
+        return self.getObjectInt32Parameter(handle, parameter)[1]
+
+    @sim("345", getObjectIntParameter="35")
+    def getObjectInt32Parameter(self, handle: Handle, parameter: int) -> tuple[int, int]:
+        """Return 1 and what getObjectInt32Param does; 0 and 0 for a parameter that is not known here."""
         found = self._objects[handle]
         known: dict[str, Callable[[], float]] = {
             "shapeintparam_static": lambda: int(_carrier(found) is None),
@@ -100,10 +159,10 @@ class Dynamics:
             "objintparam_visibility_layer": lambda: 1,
             **readable(found),
         }
-        return int(self._read("getObjectInt32Param", _WHOLE, parameter, known, 0))
+        value = self._read("getObjectInt32Param", _WHOLE, parameter, known)
+        return (0, 0) if value is None else (1, int(value))
 
-    getObjectInt32Parameter = getObjectIntParameter = getObjectIntParam = getObjectInt32Param
-
+    @sim("5", setObjectInt32Parameter="345", setObjectIntParam="", setObjectIntParameter="3")
     def setObjectInt32Param(self, handle: Handle, parameter: int, value: int) -> int:
         """Set a parameter of the scene's objects: sim.shapeintparam_static, sim.jointintparam_motor_enabled and others.
 
@@ -111,10 +170,17 @@ class Dynamics:
         """
         return self._set("setObjectInt32Param", handle, _WHOLE, parameter, value)
 
-    setObjectInt32Parameter = setObjectIntParameter = setObjectIntParam = setObjectInt32Param
-
+    @sim("5")
     def getObjectFloatParam(self, handle: Handle, parameter: int) -> float:
-        """Return sim.shapefloatparam_mass (kg), sim.objfloatparam_abs_x_velocity, _y, _z (m/s) or _rot (rad/s)."""
+        """Return sim.shapefloatparam_mass (kg), sim.objfloatparam_abs_x_velocity, _y, _z (m/s) or _rot (rad/s).
+
+        Of the scene's shapes also sim.objfloatparam_objbbox_min_x and others (m, in the shape); 0 for what is unknown.
+        """
+        return self.getObjectFloatParameter(handle, parameter)[1]
+
+    @sim("345")
+    def getObjectFloatParameter(self, handle: Handle, parameter: int) -> tuple[int, float]:
+        """Return 1 and what getObjectFloatParam does; 0 and 0 for a parameter that is not known here."""
         found = self._objects[handle]
         known: dict[str, Callable[[], float]] = {
             "shapefloatparam_mass": lambda: self.getShapeMass(handle),
@@ -122,31 +188,51 @@ class Dynamics:
             "objfloatparam_abs_y_velocity": lambda: found.velocity()[0][1],
             "objfloatparam_abs_z_velocity": lambda: found.velocity()[0][2],
             "objfloatparam_abs_rot_velocity": lambda: sum(one * one for one in found.velocity()[1]) ** 0.5,
-            "objfloatparam_size_factor": lambda: 1.0,
+            "objfloatparam_size_factor": lambda: self._factor(handle),
+            **(self._corners(handle) if isinstance(found, Freezable) else {}),
             **readable(found),
         }
-        return float(self._read("getObjectFloatParam", _FLOAT, parameter, known, 0.0))
+        value = self._read("getObjectFloatParam", _FLOAT, parameter, known)
+        return (0, 0.0) if value is None else (1, float(value))
 
-    getObjectFloatParameter = getObjectFloatParam
-
+    @sim("5", setObjectFloatParameter="345")
     def setObjectFloatParam(self, handle: Handle, parameter: int, value: Number) -> int:
         """Accept any number among an object's parameters and ignore it; return 1."""
         return self._set("setObjectFloatParam", handle, _FLOAT, parameter, value)
 
-    setObjectFloatParameter = setObjectFloatParam
-
-    def _read(
-        self, function: str, kinds: tuple[str, ...], parameter: int, known: Mapping[str, Callable[[], Any]], other: Any
-    ) -> Any:
+    def _read(self, function: str, kinds: tuple[str, ...], parameter: int, known: Getters) -> float | None:
         names = _names(kinds, parameter)
         for name in names:
             if name in known:
                 return known[name]()
-        self._ignored.say(function, f"{names[0]} is not known here: {other} is returned")
-        return other
+        self._ignored.say(function, f"{names[0]} is not known here: 0 is returned")
+        return None
+
+    def _corners(self, handle: int) -> Getters:
+        """Return what says where the box around a shape of the scene begins and ends along its own axes."""
+        operations = self._surroundings.operations
+        if operations is None:
+            return {}
+
+        def corner(axis: int, half: float) -> float:
+            size, centre = operations.box(handle)
+            return centre[axis] + half * size[axis]
+
+        ends = {"min": -0.5, "max": 0.5}
+        return {
+            f"objfloatparam_objbbox_{end}_{name}": functools.partial(corner, axis, half)
+            for end, half in ends.items()
+            for axis, name in enumerate("xyz")
+        }
+
+    def _factor(self, handle: int) -> float:
+        return self._surroundings.operations.factors(handle)[0] if self._surroundings.operations is not None else 1.0
 
     def _set(self, function: str, handle: int, kinds: tuple[str, ...], parameter: int, value: float) -> int:
-        known, names = settable(self._objects[handle]), _names(kinds, parameter)
+        known, names = dict(settable(self._objects[handle])), _names(kinds, parameter)
+        operations = self._surroundings.operations
+        if operations is not None and isinstance(self._objects[handle], Freezable):  # a shape of the scene
+            known["shapeintparam_respondable"] = lambda on: operations.change(handle, respondable=bool(on))
         for name in names:
             if name in known:
                 known[name](*numbers((value,), 1))

@@ -7,16 +7,14 @@ and ignored, for the law turns the blades.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY
 from drone_sim.mechanics.joint import FORCE, KINEMATIC, PRISMATIC, REVOLUTE, SPHERICAL, Joint
-from drone_sim.scripting.api.calls import WrongValue, numbers
-from drone_sim.scripting.api.host import Host
-from drone_sim.scripting.api.ignored import Ignored
-from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.host import Functions
+from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers, WrongValue, numbers
 
 _TYPES = {REVOLUTE: 10, PRISMATIC: 11, SPHERICAL: 12}  # sim.joint_revolute_subtype and so on
 _KINEMATIC_MODE, _DYNAMIC_MODE = 0, 5  # sim.jointmode_kinematic, _dynamic (3.x: _passive, _force)
@@ -24,22 +22,18 @@ _WITHOUT_END = (-math.pi, math.tau)  # what V-REP says of a cyclic joint: from w
 _UNIT = 1e-3  # by how much a rotation may miss
 
 
-class Joints:
-    """The functions on joints."""
-
-    def __init__(self, host: Host, ignored: Ignored):
-        """Take the drone whose objects they are, and what says that something is ignored."""
-        self._host = host
-        self._objects = host.objects
-        self._ignored = ignored
+class JointFunctions(Functions):
+    """Joints. Revolute ones in rad, rad/s and N m, prismatic ones in m, m/s and N."""
 
     # ---- where they are
 
+    @sim("345")
     def getJointPosition(self, handle: Handle) -> float:
         """Return how far a joint is turned or slid; of a propeller's, the angle of the blades."""
         found = self._objects[handle]
         return found.value if isinstance(found, Joint) else self._host.turn_joint(found.name, None)
 
+    @sim("345")
     def setJointPosition(self, handle: Handle, position: Number) -> None:
         """Put a joint somewhere, within its limits; of a propeller's, turn the blades: looks only."""
         (value,) = numbers((position,), 1)
@@ -49,14 +43,17 @@ class Joints:
         else:
             self._host.turn_joint(found.name, value)
 
+    @sim("45")
     def getJointVelocity(self, handle: Handle) -> float:
         """Return how fast the dynamics moves a joint."""
         return self._joint(handle).velocity_along
 
+    @sim("345", getSphericalJointMatrix="")
     def getJointMatrix(self, handle: Handle) -> list[float]:
         """Return the transform between a joint's own frame and what hangs on it."""
         return list(self._joint(handle).motion_matrix())
 
+    @sim("345")
     def setSphericalJointMatrix(self, handle: Handle, matrix: TwelveNumbers) -> None:
         """Turn a spherical joint; of the transform only the rotation counts."""
         joint, m = self._joint(handle), numbers(matrix, 12)
@@ -68,19 +65,20 @@ class Joints:
             raise WrongValue("the matrix of a rotation is expected")
         joint.turn = frames.from_quaternion((0.0, 0.0, 0.0), frames.to_quaternion(turn))
 
-    getSphericalJointMatrix = getJointMatrix
-
     # ---- what they are
 
+    @sim("345")
     def getJointType(self, handle: Handle) -> int:
         """Return sim.joint_revolute_subtype (10), _prismatic_subtype (11) or _spherical_subtype (12)."""
         return _TYPES[self._joint(handle).motion]
 
+    @sim("345")
     def getJointInterval(self, handle: Handle) -> tuple[bool, list[float]]:
         """Return whether a joint has no end, and its lowest position and its range."""
         limits = self._joint(handle).limits
         return (True, list(_WITHOUT_END)) if limits is None else (False, [limits[0], limits[1] - limits[0]])
 
+    @sim("345")
     def setJointInterval(self, handle: Handle, cyclic: bool, interval: Numbers = ()) -> None:
         """Give a joint its lowest position and its range, or, if cyclic, no end."""
         joint = self._moving(handle)
@@ -91,10 +89,12 @@ class Joints:
             raise WrongValue(f"the range of a joint is greater than 0, not {extent:g}")
         joint.limit(None if cyclic else (low, low + extent))
 
+    @sim("345")
     def getJointMode(self, handle: Handle) -> tuple[int, int]:
         """Return 0 for a joint that scripts move, 5 for one that the dynamics moves, and no options."""
         return (_KINEMATIC_MODE if self._joint(handle).control.mode == KINEMATIC else _DYNAMIC_MODE), 0
 
+    @sim("345")
     def setJointMode(self, handle: Handle, mode: int, _options: Any = 0) -> None:
         """Let a joint be moved by scripts alone (0), or by the dynamics (5), as it was before."""
         joint = self._joint(handle)
@@ -105,36 +105,43 @@ class Joints:
 
     # ---- what moves them
 
+    @sim("345")
     def getJointTargetPosition(self, handle: Handle) -> float:
         """Return where a joint is to go."""
         return self._joint(handle).control.position
 
+    @sim("345")
     def setJointTargetPosition(self, handle: Handle, position: Number, _motion: Any = None) -> None:
         """Let a joint go to a position; one that scripts move is there at once."""
         (value,) = numbers((position,), 1)
         if not self._is_propellers(handle, "setJointTargetPosition"):
             self._moving(handle).change(position=value)
 
+    @sim("345")
     def getJointTargetVelocity(self, handle: Handle) -> float:
         """Return how fast a joint is to move."""
         return self._joint(handle).control.velocity
 
+    @sim("345")
     def setJointTargetVelocity(self, handle: Handle, velocity: Number, _motion: Any = None) -> None:
         """Let a joint move at a velocity, in the mode for that."""
         (value,) = numbers((velocity,), 1)
         if not self._is_propellers(handle, "setJointTargetVelocity"):
             self._moving(handle).change(velocity=value)
 
+    @sim("345")
     def getJointForce(self, handle: Handle) -> float:
         """Return what a joint's motor gave in the last sub-step."""
         drive = self._joint(handle).drive
-        return 0.0 if drive is None else drive.force()
+        return 0.0 if drive is None else drive.state()[2]
 
+    @sim("5")
     def getJointTargetForce(self, handle: Handle) -> float:
         """Return the force that a joint in force mode is given, else the most that its motor gives."""
         control = self._joint(handle).control
         return control.force if control.mode == FORCE else control.max_force
 
+    @sim("5")
     def setJointTargetForce(self, handle: Handle, force: Number, signedValue: bool = True) -> None:
         """Give a joint in force mode a force, signed or in the direction of before; else set the most of its motor."""
         (value,) = numbers((force,), 1)
@@ -148,14 +155,12 @@ class Joints:
         else:
             joint.change(force=math.copysign(value, joint.control.velocity or joint.control.force or 1.0))
 
+    @sim("45")
     def getJointMaxForce(self, handle: Handle) -> float:
         """Return the most that a joint's motor gives (3.x)."""
         return abs(self.getJointTargetForce(handle))
 
-    def setJointMaxForce(self, handle: Handle, force: Number) -> None:
-        """Set the most that a joint's motor gives (3.x)."""
-        self.setJointTargetForce(handle, force, False)
-
+    @sim("345", setJointMaxForce="45")
     def setJointForce(self, handle: Handle, force: Number) -> None:
         """Set the most that a joint's motor gives (3.x)."""
         self.setJointTargetForce(handle, force, False)
@@ -169,11 +174,7 @@ class Joints:
         return True
 
     def _joint(self, handle: int) -> Joint:
-        found = self._objects[handle]
-        if not isinstance(found, Joint):
-            known = ", ".join(_names(self._objects)) or "none"
-            raise WrongValue(f"'{found.name}' is not a joint of the scene; there are: {known}")
-        return found
+        return self._found(handle, Joint, "a joint of the scene")
 
     def _moving(self, handle: int) -> Joint:
         """Return a joint that has a position."""
@@ -181,7 +182,3 @@ class Joints:
         if joint.motion == SPHERICAL:
             raise WrongValue(f"'{joint.name}' is spherical: setSphericalJointMatrix turns it")
         return joint
-
-
-def _names(objects: Any) -> Sequence[str]:
-    return [objects[handle].name for handle in objects if isinstance(objects[handle], Joint)][:20]

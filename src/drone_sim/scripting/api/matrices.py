@@ -1,4 +1,4 @@
-"""`sim`: matrices, 12 numbers each, and rotations.
+"""`sim`: matrices, 12 numbers each, poses, 7 numbers each, and rotations.
 
 Interpolation goes round one axis at one speed: K. Shoemake, Animating Rotation with Quaternion Curves, 1985.
 """
@@ -10,15 +10,25 @@ from collections.abc import Sequence
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Quaternion, Vector
-from drone_sim.scripting.api.calls import WrongValue, numbers
-from drone_sim.scripting.api.types import FourNumbers, Number, Numbers, ThreeNumbers, TwelveNumbers
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.types import (
+    FourNumbers,
+    Number,
+    Numbers,
+    SevenNumbers,
+    ThreeNumbers,
+    TwelveNumbers,
+    WrongValue,
+    numbers,
+)
 
 _MOST_POINTS = 100_000
 
 
 class Matrices:
-    """The functions on matrices."""
+    """Matrices, 12 numbers each, and rotations."""
 
+    @sim("345")
     def multiplyVector(self, matrix: TwelveNumbers, vector: Numbers) -> list[float]:
         """Return matrix · vector, of one vector or of several, one after the other."""
         m = numbers(matrix, 12)
@@ -29,40 +39,47 @@ class Matrices:
             raise WrongValue("3 numbers are expected, or 3 for each of several points")
         return [one for index in range(0, len(values), 3) for one in frames.transform(m, values[index : index + 3])]
 
+    @sim("345")
     def multiplyMatrices(self, first: TwelveNumbers, second: TwelveNumbers) -> list[float]:
         """Return first · second."""
         return list(frames.multiply(numbers(first, 12), numbers(second, 12)))
 
+    @sim("345")
     def buildIdentityMatrix(self) -> list[float]:
         """Return the transform that changes nothing."""
         return list(IDENTITY)
 
+    @sim("345")
     def copyMatrix(self, matrix: TwelveNumbers) -> list[float]:
         """Return a copy of a transform."""
         return list(numbers(matrix, 12))
 
+    @sim("345")
     def buildMatrix(self, position: ThreeNumbers, angles: Numbers) -> list[float]:
         """Return the transform of a position and Euler angles, or a quaternion (x, y, z, w)."""
         return list(built(position, angles))
 
+    @sim("345")
     def buildMatrixQ(self, position: ThreeNumbers, quaternion: FourNumbers) -> list[float]:
         """Return the transform of a position and a quaternion (x, y, z, w)."""
         return list(frames.from_quaternion(numbers(position, 3), unit(numbers(quaternion, 4))))
 
+    @sim("345")
     def getEulerAnglesFromMatrix(self, matrix: TwelveNumbers) -> list[float]:
         """Return the Euler angles of a transform."""
         return list(frames.to_euler(numbers(matrix, 12)))
 
+    @sim("345")
     def getQuaternionFromMatrix(self, matrix: TwelveNumbers) -> list[float]:
         """Return the quaternion (x, y, z, w) of a transform."""
         return list(frames.to_quaternion(numbers(matrix, 12)))
 
+    @sim("5", getInvertedMatrix="3")
     def getMatrixInverse(self, matrix: TwelveNumbers) -> list[float]:
         """Return the inverse of a transform."""
         return list(frames.invert(numbers(matrix, 12)))
 
-    getInvertedMatrix = getMatrixInverse
-
+    @sim("345")
     def invertMatrix(self, matrix: TwelveNumbers) -> list[float]:
         """Invert a transform where it stands, in the table that is given, and return it."""
         inverse = list(frames.invert(numbers(matrix, 12)))
@@ -70,16 +87,19 @@ class Matrices:
             matrix[:] = inverse
         return inverse
 
+    @sim("345")
     def interpolateMatrices(self, first: TwelveNumbers, second: TwelveNumbers, part: Number) -> list[float]:
         """Return the transform so far (0 to 1) between two, the rotation on the shortest way."""
         return list(between(numbers(first, 12), numbers(second, 12), numbers((part,), 1)[0]))
 
+    @sim("345")
     def getRotationAxis(self, start: TwelveNumbers, goal: TwelveNumbers) -> tuple[list[float], float]:
         """Return axis (world) and angle (rad) of the turn from one transform's axes to another's."""
         turn = frames.multiply(numbers(goal, 12), frames.invert(numbers(start, 12)))
         axis, angle = axis_and_angle(frames.to_quaternion(turn))
         return list(axis), angle
 
+    @sim("345")
     def rotateAroundAxis(
         self, matrix: TwelveNumbers, axis: ThreeNumbers, position: ThreeNumbers, angle: Number
     ) -> list[float]:
@@ -91,11 +111,13 @@ class Matrices:
         placed = (r0, r1, r2, there[0] - x, r4, r5, r6, there[1] - y, r8, r9, r10, there[2] - z)
         return list(frames.multiply(placed, numbers(matrix, 12)))
 
+    @sim("45")
     def alphaBetaGammaToYawPitchRoll(self, alpha: Number, beta: Number, gamma: Number) -> tuple[float, float, float]:
         """Return yaw, pitch and roll (R = Rz Ry Rx) of V-REP's Euler angles, in rad."""
         roll, pitch, yaw = frames.to_rpy(frames.from_euler((0.0, 0.0, 0.0), numbers((alpha, beta, gamma), 3)))
         return yaw, pitch, roll
 
+    @sim("45")
     def yawPitchRollToAlphaBetaGamma(self, yaw: Number, pitch: Number, roll: Number) -> tuple[float, float, float]:
         """Return V-REP's Euler angles of yaw, pitch and roll (R = Rz Ry Rx), in rad."""
         return frames.to_euler(frames.from_rpy((0.0, 0.0, 0.0), numbers((roll, pitch, yaw), 3)))
@@ -142,3 +164,46 @@ def between(first: Matrix, second: Matrix, part: float) -> Matrix:
     orientation = frames.multiply_quaternions(frames.to_quaternion(first), about(axis, part * angle))
     place = [a + part * (b - a) for a, b in zip(frames.position(first), frames.position(second))]
     return frames.from_quaternion(place, orientation)
+
+
+class Poses:
+    """Poses, 7 numbers each: a position in m and a quaternion (x, y, z, w)."""
+
+    @sim("5")
+    def buildPose(self, position: ThreeNumbers, angles: Numbers) -> list[float]:
+        """Return the pose of a position and Euler angles, or a quaternion (x, y, z, w)."""
+        return _pose(built(position, angles))
+
+    @sim("5")
+    def multiplyPoses(self, first: SevenNumbers, second: SevenNumbers) -> list[float]:
+        """Return the pose first · second."""
+        return _pose(frames.multiply(_matrix(first), _matrix(second)))
+
+    @sim("5", getPoseInverse="5")
+    def invertPose(self, pose: SevenNumbers) -> list[float]:
+        """Return the pose that undoes another."""
+        return _pose(frames.invert(_matrix(pose)))
+
+    @sim("5")
+    def interpolatePoses(self, first: SevenNumbers, second: SevenNumbers, part: Number) -> list[float]:
+        """Return the pose so far (0 to 1) between two, the rotation on the shortest way."""
+        return _pose(between(_matrix(first), _matrix(second), numbers((part,), 1)[0]))
+
+    @sim("5")
+    def poseToMatrix(self, pose: SevenNumbers) -> list[float]:
+        """Return the 12 numbers of a pose's transform."""
+        return list(_matrix(pose))
+
+    @sim("5")
+    def matrixToPose(self, matrix: TwelveNumbers) -> list[float]:
+        """Return the pose of a transform's 12 numbers."""
+        return _pose(numbers(matrix, 12))
+
+
+def _matrix(pose: SevenNumbers) -> Matrix:
+    values = numbers(pose, 7)
+    return frames.from_quaternion(values[:3], unit(values[3:]))
+
+
+def _pose(matrix: Matrix) -> list[float]:
+    return [*frames.position(matrix), *frames.to_quaternion(matrix)]

@@ -1,4 +1,4 @@
-"""Topics as a child script sees them, `simROS`, with or without ROS behind.
+"""What a script subscribes to, publishes and offers, with or without ROS behind.
 
 Whoever has a message leaves it here from any thread; the simulation hands it to the script's callback
 at the start of its next step. What a script publishes goes to the Backend where there is one, else nowhere.
@@ -8,20 +8,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from drone_sim.scripting.api.backend import Backend, Image, Sender
-from drone_sim.scripting.api.calls import Function, WrongValue
-from drone_sim.scripting.api.offered_services import OfferedServices
-from drone_sim.scripting.api.publishers import Begin, Kept, Publishers
-from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.api.subscriptions import Subscriptions
-from drone_sim.scripting.api.types import Callback, Handle, Name
+from drone_sim.scripting.api.backend import Backend, MessageSender
+from drone_sim.scripting.api.service_servers import ServiceServer
+from drone_sim.scripting.api.topics import SERVICE, OwnTopic, Subscriptions
+from drone_sim.scripting.api.types import Callback
 
 _MOST = 200  # subscriptions and publishers
 _LONGEST_QUEUE = 1000  # messages
+_MOST_WAITING = 100  # requests of one service
 _OWN_TOPICS = {
     "cmd_vel": "geometry_msgs/Twist",
     **dict.fromkeys(("takeoff", "land", "reset", "home"), "std_msgs/Empty"),
@@ -32,15 +28,20 @@ _OWN_TOPICS = {
 _TYPE = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*")
 
 
+class _Publisher(NamedTuple):
+    begin: Callable[[], MessageSender | None]  # nothing where there is no backend
+    sender: MessageSender | None
+
+
 class MessageBus:
-    """What one drone's script subscribes to and publishes; relative names stand in the drone's namespace.
+    """What one script subscribes to, publishes and offers.
 
     `backend` may be set at any time; it serves what is subscribed and advertised after that. Topics in
     `own_topics` are never asked of it: the drone itself posts them, and hears what is published on them.
     """
 
     def __init__(self, namespace: str, own_topics: Mapping[str, str] | None = None):
-        """Take the namespace ('drone', '' is none), and topics that the drone itself has, with their types."""
+        """`namespace`: 'drone', '' is none; `own_topics`: those that the drone itself has, with their types."""
         self.backend: Backend | None = None
         self._prefix = f"/{namespace}" if namespace else ""
         own = _OWN_TOPICS if own_topics is None else own_topics
@@ -49,37 +50,18 @@ class MessageBus:
         # Asked for in every step: without another call in between.
         self.new_callbacks, self.deliver = self._subscriptions.new_callbacks, self._subscriptions.deliver
         self.take = self._subscriptions.take
-        self._publishers = Publishers()
+        self._publishers: dict[int, _Publisher] = {}
         self.said: dict[str, Any] = {}  # what was last published on own topics, by their full names
         self._last_handle = 0
 
-    def functions(self) -> dict[str, Function]:
-        """Return what a script may call, by name."""
-        names = (
-            "subscribe",
-            "shutdownSubscriber",
-            "advertise",
-            "publish",
-            "shutdownPublisher",
-            "getNumSubscribers",
-            "publisherTreatUInt8ArrayAsString",
-            "subscriberTreatUInt8ArrayAsString",
-            "imageTransportAdvertise",
-            "imageTransportPublish",
-            "imageTransportShutdownPublisher",
-        )
-        offering = OfferedServices(self._subscriptions, self._new_handle, self.resolve, lambda: self.backend)
-        return {**{name: getattr(self, name) for name in names}, **offering.functions()}
+    # ---- what a script does
 
-    # ---- what a script calls
+    def subscribe(self, topic: str, kind: str, callback: Callback, queue: int = 1) -> int:
+        """Leave messages of a topic for a callback, the last `queue` of a step; return a handle. Raises ValueError.
 
-    def subscribe(self, topic: Name, kind: Name, callback: Callback, queue: int = 1, *_ignored: Any) -> int:
-        """Call the script's function `callback` with each message on `topic`; return a handle.
-
-        Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1. The same
-        topic, type and callback once more give the handle that they have; V-REP calls back once more for each.
+        The same topic, type and callback once more give the handle that they have.
         """
-        resolved, kept = self.resolve(topic), _length(queue)
+        resolved = self.resolve(topic)
         there = self._subscriptions.same(resolved, kind, callback)
         if there is not None:
             return there
@@ -91,65 +73,78 @@ class MessageBus:
 
         self._check_type(resolved, kind)
         handle = self._new_handle()
-        self._subscriptions.add(handle, resolved, kind, callback, kept, begin)
+        self._subscriptions.add(handle, resolved, kind, callback, _length(queue), begin)
         return handle
 
-    def shutdownSubscriber(self, handle: Handle) -> None:
-        """End a subscription; raises ValueError where there is none of that handle."""
-        self._subscriptions.check(handle)
-        self._subscriptions.end(handle)
+    def offer(self, name: str, kind: str, callback: Callback) -> int:
+        """Offer a service, which a callback answers; return a handle. Raises ValueError."""
+        service = self.resolve(name)
+        if self._subscriptions.has(SERVICE.format(service)):
+            raise ValueError(f"this script offers the service {service} already")
+        if not _TYPE.fullmatch(kind):
+            raise ValueError(f"'{kind:.80}' is no service type; one is, for example, std_srvs/Trigger")
 
-    def advertise(self, topic: Name, kind: Name, queue: int = 1, latch: bool = False, *_ignored: Any) -> int:
-        """Advertise a topic; return a handle to publish on."""
-        resolved, kept = self.resolve(topic), _length(queue)
+        def begin(take: Callable[[Any], None]) -> Callable[[], None]:
+            if self.backend is None:
+                return _nothing
+            server = ServiceServer(take)
+            end = self.backend.serve(service, kind, server.ask)
 
-        def begin() -> Sender | None:
+            def close() -> None:
+                server.close()  # refuses what still waits
+                end()
+
+            return close
+
+        handle = self._new_handle()
+        self._subscriptions.add(handle, SERVICE.format(service), kind, callback, _MOST_WAITING, begin)
+        return handle
+
+    def advertise(self, topic: str, kind: str, queue: int = 1, latch: bool = False) -> int:
+        """Advertise a topic; return a handle. Raises ValueError."""
+        resolved = self.resolve(topic)
+
+        def begin() -> MessageSender | None:
             if resolved in self._own_topics:
-                return Kept(self.said, resolved)
-            return self.backend.advertise(resolved, kind, kept, bool(latch)) if self.backend else None
+                return OwnTopic(self.said, resolved)
+            return self.backend.advertise(resolved, kind, _length(queue), latch) if self.backend else None
 
         self._check_type(resolved, kind)
         return self._add_publisher(begin)
 
-    def publish(self, handle: Handle, message: Any) -> None:
-        """Publish a message: a table of its fields."""
-        if message is None or isinstance(message, (str, bytes, int, float)):
-            raise WrongValue("a table of the message's fields is expected")
-        refuse_if_too_large(message)
-        self._publishers.send(handle, message)
+    def advertise_image(self, topic: str, queue: int = 1) -> int:
+        """Advertise a topic of images; return a handle. Raises ValueError."""
+        resolved = self.resolve(topic)
+        return self._add_publisher(
+            lambda: self.backend.advertise_image(resolved, _length(queue)) if self.backend else None
+        )
 
-    def shutdownPublisher(self, handle: Handle) -> None:
+    def publish(self, handle: int, message: Any) -> None:
+        """Publish a message; raises ValueError where nothing has that handle."""
+        sender = self._sender(handle)
+        if sender is not None:
+            sender.publish(message)
+
+    def subscribers(self, handle: int) -> int:
+        """Return how many listen; raises ValueError where nothing has that handle."""
+        sender = self._sender(handle)
+        return 0 if sender is None else sender.subscribers()
+
+    def end_publisher(self, handle: int) -> None:
         """Stop advertising; raises ValueError where nothing has that handle."""
-        self._publishers.end(handle)
+        sender = self._sender(handle)
+        del self._publishers[handle]
+        if sender is not None:
+            sender.shutdown()
 
-    def getNumSubscribers(self, handle: Handle) -> int:
-        """Return how many listen to what is published; V-REP has no such function."""
-        return self._publishers.subscribers(handle)
+    def check_subscription(self, handle: int, is_service: bool = False) -> None:
+        """Raise ValueError where no subscription, or no service that is offered, has that handle."""
+        self._subscriptions.check(handle, is_service)
 
-    def publisherTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] goes as a string or a table anyhow."""
-        self._publishers.subscribers(handle)
-
-    def subscriberTreatUInt8ArrayAsString(self, handle: Handle) -> None:
-        """Do nothing: uint8[] arrives as a string anyhow; string.byte(data, 1) is its first byte."""
-        self._subscriptions.check(handle)
-
-    def imageTransportAdvertise(self, topic: Name, queue: int = 1) -> int:
-        """Advertise an image topic; return a handle to publish on."""
-        resolved, kept = self.resolve(topic), _length(queue)
-
-        def begin() -> Sender | None:
-            return self.backend.advertise_image(resolved, kept) if self.backend else None
-
-        return self._add_publisher(begin)
-
-    def imageTransportPublish(self, handle: Handle, data: Any, width: int, height: int, frame_id: Name) -> None:
-        """Publish a vision sensor's image as getVisionSensorCharImage returns it, the bottom row first."""
-        self._publishers.send(handle, Image(_top_row_first(data, width, height), int(width), int(height), frame_id))
-
-    def imageTransportShutdownPublisher(self, handle: Handle) -> None:
-        """Stop advertising an image topic."""
-        self._publishers.end(handle)
+    def end_subscription(self, handle: int, is_service: bool = False) -> None:
+        """End a subscription, or offer a service no longer; raises ValueError where none has that handle."""
+        self._subscriptions.check(handle, is_service)
+        self._subscriptions.end(handle)
 
     # ---- what the simulation calls
 
@@ -169,26 +164,36 @@ class MessageBus:
     def close(self) -> None:
         """End every subscription and stop advertising: the script that made them is gone."""
         self._subscriptions.close()
-        self._publishers.close()
+        for handle in list(self._publishers):
+            self.end_publisher(handle)
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that brings back what is subscribed and advertised now, and the messages that wait."""
-        last, recalls = self._last_handle, (self._subscriptions.remember(), self._publishers.remember())
-        said = dict(self.said)
+        restore_subscriptions, kept = self._subscriptions.save_state(), dict(self._publishers)
+        last, said = self._last_handle, dict(self.said)
 
-        def recall() -> None:
-            for one in recalls:
-                one()
+        def restore() -> None:
+            restore_subscriptions()
+            for handle in set(self._publishers) - set(kept):
+                self.end_publisher(handle)
+            for handle in set(kept) - set(self._publishers):
+                kept[handle] = kept[handle]._replace(sender=kept[handle].begin())
+            self._publishers = dict(kept)
             self._last_handle = last
             self.said.clear()
             self.said.update(said)
 
-        return recall
+        return restore
 
-    def _add_publisher(self, begin: Begin) -> int:
+    def _add_publisher(self, begin: Callable[[], MessageSender | None]) -> int:
         handle = self._new_handle()
-        self._publishers.add(handle, begin)
+        self._publishers[handle] = _Publisher(begin, begin())
         return handle
+
+    def _sender(self, handle: int) -> MessageSender | None:
+        if handle not in self._publishers:
+            raise ValueError(f"no publisher has the handle {handle}")
+        return self._publishers[handle].sender
 
     def _check_type(self, topic: str, kind: str) -> None:
         """Raise ValueError for a type that the topic does not have, or that is none."""
@@ -215,17 +220,3 @@ def _nothing() -> None:
 
 def _length(queue: int) -> int:
     return min(max(1, int(queue)), _LONGEST_QUEUE)
-
-
-def _top_row_first(data: Any, width: int, height: int) -> bytes:
-    """Return an image turned over; raises WrongValue, ValueError for what is none of that size."""
-    if isinstance(data, int):
-        raise WrongValue("an image is expected")
-    refuse_if_too_large(data)
-    pixels = data.encode("utf-8") if isinstance(data, str) else bytes(data)
-    row, rows = 3 * int(width), int(height)
-    if row < 0 or rows < 0:
-        raise ValueError(f"an image of {width} x {height} does not exist")
-    if len(pixels) != row * rows:
-        raise ValueError(f"an image of {width} x {height} has {row * rows} bytes, not {len(pixels)}")
-    return b"".join(np.frombuffer(pixels, np.uint8).reshape(rows, row)[::-1])

@@ -1,43 +1,58 @@
-"""`sim`: objects by their names."""
+"""`sim`: objects by their names: V-REP 3.x names, and CoppeliaSim 4.x paths.
+
+    Quadricopter_base  Quadricopter_base#  Quadricopter_base#0     3.x; the suffix tells copies of a model apart
+    /Quadcopter/base   /Quadcopter[1]/base   /target               4.x, from the root of the scene
+    .  ./base  :/base  ..  ../propeller[0]/respondable             4.x, from the model that the script belongs to
+
+In newer 4.x models the script is an object of its own below the model (`..` is the model), in older
+ones it belongs to the model itself (`.` is): both mean the drone here. An element of a path names any
+descendant, the nearest first; [i] takes the i-th of several.
+
+A name without a suffix means the object of the script's own model, as in V-REP: in the script of Drone#0,
+Quadricopter_base is Quadricopter_base#0. Where there is none, it is an object of the scene, such as Floor, but not one
+of the model that Drone#0 is a copy of. `name#` is always the one without a suffix.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from drone_sim.mechanics.object_names import NO_SUFFIX, split
-from drone_sim.scripting.api import object_paths
-from drone_sim.scripting.api.calls import Function, numbers
-from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.handles import bare
+from drone_sim.mechanics.object_names import NO_SUFFIX, plain, split, suffixed
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.message_text import near_names
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import CONSTANTS, bare
 from drone_sim.scripting.api.host import Host
-from drone_sim.scripting.api.types import Handle, Name
+from drone_sim.scripting.api.types import Handle, Name, numbers
 
 _SELF = CONSTANTS["handle_self"]
+_SUFFIXED = re.compile(r"(.+)#(\d*)", re.DOTALL)
+_ELEMENT = re.compile(r"^([^\[\]]+)(?:\[(\d+)\])?$")
+_OWN = (".", "..", ":")
 
 
-class Names:
-    """The functions on names. A name without a suffix means the copy of the model that the script belongs to."""
+class NameFunctions:
+    """Objects by their names.
+
+    A name without a suffix means the copy of the model that the script belongs to."""
 
     def __init__(self, host: Host):
-        """Take the drone that the script flies."""
-        self._objects = host.objects
-        self._own = host.own_script
-        self._suffix = split(self._own)[1]
+        """`host` is the drone that the script flies, or what else it is on."""
+        self._objects = host.context.objects
+        self._host = host  # its object may get another name
+        self._suffix = split(host.own_script)[1]
 
-    def functions(self) -> dict[str, Function]:
-        """Return what a script may call, by name."""
-        find = (self.getObject, self.getObjectHandle)
-        others = (self.getObjectName, self.getObjectAlias, self.getNameSuffix, self.setNameSuffix)
-        return {one.__name__: one for one in (*find, *others)}
-
+    @sim("5")
     def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
         """Return the handle of an object by path or name; -1 for none with the option noError, or name@silentError.
 
         The option `index` takes the i-th of several of a path; sim.handle_self is what the script is on.
         """
         if path == _SELF:
-            return self._objects.handle(self._own)
+            return self._objects.handle(self._host.own_script)
         name, options = path, options or {}
         if isinstance(path, str):
             name, _, flag = path.partition("@")  # @alt is for names of 4.x, which are found anyhow
@@ -46,20 +61,23 @@ class Names:
             if flag == "silentError":
                 options = {"noError": True}
         try:
-            return object_paths.find(self._objects, name, self._own, self._suffix)
+            return find(self._objects, name, self._host.own_script, self._suffix)
         except ValueError:
             if options.get("noError"):
                 return -1
             raise
 
+    @sim("345")
     def getObjectHandle(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
         """Return the handle of an object by name (3.x) or path."""
         return self.getObject(path, options)
 
+    @sim("345")
     def getObjectName(self, handle: Handle) -> str:
         """Return the 3.x name of an object, with its suffix; the path where sim.handleflag_altname is added (4.2)."""
         return self._objects.path(bare(handle)) if handle != bare(handle) else self._objects[handle].name
 
+    @sim("5")
     def getObjectAlias(self, handle: Handle, options: int = -1) -> str:
         """Return the 4.x alias of an object.
 
@@ -75,6 +93,7 @@ class Names:
         is_shared = sum(self._objects[one].alias == alias for one in self._objects) > 1
         return f"{alias}__{int(handle)}__" if options == 4 or (options == 3 and is_shared) else alias
 
+    @sim("345")
     def getNameSuffix(self, name: Name | None = None) -> int | tuple[int, str]:
         """Return the suffix in a name such as 'Drone#0', -1 for none, and the name without it.
 
@@ -85,15 +104,94 @@ class Names:
         bare, suffix = split(name)
         return suffix, bare.removesuffix("#")
 
+    @sim("345")
     def setNameSuffix(self, suffix: int) -> None:
         """Let names without a suffix mean those with this one, -1 for none."""
         self._suffix = max(NO_SUFFIX, int(numbers((suffix,), 1)[0]))
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that brings back the suffix that setNameSuffix has set."""
         kept = self._suffix
 
-        def recall() -> None:
+        def restore() -> None:
             self._suffix = kept
 
-        return recall
+        return restore
+
+
+def find(objects: ObjectTree, path: str, own: str, suffix: int) -> int:
+    """Return the handle that a name or path means in a script of the object `own`, whose names have that suffix.
+
+    Raises ValueError with the near names.
+    """
+    if not isinstance(path, str):
+        raise TypeError("a name is a string")
+    first, slash, rest = path.partition("/")
+    if not slash and first not in _OWN:
+        return objects.handle(_full_name(objects, path, own, suffix))
+    here: SceneObject | None = None
+    if first in _OWN:
+        here = objects[objects.handle(own)]
+    elif first:
+        rest = path
+    for element in filter(None, rest.split("/")):
+        here = _step(objects, here, element)
+        if here is None:
+            known = [*objects.names, *(objects.path(handle) for handle in objects)]
+            raise ValueError(f"no object '{path}'; {near_names(path, known)}")
+    if here is None:
+        raise ValueError(f"no object '{path}': it names none")
+    return objects.handle_of(here)
+
+
+def _full_name(objects: ObjectTree, name: str, own: str, suffix: int) -> str:
+    """Return what a name in a script stands for, whether there is such an object or not."""
+    match = _SUFFIXED.fullmatch(name)
+    if match is None:
+        full = suffixed(name, suffix)
+        if full in objects:
+            return full
+        is_its_own = suffix == split(own)[1]  # and not one that setNameSuffix has set
+        by_its_names = (suffixed(name, split(one)[1]) for one in _names(objects, own) if is_its_own)
+        found = next((one for one in by_its_names if one in objects and one != name), None)
+        return found or (full if not _is_of_the_scene(objects, name, own) else name)
+    # A script that is copied out of a scene with several models names its own with a suffix.
+    is_meant = name in objects or (match.group(2) and objects.is_copied(match.group(1)))
+    return name if is_meant else match.group(1)
+
+
+def _names(objects: ObjectTree, own: str) -> tuple[str, ...]:
+    """Return the names of a script's object: in an imported scene its copy may have another suffix than the vehicle."""
+    return objects[objects.handle(own)].names if own in objects else ()
+
+
+def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
+    """Tell whether a name is not one of the model that `own` has copies of, or is a copy of."""
+    original = plain(own)
+    if name not in objects or original not in objects or not objects.is_copied(original):
+        return True
+    return not objects[objects.handle(name)].is_part_of(objects[objects.handle(original)])
+
+
+def _step(objects: ObjectTree, here: SceneObject | None, element: str) -> SceneObject | None:
+    if element == ".":
+        return here
+    if element == "..":
+        return here.parent if here is not None else None
+    match = _ELEMENT.match(element)
+    if match is None:
+        return None
+    name, index = match.group(1), int(match.group(2) or 0)
+    found = [candidate for candidate in _descendants(objects, here) if candidate.is_called(name)]
+    return found[index] if index < len(found) else None
+
+
+def _descendants(objects: ObjectTree, root: SceneObject | None) -> list[SceneObject]:
+    """Return everything below an object, the nearest first."""
+    level: list[SceneObject | None] = [root]
+    everything: list[SceneObject] = []
+    while level:
+        below = [child for parent in level for _, child in objects.children(parent)]
+        everything += below
+        level = [*below]
+    return everything

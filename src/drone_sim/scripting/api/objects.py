@@ -1,90 +1,104 @@
-"""`sim`: the objects of the scene, where they are, how they move, the forces on them."""
+"""`sim`: the objects of the scene: what they are, where they are, how they move, the forces on them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import WORLD
-from drone_sim.scripting.api.calls import WrongValue, numbers
-from drone_sim.scripting.api.handles import AXIS, bare
-from drone_sim.scripting.api.host import Host
+from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import AXIS, CONSTANTS, bare
+from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.matrices import unit
-from drone_sim.scripting.api.types import FourNumbers, Handle, SevenNumbers, ThreeNumbers, TwelveNumbers
+from drone_sim.scripting.api.types import (
+    FourNumbers,
+    Handle,
+    SevenNumbers,
+    ThreeNumbers,
+    TwelveNumbers,
+    WrongValue,
+    numbers,
+)
+
+_ALL, _SCENE = CONSTANTS["handle_all"], CONSTANTS["handle_scene"]
+_WITHOUT_ROOT, _CHILDREN_ALONE = 1, 2  # options of getObjectsInTree
 
 
-class Objects:
-    """The functions on objects."""
+class Objects(Functions):
+    """The objects of the scene, where they are, how they move, the forces on them."""
 
-    def __init__(self, host: Host):
-        """Take the drone whose objects they are."""
-        self._host = host
-        self._objects = host.objects
-
+    @sim("345")
     def getObjectParent(self, handle: Handle) -> int:
         """Return the handle of an object's parent, -1 for none."""
         return self._objects.handle_of(self._objects[handle].parent)
 
+    @sim("345")
     def setObjectParent(self, handle: Handle, parent: Handle = WORLD, keepInPlace: bool = True) -> None:
-        """Hang an object on another one, or on nothing (-1)."""
-        self._objects.set_parent(handle, parent, bool(keepInPlace))
-
-    def getObjectSizeFactor(self, handle: Handle) -> float:
-        """Return how much an object was scaled: 1, nothing here is."""
-        self._objects[handle]
-        return 1.0
-
-    def getObjectSizeValues(self, handle: Handle) -> list[float]:
-        """Return how much an object was scaled along x, y and z: 1, nothing here is."""
-        return [self.getObjectSizeFactor(handle)] * 3
+        """Hang an object on another one, or on nothing (-1). A joint that the dynamics moves holds what hangs on it."""
+        operations = self._surroundings.operations
+        if operations is None:
+            self._objects.set_parent(handle, parent, bool(keepInPlace))
+        else:
+            self._surroundings.outside(lambda: operations.set_parent(handle, parent, bool(keepInPlace)))
 
     # ---- where they are
 
+    @sim("345")
     def getObjectPosition(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the position of an object."""
         m = self._objects.matrix(handle, relativeTo)
         return [m[3], m[7], m[11]]
 
+    @sim("345")
     def setObjectPosition(self, handle: Handle, relativeTo: Handle, position: ThreeNumbers = ()) -> None:
         """Move an object: (handle, relativeTo, position), or (handle, position, relativeTo) as in 4.x."""
         frame, place = _frame_and_values(relativeTo, position, 3)
         self._objects.set_position(handle, frame, place)
 
+    @sim("345")
     def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the Euler angles of an object."""
         return list(frames.to_euler(self._objects.turn(handle, relativeTo)))
 
+    @sim("345")
     def setObjectOrientation(self, handle: Handle, relativeTo: Handle, angles: ThreeNumbers = ()) -> None:
         """Turn an object: (handle, relativeTo, angles), or (handle, angles, relativeTo) as in 4.x."""
         frame, turn = _frame_and_values(relativeTo, angles, 3)
         m = self._objects.matrix(handle, frame)
         self._objects.set_matrix(handle, frame, frames.from_euler((m[3], m[7], m[11]), turn))
 
+    @sim("345")
     def getObjectQuaternion(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the quaternion (x, y, z, w) of an object."""
         return list(frames.to_quaternion(self._objects.matrix(handle, relativeTo)))
 
+    @sim("345")
     def setObjectQuaternion(self, handle: Handle, relativeTo: Handle, quaternion: FourNumbers = ()) -> None:
         """Turn an object to a quaternion (x, y, z, w); the arguments in either order."""
         frame, turn = _frame_and_values(relativeTo, quaternion, 4)
         m = self._objects.matrix(handle, frame)
         self._objects.set_matrix(handle, frame, frames.from_quaternion((m[3], m[7], m[11]), unit(turn)))
 
+    @sim("45")
     def getObjectPose(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return position and quaternion of an object, 7 numbers."""
         m = self._objects.matrix(handle, relativeTo)
         return [*frames.position(m), *frames.to_quaternion(m)]
 
+    @sim("45")
     def setObjectPose(self, handle: Handle, relativeTo: Handle, pose: SevenNumbers = ()) -> None:
         """Move and turn an object to a position and a quaternion; the arguments in either order."""
         frame, place = _frame_and_values(relativeTo, pose, 7)
         self._objects.set_matrix(handle, frame, frames.from_quaternion(place[:3], unit(place[3:])))
 
+    @sim("345")
     def getObjectMatrix(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the 12 numbers of an object's transform."""
         return list(self._objects.matrix(handle, relativeTo))
 
+    @sim("345")
     def setObjectMatrix(self, handle: Handle, relativeTo: Handle, matrix: TwelveNumbers = ()) -> None:
         """Move and turn an object to a transform; the arguments in either order."""
         frame, place = _frame_and_values(relativeTo, matrix, 12)
@@ -92,6 +106,7 @@ class Objects:
 
     # ---- how they move
 
+    @sim("345")
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
         """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame.
 
@@ -104,11 +119,13 @@ class Objects:
         linear, angular = self._objects[handle].velocity()
         return list(linear), list(angular)
 
+    @sim("345")
     def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
         """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame."""
         linear, angular = self._objects[handle].velocity()
         return list(linear), list(angular)
 
+    @sim("345")
     def addForceAndTorque(
         self, handle: Handle, force: ThreeNumbers = (0, 0, 0), torque: ThreeNumbers = (0, 0, 0)
     ) -> None:
@@ -119,6 +136,7 @@ class Objects:
         shape = self._objects[handle].name
         self._host.add_force(shape, _vector(force), _vector(torque), (0.0, 0.0, 0.0))
 
+    @sim("345")
     def addForce(self, handle: Handle, position: ThreeNumbers, force: ThreeNumbers) -> None:
         """Let a force (N) act in the next step at a position (m); both in the frame of the body."""
         shape = self._objects[handle]
@@ -140,3 +158,65 @@ def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[f
 def _vector(values: Sequence[float]) -> frames.Vector:
     x, y, z = numbers(values, 3)
     return x, y, z
+
+
+class ObjectKinds(Functions):
+    """What objects are, and how they hang together."""
+
+    @sim("345")
+    def getObjectType(self, handle: Handle) -> int:
+        """Return what an object is: sim.object_shape_type (4.x: sim.sceneobject_shape), _joint_type and so on."""
+        return self._kind(self._objects[handle])
+
+    @sim("345")
+    def getObjects(self, index: int, kind: int = _ALL) -> int:
+        """Return the handle of the index-th object of a kind, from 0; -1 where there are no more."""
+        found = self._of_kind(iter(self._objects), kind)
+        return found[int(index)] if 0 <= index < len(found) else -1
+
+    @sim("345")
+    def getObjectsInTree(self, root: Handle, kind: int = _ALL, options: int = 0) -> list[int]:
+        """Return the objects of a kind below another (sim.handle_scene: all), itself first.
+
+        `options`: 1 leaves out the root, 2 takes its children alone.
+        """
+        of_scene = root in (_SCENE, -1)
+        above = None if of_scene else self._objects[root]
+        below = list(self._below(above, deep=not int(options) & _CHILDREN_ALONE))
+        if not of_scene and not int(options) & _WITHOUT_ROOT:
+            below.insert(0, int(root))
+        return self._of_kind(iter(below), kind)
+
+    @sim("345")
+    def getObjectChild(self, handle: Handle, index: int) -> int:
+        """Return the handle of an object's index-th child, from 0; -1 where there are no more."""
+        children = [child for child, _ in self._objects.children(self._objects[handle])]
+        return children[int(index)] if 0 <= index < len(children) else -1
+
+    @sim("5")
+    def isHandle(self, handle: Handle, _kind: int = -1) -> bool:
+        """Return whether an object has that handle (4.x)."""
+        return bare(handle) in set(self._objects)
+
+    @sim("345")
+    def isHandleValid(self, handle: Handle, _kind: int = -1) -> int:
+        """Return 1 where an object has that handle, else 0 (3.x)."""
+        return int(self.isHandle(handle))
+
+    @sim("5", getObjectUniqueIdentifier="345")
+    def getObjectUid(self, handle: Handle) -> int:
+        """Return a number that no other object of the run has had: its handle."""
+        self._objects[handle]
+        return int(handle)
+
+    def _below(self, above: SceneObject | None, deep: bool) -> Iterator[int]:
+        for handle, child in self._objects.children(above):
+            yield handle
+            if deep:
+                yield from self._below(child, deep)
+
+    def _of_kind(self, handles: Iterator[int], kind: int) -> list[int]:
+        return [handle for handle in handles if kind == _ALL or self._kind(self._objects[handle]) == kind]
+
+    def _kind(self, found: SceneObject) -> int:
+        return CONSTANTS[f"object_{found.kind.replace('_', '')}_type"]

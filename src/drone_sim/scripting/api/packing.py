@@ -1,4 +1,4 @@
-"""`sim`: values in a string, as signals and custom data carry them: little endian, one after the other."""
+"""`sim`: values in a string, as signals and custom data carry them, little endian, and whole numbers bit by bit."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drone_sim.scripting.api.calls import Function, WrongValue
+from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.api.types import Numbers, Text
+from drone_sim.scripting.api.types import Numbers, Text, WrongValue
 
 # What one value is called in 4.x and in 3.x, and its format (struct).
 _KINDS = {
@@ -21,25 +21,19 @@ _KINDS = {
     "UInt8Table": ("Bytes", "B"),
 }
 _FORMATS = {0: "B", 1: "b", 2: "H", 3: "h", 4: "I", 5: "i", 6: "f", 7: "d"}  # by sim.buffer_...
+_MASK = 0xFFFFFFFF
 
 
 class Packing:
-    """The functions that pack and unpack."""
+    """Values in a string, as signals and custom data carry them: little endian, one after the other."""
 
-    def functions(self) -> dict[str, Function]:
-        """Return every function, by name."""
-        found: dict[str, Function] = {}
-        for new, (old, kind) in _KINDS.items():
-            found[f"pack{new}"] = found[f"pack{old}"] = _packer(kind, new)
-            found[f"unpack{new}"] = found[f"unpack{old}"] = _unpacker(kind, new)
-        others = (self.packTable, self.unpackTable, self.transformBuffer)
-        return {**found, **{one.__name__: one for one in others}}
-
+    @sim("345")
     def packTable(self, table: Any, _scheme: int = 0) -> bytes:
         """Return a table as a string that unpackTable reads: numbers, strings, booleans, tables of those."""
         refuse_if_too_large(table)
         return json.dumps(_plain(table)).encode()
 
+    @sim("345")
     def unpackTable(self, data: Text) -> Any:
         """Return the table in a string of packTable's."""
         try:
@@ -47,6 +41,7 @@ class Packing:
         except (ValueError, TypeError, LookupError, RecursionError):
             raise ValueError("this string was not made by sim.packTable") from None
 
+    @sim("345")
     def transformBuffer(self, data: Text, from_kind: int, factor: float, offset: float, to_kind: int) -> bytes:
         """Return values of one sim.buffer_... as values of another, each times `factor` plus `offset`."""
         if from_kind not in _FORMATS or to_kind not in _FORMATS:
@@ -55,25 +50,24 @@ class Packing:
         return _packed(_FORMATS[to_kind], values)
 
 
-def _packer(kind: str, name: str) -> Function:
-    def pack(values: Numbers, start: int = 0, count: int = 0) -> bytes:
-        return _packed(kind, _part(values, start, count))
+def _add_kind(code: str, new: str, old: str) -> None:
+    """Add the functions on one kind of number."""
 
-    pack.__doc__ = f"Return numbers as a string of {struct.calcsize(kind)} bytes each, `count` (0: all) from `start`."
-    pack.__name__ = f"pack{name}"
-    return pack
+    def pack(_self: Packing, values: Numbers, start: int = 0, count: int = 0) -> bytes:
+        return _packed(code, _part(values, start, count))
 
-
-def _unpacker(kind: str, name: str) -> Function:
-    def unpack(data: Text, start: int = 0, count: int = 0, offset: int = 0) -> list[float]:
+    def unpack(_self: Packing, data: Text, start: int = 0, count: int = 0, offset: int = 0) -> list[float]:
         if not offset >= 0:
             raise WrongValue("an offset of 0 bytes or more is expected")
-        return _part(_unpacked(kind, _bytes(data)[int(offset) :]), start, count)
+        return _part(_unpacked(code, _bytes(data)[int(offset) :]), start, count)
 
-    pack_size = struct.calcsize(kind)
-    unpack.__doc__ = f"Return the numbers in a string of {pack_size} bytes each, `count` (0: all) from `start`."
-    unpack.__name__ = f"unpack{name}"
-    return unpack
+    part = f"a string of {struct.calcsize(code)} bytes each, `count` (0: all) from `start`."
+    sim.add(Packing, pack, f"pack{new}", f"Return numbers as {part}", **{f"pack{old}": "3"})
+    sim.add(Packing, unpack, f"unpack{new}", f"Return the numbers in {part}", **{f"unpack{old}": "3"})
+
+
+for _new, (_old, _code) in _KINDS.items():
+    _add_kind(_code, _new, _old)
 
 
 def _part(values: Sequence[Any], start: int, count: int) -> list[Any]:
@@ -130,3 +124,28 @@ def _table(value: Any) -> Any:
             return value["bytes"].encode("latin-1")
         return {_table(key): _table(one) for key, one in value["table"]}
     return value
+
+
+class Bits:
+    """Whole numbers, bit by bit, as V-REP's Lua 5.1 has no operators for them."""
+
+    @sim("345", boolOr16="345")
+    def boolOr32(self, first: int, second: int) -> int:
+        """Return the bits that either number has."""
+        return _whole(first) | _whole(second)
+
+    @sim("345", boolAnd16="345")
+    def boolAnd32(self, first: int, second: int) -> int:
+        """Return the bits that both numbers have."""
+        return _whole(first) & _whole(second)
+
+    @sim("345", boolXor16="345")
+    def boolXor32(self, first: int, second: int) -> int:
+        """Return the bits that one number alone has."""
+        return _whole(first) ^ _whole(second)
+
+
+def _whole(value: float) -> int:
+    if not isinstance(value, (int, float)) or value != value // 1 or abs(value) > _MASK:
+        raise WrongValue("whole numbers of 32 bits are expected")
+    return int(value) & _MASK

@@ -11,38 +11,39 @@ from typing import Any
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.path import Path
-from drone_sim.scripting.api.calls import WrongValue, numbers
-from drone_sim.scripting.api.host import Host
-from drone_sim.scripting.api.types import Handle, Number, Numbers
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.host import Functions
+from drone_sim.scripting.api.types import Handle, Number, Numbers, WrongValue, numbers
 
 _MOST = 1_000_000  # numbers of a table
 
 
-class Paths:
-    """The functions on paths."""
-
-    def __init__(self, host: Host):
-        """Take the drone whose objects they are."""
-        self._objects = host.objects
+class Paths(Functions):
+    """Paths, as objects (3.x) and as tables of numbers (4.x). Metres and radians."""
 
     # ---- objects
 
+    @sim("345")
     def getPathLength(self, handle: Handle) -> float:
         """Return the length of a path in m."""
         return self._path(handle).length
 
+    @sim("345")
     def getPositionOnPath(self, handle: Handle, relativeDistance: Number) -> list[float]:
         """Return the place in the world at a share of a path, from 0 to 1."""
         return list(frames.position(self._on_path(handle, relativeDistance)))
 
+    @sim("345")
     def getOrientationOnPath(self, handle: Handle, relativeDistance: Number) -> list[float]:
         """Return the Euler angles, in the world, of the frame at a share of a path: x ahead, z up."""
         return list(frames.to_euler(self._on_path(handle, relativeDistance)))
 
+    @sim("345")
     def getPathPosition(self, handle: Handle) -> float:
         """Return what setPathPosition has set, m."""
         return self._path(handle).position_along
 
+    @sim("345")
     def setPathPosition(self, handle: Handle, position: Number) -> None:
         """Keep how far along (m) somebody is who follows a path."""
         (self._path(handle).position_along,) = numbers((position,), 1)
@@ -52,14 +53,11 @@ class Paths:
         return frames.multiply(path.matrix(), path.at(along * path.length))
 
     def _path(self, handle: int) -> Path:
-        found = self._objects[handle]
-        if not isinstance(found, Path):
-            known = [self._objects[one].name for one in self._objects if isinstance(self._objects[one], Path)]
-            raise WrongValue(f"'{found.name}' is not a path; there are: {', '.join(known) or 'none'}")
-        return found
+        return self._found(handle, Path, "a path")
 
     # ---- tables
 
+    @sim("45")
     def getPathLengths(self, path: Numbers, dof: int, _callback: Any = None) -> tuple[list[float], float]:
         """Return how far along each point of a table lies, and the length; `dof` numbers a point, of which 3 are m."""
         points = _points(path, dof)
@@ -67,6 +65,7 @@ class Paths:
         lengths = list(itertools.accumulate(pieces, initial=0.0))
         return lengths, lengths[-1]
 
+    @sim("45")
     def getPathInterpolatedConfig(
         self, path: Numbers, lengths: Numbers, t: Number, _method: Any = None, _types: Any = None
     ) -> list[float]:

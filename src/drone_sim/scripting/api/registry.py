@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Protocol
 
-from drone_sim.wording import near_names
+from drone_sim.message_text import near_names
 
 ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
 
@@ -50,7 +50,10 @@ class Scripts:
 
     def __init__(self) -> None:
         """Start with none."""
-        self.parameters: dict[int, ScriptParameters] = {}  # by handle, for what is asked several times a step
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all; handles are given out anew."""
         self._by_handle: dict[int, Attachment] = {}
         self._by_name: dict[str, Attachment] = {}
         self._numbers = itertools.count()
@@ -62,14 +65,18 @@ class Scripts:
         handle = next(self._numbers) if before is None else before.handle
         made = Attachment(handle, name, parameters, is_law)
         self._by_handle[handle] = self._by_name[name] = made
-        self.parameters[handle] = parameters
         return made
 
     def remove(self, name: str) -> None:
         """Forget the script of an object, if there is one."""
         gone = self._by_name.pop(name, None)
         if gone is not None:
-            del self._by_handle[gone.handle], self.parameters[gone.handle]
+            del self._by_handle[gone.handle]
+
+    def rename(self, name: str, new: str) -> None:
+        """Know the script of an object by the object's new name."""
+        renamed = self._by_name[new] = self._by_name.pop(name)
+        renamed.name = new
 
     def __iter__(self) -> Iterator[Attachment]:
         """Yield all, in the order of their handles."""
@@ -78,6 +85,10 @@ class Scripts:
     def __contains__(self, name: str) -> bool:
         """Tell whether a script is attached to an object."""
         return name in self._by_name
+
+    def get(self, handle: int) -> Attachment | None:
+        """Return what has a handle, None for nothing."""
+        return self._by_handle.get(handle)
 
     def __getitem__(self, handle: int) -> Attachment:
         """Return what has a handle; raises ValueError."""

@@ -1,51 +1,145 @@
-"""`simROS`: time, frames, parameters and services of others, with or without ROS behind.
+"""`simROS`: topics, services, time, frames and parameters, with or without ROS behind.
 
 Without ROS transforms go nowhere, parameters are the script's alone, and there are no services.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drone_sim.scripting.api.backend import Backend
-from drone_sim.scripting.api.calls import Function, WrongValue
+import numpy as np
+
+from drone_sim.mechanics.clock import Clock
+from drone_sim.scripting.api.backend import Backend, Image
+from drone_sim.scripting.api.calls import simROS
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.api.types import Handle, Name
+from drone_sim.scripting.api.types import Callback, Handle, Name, WrongValue
 
 _MOST = 100  # service clients
-_KINDS: dict[str, type[Any]] = {"String": str, "Int": int, "Double": float, "Bool": bool}
+
+
+class TopicFunctions:
+    """Topics as a child script sees them, `simROS`, with or without ROS behind."""
+
+    def __init__(self, bus: MessageBus):
+        """`bus`: what the script subscribes to and publishes."""
+        self._bus = bus
+
+    @simROS()
+    def subscribe(self, topic: Name, kind: Name, callback: Callback, queue: int = 1, *_ignored: Any) -> int:
+        """Call the script's function `callback` with each message on `topic`; return a handle.
+
+        Of the messages that arrive during one step the last `queue` are kept; V-REP's 0 stands for 1. The same
+        topic, type and callback once more give the handle that they have; V-REP calls back once more for each.
+        """
+        return self._bus.subscribe(topic, kind, callback, int(queue))
+
+    @simROS()
+    def shutdownSubscriber(self, handle: Handle) -> None:
+        """End a subscription; raises ValueError where there is none of that handle."""
+        self._bus.end_subscription(handle)
+
+    @simROS()
+    def advertise(self, topic: Name, kind: Name, queue: int = 1, latch: bool = False, *_ignored: Any) -> int:
+        """Advertise a topic; return a handle to publish on."""
+        return self._bus.advertise(topic, kind, int(queue), bool(latch))
+
+    @simROS()
+    def publish(self, handle: Handle, message: Any) -> None:
+        """Publish a message: a table of its fields."""
+        if message is None or isinstance(message, (str, bytes, int, float)):
+            raise WrongValue("a table of the message's fields is expected")
+        refuse_if_too_large(message)
+        self._bus.publish(handle, message)
+
+    @simROS()
+    def shutdownPublisher(self, handle: Handle) -> None:
+        """Stop advertising; raises ValueError where nothing has that handle."""
+        self._bus.end_publisher(handle)
+
+    @simROS("")
+    def getNumSubscribers(self, handle: Handle) -> int:
+        """Return how many listen to what is published; V-REP has no such function."""
+        return self._bus.subscribers(handle)
+
+    @simROS()
+    def publisherTreatUInt8ArrayAsString(self, handle: Handle) -> None:
+        """Do nothing: uint8[] goes as a string or a table anyhow."""
+        self._bus.subscribers(handle)
+
+    @simROS()
+    def subscriberTreatUInt8ArrayAsString(self, handle: Handle) -> None:
+        """Do nothing: uint8[] arrives as a string anyhow; string.byte(data, 1) is its first byte."""
+        self._bus.check_subscription(handle)
+
+    @simROS()
+    def imageTransportAdvertise(self, topic: Name, queue: int = 1) -> int:
+        """Advertise an image topic; return a handle to publish on."""
+        return self._bus.advertise_image(topic, int(queue))
+
+    @simROS()
+    def imageTransportPublish(self, handle: Handle, data: Any, width: int, height: int, frame_id: Name) -> None:
+        """Publish a vision sensor's image as getVisionSensorCharImage returns it, the bottom row first."""
+        self._bus.publish(handle, Image(_top_row_first(data, width, height), int(width), int(height), frame_id))
+
+    @simROS()
+    def imageTransportShutdownPublisher(self, handle: Handle) -> None:
+        """Stop advertising an image topic."""
+        self._bus.end_publisher(handle)
+
+
+class ServiceFunctions:
+    """Services that a script offers to others, with or without ROS behind."""
+
+    def __init__(self, bus: MessageBus):
+        """`bus` keeps the services that the script offers."""
+        self._bus = bus
+
+    @simROS()
+    def advertiseService(self, name: Name, kind: Name, callback: Callback) -> int:
+        """Offer a service: `callback` gets each request, and returns a table of the response's fields.
+
+        It is called in the script's turn, at the beginning of the next step; who asks waits, 5 s at most.
+        """
+        return self._bus.offer(name, kind, callback)
+
+    @simROS()
+    def shutdownServiceServer(self, handle: Handle) -> None:
+        """Offer a service no longer; raises ValueError where none has that handle."""
+        self._bus.end_subscription(handle, is_service=True)
+
+    @simROS()
+    def serviceServerTreatUInt8ArrayAsString(self, handle: Handle) -> None:
+        """Do nothing: uint8[] is taken and given as a string anyhow."""
+        self._bus.check_subscription(handle, is_service=True)
 
 
 class RosFunctions:
-    """The functions of simROS that are not about topics."""
+    """Time, frames, parameters and services of others, with or without ROS behind."""
 
-    def __init__(self, bus: MessageBus, clock: Callable[[], float]):
-        """Take what reaches ROS and resolves names, and the simulation's clock."""
+    def __init__(self, bus: MessageBus, clock: Clock):
+        """`bus` reaches ROS and resolves names; `clock` is the simulation's."""
         self._bus = bus
         self._clock = clock
         self._own: dict[str, Any] = {}  # parameters, where there is no ROS
         self._clients: dict[int, tuple[str, str]] = {}
 
-    def functions(self) -> dict[str, Function]:
-        """Return every function, by name."""
-        found = {name: getattr(self, name) for name in dir(self) if not name.startswith("_") and name != "functions"}
-        for name, kind in _KINDS.items():
-            found[f"getParam{name}"], found[f"setParam{name}"] = self._getter(kind), self._setter(kind)
-        return found
-
+    @simROS()
     def getTime(self, _flag: int = 0) -> float:
         """Return ROS's time in s: what messages are stamped with."""
         backend = self._bus.backend
-        return backend.time() if backend is not None else self._clock()
+        return backend.time() if backend is not None else self._clock.time
 
     # ---- frames
 
+    @simROS()
     def sendTransform(self, transform: Mapping[str, Any]) -> None:
         """Broadcast a frame: a table with the fields of geometry_msgs/TransformStamped."""
         self.sendTransforms([transform])
 
+    @simROS()
     def sendTransforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
         """Broadcast several frames."""
         refuse_if_too_large(transforms)
@@ -56,10 +150,12 @@ class RosFunctions:
 
     # ---- parameters
 
+    @simROS()
     def hasParam(self, name: Name) -> bool:
         """Return whether a parameter is set."""
         return self._read(name)[0]
 
+    @simROS()
     def deleteParam(self, name: Name) -> None:
         """Forget a parameter."""
         full, backend = self._name(name), self._bus.backend
@@ -68,6 +164,7 @@ class RosFunctions:
         else:
             self._own.pop(full, None)
 
+    @simROS()
     def searchParam(self, name: Name) -> tuple[bool, str]:
         """Return whether a parameter is set in the drone's namespace or above it, and its full name ('' for none)."""
         space = self._name("x").rpartition("/")[0]
@@ -79,36 +176,17 @@ class RosFunctions:
                 return False, ""
             space = space.rpartition("/")[0]
 
-    def _getter(self, kind: type[Any]) -> Function:
-        def get(name: Name, default: Any = None) -> tuple[bool, Any]:
-            is_set, value = self._read(name)
-            is_right = isinstance(value, (int, float)) if kind is float else isinstance(value, kind)
-            if not is_set or not is_right:
-                return False, kind() if default is None else default
-            return True, kind(value)
-
-        get.__doc__ = "Return whether a parameter of that type is set, and its value or the default."
-        return get
-
-    def _setter(self, kind: type[Any]) -> Function:
-        def put(name: Name, value: Any) -> None:
-            full, backend = self._name(name), self._bus.backend
-            try:
-                value = kind(value)
-            except (TypeError, ValueError):
-                raise WrongValue(f"a value of the type {kind.__name__} is expected") from None
-            if backend is not None:
-                backend.set_parameter(full, value)
-            else:
-                self._own[full] = value
-
-        put.__doc__ = "Set a parameter."
-        return put
-
     def _read(self, name: str) -> tuple[bool, Any]:
         full, backend = self._name(name), self._bus.backend
         value = backend.parameter(full) if backend is not None else self._own.get(full)
         return value is not None, value
+
+    def _write(self, name: str, value: Any) -> None:
+        full, backend = self._name(name), self._bus.backend
+        if backend is not None:
+            backend.set_parameter(full, value)
+        else:
+            self._own[full] = value
 
     def _name(self, name: str) -> str:
         """Return the full name; raises WrongValue for what is none."""
@@ -118,6 +196,7 @@ class RosFunctions:
 
     # ---- services of others
 
+    @simROS()
     def serviceClient(self, name: Name, kind: Name) -> int:
         """Return a handle to call a service with."""
         if len(self._clients) >= _MOST:
@@ -126,17 +205,20 @@ class RosFunctions:
         self._clients[handle] = self._bus.resolve(name), kind
         return handle
 
+    @simROS()
     def call(self, handle: Handle, request: Any = None) -> Any:
         """Call a service with a table of the request's fields; return the response. It may take a second of time."""
         name, kind = self._client(handle)
         refuse_if_too_large(request)
         return self._ros().call_service(name, kind, request or {})
 
+    @simROS()
     def shutdownServiceClient(self, handle: Handle) -> None:
         """Forget a service client."""
         self._client(handle)
         del self._clients[handle]
 
+    @simROS()
     def serviceClientTreatUInt8ArrayAsString(self, handle: Handle) -> None:
         """Do nothing: uint8[] is taken and given as a string anyhow."""
         self._client(handle)
@@ -150,3 +232,43 @@ class RosFunctions:
         if self._bus.backend is None:
             raise ValueError("there is no ROS here, and no service")
         return self._bus.backend
+
+
+def _add_kind(word: str, kind: type[Any]) -> None:
+    """Add the functions on parameters of one type."""
+
+    def get(self: RosFunctions, name: Name, default: Any = None) -> tuple[bool, Any]:
+        is_set, value = self._read(name)
+        is_right = isinstance(value, (int, float)) if kind is float else isinstance(value, kind)
+        if not is_set or not is_right:
+            return False, kind() if default is None else default
+        return True, kind(value)
+
+    def put(self: RosFunctions, name: Name, value: Any) -> None:
+        try:
+            value = kind(value)
+        except (TypeError, ValueError):
+            raise WrongValue(f"a value of the type {kind.__name__} is expected") from None
+        self._write(name, value)
+
+    said = "Return whether a parameter of that type is set, and its value or the default."
+    simROS.add(RosFunctions, get, f"getParam{word}", said)
+    simROS.add(RosFunctions, put, f"setParam{word}", "Set a parameter.")
+
+
+for _word, _kind in {"String": str, "Int": int, "Double": float, "Bool": bool}.items():
+    _add_kind(_word, _kind)
+
+
+def _top_row_first(data: Any, width: int, height: int) -> bytes:
+    """Return an image turned over; raises WrongValue, ValueError for what is none of that size."""
+    if isinstance(data, int):
+        raise WrongValue("an image is expected")
+    refuse_if_too_large(data)
+    pixels = data.encode("utf-8") if isinstance(data, str) else bytes(data)
+    row, rows = 3 * int(width), int(height)
+    if row < 0 or rows < 0:
+        raise ValueError(f"an image of {width} x {height} does not exist")
+    if len(pixels) != row * rows:
+        raise ValueError(f"an image of {width} x {height} has {row * rows} bytes, not {len(pixels)}")
+    return b"".join(np.frombuffer(pixels, np.uint8).reshape(rows, row)[::-1])

@@ -14,12 +14,9 @@ _STRINGS = (str, bytes, bytearray, memoryview)
 Fields = Callable[[Any], Mapping[Any, Any] | None]
 
 
-def fields_of_mapping(value: Any) -> Mapping[Any, Any] | None:
-    """Return a mapping as it is, None for anything else."""
-    return value if isinstance(value, Mapping) else None
-
-
-def refuse_if_too_large(value: Any, fields: Fields = fields_of_mapping) -> None:
+def refuse_if_too_large(
+    value: Any, fields: Fields = lambda value: value if isinstance(value, Mapping) else None
+) -> None:
     """Raise ValueError for a value of the script's that is nested too deeply, in itself, or that is too large.
 
     `fields` returns the named fields of what has some. Lists, tuples and mappings are looked into, and what has fields.

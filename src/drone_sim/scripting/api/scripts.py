@@ -1,4 +1,8 @@
-"""`sim`: the simulation parameters of scripts, and the log."""
+"""`sim`: scripts: their simulation parameters, the log, and calls from one script to another.
+
+What is handed over in a call is copied: numbers, strings, and tables or lists of them. A script that waits for another
+one's answer cannot be called meanwhile.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from drone_sim.scripting.api.calls import WrongValue
+from drone_sim.message_text import near_names
+from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.host import Host
-from drone_sim.scripting.api.names import Names
+from drone_sim.scripting.api.host import Functions, Host, Surroundings
+from drone_sim.scripting.api.ignored import Ignored
+from drone_sim.scripting.api.names import NameFunctions
 from drone_sim.scripting.api.registry import Attachment, ScriptParameters
 from drone_sim.scripting.api.script_values import refuse_if_too_large
-from drone_sim.scripting.api.types import Handle, Name
+from drone_sim.scripting.api.types import Handle, Name, WrongValue
+from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import say
-from drone_sim.wording import near_names
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
 
@@ -30,21 +36,33 @@ _LEVELS = {
     **{CONSTANTS[name]: logging.ERROR for name in ("verbosity_errors", "verbosity_scripterrors")},
 }
 _SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
+_CHILD, _NONE = CONSTANTS["scripttype_childscript"], -1
 
 
-class Scripts:
-    """The functions on scripts."""
+class _OnScripts(Functions):
+    """What functions on scripts share."""
 
-    def __init__(self, host: Host, names: Names):
-        """Take the drone whose scripts they are, and how a name is understood."""
-        self._objects = host.objects
+    def __init__(self, names: NameFunctions, host: Host, surroundings: Surroundings, ignored: Ignored):
+        """`names` understands names; the others are what all functions take."""
+        super().__init__(host, surroundings, ignored)
         self._find = names.getObject
-        self._scripts = host.scripts
-        self._parameters = host.scripts.parameters
-        self._own = host.scripts.attached_to(host.own_script)
+        self._scripts = host.context.scripts
+        self._own = self._scripts.attached_to(host.own_script)
+
+    def _script(self, handle: int) -> Attachment:
+        if handle == _SELF:
+            return self._own
+        if not isinstance(handle, (int, float)):
+            raise WrongValue("the handle of a script is expected")
+        return self._scripts[int(handle)]
+
+
+class ScriptFunctions(_OnScripts):
+    """The simulation parameters of scripts, and the log."""
 
     # ---- scripts
 
+    @sim("345")
     def getScriptHandle(self, name: Name | None = None) -> int:
         """Return the handle of the script that is attached to an object; of this one without a name."""
         if name is None or name == _SELF:
@@ -55,10 +73,12 @@ class Scripts:
             found = name
         return self._scripts.attached_to(found).handle
 
+    @sim("345")
     def getObjectAssociatedWithScript(self, script: Handle) -> int:
         """Return the handle of the object that a script is attached to."""
         return self._objects.handle(self._script(script).name)
 
+    @sim("345")
     def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
         """Return a simulation parameter of a script."""
         parameters = self._script(script).parameters
@@ -67,15 +87,16 @@ class Scripts:
         value = parameters[name]
         return list(value) if isinstance(value, (list, tuple)) else value
 
+    @sim("345")
     def setScriptSimulationParameter(self, script: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of a script: `particleVelocity` (m/s) drives a propeller.
 
         With sim.handle_tree it is set in this script and those below. A name that a propeller's law does not have is
         refused where it comes near to one that it has; of any other the log says once that nothing reads it.
         """
-        known = self._parameters.get(script)
-        if known and name in known and type(value) is float and isfinite(value):  # four times a step, so at once
-            known[name] = value
+        found = self._scripts.get(script)
+        if found and name in found.parameters and type(value) is float and isfinite(value):  # often, so at once
+            found.parameters[name] = value
             return
         scripts = self._tree() if script == _TREE else [self._script(script)]
         if script == _TREE or name not in scripts[0].parameters:
@@ -83,10 +104,12 @@ class Scripts:
         for one in scripts:
             _set(one.parameters, name, value)
 
+    @sim("45")
     def getUserParameter(self, handle: Handle, name: Name, _options: Any = None) -> Any:
         """Return a simulation parameter of the script that is attached to an object (4.x)."""
         return self.getScriptSimulationParameter(self._script_of(handle).handle, name)
 
+    @sim("45")
     def setUserParameter(self, handle: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of the script that is attached to an object (4.x)."""
         self.setScriptSimulationParameter(self._script_of(handle).handle, name, value)
@@ -116,19 +139,14 @@ class Scripts:
             raise ValueError(f"a propeller has no script parameter '{name}'; near names are {known}")
         _LOG.warning("nothing reads '%.80s' of a propeller; particleVelocity drives it", name)
 
-    def _script(self, handle: int) -> Attachment:
-        if handle == _SELF:
-            return self._own
-        if not isinstance(handle, (int, float)):
-            raise WrongValue("the handle of a script is expected")
-        return self._scripts[int(handle)]
-
     # ---- log
 
+    @sim("345")
     def addStatusbarMessage(self, message: Any) -> None:
         """Write a line to the log."""
         say(message)
 
+    @sim("45")
     def addLog(self, verbosity: int, message: Any) -> None:
         """Write a line to the log: an error, a warning, or a word, by its verbosity."""
         say(message, _LEVELS.get(verbosity, logging.INFO))
@@ -163,10 +181,82 @@ def _stored(value: Any, before: Any) -> Any:
 
 
 def _from_text(text: str) -> Any:
-    words: dict[str, tuple[Any]] = {"true": (True,), "false": (False,)}
-    if text in words:
-        return words[text][0]
+    if text in ("true", "false"):
+        return text == "true"
     try:
         return float(text)
     except ValueError:
         return text
+
+
+class ScriptCalls(_OnScripts):
+    """From one script to another."""
+
+    @sim("5")
+    def getScript(self, scriptType: int, object: Handle | Name = _SELF, _name: Name = "") -> int:
+        """Return the handle of the script that is attached to an object, by its handle or path; -1 for none (4.x)."""
+        found = self._attached(object) if scriptType == _CHILD else None
+        return _NONE if found is None else found.handle
+
+    @sim("345")
+    def getScriptAssociatedWithObject(self, object: Handle) -> int:
+        """Return the handle of the script that is attached to an object, -1 for none (3.x)."""
+        return self.getScript(_CHILD, object)
+
+    @sim("345")
+    def getCustomizationScriptAssociatedWithObject(self, object: Handle) -> int:
+        """Return -1: no object has a customization script."""
+        self._objects[object]
+        return _NONE
+
+    @sim("345")
+    def getScriptName(self, script: Handle) -> str:
+        """Return the name of the object that a script is attached to."""
+        return self._script(script).name
+
+    @sim("345")
+    def getScriptExecutionCount(self) -> int:
+        """Return in how many steps this script has been called before: 0 in the first one (3.0)."""
+        return round((self._context.clock.time - self._own.began) / self._context.clock.time_step)
+
+    @sim("345")
+    def callScriptFunction(self, function: Name, script: Handle, *arguments: Any) -> Any:
+        """Call 'function@object', or 'function' of the script with a handle; return what it returns.
+
+        Behind 'function@object' stands the type of the script, such as sim.scripttype_childscript.
+        """
+        if not isinstance(function, str):
+            raise WrongValue("the name of a function is expected")
+        name, at, of = function.partition("@")
+        callee = self._script(script) if not at else self._scripts.attached_to(self._objects[self._find(of)].name)
+        values = list(arguments)
+        refuse_if_too_large(values)
+        try:
+            return self._surroundings.inside(
+                lambda: self._scripts.call(self._own, callee, lambda one: one.call_function(name, values))
+            )
+        except ScriptError as error:
+            raise ValueError(str(error)) from None
+
+    @sim("5")
+    def getScriptFunctions(self, script: Handle) -> Any:
+        """Return what calls a script's functions as its own: `functions:name(...)` in Lua, `functions.name(...)`."""
+        return _Functions(self, self._script(script).handle)
+
+    def _attached(self, object: Handle | Name) -> Attachment | None:
+        if object == _SELF:
+            return self._own
+        name = self._objects[self._find(object) if isinstance(object, str) else object].name
+        return self._scripts.attached_to(name) if name in self._scripts else None
+
+
+class _Functions:
+    """The functions of a script, as attributes."""
+
+    def __init__(self, calls: ScriptCalls, script: int):
+        self._calls, self._script = calls, script
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return lambda *arguments: self._calls.callScriptFunction(name, self._script, *arguments)

@@ -1,17 +1,26 @@
-"""`sim`: what a vehicle's instruments read; cameras are in vision.py, proximity sensors in proximity.py.
+"""`sim`: what sensors read: proximity sensors and force sensors of the scene, and a vehicle's instruments.
 
-CoppeliaSim has a function of its own for proximity sensors; its accelerometers, gyroscopes and GPS are models whose
-scripts send what they make up. So there is one name more here, readSensor, for all of them.
+A proximity sensor of the scene looks when it is read, at what is there at that moment; a range sensor has read when it
+was due. CoppeliaSim's accelerometers, gyroscopes and GPS are models whose scripts send what they make up; so there is
+one name more here, readSensor, for all instruments. Cameras are in vision.py.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 from drone_sim.mechanics.frames import Vector
-from drone_sim.scripting.api.calls import WrongValue
-from drone_sim.scripting.api.host import Host, Readable
-from drone_sim.scripting.api.types import Handle
+from drone_sim.mechanics.object_tree import WORLD
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.host import Functions, Readable
+from drone_sim.scripting.api.types import Handle, Number, WrongValue
+
+_NOT_YET, _NOTHING, _DETECTED = -1, 0, 1  # detection states of CoppeliaSim
+_EVERY_SENSOR = (CONSTANTS["handle_all"], CONSTANTS["handle_all_except_explicit"])
+_EVERYTHING = CONSTANTS["handle_all"]
+_Detection = tuple[int, float, list[float], int, list[float]]
 
 
 @runtime_checkable
@@ -21,14 +30,10 @@ class _ForceSensor(Protocol):
     def read(self) -> tuple[Vector, Vector]: ...
 
 
-class Sensors:
-    """The functions on sensors."""
+class Sensors(Functions):
+    """What force sensors of the scene read, and a vehicle's instruments."""
 
-    def __init__(self, host: Host):
-        """Take the drone whose sensors they are."""
-        self._objects = host.objects
-        self._sensors = host.sensors
-
+    @sim("345")
     def readForceSensor(self, handle: Handle) -> tuple[int, list[float], list[float]]:
         """Return 1, and force (N) and torque (N m) by which what hangs on a force sensor acts on it, in its frame."""
         found = self._objects[handle]
@@ -37,6 +42,7 @@ class Sensors:
         force, torque = found.read()
         return 1, list(force), list(torque)
 
+    @sim("")
     def readSensor(self, handle: Handle) -> dict[str, Any] | None:
         """Return the last reading of a sensor of any kind, by the names of its message's fields; nothing before it.
 
@@ -46,7 +52,102 @@ class Sensors:
 
     def _sensor(self, handle: int) -> Readable:
         name = self._objects[handle].name
-        if name not in self._sensors:
-            known = ", ".join(self._sensors) or "none"
+        if name not in self._host.sensors:
+            known = ", ".join(self._host.sensors) or "none"
             raise WrongValue(f"'{name}' is no sensor that measures numbers; there are: {known}")
-        return self._sensors[name]
+        return self._host.sensors[name]
+
+
+class FoundObject(Protocol):
+    """What a sensor has found, in its own frame."""
+
+    distance: float  # m
+    point: Vector
+    name: str
+    normal: Vector
+
+
+@runtime_checkable
+class Detector(Protocol):
+    """A proximity sensor of the scene."""
+
+    def detect(self, wanted: Callable[[str], bool] = ...) -> Any:
+        """Return what is nearest (FoundObject) of the objects whose names are wanted, or None."""
+
+
+class ProximitySensors(Functions):
+    """Proximity sensors: those of the scene, and a vehicle's range sensors."""
+
+    @sim("345")
+    def readProximitySensor(self, handle: Handle) -> _Detection:
+        """Return detection state, distance (m), point, object and normal.
+
+        The state is 1, 0 where nothing is within range, -1 before a range sensor's first reading. Point (m) and unit
+        normal are in the sensor's frame, which looks along z; the object is -1 where it has gone.
+        """
+        found = self._objects[handle]
+        return self._seen(found.detect()) if isinstance(found, Detector) else self._last(found.name)
+
+    @sim("345")
+    def handleProximitySensor(self, handle: Handle) -> _Detection:
+        """Return what readProximitySensor does; of sim.handle_all, and _all_except_explicit, the nearest of all."""
+        if handle not in _EVERY_SENSOR:
+            return self.readProximitySensor(handle)
+        every = [self._objects[one] for one in self._objects]
+        seen = [one.detect() for one in every if isinstance(one, Detector)]
+        return self._seen(min((one for one in seen if one is not None), key=lambda one: one.distance, default=None))
+
+    @sim("345")
+    def checkProximitySensor(self, handle: Handle, entity: Handle) -> _Detection:
+        """Return what readProximitySensor does of one object alone, or of sim.handle_all."""
+        sensor = self._objects[handle]
+        if not isinstance(sensor, Detector):
+            raise WrongValue(f"'{sensor.name}' is no proximity sensor of the scene: {self._known()}")
+        if entity == _EVERYTHING:
+            return self._seen(sensor.detect())
+        names = self._objects[entity].names
+        return self._seen(sensor.detect(names.__contains__))
+
+    @sim("345")
+    def checkProximitySensorEx(
+        self, handle: Handle, entity: Handle, _mode: int = 0, threshold: Number = 0.0, _maxAngle: Number = 0.0
+    ) -> _Detection:
+        """Return what checkProximitySensor does, nothing beyond a distance (m) unless that is 0."""
+        found = self.checkProximitySensor(handle, entity)
+        return found if not threshold or found[1] <= threshold else self._seen(None)
+
+    @sim("345")
+    def resetProximitySensor(self, handle: Handle) -> None:
+        """Forget what a sensor has read: there is nothing to forget, it looks when it is read."""
+        if handle not in _EVERY_SENSOR:
+            self._objects[handle]
+
+    def _seen(self, found: FoundObject | None) -> _Detection:
+        if found is None:
+            return _none(_NOTHING)
+        return _DETECTED, found.distance, list(found.point), self._handle(found.name), list(found.normal)
+
+    def _last(self, name: str) -> _Detection:
+        """Return what a vehicle's range sensor has read."""
+        sensor = self._host.sensors.get(name)
+        detected = getattr(sensor, "detected", None)
+        if sensor is None or detected is None:
+            raise WrongValue(f"'{name}' is no sensor of the kind range, and no proximity sensor: {self._known()}")
+        found = detected()
+        if found is None:
+            return _none(_NOTHING if sensor.read() else _NOT_YET)
+        distance, name, normal = found
+        return _DETECTED, distance, [0.0, 0.0, distance], self._handle(name), list(normal)
+
+    def _handle(self, name: str) -> int:
+        return self._objects.handle(name) if name in self._objects else WORLD
+
+    def _known(self) -> str:
+        ranges = [name for name, one in self._host.sensors.items() if hasattr(one, "detected")]
+        every = [self._objects[one] for one in self._objects]
+        return f"there are: {', '.join([*ranges, *(one.name for one in every if isinstance(one, Detector))]) or 'none'}"
+
+
+def _none(state: int) -> _Detection:
+    """Return what is read where nothing is detected; the lists are the script's own."""
+    return state, 0.0, [0.0, 0.0, 0.0], WORLD, [0.0, 0.0, 0.0]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
+from concurrent import futures
+from concurrent.futures import Future, InvalidStateError
 from typing import Any
 
 from drone_sim.scripting.api.calls import show
@@ -21,18 +24,15 @@ class ServiceRequest:
     """A request, from any thread, to what a script offers; the script answers it between two steps."""
 
     def __init__(self, content: Any, made: Callable[[Any], Any]):
-        """Take the request's message, and what makes the response's of what the script answers (or ValueError)."""
+        """`content`: the request's message; `made` makes the response's of what the script answers, or ValueError."""
         self.content = content
         self._made = made
-        self._done = threading.Event()
-        self._lock = threading.Lock()
-        self._answer: Any = None
-        self._why_not = ""
+        self._answer: Future[Any] = Future()
 
     @property
     def is_abandoned(self) -> bool:
         """Whether nobody waits for the answer any more, and none was given."""
-        return bool(self._why_not)
+        return self._answer.done() and self._answer.exception() is not None
 
     def answer(self, fields: Any) -> None:
         """Give the answer: the response's fields, None for none; later than another, or than `refuse`, it is dropped.
@@ -40,35 +40,31 @@ class ServiceRequest:
         What does not fit is said in the log, and to who asked.
         """
         try:
-            self._end(self._made(_checked(fields)), "")
+            made = self._made(_checked(fields))
         except ValueError as error:
             self.refuse(str(error))
             LOG.error("%s", error)
+        else:
+            with contextlib.suppress(InvalidStateError):
+                self._answer.set_result(made)
 
     def refuse(self, why: str) -> None:
         """Give no answer, and say why in one line."""
-        self._end(None, why)
+        with contextlib.suppress(InvalidStateError):
+            self._answer.set_exception(Unanswered(why))
 
     def wait(self, seconds: float) -> Any:
         """Return the answer. Raises Unanswered, also where none comes within so many seconds of real time."""
-        if not self._done.wait(seconds):
+        if not futures.wait([self._answer], seconds).done:
             self.refuse(f"no answer within {seconds:g} s: the simulation is paused, or steps too slowly")
-        if self._why_not:
-            raise Unanswered(self._why_not)
-        return self._answer
-
-    def _end(self, value: Any, why_not: str) -> None:
-        with self._lock:
-            if not self._done.is_set():
-                self._answer, self._why_not = value, why_not
-                self._done.set()
+        return self._answer.result()
 
 
 class ServiceServer:
     """One service of a script: what its callers wait in."""
 
     def __init__(self, take: Callable[[ServiceRequest], None], patience: float = PATIENCE):
-        """`take` leaves a request where the script finds it."""
+        """`take` leaves a request where the script finds it; who asks has `patience` for so many seconds."""
         self._take = take
         self._patience = patience
         self._waiting: set[ServiceRequest] = set()

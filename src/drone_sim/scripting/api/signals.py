@@ -1,18 +1,21 @@
-"""`sim`: signals, values under a name that one script leaves for another, or for itself."""
+"""`sim`: signals and tubes, by which one script leaves something for another, or for itself."""
 
 from __future__ import annotations
 
 import copy
+from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
-from drone_sim.scripting.api.calls import Function, WrongValue
-from drone_sim.scripting.api.script_values import MOST_BYTES
-from drone_sim.scripting.api.types import Name, Number, Text
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.script_values import MOST_BYTES, refuse_if_too_large
+from drone_sim.scripting.api.types import Handle, Name, Number, Text, WrongValue, numbers
 
 _MOST = 10_000  # signals of a kind
 _LONGEST_NAME = 200  # characters
 _LARGEST = 2**31 - 1
+_MOST_ENDS = 1000  # of tubes
+_LONGEST = 1000  # packets that wait at one end
 
 
 class Signals:
@@ -20,81 +23,197 @@ class Signals:
 
     def __init__(self) -> None:
         """Start with none."""
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
         self._values: dict[type[Any], dict[str, Any]] = {float: {}, int: {}, str: {}}
 
-    def remember(self) -> Callable[[], None]:
-        """Return a function that brings the present signals back."""
-        kept = copy.deepcopy(self._values)
+    def get(self, kind: type[Any], name: str) -> Any:
+        """Return the value of a signal of a kind, None where it is not set."""
+        return self._values[kind].get(name)
 
-        def recall() -> None:
-            self._values = copy.deepcopy(kept)
+    def find(self, name: str) -> Any:
+        """Return the value of a signal of any kind, None where it is not set."""
+        return next((values[name] for kind in (int, float, str) if name in (values := self._values[kind])), None)
 
-        return recall
-
-    def functions(self) -> dict[str, Function]:
-        """Return what a script may call, by name."""
-        return {name: getattr(self, name) for name in dir(self) if name.endswith("Signal")}
-
-    def setFloatSignal(self, name: Name, value: Number) -> None:
-        """Set a number."""
-        self._set(float, name, float(value))
-
-    def getFloatSignal(self, name: Name) -> float | None:
-        """Return a number, or nothing where it is not set."""
-        return self._values[float].get(name)
-
-    def clearFloatSignal(self, name: Name | None = None) -> None:
-        """Forget a number, or all of them."""
-        self._clear(float, name)
-
-    setDoubleSignal, getDoubleSignal, clearDoubleSignal = setFloatSignal, getFloatSignal, clearFloatSignal
-
-    def setInt32Signal(self, name: Name, value: int) -> None:
-        """Set a whole number."""
-        if not abs(value) <= _LARGEST:  # so written, it refuses NaN
-            raise WrongValue(f"a whole number within +-{_LARGEST} is expected")
-        self._set(int, name, int(value))
-
-    def getInt32Signal(self, name: Name) -> int | None:
-        """Return a whole number, or nothing where it is not set."""
-        return self._values[int].get(name)
-
-    def clearInt32Signal(self, name: Name | None = None) -> None:
-        """Forget a whole number, or all of them."""
-        self._clear(int, name)
-
-    setIntegerSignal, getIntegerSignal, clearIntegerSignal = setInt32Signal, getInt32Signal, clearInt32Signal
-
-    def setStringSignal(self, name: Name, value: Text) -> None:
-        """Set a string."""
-        if not isinstance(value, (str, bytes)):
-            raise WrongValue("a string is expected")
-        before = self._values[str].get(name, "")
-        size = sum(map(len, self._values[str].values())) - len(before) + len(value)
-        if size > MOST_BYTES:
-            raise ValueError(f"string signals may hold {MOST_BYTES} bytes together, not {size}")
-        self._set(str, name, value)
-
-    def getStringSignal(self, name: Name) -> str | None:
-        """Return a string, or nothing where it is not set."""
-        return self._values[str].get(name)
-
-    def clearStringSignal(self, name: Name | None = None) -> None:
-        """Forget a string, or all of them."""
-        self._clear(str, name)
-
-    def _set(self, kind: type[Any], name: str, value: Any) -> None:
+    def set(self, kind: type[Any], name: str, value: Any) -> None:
+        """Set a signal; raises WrongValue and ValueError, also for more than signals may hold."""
         if not isinstance(name, str):
             raise WrongValue("the name of a signal is a string")
         if len(name) > _LONGEST_NAME:
             raise ValueError(f"the name of a signal has at most {_LONGEST_NAME} characters, not {len(name)}")
         values = self._values[kind]
+        if kind is str:
+            size = sum(map(len, values.values())) - len(values.get(name, "")) + len(value)
+            if size > MOST_BYTES:
+                raise ValueError(f"string signals may hold {MOST_BYTES} bytes together, not {size}")
         if name not in values and len(values) >= _MOST:
             raise ValueError(f"{_MOST} signals of a kind are there already: clear some")
         values[name] = value
 
-    def _clear(self, kind: type[Any], name: str | None) -> None:
+    def forget(self, kind: type[Any], name: str | None) -> None:
+        """Clear a signal of a kind, or all of them."""
         if name is None:
             self._values[kind].clear()
         else:
             self._values[kind].pop(name, None)
+
+    def save_state(self) -> Callable[[], None]:
+        """Return a function that brings the present signals back."""
+        kept = copy.deepcopy(self._values)
+
+        def restore() -> None:
+            self._values = copy.deepcopy(kept)
+
+        return restore
+
+
+class SignalFunctions:
+    """Signals, values under a name that one script leaves for another, or for itself."""
+
+    def __init__(self, signals: Signals):
+        """Take the signals of the simulation."""
+        self._signals = signals
+
+    @sim("345", setDoubleSignal="345")
+    def setFloatSignal(self, name: Name, value: Number) -> None:
+        """Set a number."""
+        self._signals.set(float, name, float(value))
+
+    @sim("5", setIntegerSignal="345")
+    def setInt32Signal(self, name: Name, value: int) -> None:
+        """Set a whole number."""
+        if not abs(value) <= _LARGEST:  # so written, it refuses NaN
+            raise WrongValue(f"a whole number within +-{_LARGEST} is expected")
+        self._signals.set(int, name, int(value))
+
+    @sim("345")
+    def setStringSignal(self, name: Name, value: Text) -> None:
+        """Set a string."""
+        if not isinstance(value, (str, bytes)):
+            raise WrongValue("a string is expected")
+        self._signals.set(str, name, value)
+
+
+def _add_kind(word: str, kind: type[Any], what: str, generations: str = "345", older: str = "") -> None:
+    """Add what reads and forgets signals of a kind; `older`: what 3.x calls it besides."""
+
+    def get(self: SignalFunctions, name: Name) -> Any:
+        return self._signals.get(kind, name)
+
+    def clear(self: SignalFunctions, name: Name | None = None) -> None:
+        self._signals.forget(kind, name)
+
+    docs = {get: f"Return {what}, or nothing where it is not set.", clear: f"Forget {what}, or all of them."}
+    for function, doc in docs.items():
+        verb = function.__name__
+        others = {f"{verb}{older}Signal": "345"} if older else {}
+        sim.add(SignalFunctions, function, f"{verb}{word}Signal", doc, generations, **others)
+
+
+_add_kind("Float", float, "a number", older="Double")
+_add_kind("Int32", int, "a whole number", "5", older="Integer")
+_add_kind("String", str, "a string")
+
+
+class _End(NamedTuple):
+    tube: tuple[int, str]
+    waiting: deque[Any]
+
+
+class Tubes:
+    """The tubes between the scripts of a simulation: each has one header and name, and two ends."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self._ends: dict[int, _End] = {}
+        self._last_handle = 0
+
+    def open(self, kind: int, name: str, length: int) -> int:
+        """Open one end, at which so many packets wait; return its handle. Raises ValueError."""
+        if sum(one.tube == (kind, name) for one in self._ends.values()) >= 2:
+            raise ValueError(f"the tube '{name:.80}' has two ends already")
+        if len(self._ends) >= _MOST_ENDS:
+            raise ValueError(f"{_MOST_ENDS} ends of tubes are open already: close some")
+        self._last_handle += 1
+        self._ends[self._last_handle] = _End((kind, name), deque(maxlen=min(max(1, length), _LONGEST)))
+        return self._last_handle
+
+    def close(self, handle: int) -> None:
+        """Close one end. Raises ValueError for a handle that there is not."""
+        self.waiting(handle)
+        del self._ends[handle]
+
+    def waiting(self, handle: int) -> deque[Any]:
+        """Return what waits at an end. Raises ValueError for a handle that there is not."""
+        if handle not in self._ends:
+            raise ValueError(f"no tube has the handle {handle}")
+        return self._ends[handle].waiting
+
+    def waiting_at_other(self, handle: int) -> deque[Any] | None:
+        """Return what waits at the other end, None where that is not open. Raises ValueError."""
+        self.waiting(handle)
+        tube = self._ends[handle].tube
+        return next((one.waiting for number, one in self._ends.items() if one.tube == tube and number != handle), None)
+
+    def clear(self) -> None:
+        """Close all, as at the beginning of a run."""
+        self._ends.clear()
+        self._last_handle = 0
+
+    def save_state(self) -> Callable[[], None]:
+        """Return a function that brings back the tubes, and what waits in them."""
+        kept, last = copy.deepcopy(self._ends), self._last_handle
+
+        def restore() -> None:
+            self._ends, self._last_handle = copy.deepcopy(kept), last
+
+        return restore
+
+
+class TubeFunctions:
+    """Tubes, two-way pipes between two scripts, which V-REP 3.x's sensors send their readings through."""
+
+    def __init__(self, tubes: Tubes):
+        """Take the tubes of the simulation."""
+        self._tubes = tubes
+
+    @sim("345")
+    def tubeOpen(self, header: Number, name: Name, size: Number = 1, *_unused: Any) -> int:
+        """Open one end of a tube, at which up to `size` packets wait; return its handle.
+
+        It is connected once somebody opens the other end, with the same header and name.
+        """
+        kind, length = (int(one) for one in numbers((header, size), 2))
+        if not isinstance(name, str):
+            raise WrongValue("the name of a tube is a string")
+        return self._tubes.open(kind, name, length)
+
+    @sim("345")
+    def tubeClose(self, handle: Handle) -> None:
+        """Close one end of a tube."""
+        self._tubes.close(handle)
+
+    @sim("345")
+    def tubeStatus(self, handle: Handle) -> tuple[int, int, int]:
+        """Return 1 where both ends are open, else 0, and how many packets wait at this end and at the other."""
+        here, other = self._tubes.waiting(handle), self._tubes.waiting_at_other(handle)
+        return int(other is not None), len(here), len(other or ())
+
+    @sim("345")
+    def tubeWrite(self, handle: Handle, data: Text) -> int:
+        """Send a string to the other end, where the oldest goes if there are too many; return 1, 0 for no other end."""
+        if not isinstance(data, (str, bytes)):
+            raise WrongValue("a string is expected")
+        refuse_if_too_large(data)
+        other = self._tubes.waiting_at_other(handle)
+        if other is not None:
+            other.append(data)
+        return int(other is not None)
+
+    @sim("345")
+    def tubeRead(self, handle: Handle, _wait: Any = False) -> Any:
+        """Return the oldest string that waits at this end; nothing where none does."""
+        waiting = self._tubes.waiting(handle)
+        return waiting.popleft() if waiting else None

@@ -6,25 +6,25 @@ import os
 import random
 from typing import Any
 
+from drone_sim.message_text import near_names
+from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.control import PAUSE, STOP
-from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.host import Functions, Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.types import Number
-from drone_sim.wording import near_names
 
 VERSION, REVISION = 40600, 0  # the CoppeliaSim whose API this is nearest to
 _LINUX = 2
 _PLUGINS = ("RosInterface", "ROSInterface", "ROS", "simROS", "CustomUI", "simUI")  # by every name that they had
 
 
-class SimulationFunctions:
-    """The functions on the simulation and the simulator."""
+class SimulationFunctions(Functions):
+    """The simulation as a whole: its state, its time, and the parameters of the simulator."""
 
-    def __init__(self, surroundings: Surroundings, ignored: Ignored):
-        """Take the clock and whatever else is around the drone, and what says that something is ignored."""
-        self._around = surroundings
-        self._ignored = ignored
+    def __init__(self, host: Host, surroundings: Surroundings, ignored: Ignored):
+        """Take what all functions take."""
+        super().__init__(host, surroundings, ignored)
         self._random = random.Random(1)  # the same flight every time
         self._values: dict[str, dict[int, Any]] = {
             "intparam": _by_number(
@@ -36,62 +36,71 @@ class SimulationFunctions:
                 dynamic_engine=0,
                 core_count=os.cpu_count() or 1,
             ),
-            "floatparam": _by_number("floatparam", simulation_time_step=surroundings.time_step),
+            "floatparam": _by_number("floatparam", simulation_time_step=self._context.clock.time_step),
             "boolparam": _by_number(
                 "boolparam", dynamics_handling_enabled=True, vision_sensor_handling_enabled=True, display_enabled=False
             ),
             "stringparam": _by_number("stringparam", application_path="", scene_path="", scene_name=""),
-            "arrayparam": _by_number("arrayparam", gravity=[0.0, 0.0, surroundings.gravity]),
+            "arrayparam": _by_number("arrayparam", gravity=[0.0, 0.0, self._context.gravity]),
         }
 
     # ---- state and time
 
+    @sim("345")
     def getSimulationState(self) -> int:
         """Return sim.simulation_advancing_firstafterstop in init, then _running, _abouttostop, _lastbeforestop."""
-        return self._around.control.state(self._around.clock())
+        return self._context.control.state(self._context.clock.time)
 
+    @sim("5")
     def getSimulationStopping(self) -> bool:
         """Return whether the simulation ends with this step."""
-        return self._around.control.is_ending or self._around.control.asked == STOP
+        return self._context.control.is_ending or self._context.control.asked == STOP
 
+    @sim("345")
     def stopSimulation(self, *_wait: Any) -> int:
         """Let the simulation stop after this step; return 1."""
-        self._around.control.asked = STOP
+        self._context.control.asked = STOP
         return 1
 
+    @sim("345")
     def pauseSimulation(self) -> int:
         """Let the simulation pause after this step; return 1."""
-        self._around.control.asked = PAUSE
+        self._context.control.asked = PAUSE
         return 1
 
+    @sim("345")
     def startSimulation(self) -> int:
         """Take back what was asked for in this step: whoever can call this runs already; return 1."""
-        self._around.control.asked = ""
+        self._context.control.asked = ""
         return 1
 
+    @sim("345")
     def getSimulationTime(self) -> float:
         """Return the simulated time in seconds."""
-        return self._around.clock()
+        return self._context.clock.time
 
+    @sim("345")
     def getSimulationTimeStep(self) -> float:
         """Return the simulation step in seconds."""
-        return self._around.time_step
+        return self._context.clock.time_step
 
+    @sim("345")
     def getSystemTime(self) -> float:
         """Return the simulated time in seconds: a flight is the same however fast it is computed."""
-        return self._around.clock()
+        return self._context.clock.time
 
+    @sim("345", getSystemTimeInMilliseconds="3")
     def getSystemTimeInMs(self, since: Number = -1) -> int:
         """Return the simulated time in ms, or the ms since such a time; -1 and -2 are no such times."""
-        now = round(1000 * self._around.clock())
+        now = round(1000 * self._context.clock.time)
         return now if since < 0 else now - int(since)
 
-    getSystemTimeInMilliseconds = getSystemTimeInMs
-
+    @sim("345")
     def getModuleName(self, index: int) -> tuple[str | None, int]:
         """Return name and version of a plugin, from 0, as scripts ask whether there is one; nothing beyond the last."""
         return (_PLUGINS[int(index)], 1) if 0 <= index < len(_PLUGINS) else (None, 0)
 
+    @sim("345")
     def getRandom(self, seed: Number | None = None) -> float:
         """Return a random number from 0 to 1, the same ones in every run; a seed begins another series."""
         if seed is not None:
@@ -100,67 +109,32 @@ class SimulationFunctions:
 
     # ---- parameters of the simulator
 
+    @sim("5", getInt32Parameter="345", getIntegerParameter="3")
     def getInt32Param(self, parameter: int) -> int:
         """Return sim.intparam_program_version, _program_revision, _platform, _dynamic_engine or _core_count."""
         return int(self._read("intparam", parameter, 0))
 
-    getInt32Parameter = getIntegerParameter = getInt32Param
-
-    def setInt32Param(self, parameter: int, _value: int) -> None:
-        """Accept any sim.intparam_... and ignore it."""
-        self._set("setInt32Param", "intparam", parameter)
-
-    setInt32Parameter = setIntegerParameter = setInt32Param
-
+    @sim("5", getFloatParameter="345", getFloatingParameter="3")
     def getFloatParam(self, parameter: int) -> float:
         """Return sim.floatparam_simulation_time_step in s, or a random number for sim.floatparam_rand."""
         if parameter == CONSTANTS["floatparam_rand"]:
             return self._random.random()
         return float(self._read("floatparam", parameter, 0.0))
 
-    getFloatParameter = getFloatingParameter = getFloatParam
-
-    def setFloatParam(self, parameter: int, _value: Number) -> None:
-        """Accept any sim.floatparam_... and ignore it."""
-        self._set("setFloatParam", "floatparam", parameter)
-
-    setFloatParameter = setFloatingParameter = setFloatParam
-
+    @sim("5", getBoolParameter="345", getBooleanParameter="3")
     def getBoolParam(self, parameter: int) -> bool:
         """Return whether the simulator does what a sim.boolparam_... names: dynamics and vision sensors."""
         return bool(self._read("boolparam", parameter, False))
 
-    getBoolParameter = getBooleanParameter = getBoolParam
-
-    def setBoolParam(self, parameter: int, _value: Any) -> None:
-        """Accept any sim.boolparam_... and ignore it."""
-        self._set("setBoolParam", "boolparam", parameter)
-
-    setBoolParameter = setBooleanParameter = setBoolParam
-
+    @sim("5", getStringParameter="345")
     def getStringParam(self, parameter: int) -> str:
         """Return '' for any sim.stringparam_...: there is no application, and no scene of CoppeliaSim's."""
         return str(self._read("stringparam", parameter, ""))
 
-    getStringParameter = getStringParam
-
-    def setStringParam(self, parameter: int, _value: Any) -> None:
-        """Accept any sim.stringparam_... and ignore it."""
-        self._set("setStringParam", "stringparam", parameter)
-
-    setStringParameter = setStringParam
-
+    @sim("5", getArrayParameter="345")
     def getArrayParam(self, parameter: int) -> list[float]:
         """Return sim.arrayparam_gravity in m/s²; there is no other."""
         return list(self._read("arrayparam", parameter, [0.0, 0.0, 0.0]))
-
-    getArrayParameter = getArrayParam
-
-    def setArrayParam(self, parameter: int, _value: Any) -> None:
-        """Accept any sim.arrayparam_... and ignore it: gravity is a parameter of the node."""
-        self._set("setArrayParam", "arrayparam", parameter)
-
-    setArrayParameter = setArrayParam
 
     def _read(self, kind: str, parameter: int, otherwise: Any) -> Any:
         """Return a parameter; raises ValueError for a number that is none of that kind."""
@@ -171,8 +145,23 @@ class SimulationFunctions:
             return otherwise
         return values[parameter]
 
-    def _set(self, function: str, kind: str, parameter: int) -> None:
-        self._ignored.say(function, f"{_name(kind, parameter)} is accepted and ignored")
+
+def _add_setter(word: str, kind: str, old: str, so: str = "") -> None:
+    """Add what sets parameters of a kind; `old`: what 3.x calls these."""
+    name = f"set{word}Param"
+
+    def put(self: SimulationFunctions, parameter: int, _value: Any) -> None:
+        self._ignored.say(name, f"{_name(kind, parameter)} is accepted and ignored")
+
+    others = {f"set{word}Parameter": "345"} | ({f"set{old}Parameter": "3"} if old else {})
+    sim.add(SimulationFunctions, put, name, f"Accept any sim.{kind}_... and ignore it{so}.", "5", **others)
+
+
+_add_setter("Int32", "intparam", "Integer")
+_add_setter("Float", "floatparam", "Floating")
+_add_setter("Bool", "boolparam", "Boolean")
+_add_setter("String", "stringparam", "")
+_add_setter("Array", "arrayparam", "", ": gravity is a parameter of the node")
 
 
 def _by_number(kind: str, **values: Any) -> dict[int, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from drone_sim.wording import near_names
+from drone_sim.message_text import near_names
 
 _LONGEST = 80  # characters of a name that is looked at
 
@@ -42,12 +42,14 @@ ABSENT: dict[str, str] = {
     r"simExt(?!RosInterface_)\w+": "a plugin of V-REP's that is not here",
     r"sim_ext_\w+": "a constant of a plugin that is not here",
     r"sim\.\w*(?:Ik|IK)(?:Group|Element|Path|\b)\w*|sim\.(?:getConfigForTipPose|computeJacobian)": PLUGINS["simIK"],
-    r"sim\.(?:load|save|close|export|import)\w*": "scenes and models are files: see `scene_file` and `vehicles`",
-    r"sim\.(?:create|copyPaste|remove|group|ungroup|convert|scale)(?!DrawingObject|Particle|Dialog)\w*": (
-        "objects come from the scene file: a script makes and removes dummies alone"
+    r"sim\.(?:load|save|close)Scene": (
+        "scenes are for when the simulation is stopped, and no child script runs; clients of the remote API can do it"
     ),
-    r"sim\.setObject(?:Name|Alias)": "names are those of the scene file",
-    r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "masses are those of the URDF and the scene file",
+    r"sim\.(?:load|save|close|export|import)\w*": "scenes are files: see `scene_file`; loadModel adds one's objects",
+    r"sim\.(?:create|copyPaste|remove|group|ungroup|convert|scale)(?!DrawingObject|Particle|Dialog)\w*": (
+        "such objects come from the scene file"
+    ),
+    r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "setShapeMass says what a shape weighs",
     r"sim\.\w*(?:Collision|Distance)\w*": (
         "there are no collision and distance objects; checkCollision and checkDistance measure between two objects"
     ),

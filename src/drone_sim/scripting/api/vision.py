@@ -7,17 +7,16 @@ step, or as of now where nobody has looked since. Depth is in m along the sensor
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from drone_sim.mechanics.object_tree import ObjectTree
-from drone_sim.scripting.api.calls import WrongValue, numbers
-from drone_sim.scripting.api.handles import CODED, GREYSCALE, METRES, bare, has
-from drone_sim.scripting.api.host import Host, Surroundings
-from drone_sim.scripting.api.types import Handle, Number
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import CODED, GREYSCALE, METRES, bare, has
+from drone_sim.scripting.api.host import Functions
+from drone_sim.scripting.api.types import Handle, Number, WrongValue, numbers
 
 _GREY, _DEPTH_IN_METRES = 1, 1  # options of 4.x
 _LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601
@@ -37,16 +36,10 @@ class Eye(Protocol):
         """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane."""
 
 
-class VisionSensors:
-    """The functions on vision sensors."""
+class VisionSensors(Functions):
+    """What vision sensors see."""
 
-    def __init__(self, host: Host, surroundings: Surroundings):
-        """Take the drone and its cameras."""
-        self._objects = host.objects
-        self._pictures = surroundings.pictures
-        self._planes = surroundings.planes
-        self._outside = surroundings.outside
-
+    @sim("345")
     def getVisionSensorCharImage(
         self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0, *_options: Any
     ) -> tuple[bytes, int, int]:
@@ -60,6 +53,7 @@ class VisionSensors:
         rows, columns = picture.shape[:2]
         return b"".join(picture[::-1]), columns, rows  # row by row: `tobytes` takes forty times as long
 
+    @sim("5")
     def getVisionSensorImg(
         self, handle: Handle, options: int = 0, _cutoff: Number = 0.0, pos: Any = (0, 0), size: Any = (0, 0)
     ) -> tuple[bytes, list[int]]:
@@ -68,19 +62,15 @@ class VisionSensors:
         image, width, height = self.getVisionSensorCharImage(bare(handle) + flag, *_two(pos), *_two(size))
         return image, [width, height]
 
+    @sim("345")
     def getVisionSensorImage(
-        self,
-        handle: Handle,
-        x: Number = 0,
-        y: Number = 0,
-        width: Number = 0,
-        height: Number = 0,
-        as_string: int = 0,
+        self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0, as_string: int = 0
     ) -> Any:
         """Return an image as numbers from 0 to 1, or as a string where `as_string` is 1 (3.x)."""
         image = self.getVisionSensorCharImage(handle, x, y, width, height)[0]
         return image if as_string else (np.frombuffer(image, np.uint8) / np.float32(255)).tolist()
 
+    @sim("5")
     def getVisionSensorDepth(
         self, handle: Handle, options: int = 0, pos: Any = (0, 0), size: Any = (0, 0)
     ) -> tuple[bytes, list[int]]:
@@ -92,6 +82,7 @@ class VisionSensors:
         depths = self._depths(bare(handle) + flag, _two(pos), _two(size))
         return depths.tobytes(), [depths.shape[1], depths.shape[0]]
 
+    @sim("345")
     def getVisionSensorDepthBuffer(
         self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0
     ) -> Any:
@@ -102,18 +93,19 @@ class VisionSensors:
         depths = self._depths(handle, (x, y), (width, height))
         return depths.tobytes() if has(handle, CODED) else depths.ravel().tolist()
 
+    @sim("345", getVisionSensorRes="5")
     def getVisionSensorResolution(self, handle: Handle) -> list[int]:
         """Return [width, height]."""
         height, width = self._picture(handle).shape[:2]
         return [width, height]
 
-    getVisionSensorRes = getVisionSensorResolution
-
+    @sim("345")
     def handleVisionSensor(self, handle: Handle) -> int:
         """Take the picture; return the number of detections: 0, there are no filters."""
         self._picture(handle)
         return 0
 
+    @sim("345")
     def readVisionSensor(self, handle: Handle) -> tuple[int, list[float]]:
         """Return 0, as there are no filters that detect anything, and 15 numbers.
 
@@ -144,19 +136,18 @@ class VisionSensors:
         depths = np.nan_to_num(_part(picture, pos, size)[::-1].astype("<f4"), nan=np.inf)
         if has(handle, METRES):
             return depths
-        near, far = (found.near, found.far) if isinstance(found, Eye) else self._planes[name]
+        near, far = (found.near, found.far) if isinstance(found, Eye) else self._surroundings.planes[name]
         return np.clip((depths - near) / max(far - near, 1e-9), 0.0, 1.0).astype("<f4")
 
     def _picture(self, handle: int, kind: str = "color") -> np.ndarray:
         """Return what a sensor sees; one of the scene sees what `kind` says, a drone's camera what it is made for."""
-        found = self._objects[bare(handle)]
-        name = found.name
-        if isinstance(found, Eye):  # of the scene
-            return self._outside(partial(found.picture, kind))
-        if name not in self._pictures:
-            known = ", ".join([*self._pictures, *_eyes(self._objects)]) or "none"
-            raise WrongValue(f"'{name}' is not a vision sensor; there are: {known}")
-        return self._outside(self._pictures[name])  # not the script's time; the first picture compiles shaders
+        found, pictures = self._objects[bare(handle)], self._surroundings.pictures
+        take = partial(found.picture, kind) if isinstance(found, Eye) else pictures.get(found.name)
+        if take is None:
+            eyes = [one.name for one in map(self._objects.__getitem__, self._objects) if isinstance(one, Eye)]
+            known = ", ".join([*pictures, *eyes]) or "none"
+            raise WrongValue(f"'{found.name}' is not a vision sensor; there are: {known}")
+        return self._surroundings.outside(take)  # not the script's time; the first picture compiles shaders
 
 
 def _two(values: Any) -> tuple[float, ...]:
@@ -173,7 +164,3 @@ def _part(picture: np.ndarray, pos: Sequence[float], size: Sequence[float]) -> n
     if x < 0 or y < 0 or width <= 0 or height <= 0 or x + width > columns or y + height > rows:
         raise WrongValue(f"a part of a picture of {columns} x {rows} is expected")
     return picture[rows - y - height : rows - y, x : x + width]
-
-
-def _eyes(objects: ObjectTree) -> Iterator[str]:
-    return (objects[handle].name for handle in objects if isinstance(objects[handle], Eye))

@@ -1,4 +1,4 @@
-"""What scripts open for a person to look at: floating views, dialogs and consoles, all of them bounded."""
+"""`sim`: floating views, dialogs and consoles: what scripts open for a person to look at, all of it bounded."""
 
 from __future__ import annotations
 
@@ -8,11 +8,25 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.ignored import Ignored
+from drone_sim.scripting.script_log import say, shown
+
 MOST = 16  # of each kind; of more, the oldest go
 _TITLE, _TEXT, _LINE, _LINES = 200, 4000, 300, 100  # characters, and lines of a console
 
 OK = "ok"
 _Kind = TypeVar("_Kind")
+_STILL_OPEN, _STYLE = CONSTANTS["dlgret_still_open"], 0x1F  # the bits that say which buttons
+_INPUT = CONSTANTS["dlgstyle_input"]
+_BUTTONS = {
+    _INPUT: (OK,),
+    CONSTANTS["dlgstyle_ok"]: (OK,),
+    CONSTANTS["dlgstyle_ok_cancel"]: (OK, "cancel"),
+    CONSTANTS["dlgstyle_yes_no"]: ("yes", "no"),
+}
 
 
 @dataclass
@@ -51,11 +65,11 @@ class Windows:
 
     def __init__(self) -> None:
         """Begin with none, and with nobody who could answer a dialog."""
+        self.readers: set[Callable[[], bool]] = set()  # each says whether it can answer now
         self.views: dict[int, View] = {}
         self.dialogs: dict[int, Dialog] = {}
         self.consoles: dict[int, Console] = {}
         self.changes = 0
-        self.can_answer: Callable[[], bool] = lambda: False
 
     # ---- what scripts do
 
@@ -109,6 +123,10 @@ class Windows:
 
     # ---- what a person does
 
+    def can_answer(self) -> bool:
+        """Tell whether anybody is there to answer a dialog."""
+        return any(can() for can in self.readers)
+
     def answer(self, handle: int, button: str, typed: str = "") -> None:
         """Press a button of a dialog that is open. Raises ValueError for one that there is not."""
         dialog = self.dialogs.get(handle)
@@ -148,7 +166,7 @@ class Windows:
         """Close all, as at the beginning of a run."""
         self._be({}, {}, {})
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that brings back what is open now."""
         kept = copy.deepcopy((self.views, self.dialogs, self.consoles))
         return lambda: self._be(*copy.deepcopy(kept))
@@ -171,3 +189,115 @@ def read_answer(given: Any) -> tuple[int, str, str]:
 
 def _said(buttons: tuple[str, ...]) -> str:
     return " and ".join(buttons) or "none"
+
+
+class Dialogs:
+    """Dialogs and consoles. What they say goes to the log, and to whoever shows `Windows`.
+
+    Nothing waits: a modal dialog is shown, and counts as answered."""
+
+    def __init__(self, windows: Windows, new_handle: Callable[[], int], ignored: Ignored):
+        """`windows` are open, `new_handle` gives a handle that nothing else has, `ignored` says what is ignored."""
+        self._new_handle = new_handle
+        self._windows = windows
+        self._ignored = ignored
+
+    @sim("345")
+    def displayDialog(
+        self, title: Any, text: Any = "", style: Any = 0, modal: Any = False, initial: Any = "", *_looks: Any
+    ) -> int:
+        """Open a dialog, and write its title and text to the log; return a handle."""
+        say(f"{_text(title)}: {_text(text)}")
+        kind = style & _STYLE if isinstance(style, int) else 0
+        typed = _text(initial or "") if kind == _INPUT and not modal else None
+        handle = self._new_handle()
+        buttons = () if modal else _BUTTONS.get(kind, ())
+        self._windows.add_dialog(handle, Dialog(_text(title), _text(text), buttons, typed))
+        return handle
+
+    @sim("345")
+    def getDialogResult(self, handle: int) -> int:
+        """Return which button was pressed, sim.dlgret_still_open before; sim.dlgret_ok where nobody could press one."""
+        dialog = self._windows.dialogs.get(handle)
+        if dialog is not None and dialog.buttons and not dialog.answer:
+            if self._windows.can_answer():
+                return _STILL_OPEN
+            self._ignored.say("getDialogResult", "nobody answers: sim.dlgret_ok is returned")
+            self._windows.assume_ok(handle)
+        answer = dialog.answer if dialog is not None else ""
+        return CONSTANTS[f"dlgret_{answer or OK}"]
+
+    @sim("345")
+    def getDialogInput(self, handle: int) -> str:
+        """Return what was written into a dialog that has been answered, '' where nobody has."""
+        dialog = self._windows.dialogs.get(handle)
+        return dialog.typed or "" if dialog is not None and dialog.answer else ""
+
+    @sim("345")
+    def endDialog(self, handle: int) -> int:
+        """Close a dialog; return 1, or 0 where there is none."""
+        return int(self._windows.close(self._windows.dialogs, handle))
+
+    @sim("345")
+    def auxiliaryConsoleOpen(self, title: Any, lines: Any = 0, *_looks: Any) -> int:
+        """Open a console that shows its last lines, which also go to the log; return a handle."""
+        handle = self._new_handle()
+        self._windows.add_console(handle, _text(title), int(lines) if isinstance(lines, (int, float)) else 0)
+        return handle
+
+    @sim("345")
+    def auxiliaryConsolePrint(self, handle: int, text: Any = None) -> int:
+        """Print there, and to the log; without a text, empty the console; return 1."""
+        if handle in self._windows.consoles:
+            self._windows.print(handle, None if text is None else _text(text))
+        if text is not None:
+            say(_text(text).rstrip("\n"))
+        return 1
+
+    @sim("345")
+    def auxiliaryConsoleShow(self, handle: int, show: Any = True) -> int:
+        """Show or hide a console; return 1, or 0 where there is none."""
+        if handle not in self._windows.consoles:
+            return 0
+        self._windows.show_console(handle, bool(show))
+        return 1
+
+    @sim("345")
+    def auxiliaryConsoleClose(self, handle: int) -> int:
+        """Close a console; return 1, or 0 where there is none."""
+        return int(self._windows.close(self._windows.consoles, handle))
+
+
+def _text(value: Any) -> str:
+    return value if type(value) is str else shown(value)
+
+
+class Views:
+    """Floating views. Whoever shows `Windows` shows what the sensor sees; where it stands is theirs to say."""
+
+    def __init__(self, windows: Windows, new_handle: Callable[[], int], objects: ObjectTree):
+        """`windows`: what is open; `new_handle` gives a handle that nothing else has; `objects` are to be seen."""
+        self._new_handle = new_handle
+        self._objects = objects
+        self._windows = windows
+
+    @sim("345")
+    def floatingViewAdd(self, *_place: Any) -> int:
+        """Open a floating view, which shows nothing before sim.adjustView has said what; return a handle."""
+        handle = self._new_handle()
+        self._windows.add_view(handle)
+        return handle
+
+    @sim("345")
+    def adjustView(self, view: int, sensor: int, _options: Any = 0, label: Any = None) -> int:
+        """Let a floating view show what a vision sensor sees, -1 for nothing; return 1, or 0 for another view."""
+        if view not in self._windows.views:
+            return 0
+        name = "" if sensor == -1 else self._objects[sensor].name
+        self._windows.aim(view, name, name if label is None else shown(label))
+        return 1
+
+    @sim("345")
+    def floatingViewRemove(self, view: int) -> int:
+        """Close a floating view; return 1, or 0 where there is none."""
+        return int(self._windows.close(self._windows.views, view))

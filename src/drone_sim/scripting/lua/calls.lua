@@ -112,10 +112,10 @@ function sandbox.functions()
   return run(list_functions)
 end
 
-function sandbox.remember()
+function sandbox.save_state()
   return run(take_snapshot)
 end
 
-function sandbox.recall(snapshot)
+function sandbox.restore(snapshot)
   return run(snapshot)
 end

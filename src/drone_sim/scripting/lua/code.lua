@@ -1,7 +1,7 @@
--- The script's code: how its files are compiled, and what it requires.
+-- The script's code: how its files are compiled, what it requires, and other scripts' functions.
 local bridge, sandbox = ...
 
-local error, type, tostring, select = error, type, tostring, select
+local error, type, tostring, select, setmetatable = error, type, tostring, select, setmetatable
 local byte = string.byte
 local load, loadstring, setfenv = load, loadstring, setfenv
 local newer = _VERSION ~= 'Lua 5.1'
@@ -62,3 +62,19 @@ function env.require(name)
   if module == nil then module = load_module(name) end
   return module
 end
+
+---- other scripts' functions, as if they were a table's
+
+local api, own = sandbox.api, sandbox.own
+
+local function functions_of(script)
+  api['sim.getScriptName'](script) -- or there is none
+  return setmetatable({}, {__index = function(functions, name)
+    return function(first, ...)
+      if first == functions then return api['sim.callScriptFunction'](name, script, ...) end
+      return api['sim.callScriptFunction'](name, script, first, ...)
+    end
+  end})
+end
+
+own['sim.getScriptFunctions'], own.simGetScriptFunctions = functions_of, functions_of

@@ -2,34 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Set
+import functools
+from collections.abc import Callable, Iterator, Mapping, Set
 from typing import Any
 
-from drone_sim.scripting.api.calls import Api, Function, contents, explain
+from drone_sim.scripting.api.calls import Api, Function, contents, explain, flat_name, most_values
+from drone_sim.scripting.api.control import Wait, waits
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
-from drone_sim.scripting.lua.thread import Door
-from drone_sim.scripting.lua.values import AS_STREAM, FAILED, MEMORY, TOO_MUCH, Values
+from drone_sim.scripting.lua.state import MEMORY, LuaState
+from drone_sim.scripting.lua.values import AS_STREAM, FAILED, PLAIN, TOO_MUCH
+from drone_sim.scripting.script_log import LOG
 
-_FLAT = {"simROS": "simExtRosInterface_"}
+_MOST_WAITS = 1000  # which Lua does not count as memory
 _AS_STREAM, _TOO_MUCH, _STOPPED = (AS_STREAM,), (TOO_MUCH,), (FAILED, b"stopped")
 
 
-def define(runtime: Any, sandbox: Any, modules: Mapping[str, Api], values: Values, door: Door) -> set[str]:
+def define(state: LuaState, modules: Mapping[str, Api]) -> set[str]:
     """Put modules of the API among the script's globals, with their flat names, too; return every name."""
     known: set[str] = set()
+    sandbox = state.sandbox
     script_globals = sandbox[b"globals"]
 
     def add(place: Any, name: str, shown: str, function: Function) -> None:
         known.add(name)
-        called = lua_function(shown, function, values, door)
-        sandbox[b"define"](place, name.encode(), shown.encode(), called)
+        called = lua_function(shown, function, state)
+        sandbox[b"define"](place, name.encode(), shown.encode(), called, waits(function))
 
     for api in modules.values():
         module, functions, constants = contents(api)
-        table = runtime.table()
+        table = state.runtime.table()
         for name, function in functions.items():
             add(table, name, f"{module}.{name}", function)
-            flat = _flat(module, name)
+            flat = flat_name(module, name)
             add(script_globals, flat, flat, function)
             known.add(flat)
         for name, constant in constants.items():
@@ -51,14 +55,16 @@ def _why_not(prefix: str, known: Set[str]) -> Callable[[bytes], bytes | None]:
     return why
 
 
-def lua_function(name: str, function: Function, values: Values, door: Door) -> Function:
+def lua_function(name: str, function: Function, state: LuaState) -> Function:
     """Return a function that answers Lua's calls; one of a script that was left behind does nothing."""
-    readers, answer = values.readers(), values.answer_of(function)
+    executor, readers, answer = state.executor, state.values.readers(), state.values.answer_of(function)
+    if waits(function):
+        answer = functools.partial(_asked_in_steps, name, state)
 
     def call(how: int, *given: Any) -> tuple[Any, ...]:
-        if door.closed:
+        if executor.closed:
             return _STOPPED
-        if values.used() > MEMORY and values.too_much():  # or there may be no room for the answer
+        if state.used() > MEMORY and state.too_much():  # or there may be no room for the answer
             return _TOO_MUCH
         arguments: Any = given
         try:
@@ -68,14 +74,45 @@ def lua_function(name: str, function: Function, values: Values, door: Door) -> F
                     return _AS_STREAM
             return answer(function(*arguments))
         except Exception as error:
-            return FAILED, explain(name, function, arguments, error).encode("utf-8", "replace")
+            return _failed(name, function, arguments, error, call, state)
 
-    door.api_code = call.__code__
+    executor.api_code = call.__code__
     return call
 
 
-def _flat(module: str, name: str) -> str:
-    """Return the 3.x name of a function: simGetObjectPosition, simExtRosInterface_publish."""
-    if module == "sim":
-        return f"sim{name[:1].upper()}{name[1:]}"
-    return _FLAT.get(module, module + "_") + name
+def _failed(
+    name: str, function: Function, arguments: Any, error: Exception, call: Function, state: LuaState
+) -> tuple[Any, ...]:
+    """Answer with what went wrong; or, as V-REP does, by a call without what the function does not take."""
+    most = most_values(function)
+    if len(arguments) <= most:
+        return FAILED, explain(name, function, arguments, error).encode("utf-8", "replace")
+    if name not in state.lavish:
+        state.lavish.add(name)
+        LOG.info("%s: %d values given, %d taken: the others are ignored", name, len(arguments), most)
+    answered: tuple[Any, ...] = call(0, *arguments[:most])
+    return answered
+
+
+def _asked_in_steps(name: str, state: LuaState, wait: Wait) -> tuple[Any, ...]:
+    """Answer with a function that Lua calls once a step: it returns whether to wait, and what the wait has brought."""
+    if state.waits >= _MOST_WAITS:
+        state.runtime.gccollect()  # those of coroutines that are no more
+    if state.waits >= _MOST_WAITS:
+        raise ValueError(f"at most {_MOST_WAITS} coroutines of a script wait at once")
+    steps = _steps(wait, state)
+
+    def waited() -> tuple[bool, Any]:
+        return next(steps)
+
+    return PLAIN, lua_function(name, waited, state)
+
+
+def _steps(wait: Wait, state: LuaState) -> Iterator[tuple[bool, Any]]:
+    state.waits += 1
+    try:
+        for _ in wait:
+            yield True, None
+    finally:
+        state.waits -= 1
+    yield False, wait.value()

@@ -1,4 +1,4 @@
--- The script's globals: what of Lua it finds, and what it may not reach.
+-- The script's globals: what of Lua it finds, what it may not reach, and which names are refused.
 --
 -- They are the script's own; the real ones, which lupa looks at, stay as they are. Nothing of Python is in reach: API
 -- functions are Lua closures over Python functions, and an error that is a Python object passes through every pcall.
@@ -9,12 +9,14 @@ local error, type, tostring, select, pairs = error, type, tostring, select, pair
 local rawget, setmetatable = rawget, setmetatable
 local unpack = table.unpack or unpack
 local concat, byte, sub = table.concat, string.byte, string.sub
+local find, gmatch = string.find, string.gmatch
 local load, loadstring, setfenv = load, loadstring, setfenv
 local create, resume, close = coroutine.create, sandbox.resume, coroutine.close
 local getmeta = sandbox.debug.getmetatable
 local log, caught, protected, limit = bridge.log, sandbox.caught, sandbox.protected, sandbox.limit
 local check, checked, tonumber = sandbox.check, sandbox.checked, tonumber
 local env, modules = sandbox.globals, sandbox.modules
+local texts, place_in_script = sandbox.texts, sandbox.place_in_script
 local newer = _VERSION ~= 'Lua 5.1'
 
 local function pack(...)
@@ -166,12 +168,39 @@ string.gfind = string.gmatch and (string.gfind or string.gmatch)
 local seed = math.randomseed
 function math.randomseed(number) -- newer Lua takes whole numbers alone, and without one any that comes
   if number == nil then number = 1 end
-  if newer and type(number) == 'number' then number = math.floor(number) end
+  if type(number) == 'number' then number = math.floor(number % 1 == 0 and number or number % 2 ^ 53) end
   return seed(number)
 end
 math.randomseed(1) -- the same flight every time
-local seed = math.randomseed
-function math.randomseed(number, ...) -- which Lua 5.3 takes whatever the number, and 5.4 if it is whole
-  if type(number) == 'number' and number % 1 ~= 0 then number = math.floor(number % 2 ^ 53) end
-  return seed(number, ...)
+
+---- names that the API does not have: reading one is an error that names near ones, as it is in Python
+
+-- In CoppeliaSim it is nil, and the script falls much later, or does the wrong thing without a word. Two ways of asking
+-- stay: whether a plugin is there (`if simROS2 then`), and whether a global that the script itself sets has been set.
+local own, read = {}, 0 -- names that the script gives a value to; how many of its texts have been read for them
+
+-- Tell whether the script, or a file that it requires, gives a global of that name a value.
+local function is_own(name)
+  while read < #texts do
+    read = read + 1
+    -- Each piece of the text is read once, whatever stands there: no hook ends a search.
+    for names, equals in gmatch(texts[read], '([%w_][%w_%.,%s]*)(=?=?)') do
+      if equals == '=' then
+        for one in gmatch(names .. ',', '%f[%w_](sim[A-Z_][%w_]*)%s*,') do own[one] = true end
+      end
+    end
+    for one in gmatch(texts[read], '%f[%w_]function%s+(sim[A-Z_][%w_]*)') do own[one] = true end
+  end
+  return own[name]
+end
+
+-- Let a table refuse what it does not have; `message` returns why, or nil for a name that may be nil.
+function sandbox.guard(guarded, message)
+  setmetatable(guarded, {__index = function(_, name)
+    if type(name) ~= 'string' or (guarded == env and (not find(name, '^sim[A-Z_][%w_]*$') or is_own(name))) then return end
+    local why = message(name)
+    if why == nil then return end
+    local line, file = place_in_script()
+    error(file .. ':' .. line .. ': ' .. why, 0)
+  end})
 end

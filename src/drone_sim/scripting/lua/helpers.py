@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
-from drone_sim.scripting import source_files
+from drone_sim.message_text import near_names
+from drone_sim.scripting.errors import read_source
 from drone_sim.scripting.lua.source import LuaSource
-from drone_sim.wording import near_names
 
 _CHUNK_LENGTH = 50  # Lua cuts longer chunk names
 _NAME = re.compile(r"[\w-]+(?:[./][\w-]+)*")
@@ -38,61 +39,48 @@ class LuaHelpers:
 
     def read(self, name: bytes) -> tuple[bool, bytes, bytes]:
         """Return true, text and chunk name of a module; or false and a message."""
-        try:
-            text, chunk = self._read(name.decode("utf-8"))
-        except (OSError, ValueError) as error:
-            said = getattr(error, "strerror", None) or error
-            return False, f"no module '{name.decode('utf-8', 'replace')[:80]}': {said}".encode("utf-8", "replace"), b""
-        return True, text, chunk.encode("utf-8", "replace")
+        return self._read("no module", name, self._module)
 
     def read_file(self, name: bytes) -> tuple[bool, bytes, bytes]:
         """Return true, text and chunk name of a .lua file; or false and a message."""
+        return self._read("cannot load", name, self._file)
+
+    def _read(self, failed: str, name: bytes, found: Callable[[str], str]) -> tuple[bool, bytes, bytes]:
         try:
-            text, chunk = self._read_file(name.decode("utf-8"))
+            file = found(name.decode("utf-8"))
+            path, chunk = self._folder / file, self._chunk(file)
+            if not path.resolve().is_relative_to(self._folder.resolve()):
+                raise ValueError("leads out of the script's folder")
+            text = LuaSource(read_source(path)).text
+            if len(self._paths) > _MOST:
+                raise ValueError(f"a script has at most {_MOST} modules")
         except (OSError, ValueError) as error:
-            said = getattr(error, "strerror", None) or error
-            return (
-                False,
-                f"cannot load '{name.decode('utf-8', 'replace')[:80]}': {said}".encode("utf-8", "replace"),
-                b"",
-            )
+            why = getattr(error, "strerror", None) or error
+            return False, f"{failed} '{name.decode('utf-8', 'replace')[:80]}': {why}".encode("utf-8", "replace"), b""
+        self._paths[chunk] = str(path)
         return True, text, chunk.encode("utf-8", "replace")
 
-    def _read_file(self, name: str) -> tuple[bytes, str]:
-        inner = name.removeprefix("./")
-        if len(inner) > _LONGEST or not _FILE.fullmatch(inner):
+    def _file(self, name: str) -> str:
+        file = name.removeprefix("./")
+        if len(file) > _LONGEST or not _FILE.fullmatch(file):
             raise ValueError(
                 "a .lua file beside the script, or in a folder there, is expected, such as helpers/pid.lua"
             )
-        path = self._folder / inner
-        if not path.exists():
-            near = near_names(inner, [one.name for one in self._folder.glob("*.lua")])
+        if not (self._folder / file).exists():
+            near = near_names(file, [one.name for one in self._folder.glob("*.lua")])
             raise ValueError(f"no such file beside the script; {near}")
-        return self._text(path), self._known(inner, path)
+        return file
 
-    def _read(self, name: str) -> tuple[bytes, str]:
+    def _module(self, name: str) -> str:
         if len(name) > _LONGEST or not _NAME.fullmatch(name):
             raise ValueError("a module's name is made of letters, digits, _ and -; dots stand for folders")
         inner = name.replace(".", "/")
         for file in (f"{inner}.lua", f"{inner}/init.lua"):
-            path = self._folder / file
-            if path.exists():
-                return self._text(path), self._known(file, path)
+            if (self._folder / file).exists():
+                return file
         beside = [path.stem for path in self._folder.glob("*.lua") if str(path) not in self._paths.values()]
         near = near_names(name, beside)
         raise ValueError(f"no file {inner}.lua beside the script{f'; {near}' if beside else ''}")
-
-    def _text(self, path: Path) -> bytes:
-        if not path.resolve().is_relative_to(self._folder.resolve()):
-            raise ValueError("leads out of the script's folder")
-        return LuaSource(source_files.read(path)).text
-
-    def _known(self, file: str, path: Path) -> str:
-        if len(self._paths) > _MOST:
-            raise ValueError(f"a script has at most {_MOST} modules")
-        chunk = self._chunk(file)
-        self._paths[chunk] = str(path)
-        return chunk
 
     @staticmethod
     def _chunk(file: str) -> str:

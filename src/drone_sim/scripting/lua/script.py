@@ -15,8 +15,9 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from drone_sim.message_text import near_names
 from drone_sim.scripting import phase_names, script_log
-from drone_sim.scripting.api.calls import Api, remember
+from drone_sim.scripting.api.calls import Api, save_state
 from drone_sim.scripting.api.constants import CONSTANTS, PHASES
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
@@ -24,26 +25,26 @@ from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.source import LuaSource
-from drone_sim.scripting.lua.thread import MOST_LEFT, Door, LeftBehind, LuaThread, SameThread, left_behind
-from drone_sim.scripting.lua.values import MEMORY, MIB, Values
+from drone_sim.scripting.lua.thread import MOST_LEFT, Executor, LeftBehind, LuaThread, SameThread, left_behind
 from drone_sim.scripting.time_limit import Labels, TimeLimit
-from drone_sim.wording import near_names
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
 _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NUMBERS = {phase: number for number, phase in enumerate((*PHASES, "thread"), start=1)}
 _NEAR = 0.8  # of difflib's ratio
-_EVERY_STEP = ("actuation", "sensing")
 _THREAD = 1 << _NUMBERS["thread"] - 1
-_CALLS = ("open", "phase", "called", "called_back", "has", "functions", "remember", "recall")  # in calls.lua
-_ABOUT_MEMORY = f"not enough memory: the script uses more than {MEMORY // MIB} MiB"
+_CALLS = ("open", "phase", "called", "called_back", "has", "functions", "save_state", "restore")  # in calls.lua
+_ABOUT_MEMORY = f"not enough memory: the script uses more than {state.MEMORY // state.MIB} MiB"
 
 
 class LuaScript:
     """A file that defines sysCall_init, ... as it needs them, or looks at sim_call_type."""
 
     def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
-        """Compile the file's text; run its top level unless it is to run in every phase. Raises ScriptError."""
+        """Compile a `source`; run its top level unless it is to run in every phase. Raises ScriptError.
+
+        `path` is its file, `modules` are the API, `limit` is how long it may run.
+        """
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
         text = LuaSource(source)
@@ -56,7 +57,7 @@ class LuaScript:
         self._check_call_types(text)
         if text.loops_in_c and left_behind() >= MOST_LEFT:
             raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
-        self._thread: Door = LuaThread(limit) if text.loops_in_c else SameThread(limit)
+        self._thread: Executor = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
             dialect = state.OLDEST if text.flat or "phases" in text.form else state.newest()
             self._has_coroutines = text.coroutines
@@ -70,13 +71,11 @@ class LuaScript:
 
     def _build(self, dialect: str, threads: bool) -> dict[str, Any]:
         """Return what can be called of a new Lua state, with the API in it; `threads`: the script may have some."""
-        runtime = state.new_runtime(dialect)
-        self._values = Values(runtime)
-        self._finalizer = weakref.finalize(self, _free, self._thread, self._values)
-        sandbox = state.make_sandbox(runtime, self._thread, self._limit, self._values, self._helpers, threads)
-        self._known = functions.define(runtime, sandbox, self._modules, self._values, self._thread)
+        self._state = state.LuaState(dialect, self._thread, self._limit, self._helpers, threads)
+        self._finalizer = weakref.finalize(self, _free, self._state)
+        self._known = functions.define(self._state, self._modules)
         _LOG.debug("%s runs in %s", self._path, dialect)
-        return {name: sandbox[name.encode()] for name in _CALLS}
+        return {name: self._state.sandbox[name.encode()] for name in _CALLS}
 
     # ---- the script
 
@@ -116,7 +115,7 @@ class LuaScript:
         if self._phases & 1 << number - 1:
             if self._end and phase == "cleanup":  # said when it happened
                 return
-            self._run(phase, self._lua.get("phase"), number, near=phase in _EVERY_STEP)
+            self._run(phase, self._lua.get("phase"), number)
 
     @property
     def threaded(self) -> bool:
@@ -125,45 +124,43 @@ class LuaScript:
 
     def take_turn(self) -> None:
         """Let its thread run until it is left; raises ScriptError."""
-        self._run("thread", self._lua.get("phase"), _NUMBERS["thread"], near=True)
+        self._run("thread", self._lua.get("phase"), _NUMBERS["thread"])
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
         self._run(name, self._call_function, name, arguments)
-        return self._values.handed_back()
+        return self._state.values.handed_back()
 
     def _call_function(self, name: str, arguments: list[Any]) -> Any:
-        return self._lua["called"](name.encode(), *self._values.to_lua(arguments, unpacked=True))
+        return self._lua["called"](name.encode(), *self._state.values.to_lua(arguments, unpacked=True))
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call the script's function of that name with a message; raises ScriptError."""
-        name = callback if isinstance(callback, str) else "callback"
-        called = callback.encode() if isinstance(callback, str) else callback
-        self._run(name, self._call_back, called, message, near=True)
+        self._call_back(callback, message, False)
 
     def answer(self, callback: Callback, request: Any) -> Any:
         """Call the script's function with a request; return its value, a tuple of several. Raises ScriptError."""
-        name = callback if isinstance(callback, str) else "callback"
-        called = callback.encode() if isinstance(callback, str) else callback
-        self._run(name, self._call_back, called, request, True, near=True)
-        return self._values.handed_back()
+        self._call_back(callback, request, True)
+        return self._state.values.handed_back()
 
-    def _call_back(self, callback: Any, message: Any, answered: bool = False) -> Any:
-        return self._lua["called_back"](callback, self._values.to_lua(message), answered)
+    def _call_back(self, callback: Callback, message: Any, answered: bool) -> None:
+        name, called = (callback, callback.encode()) if isinstance(callback, str) else ("callback", callback)
+        to_lua = self._state.values.to_lua
+        self._run(name, lambda: self._lua["called_back"](called, to_lua(message), answered))
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now. Raises ScriptError."""
-        snapshot = self._run("snapshot", self._lua.get("remember"))
-        recalls = remember(self._modules.values())
+        snapshot = self._run("snapshot", self._lua.get("save_state"))
+        restoring = save_state(self._modules.values())
 
-        def recall() -> None:
+        def restore() -> None:
             if self.threaded or self._has_coroutines:
                 script_log.say(script_log.THREAD_GOES_ON.format(self._path))
-            self._run("restore", self._lua.get("recall"), snapshot)
-            for one in recalls:
+            self._run("restore", self._lua.get("restore"), snapshot)
+            for one in restoring:
                 one()
 
-        return recall
+        return restore
 
     def close(self) -> None:
         """Free the Lua state; the script cannot be called after that."""
@@ -172,24 +169,24 @@ class LuaScript:
         self._phases = 0
         self._lua.clear()
 
-    def _run(self, phase: str, function: Any, *arguments: Any, near: bool = False) -> Any:
-        """Call a function in Lua's thread (`near`: see there); return what it returns."""
+    def _run(self, phase: str, function: Any, *arguments: Any) -> Any:
+        """Call a function in Lua's thread; return what it returns."""
         if self._end:
             raise self._error(phase, self._end)
         self._limit.label = self._labels[phase]
         try:
-            outcome = self._thread.run(function, *arguments, near=near)
+            outcome = self._thread.run(function, *arguments)
         except LeftBehind:
             self._end = str(self._limit)
             raise self._error(phase, self._end) from None
         except Exception as error:  # lupa's own, or a message that cannot be handed over
             said = str(error) or type(error).__name__
             if said == "stopped":  # by a hook just before the script's beginning, or behind its end
-                said = _ABOUT_MEMORY if self._values.used() > MEMORY else str(self._limit)
+                said = _ABOUT_MEMORY if self._state.used() > state.MEMORY else str(self._limit)
             raise self._error(phase, said) from None
         finally:
             script_log.end_call()
-            if not self._end and self._values.used() > MEMORY and self._values.too_much():
+            if not self._end and self._state.used() > state.MEMORY and self._state.too_much():
                 self._end = _ABOUT_MEMORY  # entered once more, lupa itself might find no room
         self._phases, how, *found = outcome if isinstance(outcome, tuple) else (outcome, True, None)
         if how is True:
@@ -231,6 +228,6 @@ class LuaScript:
         return f"; near names are {', '.join(near)}" if near else ""
 
 
-def _free(thread: Door, values: Values) -> None:
-    thread.close()
-    values.close()
+def _free(lua: state.LuaState) -> None:
+    lua.executor.close()
+    lua.close()

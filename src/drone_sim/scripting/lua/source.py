@@ -8,27 +8,14 @@ import re
 _COMMENT = re.compile(rb"--(?:\[(=*)\[)?")
 _PER_PHASE = re.compile(rb"\bsim_call_type\b")
 # Functions that can loop in C for good, where no hook ends them. Whoever names none of them gets none of them.
-_LOOP_IN_C = (
-    *("find", "match", "gmatch", "gfind", "gsub", "sort", "move", "load", "loadstring", "collectgarbage"),
-    *("date", "utf8"),
-)
-_LOOPS_IN_C = re.compile(rb"\b(?:" + "|".join(_LOOP_IN_C).encode() + rb")\b")
+_LOOPS_IN_C = re.compile(rb"\b(?:find|g?match|gfind|gsub|sort|move|load|loadstring|collectgarbage|date|utf8)\b")
 _REQUIRE = re.compile(rb"\b(?:require|loadfile|dofile)\b")  # a helper may name what it likes; these cannot
 _REQUIRE_OWN = re.compile(rb"\brequire[ \t]{0,9}\(?[ \t]{0,9}['\"](?:sim|simROS|math|string|table|coroutine|os)['\"]")
 _PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|thread|threadmain)\b")
 _THREAD_TYPE = re.compile(rb"\b(?:syscb_thread(?:main)?|childscriptcall_threaded)\b")
-_THREAD_CALLS = (
-    *(
-        "SetThreadSwitchTiming",
-        "SetThreadAutomaticSwitch",
-        "SwitchThread",
-        "SetThreadIsFree",
-        "SetThreadResumeLocation",
-    ),
-    *("DelegateChildScriptExecution", "GetThreadId", "Wait", "WaitForSignal", "GetThreadExi(?:s?)tRequest"),
-)
 _IN_THREAD = re.compile(
-    rb"\bsim(?:" + b"|".join(rf"{name}|\.{name[0].lower()}{name[1:]}".encode() for name in _THREAD_CALLS) + rb")\b"
+    rb"\bsim\.?(?:[sS]etThread(?:SwitchTiming|AutomaticSwitch|IsFree|ResumeLocation)|[sS]witchThread|"
+    rb"[gG]etThread(?:Id|Exis?tRequest)|[wW]ait(?:ForSignal)?|[dD]elegateChildScriptExecution)\b"
     rb"|\bsim[._]simulation_advancing_abouttostop\b|\bthreadFunction\b"
 )
 _COROUTINES = re.compile(rb"\bcoroutine\b")
@@ -51,7 +38,7 @@ class LuaSource:
     """
 
     def __init__(self, text: bytes):
-        """Take the file's contents, which may begin with UTF-8's byte order mark and a #! line."""
+        """`text`: the file's contents, which may begin with UTF-8's byte order mark and a #! line."""
         text = text.removeprefix(codecs.BOM_UTF8)
         self.text = b"--" + text if text.startswith(b"#") else text
         bare = _without_comments(self.text)

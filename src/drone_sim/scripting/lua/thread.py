@@ -1,4 +1,4 @@
-"""The one door through which everything enters Lua: most often the thread that a Lua state lives in.
+"""What runs everything that enters Lua: most often the thread that a Lua state lives in.
 
 Lua does not hold Python's lock while it runs, so the simulation's thread can wait for it, with a limit. A hook
 inside Lua ends what loops in Lua. What loops in C, such as string.find with an evil pattern, cannot be ended
@@ -16,8 +16,7 @@ from collections.abc import Callable
 from types import CodeType
 from typing import Any
 
-from drone_sim.scripting.lua.cores import Cores
-from drone_sim.scripting.time_limit import Stopped, TimeLimit
+from drone_sim.scripting.time_limit import ScriptStopped, TimeLimit
 
 _GRACE = 0.25  # s of the thread's own CPU time beyond the time limit, for what the hook ends
 _PATIENCE = 10.0  # s beyond the time limit, however little time a busy machine gives the thread
@@ -29,7 +28,7 @@ MOST_LEFT = 8  # threads of a process that may hang at once
 _left: list[threading.Thread] = []
 
 
-class LeftBehind(Stopped):
+class LeftBehind(ScriptStopped):
     """The script hangs in C: its thread is left alone, and nothing can be called in it any more."""
 
 
@@ -48,7 +47,7 @@ class SameThread:
         self.api_code: CodeType | None = None
         self._limit = limit
 
-    def run(self, function: Callable[..., Any], *arguments: Any, near: bool = False) -> Any:
+    def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a function; raises what it raises."""
         self._limit.start()
         self._limit.show()
@@ -69,7 +68,7 @@ class LuaThread:
     """
 
     def __init__(self, limit: TimeLimit):
-        """Start the thread; it ends with `close`."""
+        """Start the thread, whose functions may run as long as `limit` says; it ends with `close`."""
         self.closed = False  # once it is, no function of the API does anything
         self.api_code: CodeType | None = None  # of the function that answers Lua's calls
         self._limit = limit
@@ -83,25 +82,18 @@ class LuaThread:
         self._outcome: tuple[Any, BaseException | None] = (None, None)
         self._thread = threading.Thread(target=self._work, name="Lua script", daemon=True)
         self._thread.start()
-        self._cores = Cores(self._thread.native_id or 0)
 
     # ---- in the simulation's thread
 
-    def run(self, function: Callable[..., Any], *arguments: Any, near: bool = False) -> Any:
-        """Call a function in the thread; raises what it raises, and LeftBehind where it does not come back.
-
-        `near` is for what is called in every step: for as long as it takes, both threads share a core.
-        """
+    def run(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a function in the thread; raises what it raises, and LeftBehind where it does not come back."""
         if self.closed:
             raise LeftBehind
         self._job = (function, arguments)
         self._limit.start()
         try:
-            if near:
-                self._cores.share()
             self._go.release()
             came = self._done.acquire(timeout=self._seconds)
-            self._cores.part()
             if not came or self._errand is not None:
                 self._wait(came)
         except BaseException:  # LeftBehind, or what a signal's handler raised
@@ -162,7 +154,6 @@ class LuaThread:
 
     def _end(self) -> None:
         """Stop what runs, or leave it behind."""
-        self._cores.part()
         if not self.closed:
             self._limit.expire()
             try:
@@ -181,7 +172,6 @@ class LuaThread:
                 break
         else:
             _left.append(self._thread)
-            self._cores.free()
             with contextlib.suppress(OSError, TypeError):
                 os.setpriority(os.PRIO_PROCESS, self._thread.native_id, _NICE)  # type: ignore[arg-type]
         raise LeftBehind
@@ -224,4 +214,4 @@ class LuaThread:
         return value
 
 
-Door = LuaThread | SameThread
+Executor = LuaThread | SameThread

@@ -18,11 +18,6 @@ local function in_thread()
   return thread ~= nil and not is_main and (isyieldable == nil or isyieldable())
 end
 
-local function switch(name)
-  if not in_thread() then error(name .. ': ' .. bridge.no_thread, 3) end
-  yield()
-end
-
 -- Return a function of the API that counts its calls in threads.
 function sandbox.counted(f)
   if not bridge.threads then return f end
@@ -83,35 +78,22 @@ end
 
 ---- what a thread calls
 
-local functions = {}
-
-function functions.switchThread() switch('sim.switchThread') end
-function functions.step() switch('sim.step') end
-functions['yield'] = function() switch('sim.yield') end
-
-function functions.wait(seconds)
-  if type(seconds) ~= 'number' or seconds ~= seconds then error('sim.wait: a number of seconds is expected', 2) end
-  local time, is_ending = api['sim.getSimulationTime'], api['sim.getThreadExitRequest']
-  local finish = time() + seconds
-  while time() < finish - bridge.soon do
-    switch('sim.wait')
-    if is_ending() then break end
-  end
-  return time() - finish
-end
-
-local KINDS = {'sim.getInt32Signal', 'sim.getFloatSignal', 'sim.getStringSignal'}
-
-function functions.waitForSignal(name)
-  while true do
-    for index = 1, 3 do
-      local value = api[KINDS[index]](name)
-      if value ~= nil then return value end
+-- Return a function of the API that waits: `begun` returns what tells, once a step, whether to wait for longer, and what
+-- it has brought; `results` reads that.
+function sandbox.waiting(name, begun, results)
+  return function(...)
+    local ask = begun(...)
+    local waits, value = results(ask(0))
+    while waits do
+      if not in_thread() then error(name .. ': ' .. bridge.no_thread, 2) end
+      yield()
+      waits, value = results(ask(0))
     end
-    switch('sim.waitForSignal')
-    if api['sim.getThreadExitRequest']() then return nil end
+    return value
   end
 end
+
+local functions = {}
 
 function functions.setThreadSwitchTiming(milliseconds)
   if type(milliseconds) ~= 'number' or milliseconds ~= milliseconds then

@@ -1,8 +1,8 @@
 -- What passes between a script and Python, on Lua's side; values.py is the other one.
 --
 -- Values pass as plain numbers, strings, booleans and nil: no Lua table is touched from Python, since lupa does that
--- outside of any protected call. The commonest calls, with at most one or two short lists of numbers, have a form of
--- their own; everything else passes as a stream of values and marks.
+-- outside of any protected call. The commonest calls, with short lists of numbers, pass at once; everything else passes
+-- as a stream of values and marks.
 local bridge, sandbox = ...
 
 local error, type, select, next, rawget, rawset = error, type, select, next, rawget, rawset
@@ -10,7 +10,7 @@ local rawlen = rawlen or function(t) return #t end -- which knows no __len in 5.
 local unpack = table.unpack or unpack
 local place_in_script, stop = sandbox.place_in_script, sandbox.stop
 local shortcuts, wrappers = sandbox.shortcuts, sandbox.wrappers
-local api, own, counted = sandbox.api, sandbox.own, sandbox.counted
+local api, own, counted, waiting = sandbox.api, sandbox.own, sandbox.counted, sandbox.waiting
 local fresh, put = bridge.fresh, bridge.put
 local OPEN_LIST, OPEN_FIELDS, CLOSE = bridge.open_list, bridge.open_fields, bridge.close
 local DEEPEST, MOST_VALUES, MOST_BYTES = bridge.deepest, bridge.most_values, bridge.most_bytes
@@ -95,12 +95,19 @@ local function stream(name)
   return write, function() put(unpack(values, 1, count)) end
 end
 
-local function hand_over(f, name, ...)
+-- Hand values over, which nobody has to have asked for by a function of the API.
+local function hand_back(name, ...)
   local write, flush = stream(name)
   fresh()
   for index = 1, select('#', ...) do write((select(index, ...)), 1) end
   flush()
-  return results(f(6))
+  return true
+end
+sandbox.hand_back = hand_back
+
+local function hand_over(f, name, ...)
+  hand_back(name, ...)
+  return results(f(5))
 end
 
 local SCALAR = {number = 1, boolean = 1, ['nil'] = 1, string = 2, table = 3}
@@ -111,43 +118,35 @@ local function results_of_lists(f, name, a, b, c, how, ...)
   return results(how, ...)
 end
 
--- Call a function with one to three values, one or two of which are tables.
+local function is_short(list)
+  local length = #list
+  return 0 < length and length <= SHORT
+end
+
+-- Call a function with one to three values, one of which is a table; `place` counts from 0.
+local function with_list(f, name, a, b, c, place, list, one, other)
+  if not is_short(list) then return hand_over(f, name, a, b, c) end
+  return results_of_lists(f, name, a, b, c, f(2, place, one, other, unpack(list, 1, #list)))
+end
+
+-- Call a function with one to three values, some of which are tables.
 local function with_lists(f, name, kind_a, kind_b, kind_c, a, b, c)
-  if kind_b == 1 and kind_c == 1 then
-    local n = #a
-    if 0 < n and n <= SHORT then return results_of_lists(f, name, a, b, c, f(1, b, c, unpack(a, 1, n))) end
-  elseif kind_a == 1 and kind_c == 1 then
-    local n = #b
-    if 0 < n and n <= SHORT then return results_of_lists(f, name, a, b, c, f(2, a, c, unpack(b, 1, n))) end
-  elseif kind_a == 1 and kind_b == 1 then
-    local n = #c
-    if 0 < n and n <= SHORT then return results_of_lists(f, name, a, b, c, f(3, a, b, unpack(c, 1, n))) end
-  elseif kind_a == 3 and kind_b == 3 and c == nil then
-    local n = #a
-    if 0 < n and n <= SHORT and #b == 3 then
-      return results_of_lists(f, name, a, b, c, f(4, b[1], b[2], b[3], unpack(a, 1, n)))
-    end
-  elseif kind_a == 1 and kind_b == 3 and kind_c == 3 then
-    local n = #c
-    if 0 < n and n <= SHORT and #b == 3 then
-      return results_of_lists(f, name, a, b, c, f(5, a, b[1], b[2], b[3], unpack(c, 1, n)))
-    end
+  if kind_a == 1 and kind_b == 1 then return with_list(f, name, a, b, c, 2, c, a, b) end
+  if kind_a == 1 and kind_c == 1 then return with_list(f, name, a, b, c, 1, b, a, c) end
+  if kind_b == 1 and kind_c == 1 then return with_list(f, name, a, b, c, 0, a, b, c) end
+  if kind_a == 3 and kind_b == 3 and c == nil and #b == 3 and is_short(a) then
+    return results_of_lists(f, name, a, b, c, f(3, b[1], b[2], b[3], unpack(a, 1, #a)))
+  end
+  if kind_a == 1 and kind_b == 3 and kind_c == 3 and #b == 3 and is_short(c) then
+    return results_of_lists(f, name, a, b, c, f(4, a, b[1], b[2], b[3], unpack(c, 1, #c)))
   end
   return hand_over(f, name, a, b, c)
 end
 
--- Hand values over that nobody has asked for by a function of the API.
-function sandbox.hand_back(name, ...)
-  local write, flush = stream(name)
-  fresh()
-  for index = 1, select('#', ...) do write((select(index, ...)), 1) end
-  flush()
-  return true
-end
 local function as_it_is(f) return f end
 
 -- Put a function of the API into a table; `name` is what messages call it.
-function sandbox.define(place, key, name, f)
+function sandbox.define(place, key, name, f, waits)
   local shortcut = shortcuts[name]
   local wrapper = wrappers[name] or as_it_is
   api[name] = wrapper(function(a, b, c, ...)
@@ -165,11 +164,11 @@ function sandbox.define(place, key, name, f)
       return with_lists(f, name, kind_a, kind_b, kind_c, a, b, c)
     end
     local how = 0
-    if kind_a == 2 or kind_b == 2 or kind_c == 2 then how = 7 end
+    if kind_a == 2 or kind_b == 2 or kind_c == 2 then how = 1 end
     if c ~= nil then return results(f(how, a, b, c)) end
     if b ~= nil then return results(f(how, a, b)) end
     if a ~= nil then return results(f(how, a)) end
     return results(f(0))
   end)
-  rawset(place, key, own[name] or counted(api[name]))
+  rawset(place, key, own[name] or (waits and waiting(name, api[name], results)) or counted(api[name]))
 end

@@ -16,9 +16,6 @@ _NUMBERS = frozenset((float, int, bool))
 _ALL_NUMBERS = _NUMBERS.issuperset
 _LARGEST = 2**63  # whole numbers beyond are floats in Lua
 
-MIB = 1024 * 1024
-MEMORY = 256 * MIB  # bytes that a script may use
-
 # How the values of an answer to Lua are read there (values.lua).
 FAILED, PLAIN, LIST, TWO_LISTS, AS_STREAM, TOO_MUCH = range(6)
 
@@ -41,25 +38,16 @@ _OPEN_LIST, _OPEN_FIELDS, _CLOSE = _Mark(), _Mark(), _Mark()
 
 
 class Values:
-    """Converts for one Lua state. `close` lets go of it: Python cannot see a cycle that leads through Lua."""
+    """Converts for one Lua state, of which `close` lets go."""
 
-    def __init__(self, runtime: Any):
-        """Take lupa's runtime."""
-        self._runtime = runtime
-        self.used: Callable[[], int] = runtime.get_memory_used  # Lua's own count leaves out 5.5's long strings
+    def __init__(self, table_from: Callable[[Any], Any]):
+        """`table_from` makes a table of Lua's, as lupa's runtime does."""
+        self._table_from = table_from
         self._stream: list[Any] = []
 
     def close(self) -> None:
         """Let go of the Lua state."""
-        self._runtime = None
-        self.used = int
-
-    def too_much(self) -> bool:
-        """Tell whether the script uses more memory than it may, without what it does not need any more."""
-        if self.used() <= MEMORY:
-            return False
-        self._runtime.gccollect()
-        return self.used() > MEMORY
+        self._table_from = list  # anything that leads to no state
 
     def bridge(self) -> dict[str, Any]:
         """Return what the Lua side needs for handing values over."""
@@ -98,7 +86,7 @@ class Values:
 
         They return None where lists hold other things than numbers: the call is to be made anew, with a stream.
         """
-        return (tuple, _first, _second, _third, _first_and_second, _second_and_third, self._from_stream, _scalars)
+        return tuple, _scalars, _one_list, _first_and_second, _second_and_third, self._from_stream
 
     # ---- to Lua
 
@@ -138,8 +126,8 @@ class Values:
             return bytes(value)
         named = fields(value)
         if named is None:
-            return self._runtime.table_from([self._to_lua(item) for item in value])
-        return self._runtime.table_from({self._key(key): self._to_lua(item) for key, item in named.items()})
+            return self._table_from([self._to_lua(item) for item in value])
+        return self._table_from({self._key(key): self._to_lua(item) for key, item in named.items()})
 
     def _key(self, key: Any) -> Any:
         if key is None or key != key:
@@ -151,23 +139,16 @@ def _scalars(given: tuple[Any, ...]) -> list[Any]:
     return [_text(value) if type(value) is bytes else value for value in given]
 
 
-def _first(given: tuple[Any, ...]) -> list[Any] | None:
-    second, third, *values = given
-    if not _ALL_NUMBERS(map(type, values)):
+def _one_list(given: tuple[Any, ...]) -> list[Any] | None:
+    """Read a list, and two values that may be missing: first at which place it comes."""
+    place, one, other, *numbers = given
+    if not _ALL_NUMBERS(map(type, numbers)):
         return None
-    return [values] if second is third is None else [values, second, third]
-
-
-def _second(given: tuple[Any, ...]) -> list[Any] | None:
-    first, third, *values = given
-    if not _ALL_NUMBERS(map(type, values)):
-        return None
-    return [first, values] if third is None else [first, values, third]
-
-
-def _third(given: tuple[Any, ...]) -> list[Any] | None:
-    first, second, *values = given
-    return [first, second, values] if _ALL_NUMBERS(map(type, values)) else None
+    found = [one, other]
+    found.insert(place, numbers)
+    while found[-1] is None:
+        found.pop()
+    return found
 
 
 def _first_and_second(given: tuple[Any, ...]) -> list[Any] | None:

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import builtins
 import difflib
-import importlib.util
 import itertools
 import logging
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.machinery import FileFinder, ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any, cast
 
-from drone_sim.scripting import source_files
+from drone_sim.scripting.errors import read_source
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
 BUILT_IN = Path(__file__).resolve().parents[2] / "child_scripts"
@@ -31,7 +30,7 @@ class Helpers:
     """Finds, reads and keeps the modules of one script; inside Python they stand below a package of its own."""
 
     def __init__(self, script: str, names: Mapping[str, Any], compiled: Callable[[bytes, str], CodeType]):
-        """Take the script's path, the names that its modules find as they find `len`, and what compiles a file."""
+        """`script`: its path; `names`: what its modules find as they find `len`; `compiled` compiles a file."""
         self.files = {script}
         self.builtins: dict[str, Any] = {**vars(builtins), **names, "__import__": self._import}
         self._folder = Path(script).parent
@@ -107,31 +106,23 @@ class Helpers:
         """Return how to load a module below the script's package."""
         if not name.startswith(self.package + ".") or path is None:
             return None
-        last, loader = name.rpartition(".")[2], cast(Any, self)
-        for folder in map(Path, path):
-            within = [str(folder / last)]
-            for file, inner in ((folder / last / "__init__.py", within), (folder / f"{last}.py", None)):
-                if file.is_file():
-                    return importlib.util.spec_from_file_location(
-                        name, file, loader=loader, submodule_search_locations=inner
-                    )
-            if (folder / last).is_dir():
-                spec = ModuleSpec(name, None, is_package=True)
-                spec.submodule_search_locations = within
-                return spec
-        return None
+        finders = (FileFinder(folder, (SourceFileLoader, [".py"])) for folder in path)  # new ones, which keep nothing
+        spec = next(filter(None, (one.find_spec(name) for one in finders)), None)
+        if spec is not None and spec.loader is not None:
+            spec.loader = cast(Any, self)
+        return spec
 
     def create_module(self, _spec: ModuleSpec) -> None:
         """Let Python make an empty module."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Read and run a module's file. Raises OSError, ValueError, and what the file raises."""
+        """Read and run a module's file. Raises ImportError, and what the file raises."""
         path = str(module.__file__)
         self.files.add(path)
         namespace = vars(module)
         namespace["__builtins__"] = self.builtins
         try:
-            source = source_files.read(path)
-        except (OSError, ValueError) as error:
-            raise ImportError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+            source = read_source(path)
+        except ValueError as error:
+            raise ImportError(f"{path}: {error}") from None
         exec(self._compiled(source, path), namespace)

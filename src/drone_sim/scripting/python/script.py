@@ -13,24 +13,22 @@ from collections.abc import Callable, Mapping
 from types import CodeType
 from typing import TYPE_CHECKING, Any
 
+from drone_sim.message_text import near_names
 from drone_sim.scripting import phase_names, script_log
-from drone_sim.scripting.api.calls import Api, mistake, remember
-from drone_sim.scripting.api.turns import Turns
+from drone_sim.scripting.api.calls import Api, Function, UnknownName, contents, mistake, save_state
+from drone_sim.scripting.api.control import NoThread, Turns, waits
 from drone_sim.scripting.api.types import Callback
-from drone_sim.scripting.errors import ScriptError, UnknownName, no_function
+from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS, THREADS
 from drone_sim.scripting.python.helpers import Helpers
 from drone_sim.scripting.python.process import Forks, end_copy, process_kept
 from drone_sim.scripting.script_log import THREAD_GOES_ON, say, shown
-from drone_sim.scripting.time_limit import Labels, Stopped, TimeLimit
-from drone_sim.wording import near_names
+from drone_sim.scripting.time_limit import Labels, ScriptStopped, TimeLimit
 
 if TYPE_CHECKING:
     from drone_sim.scripting.python.thread import PythonThread
 
-__all__ = ["PythonScript", "ScriptError"]
-
-_STOPPED = "__stopped__"  # Stopped, among a script's globals
+_STOPPED = "__stopped__"  # ScriptStopped, among a script's globals
 _NAMES_THREAD = b"sysCall_thread"
 _RARE = frozenset(("init", "cleanup"))
 _NOT_COPIED = ("__builtins__", "__loader__", "__spec__")
@@ -53,14 +51,19 @@ class PythonScript:
     """
 
     def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns):
-        """Run the file's top level; its thread has those turns. Raises ScriptError."""
+        """Run the top level of a `source`. Raises ScriptError.
+
+        `path` is its file, `modules` are the API, `limit` is how long it may run, `turns` are its thread's.
+        """
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
         self.is_empty = not source.strip()
         self._modules = modules
         self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
-        self._found = {name: self._thread.counted(one) for name, one in modules.items()} if self._thread else modules
-        found = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: Stopped, **self._found}
+        self._found = {name: _waiting(one, turns) for name, one in modules.items()}
+        if self._thread:
+            self._found = {name: self._thread.counted(one) for name, one in self._found.items()}
+        found = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: ScriptStopped, **self._found}
         self._helpers = Helpers(path, found, _compiled)
         self._globals: dict[str, Any] = {
             "__name__": self._helpers.package,
@@ -152,32 +155,32 @@ class PythonScript:
             known = [name for name, one in self._named() if inspect.isfunction(one)]
             raise ScriptError(str(callback), self._path, 0, no_function(callback, known))
 
-    def remember(self) -> Callable[[], None]:
+    def save_state(self) -> Callable[[], None]:
         """Return a function that gives `self` and the global variables the values that they have now.
 
         So it does for those of the modules beside the script. Values that cannot be copied (open files, modules, API
         objects) stay as they are. Both raise ScriptError.
         """
-        recalls = remember(self._modules.values())
-        recall_variables = self._run("snapshot", self._remember_variables)
+        restoring = save_state(self._modules.values())
+        restore_variables = self._run("snapshot", self._save_variables)
 
-        def recall() -> None:
+        def restore() -> None:
             if self.threaded:
                 script_log.say(THREAD_GOES_ON.format(self._path))
-            self._run("restore", recall_variables)
-            for one in recalls:
+            self._run("restore", restore_variables)
+            for one in restoring:
                 one()
 
-        return recall
+        return restore
 
-    def _remember_variables(self) -> Callable[[], None]:
+    def _save_variables(self) -> Callable[[], None]:
         modules = self._helpers.modules()
         builtins = self._helpers.builtins  # where its modules find `self`, and it, too, if it has lost its own
         namespaces = (self._globals, *map(vars, modules.values()))
         own, *kept = _copied({"self": builtins["self"]}, *namespaces)
         as_they_are = [{name: one[name] for name in _NOT_COPIED if name in one} for one in namespaces]
 
-        def recall() -> None:
+        def restore() -> None:
             for name in set(self._helpers.modules()) - set(modules):
                 self._helpers.forget(name)
             found, *copies = _copied(own, *kept)
@@ -188,7 +191,7 @@ class PythonScript:
                 variables.update(fresh)
                 variables.update(others)
 
-        return recall
+        return restore
 
     def close(self) -> None:
         """Forget the script; it cannot be called after that."""
@@ -208,7 +211,7 @@ class PythonScript:
             failed = self._error(phase, error)
         if Forks.count != forks:
             end_copy(self._path)
-        if script_log.lines.count:  # seldom: asked here, a call less in every phase
+        if script_log.Lines.count:  # seldom: asked here, a call less in every phase
             script_log.end_call()
         if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive
             raise failed
@@ -221,23 +224,23 @@ class PythonScript:
 
     def _error(self, phase: str, error: BaseException) -> ScriptError:
         if self._limit.struck:
-            while isinstance(error.__context__, Stopped):  # struck once more, in a handler
+            while isinstance(error.__context__, ScriptStopped):  # struck once more, in a handler
                 error = error.__context__
             return ScriptError(phase, *self._place(error), str(self._limit))
         kind = "an exception"
         try:
             kind = type(error).__name__
-            (path, line), message = self._limit.run(self._told, error)
+            (path, line), message = self._limit.run(self._format_error, error)
         except BaseException:
             path, line, message = self._path, 0, f"{kind}, which cannot be shown"
         return ScriptError(phase, path, line, message)
 
-    def _told(self, error: BaseException) -> tuple[tuple[str, int], str]:
+    def _format_error(self, error: BaseException) -> tuple[tuple[str, int], str]:
         """Return place and message of an exception; whatever the script made of it may raise, or not return."""
         if isinstance(error, SyntaxError) and error.filename in self._helpers.files:
             return (str(error.filename), error.lineno or 0), f"SyntaxError: {error.msg}"
         place = self._place(error)
-        if isinstance(error, UnknownName):
+        if isinstance(error, (UnknownName, NoThread)):
             return place, str(error)
         name = type(error).__name__
         text = self._helpers.shown(error) if isinstance(error, ImportError) else shown(error)
@@ -249,8 +252,7 @@ class PythonScript:
         return ([(self._path, 0)] + [place for place in frames if place[0] in self._helpers.files])[-1]
 
 
-@functools.lru_cache(maxsize=32)  # the same few scripts fly again and again
-@functools.lru_cache(maxsize=16)  # a fork need not do again what has been done before it
+@functools.lru_cache(maxsize=32)  # the same few scripts fly again and again, in forks of this process, too
 def _compiled(source: bytes, path: str) -> CodeType:
     return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
 
@@ -278,6 +280,21 @@ def _copy(value: Any, memo: dict[int, Any]) -> Any:
         return value
 
 
+def _waiting(api: Api, turns: Turns) -> Api:
+    """Return a module whose functions leave the script's thread as long as they have to wait."""
+    name, functions, constants = contents(api)
+
+    def waiting(function: Function, called: str) -> Function:
+        @functools.wraps(function)
+        def call(*arguments: Any, **named: Any) -> Any:
+            return turns.wait_for(function(*arguments, **named), called)
+
+        return call
+
+    that_wait = {key: waiting(one, f"{name}.{key}") for key, one in functions.items() if waits(one)}
+    return Api(name, {**functions, **that_wait}, constants) if that_wait else api
+
+
 def _print(*values: Any, sep: str = " ", file: Any = None, **options: Any) -> None:
     if file is not None:
         print(*values, sep=sep, file=file, **options)
@@ -286,7 +303,7 @@ def _print(*values: Any, sep: str = " ", file: Any = None, **options: Any) -> No
 
 
 def _let_stopped_pass(tree: ast.Module) -> ast.Module:
-    """Let no handler of the script catch Stopped: `while True: try: ... except: pass` has to end, too."""
+    """Let no handler of the script catch ScriptStopped: `while True: try: ... except: pass` has to end, too."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Try) and node.handlers:
             name = ast.Name(id=_STOPPED, ctx=ast.Load())

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import greenlet
 
 from drone_sim.scripting.api.calls import Api, contents
-from drone_sim.scripting.api.turns import NO_THREAD, Turns
-from drone_sim.scripting.time_limit import Stopped
+from drone_sim.scripting.api.control import Turns
+from drone_sim.scripting.time_limit import ScriptStopped
 
 _abandoned: list[greenlet.greenlet] = []  # that would not end: kept, or Python would run them once more to free them
 
@@ -22,7 +22,7 @@ class PythonThread:
     """A thread that takes turns with the simulation."""
 
     def __init__(self, turns: Turns):
-        """Take what decides when it is left; it has not begun."""
+        """`turns` decide when it is left; it has not begun."""
         self._turns = turns
         self._greenlet: greenlet.greenlet | None = None
         self.has_ended = False
@@ -53,10 +53,11 @@ class PythonThread:
         finally:
             self.has_ended = self._greenlet.dead
 
-    def _leave(self) -> None:
+    def _leave(self) -> bool:
         if greenlet.getcurrent() is not self._greenlet or self._greenlet.parent is None:
-            raise ValueError(NO_THREAD)
+            return False
         self._greenlet.parent.switch()
+        return True
 
     def end(self) -> None:
         """End it where it is: its `finally` runs, and no handler of the script sees why."""
@@ -66,11 +67,11 @@ class PythonThread:
         self._turns.leave = _stop
         self._greenlet.parent = greenlet.getcurrent()
         try:
-            self._greenlet.throw(Stopped)
+            self._greenlet.throw(ScriptStopped)
         finally:
             if not self._greenlet.dead:
                 _abandoned.append(self._greenlet)
 
 
-def _stop() -> None:
-    raise Stopped
+def _stop() -> NoReturn:
+    raise ScriptStopped

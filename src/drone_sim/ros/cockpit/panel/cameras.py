@@ -1,31 +1,45 @@
-"""The cameras in the browser: each on demand, and of each the latest picture alone."""
+"""The cameras in the browser: each on demand, of each the latest picture alone; and what scripts have opened there."""
 
 from __future__ import annotations
 
+import json
+import math
 import threading
+from collections import deque
+from collections.abc import Mapping
 from typing import Any
 
+import cv2
+import numpy as np
 import rospy
+from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import String
 
-from drone_sim.ros.cockpit.found import Source
-from drone_sim.ros.cockpit.panel.pictures import packed
-from drone_sim.ros.cockpit.server.wire import Wire
+from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
+from drone_sim.ros.cockpit.topics import ImageTopic
 
 _BUFFER = 1 << 24  # bytes: more than a picture, or old ones wait in it
+_WIDEST, _WIDEST_DEPTHS = 640, 320  # px; of a larger one, every other pixel, or less, is shown
+_COLORS = cv2.COLORMAP_TURBO  # near is blue, far is red
+_JPEG = (cv2.IMWRITE_JPEG_QUALITY, 80)
+_MILLIMETRES = "16UC1"  # REP-118
+_KINDS = ("views", "dialogs", "consoles")
+_LONGEST = 1 << 21  # characters of a message; the simulation's own have less
+_bridge = CvBridge()
 
 
-class Cameras:
+class CameraSwitches:
     """A switch for each topic of pictures; who is switched on is listened to, and shown beside the scene."""
 
-    def __init__(self, gui: Any, wire: Wire):
-        """Begin without any."""
-        self._gui, self._wire = gui, wire
+    def __init__(self, gui: Any, socket: PageSocket):
+        """Draw into `gui`; pictures go through `socket`."""
+        self._gui, self._socket = gui, socket
         self._folder = gui.add_folder("Cameras")
         self._lock = threading.RLock()  # switches are also turned by browsers
-        self._sources: dict[str, Source] = {}
+        self._sources: dict[str, ImageTopic] = {}
         self._switches: dict[str, Any] = {}
-        self._shown: dict[str, _Camera] = {}
+        self._shown: dict[str, _CameraListener] = {}
         self._views: frozenset[str] = frozenset()
         self._resting = True
 
@@ -34,7 +48,7 @@ class Cameras:
         """The topics that are shown."""
         return list(self._shown)
 
-    def offer(self, sources: tuple[Source, ...]) -> None:
+    def offer(self, sources: tuple[ImageTopic, ...]) -> None:
         """Offer these."""
         with self._lock:
             self._sources = {one.topic: one for one in sources}
@@ -69,19 +83,19 @@ class Cameras:
     def _switch(self, topic: str, on: bool) -> None:
         with self._lock:
             if on and topic not in self._shown:
-                self._shown[topic] = camera = _Camera(self._sources[topic])
+                self._shown[topic] = camera = _CameraListener(self._sources[topic])
                 camera.listen(not self._resting)
             elif not on and topic in self._shown:
                 self._shown.pop(topic).listen(False)
-                self._wire.close_picture(topic)
+                self._socket.close_picture(topic)
             else:
                 return
-            self._wire.tell({"pictures": self.shown})
+            self._socket.tell({"pictures": self.shown})
 
     def show(self) -> None:
         """Send the latest pictures to the browsers that have shown those before."""
         for topic, camera in list(self._shown.items()):
-            if not self._wire.wants_picture(topic):
+            if not self._socket.wants_picture(topic):
                 continue
             message = camera.take()
             if message is None:
@@ -91,7 +105,7 @@ class Cameras:
             except ValueError as error:
                 rospy.logwarn_throttle(10, f"{topic} is not shown: {error}")
                 continue
-            self._wire.show_picture({"picture": topic, "name": label(topic), "note": caption}, picture)
+            self._socket.show_picture({"picture": topic, "name": label(topic), "note": caption}, picture)
 
     def rest(self, resting: bool) -> None:
         """Listen to nobody while no browser is open, and to those that were switched on again afterwards."""
@@ -101,11 +115,10 @@ class Cameras:
                 camera.listen(not resting)
 
 
-class _Camera:
-    def __init__(self, source: Source):
+class _CameraListener:
+    def __init__(self, source: ImageTopic):
         self._source = source
-        self._message: Any = None
-        self._lock = threading.Lock()
+        self._latest: deque[Any] = deque(maxlen=1)
         self._subscriber: rospy.Subscriber | None = None
 
     def listen(self, on: bool) -> None:
@@ -113,22 +126,115 @@ class _Camera:
         if on and self._subscriber is None:
             kind = CompressedImage if source.compressed else Image
             topic = source.compressed or source.topic
-            self._subscriber = rospy.Subscriber(topic, kind, self._hear, queue_size=1, buff_size=_BUFFER)
+            self._subscriber = rospy.Subscriber(topic, kind, self._latest.append, queue_size=1, buff_size=_BUFFER)
         elif not on and self._subscriber is not None:
             self._subscriber.unregister()
             self._subscriber = None
 
-    def _hear(self, message: Any) -> None:
-        with self._lock:
-            self._message = message
-
     def take(self) -> Any:
-        """Return what has come since the last time, None where nothing has."""
-        with self._lock:
-            message, self._message = self._message, None
-        return message
+        """Return what has come since the last time, None where nothing has. One thread alone calls this."""
+        return self._latest.pop() if self._latest else None
+
+
+class ScriptWindows:
+    """Tells the browsers of views, dialogs and consoles; a view switches its camera on."""
+
+    def __init__(self, node: str, cameras: CameraSwitches, socket: PageSocket):
+        """Begin without listening to `node`; a view switches one of `cameras` on, `socket` tells browsers."""
+        self._node = node
+        self._cameras, self._socket = cameras, socket
+        self._listening: rospy.Subscriber | None = None
+        self._answering: rospy.Publisher | None = None
+        self._state: dict[str, Any] = {kind: [] for kind in _KINDS}
+
+    @property
+    def answers(self) -> dict[str, Answer]:
+        """What answers `windows`, `answer` and `camera`."""
+        return {
+            "windows": lambda _: {"windows": self._state, "pictures": self._cameras.shown},
+            "answer": self._answer,
+            "camera": self._turn,
+        }
+
+    def listen(self, on: bool) -> None:
+        """Listen, and be there to answer dialogs, or do neither."""
+        if on and self._listening is None:
+            self._answering = rospy.Publisher(f"{self._node}/window_answers", String, queue_size=10)
+            self._listening = rospy.Subscriber(f"{self._node}/windows", String, self._on_message, queue_size=1)
+        elif not on and self._listening is not None and self._answering is not None:
+            self._listening.unregister()
+            self._answering.unregister()
+            self._listening = self._answering = None
+            self._show({kind: [] for kind in _KINDS})
+
+    def _on_message(self, message: String) -> None:
+        try:
+            state = json.loads(message.data) if len(message.data) <= _LONGEST else None
+        except (ValueError, RecursionError):
+            state = None
+        if isinstance(state, Mapping) and all(isinstance(state.get(kind), list) for kind in _KINDS):
+            self._show({kind: [one for one in state[kind] if isinstance(one, dict)] for kind in _KINDS})
+
+    def _show(self, state: dict[str, Any]) -> None:
+        self._state = state
+        self._cameras.follow_views(frozenset(str(one.get("topic")) for one in state["views"] if one.get("topic")))
+        self._socket.tell({"windows": state})
+
+    def _answer(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Hand on which button was pressed; the simulation checks it."""
+        if self._answering is None:
+            raise ValueError("there is no simulation that hears the answer")
+        self._answering.publish(json.dumps({key: message.get(key) for key in ("handle", "button", "typed")}))
+        return {}
+
+    def _turn(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        self._cameras.turn(str(message.get("topic")), bool(message.get("on")))
+        return {}
 
 
 def label(topic: str) -> str:
     """Return what a person calls a topic of pictures."""
     return topic.strip("/").removesuffix("/image")
+
+
+def packed(message: CompressedImage | Image) -> tuple[bytes, str]:
+    """Return a picture as a browser shows it, and a caption. Raises ValueError for one of an unknown kind."""
+    if isinstance(message, CompressedImage):
+        return bytes(message.data), ""
+    try:
+        image = _bridge.imgmsg_to_cv2(message)
+    except (CvBridgeError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"encoding '{message.encoding[:40]}': {error}") from None
+    if not image.size:
+        raise ValueError("has no pixels")
+    is_depth = image.ndim == 2 and image.dtype != np.uint8
+    step = -(-image.shape[1] // (_WIDEST_DEPTHS if is_depth else _WIDEST))
+    image = image[::step, ::step]
+    if is_depth:
+        return _depths(image.astype(np.float32) * (1e-3 if message.encoding == _MILLIMETRES else 1.0))
+    return _encoded(_as_bgr(image, message.encoding)), ""
+
+
+def _depths(depths: np.ndarray) -> tuple[bytes, str]:
+    """Return depths (m) in colours, black where there is none, and the range of these."""
+    there = np.isfinite(depths) & (depths > 0)
+    if not there.any():
+        return _encoded(np.zeros((*depths.shape, 3), np.uint8)), "nothing within its range"
+    near, far = float(depths[there].min()), float(depths[there].max())
+    share = np.log(np.where(there, depths, near) / near) / max(math.log(far / near), 1e-6)  # as eyes see distances
+    scaled = (255 * share).astype(np.uint8)
+    colored = cv2.applyColorMap(scaled, _COLORS)
+    colored[~there] = 0
+    return _encoded(colored), f"{near:.2f} m (blue) to {far:.2f} m (red)"
+
+
+def _as_bgr(image: np.ndarray, encoding: str) -> np.ndarray:
+    if image.dtype != np.uint8:
+        raise ValueError(f"encoding '{encoding[:40]}' is none of colours with 8 bits, grey, or depth")
+    if image.ndim == 3 and image.shape[2] in (3, 4) and encoding.startswith("rgb"):
+        return np.ascontiguousarray(image[:, :, 2::-1])
+    return np.ascontiguousarray(image[:, :, :3] if image.ndim == 3 else image)
+
+
+def _encoded(image: np.ndarray) -> bytes:
+    return bytes(cv2.imencode(".jpg", image, _JPEG)[1])

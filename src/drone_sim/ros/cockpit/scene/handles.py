@@ -8,14 +8,11 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from geometry_msgs.msg import Point, Pose, Quaternion
-from visualization_msgs.msg import (
-    InteractiveMarkerFeedback,
-    InteractiveMarkerInit,
-    InteractiveMarkerUpdate,
-)
+from std_msgs.msg import Header
+from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, InteractiveMarkerUpdate
 
 from drone_sim.mechanics import frames
-from drone_sim.ros.cockpit.scene.frames import ROOT
+from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz
 
 LARGE = {"scale": 0.25}  # m
 ANYWHERE = {"scale": 90.0, "fixed": True}  # pixels, near or far
@@ -28,7 +25,7 @@ _KINDS = {
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # wxyz
 
 
-class _Control:
+class _DragControl:
     """Arrows and planes along the axes, and a ring about the vertical, which turns by itself."""
 
     def __init__(self, scene: Any, name: str, visible: bool, size: Mapping[str, Any]):
@@ -38,11 +35,10 @@ class _Control:
         self.ring = scene.add_transform_controls(f"{name}/turn", **alone, **look)
 
     def put(self, pose: Pose) -> None:
-        at, turn = pose.position, pose.orientation
-        place, wxyz = (at.x, at.y, at.z), (turn.w, turn.x, turn.y, turn.z)
+        turn = pose.orientation
         for control, name, value in (
-            (self.arrows, "position", place),
-            (self.arrows, "wxyz", wxyz),
+            (self.arrows, "position", xyz(pose.position)),
+            (self.arrows, "wxyz", (turn.w, turn.x, turn.y, turn.z)),
             (self.ring, "wxyz", _UPRIGHT),
         ):
             if tuple(getattr(control, name)) != value:
@@ -59,7 +55,7 @@ class _Control:
         self.arrows.remove()
 
 
-class Handles:
+class DragControls:
     """One control for each interactive marker of a server. Messages are taken in any thread, and shown in one."""
 
     def __init__(
@@ -71,14 +67,17 @@ class Handles:
         size: Mapping[str, Any] = LARGE,
         clock: Callable[[], float] = time.monotonic,
     ):
-        """Take what hears about drags, the topic `…/feedback`, and which of the markers have a control."""
+        """Show controls of `size` below `folder` in `scene`, for each marker that `is_offered`.
+
+        `publish` sends what is dragged to the topic `…/feedback`; `clock` returns s.
+        """
         self._scene, self._folder, self._size = scene, folder, size
         self._publish = publish
         self._is_offered = is_offered
         self._clock = clock
         self._lock = threading.Lock()
         self._known: dict[str, Pose] = {}
-        self._shown: dict[str, _Control] = {}
+        self._shown: dict[str, _DragControl] = {}
         self._held: dict[str, tuple[int, float]] = {}  # by whom, and when that was said last
         self._visible = True
 
@@ -93,12 +92,12 @@ class Handles:
         """Whether somebody drags one."""
         return bool(self._held)
 
-    def hear_all(self, message: InteractiveMarkerInit) -> None:
+    def on_init(self, message: InteractiveMarkerInit) -> None:
         """Take all that there are."""
         with self._lock:
             self._known = {one.name: one.pose for one in message.markers}
 
-    def hear(self, message: InteractiveMarkerUpdate) -> None:
+    def on_update(self, message: InteractiveMarkerUpdate) -> None:
         """Take what has come, gone or moved."""
         with self._lock:
             self._known.update({one.name: one.pose for one in message.markers})
@@ -138,9 +137,9 @@ class Handles:
         for control in self._shown.values():
             control.arrows.visible = visible
 
-    def _make(self, name: str) -> _Control:
+    def _make(self, name: str) -> _DragControl:
         path = f"/{self._folder}/{name.replace('/', '_')}"
-        control = self._shown[name] = _Control(self._scene, path, self._visible, self._size)
+        control = self._shown[name] = _DragControl(self._scene, path, self._visible, self._size)
 
         async def drag(event: Any) -> None:  # so, and not in a thread, the events keep their order
             self._tell(name, event.client_id, _KINDS[event.phase])
@@ -166,7 +165,17 @@ class Handles:
                 self._held[name] = browser, self._clock()
             if name in self._known:
                 self._known[name] = pose  # until the simulation says where it is
-        feedback = InteractiveMarkerFeedback(client_id=f"cockpit/{browser}", marker_name=name, event_type=kind)
-        feedback.header.frame_id = ROOT
-        feedback.pose = pose
-        self._publish(feedback)
+        who = {"header": Header(frame_id=WORLD_FRAME), "client_id": f"cockpit/{browser}", "marker_name": name}
+        self._publish(InteractiveMarkerFeedback(**who, event_type=kind, pose=pose))
+
+
+class Selection:
+    """The same for all browsers."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self.name = ""
+
+    def toggle(self, name: str) -> None:
+        """Take another one; let go of the one that has been taken."""
+        self.name = "" if name == self.name else name

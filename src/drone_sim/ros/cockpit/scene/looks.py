@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from trimesh.visual.material import PBRMaterial
 from visualization_msgs.msg import Marker
 
 from drone_sim.files.resources import resolve
+from drone_sim.ros.core.message_conversion import xyz
 
 _LOG = logging.getLogger(__name__)
 _PIXELS = 3.0  # width of lines
@@ -51,36 +53,19 @@ def change(handle: Any, marker: Marker) -> bool:
 
 def place(marker: Marker) -> dict[str, tuple[float, ...]]:
     """Return position (m) and orientation (wxyz) of a marker in its frame."""
-    at, turn = marker.pose.position, marker.pose.orientation
+    turn = marker.pose.orientation
     wxyz = (turn.w, turn.x, turn.y, turn.z)
-    return {"position": (at.x, at.y, at.z), "wxyz": wxyz if any(wxyz) else (1.0, 0.0, 0.0, 0.0)}
+    return {"position": xyz(marker.pose.position), "wxyz": wxyz if any(wxyz) else (1.0, 0.0, 0.0, 0.0)}
 
 
 def _rgb(color: Any) -> tuple[float, float, float]:
     return color.r, color.g, color.b
 
 
-def _box(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
-    size = marker.scale.x, marker.scale.y, marker.scale.z
-    look = {"color": _rgb(marker.color), "opacity": _opacity(marker)}
-    return scene.add_box(name, dimensions=size, **look, **shade, **place(marker))
-
-
-def _sphere(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
-    size = marker.scale.x, marker.scale.y, marker.scale.z
-    look = {"color": _rgb(marker.color), "opacity": _opacity(marker)}
-    return scene.add_icosphere(name, radius=0.5, scale=size, **look, **shade, **place(marker))
-
-
-def _cylinder(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
-    # viser's stands along z, too; rviz's may be an ellipse
-    size = marker.scale.x, marker.scale.y, marker.scale.z
-    look = {"color": _rgb(marker.color), "opacity": _opacity(marker)}
-    return scene.add_cylinder(name, radius=0.5, height=1.0, scale=size, **look, **shade, **place(marker))
-
-
-def _opacity(marker: Marker) -> float | None:
-    return marker.color.a if marker.color.a < 1 else None
+def _primitive(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
+    add, form, size = _PRIMITIVES[marker.type]
+    look = {"color": _rgb(marker.color), "opacity": marker.color.a if marker.color.a < 1 else None}
+    return getattr(scene, add)(name, **form, **{size: xyz(marker.scale)}, **look, **shade, **place(marker))
 
 
 def _arrow(scene: Any, name: str, marker: Marker) -> Any:
@@ -129,7 +114,7 @@ def _text(scene: Any, name: str, marker: Marker) -> Any:
 
 
 def _triangles(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
-    corners = _points(marker) * (marker.scale.x, marker.scale.y, marker.scale.z)
+    corners = _points(marker) * xyz(marker.scale)
     corners = corners[: len(corners) // 3 * 3]
     if not len(corners):
         return None
@@ -144,8 +129,7 @@ def _triangles(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
 def _mesh(scene: Any, name: str, marker: Marker, **shade: bool) -> Any:
     color = None if marker.mesh_use_embedded_materials else (*_rgb(marker.color), marker.color.a)
     glb = _glb(marker.mesh_resource, color)
-    size = marker.scale.x, marker.scale.y, marker.scale.z
-    return scene.add_glb(name, glb, scale=size, **shade, **place(marker)) if glb else None
+    return scene.add_glb(name, glb, scale=xyz(marker.scale), **shade, **place(marker)) if glb else None
 
 
 @lru_cache(maxsize=64)
@@ -158,23 +142,23 @@ def _glb(resource: str, rgba: tuple[float, ...] | None) -> bytes | None:
             raise ValueError(f"larger than {_LARGEST} bytes")
         loaded = trimesh.load(path, process=False)
         if rgba is not None:
-            _tint(loaded, rgba)
+            color = _linear(np.array(rgba))
+            for mesh in _meshes(loaded):
+                mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(color, (len(mesh.faces), 1)))
         return as_glb(loaded, is_lit=_take_paint(loaded), is_clear=rgba is not None and rgba[3] < 1)
     except Exception as error:  # trimesh raises what it likes on other people's files
         _LOG.warning("the cockpit cannot show %s: %s", resource, " ".join(str(error).split()))
         return None
 
 
-def _tint(loaded: Any, rgba: tuple[float, ...]) -> None:
-    color = _linear(np.array(rgba))
-    for mesh in loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]:
-        mesh.visual = trimesh.visual.ColorVisuals(mesh, face_colors=np.tile(color, (len(mesh.faces), 1)))
+def _meshes(loaded: Any) -> Iterable[Any]:
+    return loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]
 
 
 def _take_paint(loaded: Any) -> bool:
     """Let textures count as they are, whatever light a material asks rviz for; tell whether there are any."""
     painted = False
-    for mesh in loaded.geometry.values() if isinstance(loaded, trimesh.Scene) else [loaded]:
+    for mesh in _meshes(loaded):
         material: Any = getattr(mesh.visual, "material", None)
         image = getattr(material, "image", None)
         if image is not None:
@@ -216,9 +200,15 @@ def _linear(rgba: np.ndarray) -> np.ndarray:
 
 
 def _points(marker: Marker) -> np.ndarray:
-    return np.array([(one.x, one.y, one.z) for one in marker.points], dtype=float).reshape(-1, 3)
+    return np.array([xyz(one) for one in marker.points], dtype=float).reshape(-1, 3)
 
 
+# viser's function, its arguments, and the one that is a marker's scale
+_PRIMITIVES: dict[int, tuple[str, dict[str, float], str]] = {
+    Marker.CUBE: ("add_box", {}, "dimensions"),
+    Marker.SPHERE: ("add_icosphere", {"radius": 0.5}, "scale"),
+    Marker.CYLINDER: ("add_cylinder", {"radius": 0.5, "height": 1.0}, "scale"),  # rviz's may be an ellipse, too
+}
 _ENDS = {Marker.LINE_STRIP: _strip_ends, Marker.LINE_LIST: _list_ends}
 _MAKERS = {
     Marker.ARROW: _arrow,
@@ -230,9 +220,9 @@ _MAKERS = {
     Marker.TEXT_VIEW_FACING: _text,
 }
 _SOLID = {
-    Marker.CUBE: _box,
-    Marker.SPHERE: _sphere,
-    Marker.CYLINDER: _cylinder,
+    Marker.CUBE: _primitive,
+    Marker.SPHERE: _primitive,
+    Marker.CYLINDER: _primitive,
     Marker.TRIANGLE_LIST: _triangles,
     Marker.MESH_RESOURCE: _mesh,
 }

@@ -13,7 +13,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.ros.cockpit.scene import looks
-from drone_sim.ros.cockpit.scene.frames import Frames
+from drone_sim.ros.cockpit.scene.frames import FrameTree
 
 _Key = tuple[str, int]
 _DIGITS = 2  # of a size in m
@@ -25,28 +25,29 @@ class _Look(NamedTuple):
     form: bytes  # points and words, which may change in place
 
 
-class _Shown(NamedTuple):
+class _ShownMarker(NamedTuple):
     handle: Any  # None where there is nothing to see
     look: _Look
     marker: Marker
 
 
-class Markers:
+class MarkerNodes:
     """The markers of one topic. Messages are taken in any thread, and shown in the one that calls `show`."""
 
     def __init__(
         self,
         scene: Any,
         topic: str,
-        frames: Frames,
+        frames: FrameTree,
         on_new: Callable[[Marker, Any], None] = lambda *_: None,
         *,
         hidden: Collection[str] = (),
         casts: bool = False,
     ):
-        """Begin with nothing; `on_new` is called with every marker that is made anew, and its handle.
+        """Show those of `topic` in `scene`, each at its frame in `frames`; begin with none.
 
-        `hidden` are namespaces that the browser has in another way; `casts`: the markers throw shadows.
+        `on_new` is called with every marker that is made anew, and its handle. `hidden` are namespaces that the browser
+        has in another way; with `casts` the markers throw shadows.
         """
         self._scene = scene
         self._name = topic.replace("/", "_")
@@ -56,9 +57,9 @@ class Markers:
         self._wanted: dict[_Key, Marker] = {}
         self._lock = threading.Lock()
         self._changed = False
-        self._shown: dict[_Key, _Shown] = {}
+        self._shown: dict[_Key, _ShownMarker] = {}
 
-    def hear(self, message: MarkerArray) -> None:
+    def on_markers(self, message: MarkerArray) -> None:
         """Take a message."""
         with self._lock:
             for marker in message.markers:
@@ -108,10 +109,10 @@ class Markers:
             self._remove(key)
         else:
             self._on_new(marker, handle)
-        self._shown[key] = _Shown(handle, look, marker)
+        self._shown[key] = _ShownMarker(handle, look, marker)
 
     @staticmethod
-    def _change(before: _Shown, look: _Look, marker: Marker) -> bool:
+    def _change(before: _ShownMarker, look: _Look, marker: Marker) -> bool:
         """Show a marker by what is there already; tell whether that was possible."""
         same = before.look == look
         if before.handle is None or before.look.kind != look.kind:

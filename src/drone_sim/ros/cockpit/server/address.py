@@ -1,15 +1,24 @@
-"""Where the cockpit listens: what a user asked for, checked before viser tries it, and what to type into a browser."""
+"""Where the cockpit listens, checked before viser tries it; what opens it in a browser, and where that is told."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import os
 import socket
+import stat
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
+
+import rospkg
 
 _HIGHEST = 65535
 _TRIES = 100  # ports, from the one that was asked for
 _EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # listening at all addresses: the one for this machine itself
 _FAR = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}  # kept for examples: nobody's
+_MODE = stat.S_IRUSR | stat.S_IWUSR
 
 
 class AddressError(ValueError):
@@ -71,7 +80,7 @@ def urls(host: str, port: int, token: str) -> tuple[str, str]:
     """Return what opens the cockpit in a browser on this machine, and on others, '' where they cannot reach it."""
     here = _EVERYWHERE.get(host, host)
     there = _outside(host) if host in _EVERYWHERE else ""
-    url, far = (f"http://{_bracketed(one)}:{port}/?token={token}" for one in (here, there))
+    url, far = (f"http://{f'[{one}]' if ':' in one else one}:{port}/?token={token}" for one in (here, there))
     return url, far if there else ""
 
 
@@ -86,5 +95,40 @@ def _outside(host: str) -> str:
         return socket.gethostname()
 
 
-def _bracketed(host: str) -> str:
-    return f"[{host}]" if ":" in host else host
+@contextlib.contextmanager
+def address_file(address: str, port: int) -> Iterator[str]:
+    """Keep the address in `$ROS_HOME/drone_sim/cockpit_PORT.txt` meanwhile; give one line on where it is."""
+    file = Path(rospkg.get_ros_home()) / "drone_sim" / f"cockpit_{port}.txt"
+    content = f"{address}\n"
+    try:
+        _write(file, content)
+    except OSError as error:
+        yield f"the token that opens it is on the terminal alone: {file}: {error.strerror}"
+        return
+    try:
+        yield f"the address with the token that opens it is in {file}"
+    finally:
+        with contextlib.suppress(OSError, ValueError):
+            if file.read_text(encoding="utf-8") == content:  # or another one is at that port by now
+                file.unlink()
+
+
+def _write(file: Path, content: str) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.unlink(missing_ok=True)  # of one that was killed; whoever may read that must not read this
+    descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, _MODE)
+    with os.fdopen(descriptor, "w", encoding="utf-8") as opened:
+        opened.write(content)
+
+
+def print_to_terminal(line: str) -> None:
+    """Print a line for the user, but not into the log that roslaunch makes of nodes without output="screen"."""
+    if sys.stdout is None:
+        return
+    target = ""
+    with contextlib.suppress(OSError, ValueError):  # no file at all, as in a test
+        target = os.readlink(f"/proc/self/fd/{sys.stdout.fileno()}")
+    if target.startswith(os.path.realpath(rospkg.get_log_dir()) + os.sep):
+        return
+    with contextlib.suppress(OSError):  # nobody reads it
+        print(line, flush=True)

@@ -1,0 +1,54 @@
+"""What the programs have in common: a mistake gets one line, whoever finds it."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Callable
+from typing import NoReturn
+
+from drone_sim.message_text import printable
+from drone_sim.scripting.errors import ScriptError
+
+FAILED, SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
+EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that says what is wrong in one line, instead of the usage."""
+
+    wrong = FAILED  # the exit status for wrong arguments
+
+    def error(self, message: str) -> NoReturn:
+        """End the program, with that line on stderr."""
+        self.exit(self.wrong, f"{self.prog}: {' '.join(message.split())} (see {self.prog} --help)\n")
+
+
+def status_of(
+    program: str,
+    action: Callable[[], int | None],
+    wrong: int = FAILED,
+    passed_on: type[Exception] | tuple[()] = (),
+) -> int:
+    """Return the exit status of an action, 0 for None; 130 after Ctrl-C; `wrong` after a line for a user's mistake.
+
+    What is `passed_on` goes on to whoever knows more of it.
+    """
+    try:
+        return action() or 0
+    except KeyboardInterrupt:
+        return SIGNALLED + signal.SIGINT
+    except passed_on:
+        raise
+    except EXPECTED as error:
+        print(f"{program}: {printable(format_error(error))}", file=sys.stderr, flush=True)
+        return wrong
+
+
+def format_error(error: BaseException) -> str:
+    """Return what is wrong, in one line; of an OSError its file, too."""
+    said = str(error)
+    if isinstance(error, OSError) and error.filename is not None:
+        said = f"{error.filename}: {error.strerror}"
+    return " ".join(said.split())

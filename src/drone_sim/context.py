@@ -1,0 +1,74 @@
+"""What one simulation shares: whoever needs any of it is given all of it, once, by its constructor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from drone_sim.config.types import DatumParameters
+from drone_sim.forces.weather import Weather
+from drone_sim.mechanics.frames import Vector
+from drone_sim.scripting.api.backend import Backend
+from drone_sim.scripting.api.host import ScriptContext
+from drone_sim.sensors.camera import TurningBlades, Vision
+from drone_sim.world import World
+
+NOBODY = ("", "")
+
+
+class FollowingBody(Protocol):
+    """A body that goes where something else goes."""
+
+    def follow(self) -> None:
+        """Put it where what carries it has gone."""
+
+
+@dataclass
+class CarriedBodies:
+    """The bodies without mass that something carries, by their numbers in the world."""
+
+    bases: dict[int, FollowingBody] = field(default_factory=dict)  # of chains, before what hangs on their links
+    shapes: dict[int, FollowingBody] = field(default_factory=dict)
+
+    def follow(self) -> None:
+        """Put every one where what carries it has gone."""
+        for one in (*self.bases.values(), *self.shapes.values()):
+            one.follow()
+
+
+@dataclass(kw_only=True)
+class SimulationContext(ScriptContext):
+    """World, weather, renderer, names and limits, beside what scripts share; it lasts from one start to the next.
+
+    `sub_step` in s; `script_time_limit` in s of real time; `magnetic_field` in T. `names` has for each body what a
+    person calls it, and its name among the objects of scripts, or ''; `link_names` the latter for single links.
+    """
+
+    world: World
+    vision: Vision
+    weather: Weather
+    sub_step: float
+    datum: DatumParameters
+    magnetic_field: Vector
+    script_time_limit: float
+    backend: Backend | None = None
+    names: dict[int, tuple[str, str]] = field(default_factory=dict)
+    link_names: dict[tuple[int, int], str] = field(default_factory=dict)
+    carried: CarriedBodies = field(default_factory=CarriedBodies)
+    blades: list[TurningBlades] = field(default_factory=list)  # of all vehicles
+    tunings: int = 0  # grows whenever something is other than it was that may be tuned
+
+    def change_weather(self, changes: Mapping[str, Any]) -> None:
+        """Let another weather be where all are: keys of `weather`, as in YAML. Raises ParameterError."""
+        self.weather.change(changes)
+        self.tunings += 1
+
+    def name_of(self, body: int, link: int = -1) -> str:
+        """Return what scripts call a body's link (-1: its root), '' for what they do not know."""
+        name = self.link_names.get((body, link))
+        return self.names.get(body, NOBODY)[1] if name is None else name
+
+    def body_of(self, name: str) -> int:
+        """Return the body that scripts call so. Raises LookupError."""
+        return next(body for body, (_, one) in self.names.items() if one == name)

@@ -1,0 +1,195 @@
+"""What is changed of a vehicle while it flies: gains, limits, noise, cameras, weather, faults, script parameters."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from drone_sim.config.errors import changed
+from drone_sim.config.fields import ParameterField
+from drone_sim.config.types import ParameterError, ParameterProblem
+from drone_sim.forces.weather import WeatherParameters
+from drone_sim.hosting.tunable import CONTROL, LONGEST, SCRIPT, nested, tunables, value_at
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
+from drone_sim.message_text import near_names, shown
+from drone_sim.vehicles.parameters import EquipmentParameters
+from drone_sim.vehicles.vehicle import Vehicle
+
+_LOG = logging.getLogger(__name__)
+TOPIC = "parameter_updates"
+_CONDITIONS = ("weather", "faults")  # of a flight: the next one begins with its own
+_HEIGHT = "takeoff_height"  # which scripts read, too
+_TEXT = f"a text of at most {LONGEST} characters"
+_WORDS = {float: "a finite number", int: "a whole number", bool: "true or false", str: _TEXT}
+
+
+class _Parameter(NamedTuple):
+    """dynamic_reconfigure/DoubleParameter and the like."""
+
+    name: str
+    value: Any
+
+
+class Config(NamedTuple):
+    """dynamic_reconfigure/Config: what scripts are told of new values, as ROS has it on the same topic."""
+
+    bools: list[_Parameter]
+    ints: list[_Parameter]
+    strs: list[_Parameter]
+    doubles: list[_Parameter]
+    groups: list[Any]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Config:
+        """Return the message that says what holds, by name."""
+
+        def those(kind: type) -> list[_Parameter]:
+            return [_Parameter(name, value) for name, value in values.items() if type(value) is kind]
+
+        return cls(those(bool), those(int), those(str), those(float), [])
+
+
+class TunedParameters(EquipmentParameters):
+    """A vehicle and the weather around it: what is changed at once is checked at once."""
+
+    weather: WeatherParameters
+
+
+class _Checked(NamedTuple):
+    changes: Mapping[str, Any]  # as YAML has them
+    parameters: TunedParameters
+
+
+class Tuning:
+    """What may be changed of one vehicle, and what has been."""
+
+    def __init__(self, vehicle: Vehicle, parameters: dict[str, Any]):
+        """Take the vehicle, of which nothing has been changed, and the parameters of its child script."""
+        self._vehicle = vehicle
+        self._parameters = parameters
+        self.chosen: dict[str, Any] = {}  # by name: what stays so through every start
+
+    @property
+    def known(self) -> dict[str, ParameterField]:
+        """What may be changed now, by name."""
+        own = self._vehicle.context.scripts.attached_to(self._vehicle.object_name)
+        declared = {name: value for name, value in own.parameters.items() if name not in own.read}
+        return tunables(self._vehicle.parameters, declared)
+
+    def values(self) -> dict[str, Any]:
+        """Return what holds now, by name: floats, ints, bools and strs."""
+        return {name: self._value(one) for name, one in self.known.items()}
+
+    def _value(self, leaf: ParameterField) -> Any:
+        vehicle, (first, *rest) = self._vehicle, leaf.location
+        if first in (CONTROL, SCRIPT, _HEIGHT):
+            found = value_at(self._parameters, rest or (first,))
+        elif first in _CONDITIONS:
+            found = value_at(vehicle.context.weather.now if first == "weather" else vehicle.faults.now, rest)
+        else:
+            found = value_at(vehicle.parameters, leaf.location)
+        if found is None:
+            return leaf.none if leaf.none is not None else (*leaf.choices, leaf.kind())[0]
+        if not _fits(leaf, found):  # a script may have put anything there
+            found = value_at(vehicle.parameters, leaf.location)
+        return leaf.kind(found)
+
+    # ---- changing
+
+    def check(self, changes: Mapping[str, Any]) -> _Checked:
+        """Return what other values, by name, come to. Raises ParameterError for what is not allowed."""
+        known = self.known
+        for name, value in changes.items():
+            if name not in known:
+                near = near_names(name[:80], known)
+                raise ParameterError(f"cannot be changed in flight; {near}", (shown(name),))
+            if not _fits(known[name], value):
+                raise ParameterError(f"must be {_WORDS[known[name].kind]}", (name,), shown(value))
+        laid = nested(known, self.values(), changes)
+        own = self._vehicle
+        present = {key: getattr(own.parameters, key) for key in EquipmentParameters.model_fields}
+        present.update(weather=own.context.weather.now, faults=own.faults.now)
+        try:
+            return _Checked(laid, changed(TunedParameters.model_construct(**present), laid))
+        except ParameterError as error:
+            raise ParameterError.of([_by_name(one, known) for one in error.problems]) from None
+
+    def change(self, changes: Mapping[str, Any]) -> None:
+        """Let other values hold, by name, from the next step on: all of them, or none. Raises ParameterError."""
+        now = self.values()
+        changes = {name: value for name, value in changes.items() if name not in now or now[name] != value}
+        laid, new = self.check(changes)  # without what holds already: a wind of 0 would bring air
+        vehicle = self._vehicle
+        self._keep(laid, new)
+        vehicle.commands.timeout = new.cmd_vel_timeout
+        for name in laid.get("cameras", ()):
+            vehicle.cameras[name].change(new.cameras[name])
+        for name in laid.get("sensors", ()):
+            vehicle.instruments.by_name[name].change_noise(new.sensors[name])
+        if "weather" in laid:
+            vehicle.context.change_weather(laid["weather"])
+        if "faults" in laid:
+            vehicle.change_faults(laid["faults"])
+        known = self.known
+        self.chosen.update({name: one for name, one in changes.items() if known[name].location[0] not in _CONDITIONS})
+        self._tell()
+
+    def _keep(self, laid: Mapping[str, Any], new: TunedParameters) -> None:
+        """Keep what scripts read where they read it, and all but the conditions for the next start."""
+        vehicle = self._vehicle
+        own = self._parameters
+        own.update({name: getattr(new.control, name) for name in laid.get(CONTROL, ())})
+        own.update({name: new.script_parameters[name] for name in laid.get(SCRIPT, ())})
+        own.update({_HEIGHT: new.takeoff_height} if _HEIGHT in laid else {})
+        kept = {key: getattr(new, key) for key in laid if key not in _CONDITIONS}
+        if SCRIPT in kept:  # what a script declares is not among them
+            kept[SCRIPT] = {name: new.script_parameters[name] for name in vehicle.parameters.script_parameters}
+        vehicle.parameters = vehicle.parameters.model_copy(update=kept)
+
+    def _tell(self) -> None:
+        """Let the scripts know that something is different."""
+        self._vehicle.context.tunings += 1
+        hearing = [bus for bus in self._vehicle.commands.buses if bus.hears(TOPIC)]
+        message = Config.of(self.values()) if hearing else None
+        for bus in hearing:
+            bus.post(TOPIC, message)
+
+    # ---- starts and snapshots
+
+    def take_over(self, before: Tuning) -> None:
+        """Be tuned as the vehicle was that this one takes the place of; say so where that is not possible."""
+        self.chosen = dict(before.chosen)
+        known = self.known
+        try:
+            self.change({name: one for name, one in self.chosen.items() if name in known})
+        except ParameterError as error:
+            _LOG.warning("%s is not tuned as it was: %s", self._vehicle.name, error)
+
+    def begin(self) -> None:
+        """Give the script's parameters the values that files or tuning say: those of its init are only defaults."""
+        own = self._parameters
+        own.update(self._vehicle.parameters.script_parameters)
+        for name, leaf in self.known.items() if self.chosen else ():
+            if name in self.chosen and leaf.location[0] == SCRIPT and _fits(leaf, self.chosen[name]):
+                own[str(leaf.location[1])] = self.chosen[name]
+
+    def save_state(self) -> Restore:
+        """Return a function that brings back what was changed; commands, cameras, sensors have theirs themselves."""
+        return in_turn(saved(self._vehicle, "parameters"), saved(self, "chosen"))
+
+
+def _fits(leaf: ParameterField, value: Any) -> bool:
+    """Tell whether a value is of the kind that a parameter has."""
+    if leaf.kind in (float, int):
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return is_number and (leaf.location[0] != SCRIPT or math.isfinite(value))
+    return isinstance(value, leaf.kind) and (not isinstance(value, str) or len(value) <= LONGEST)
+
+
+def _by_name(problem: ParameterProblem, known: Mapping[str, ParameterField]) -> ParameterProblem:
+    """Return what is wrong with a value named as it is tuned."""
+    names = (name for name, leaf in known.items() if leaf.location == problem.location)
+    name = next(names, None)
+    return problem if name is None else problem._replace(location=(name,))

@@ -1,0 +1,170 @@
+"""What a shape of a file is in a scene: a simple form where it is made of such, a mesh file where not.
+
+Mesh files are OBJ, with a list of materials where there are several colours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import numpy as np
+
+from drone_sim.files.mesh_files import MAX_PARTS, MAX_TRIANGLES
+from drone_sim.importing.folder import Folder, numbers, pose_keys, shade
+from drone_sim.mechanics.frames import IDENTITY, Matrix
+from drone_sim.vrep_files.model import Rgba, VrepMesh, VrepPrimitive, VrepShape
+
+MAX_SCENE_TRIANGLES = 450_000  # of all files that are written: a scene may have 500 000
+Surface = tuple[VrepMesh, Matrix]  # and where it stands
+
+
+class TooLarge(ValueError):
+    """A mesh has more triangles than a file may have, or than a scene has left."""
+
+
+class MeshWriter:
+    """Writes mesh files, the same one for the same meshes, as long as there are triangles left."""
+
+    def __init__(self, folder: Folder):
+        """Take where they go."""
+        self._folder = folder
+        self._written: dict[int, str] = {}
+        self._left = MAX_SCENE_TRIANGLES
+
+    def write(self, name: str, surfaces: Sequence[Surface]) -> str:
+        """Return the name of a file with these surfaces; their colours are in it where there are several.
+
+        Raises TooLarge.
+        """
+        triangles = sum(len(mesh.faces) for mesh, _ in surfaces)
+        if triangles > min(MAX_TRIANGLES, self._left):
+            raise TooLarge(f"its {triangles} triangles are more than a scene can have")
+        materials = _materials(surfaces)
+        content = _obj(surfaces, materials)
+        key = hash((content, tuple(materials.items())))
+        self._left -= triangles
+        if key not in self._written:
+            file = self._folder.free_name(name, ".obj", "meshes/")
+            if len(materials) > 1:
+                listed = file.removesuffix(".obj") + ".mtl"
+                self._folder.write(listed, _mtl(materials))
+                content = f"mtllib {listed.rpartition('/')[2]}\n{content}"
+            self._folder.write(file, content)
+            self._written[key] = file
+        return self._written[key]
+
+
+def color(surfaces: Sequence[Surface]) -> Rgba | None:
+    """Return the one colour of some surfaces; None where they have several, which their file says."""
+    colors = {mesh.color for mesh, _ in surfaces}
+    return colors.pop() if len(colors) == 1 else None
+
+
+def has_triangles(mesh: VrepMesh) -> bool:
+    """Tell whether there is anything to see of a mesh."""
+    return len(mesh.faces) > 0
+
+
+def _materials(surfaces: Sequence[Surface]) -> dict[Rgba, str]:
+    colors = dict.fromkeys(mesh.color for mesh, _ in surfaces)
+    return {one: f"color_{number}" for number, one in enumerate(colors)}
+
+
+def _obj(surfaces: Sequence[Surface], materials: dict[Rgba, str]) -> str:
+    lines, first = [], 1
+    for number, (rgba, material) in enumerate(materials.items()):
+        if len(materials) > 1 and number < MAX_PARTS:  # what comes after the last one that may be is of its colour
+            lines.append(f"usemtl {material}")
+        for mesh, matrix in (one for one in surfaces if one[0].color == rgba):
+            vertices = moved(mesh.vertices, matrix)
+            lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in cast("list[list[float]]", vertices.tolist())]
+            lines += [f"f {a} {b} {c}" for a, b, c in cast("list[list[int]]", (mesh.faces + first).tolist())]
+            first += len(vertices)
+    return "\n".join([*lines, ""])
+
+
+def moved(vertices: np.ndarray, matrix: Matrix) -> np.ndarray:
+    """Return vertices (n, 3) at a transform."""
+    if matrix == IDENTITY:
+        return vertices
+    turn = np.array(matrix).reshape(3, 4)
+    return vertices @ turn[:, :3].T + turn[:, 3]
+
+
+def _mtl(materials: dict[Rgba, str]) -> str:
+    lines = []
+    for (red, green, blue, opacity), name in materials.items():
+        lines += [f"newmtl {name}", f"Kd {red:.4g} {green:.4g} {blue:.4g}", f"d {opacity:.4g}"]
+    return "\n".join([*lines, ""])
+
+
+_THIN = 1e-3  # m, of what has no thickness
+_SHORTEST = 1e-4  # m, of a length in a scene file
+_MOST_PARTS = 64  # of a compound
+_EQUAL = 1e-3  # two lengths that differ by less than this part of them
+
+
+def form(name: str, shape: VrepShape, writer: MeshWriter, is_solid: bool) -> dict[str, Any] | None:
+    """Return the keys of a shape in a scene file; None where there is nothing of it.
+
+    `is_solid`: it is convex in each of its meshes, as what the dynamics moves has to be. Raises TooLarge.
+    """
+    meshes = [mesh for mesh in shape.meshes if has_triangles(mesh) or mesh.primitive is not None]
+    simple = [_simple(mesh) for mesh in meshes]
+    if not meshes:
+        return None
+    if len(meshes) == 1:
+        return _one(name, meshes[0], simple[0], writer)
+    if len(meshes) <= _MOST_PARTS and (is_solid or all(simple)):
+        return {"shape": "compound", "parts": [_part(name, *pair, writer) for pair in zip(meshes, simple)]}
+    return _mesh(name, [(mesh, IDENTITY) for mesh in meshes if has_triangles(mesh)], writer)
+
+
+def _one(name: str, mesh: VrepMesh, simple: dict[str, Any] | None, writer: MeshWriter) -> dict[str, Any] | None:
+    if simple is None:
+        return _mesh(name, [(mesh, IDENTITY)], writer) if has_triangles(mesh) else None
+    if "position" in simple or "rpy" in simple:  # a scene's shapes are centred on their frames
+        return {"shape": "compound", "parts": [{**simple, "color": shade(mesh.color)}]}
+    return {**simple, "color": shade(mesh.color)}
+
+
+def _part(name: str, mesh: VrepMesh, simple: dict[str, Any] | None, writer: MeshWriter) -> dict[str, Any]:
+    if simple is None:
+        return _mesh(name, [(mesh, IDENTITY)], writer)
+    return {**simple, "color": shade(mesh.color)}
+
+
+def _mesh(name: str, surfaces: list[Surface], writer: MeshWriter) -> dict[str, Any]:
+    if not surfaces:
+        raise TooLarge("it has no triangles")
+    keys: dict[str, Any] = {"shape": "mesh", "file": writer.write(name, surfaces)}
+    own = color(surfaces)
+    return keys if own is None else {**keys, "color": shade(own)}
+
+
+def _simple(mesh: VrepMesh) -> dict[str, Any] | None:
+    """Return shape, size and place of a simple form; None for what a scene file has no word for."""
+    found = None if mesh.primitive is None else simple_size(mesh.primitive)
+    if found is None or mesh.primitive is None:
+        return None
+    word, size = found
+    return {"shape": word, "size": numbers(size), **pose_keys(mesh.primitive.pose.matrix)}
+
+
+def simple_size(primitive: VrepPrimitive) -> tuple[str, tuple[float, ...]] | None:
+    """Return the word and the size (m) of a form in a scene file; None for what that has no word for."""
+    x, y, z = primitive.size
+    word = primitive.word
+    if word in ("plane", "disc"):
+        z = _THIN
+    if min(x, y, z) < _SHORTEST and word not in ("spheroid", "capsule"):
+        x, y, z = (max(length, _SHORTEST) for length in (x, y, z))
+    if word in ("cuboid", "plane"):
+        return "box", (x, y, z)
+    round_ = abs(x - y) < _EQUAL * max(x, y, _SHORTEST)
+    if word in ("cylinder", "disc") and round_:
+        return "cylinder", (x / 2, z)
+    if word == "spheroid" and round_ and abs(x - z) < _EQUAL * max(x, z, _SHORTEST) and x > 2 * _SHORTEST:
+        return "sphere", (x / 2,)
+    return None

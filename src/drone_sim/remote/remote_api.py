@@ -1,0 +1,19 @@
+"""Whether anybody outside may drive the simulation: the server where it is on, nobody where it is off."""
+
+from __future__ import annotations
+
+from drone_sim.remote.conversation import RemoteApi
+from drone_sim.run.parameters import RemoteApiParameters
+from drone_sim.run.player import Player
+from drone_sim.scripting.api.backend import Backend
+
+
+def start_server(parameters: RemoteApiParameters, player: Player, backend: Backend | None = None) -> RemoteApi:
+    """Return who is outside. Raises OSError where nobody can be heard, in one line."""
+    if not parameters.serve:
+        return RemoteApi()
+    try:
+        from drone_sim.remote.server import RemoteApiServer  # whoever serves nobody needs neither pyzmq nor cbor2
+    except ImportError as error:
+        raise OSError(f"the remote API needs pyzmq and cbor2 (pip install pyzmq cbor2): {error}") from None
+    return RemoteApiServer(player, parameters.address, parameters.port, backend)

@@ -1,0 +1,116 @@
+"""The texts beside the editor: the tutorial's sections and the tasks, read from where they are for readers on paper."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from drone_sim.files.resources import package_path, read_bytes
+from drone_sim.grading import tasks
+from drone_sim.ros.cockpit.editor.script_store import ScriptFile
+
+_LARGEST = 1 << 20  # bytes of a text
+_TUTORIAL = "docs/tutorial.md"
+_HEADING = re.compile(r"^## (.+)$")
+_FENCE = re.compile(r"^\s*(```|~~~)")
+_SCRIPT = re.compile(r"^\*Script: \[[^\]]+\]\(tutorial/([^)]+)\)\*$", re.MULTILINE)
+_FLOWN = re.compile(r"drone\.launch script:=docs/tutorial/\S+ scene:=(\S+)")
+_PICTURE = re.compile(r"/(docs/pictures/tutorial_\w+\.png|tasks/\w+/\w+\.png)")
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """A section of the tutorial, or a task."""
+
+    name: str  # the section's anchor, such as stage-2-elevation; of a task tasks/hover
+    title: str
+    text: str  # Markdown
+    folder: str  # in the package, from which its links and pictures are seen
+    script: str = ""  # what it begins with, as the script store names it
+    scene: str = ""  # of a section: the scene file that its command flies in, in the package; '' is any
+
+    @property
+    def task(self) -> str:
+        """The name of the task, '' for the tutorial's."""
+        return self.name.partition("/")[2]
+
+
+class Lessons:
+    """All texts, in the order in which they are read. A package without them has none."""
+
+    def __init__(self, package: Path | None = None):
+        """Read from `package`, the folder that holds docs/ and tasks/; None is this package's."""
+        self._package = package or package_path()
+
+    def all(self) -> list[Lesson]:
+        """Return all that there are now."""
+        return [*self._sections(), *self._tasks()]
+
+    def find(self, name: object) -> Lesson | None:
+        """Return the text of a name, None where there is none."""
+        return next((one for one in self.all() if one.name == name), None)
+
+    def of_script(self, script: ScriptFile) -> Lesson | None:
+        """Return the text that a script belongs to: one of the user's by its name, such as 2_elevation_mine.py."""
+        if not script.is_own:
+            return next((one for one in self.all() if one.script == script.name), None)
+        stem = Path(script.file_name).stem
+        begun = [one for one in self.all() if one.script and f"{stem}_".startswith(f"{Path(one.script).stem}_")]
+        return max(begun, key=lambda one: len(one.script), default=None)
+
+    def picture(self, path: str) -> tuple[str, bytes] | None:
+        """Return content type and content of a picture that a text shows, by its path in the package."""
+        if not _PICTURE.fullmatch(path):
+            return None
+        try:
+            return "image/png", read_bytes(self._package / path[1:], _LARGEST)
+        except (OSError, ValueError):
+            return None
+
+    def _sections(self) -> Iterator[Lesson]:
+        for title, text in _parted(_text(self._package / _TUTORIAL)):
+            script, scene = _SCRIPT.search(text), _FLOWN.search(text)
+            yield Lesson(
+                name=_anchor(title),
+                title=title,
+                text=text,
+                folder="docs",
+                script=f"tutorial/{script[1]}" if script else "",
+                scene=str(self._package / scene[1]) if script and scene else "",
+            )
+
+    def _tasks(self) -> Iterator[Lesson]:
+        for name in tasks.names():
+            text = _text(self._package / "tasks" / name / "README.md")
+            title = text.partition("\n")[0].removeprefix("# ").strip() or name
+            yield Lesson(f"tasks/{name}", title, text, f"tasks/{name}", f"tasks/{name}.py")
+
+
+def _parted(text: str) -> Iterator[tuple[str, str]]:
+    """Yield title and text of each section; what looks like a heading in a block of code is none."""
+    title, in_code = "", False
+    lines: list[str] = []
+    for line in text.splitlines():
+        in_code ^= bool(_FENCE.match(line))
+        heading = None if in_code else _HEADING.match(line)
+        if heading:
+            if title:
+                yield title, "\n".join(lines)
+            title, lines = heading[1], []
+        lines.append(line)
+    if title:
+        yield title, "\n".join(lines)
+
+
+def _anchor(title: str) -> str:
+    """Return the name by which a link leads to a heading, as GitHub makes it."""
+    return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_bytes(path, _LARGEST).decode("utf-8")
+    except (OSError, ValueError):
+        return ""

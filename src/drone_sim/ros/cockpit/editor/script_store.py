@@ -1,0 +1,285 @@
+"""The scripts that the editor may open: those of the package, to be copied, and those in a folder of the user's."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drone_sim.files import writing
+from drone_sim.files.resources import package_path, read_bytes
+from drone_sim.grading import tasks
+from drone_sim.scripting.python.helpers import BUILT_IN
+
+OWN = "mine"
+_ENDINGS = (".py", ".lua")
+_LONGEST = 100  # characters of a name
+_MOST = 1000  # scripts of one kind
+_START = "start.py"  # what a task begins with
+_LAST_STAGE = "6_ros.py"  # the tutorial's whole controller
+LARGEST = 1 << 20  # bytes
+_LARGEST_COPY = 1 << 26  # bytes of what another program has made of a script
+
+
+class ScriptStoreError(ValueError):
+    """What was asked of the script store cannot be done; one line."""
+
+
+class NoSuchScript(ScriptStoreError):
+    """There is none of that name any more."""
+
+
+@dataclass(frozen=True)
+class ScriptFile:
+    """A script: the name by which a browser asks for it, and its file."""
+
+    name: str  # such as tutorial/1_thrust.py
+    path: Path
+    is_own: bool  # whether it may be written
+
+    @property
+    def group(self) -> str:
+        """Which kind it is of: built-in, tutorial, tasks or mine."""
+        return self.name.partition("/")[0]
+
+    @property
+    def file_name(self) -> str:
+        """The name without its kind, such as 1_thrust.py."""
+        return self.name.partition("/")[2]
+
+
+class ScriptStore:
+    """Scripts by name, such as `built-in/pilot.py` or `mine/first.lua`. Nothing else is read or written."""
+
+    def __init__(self, folder: Path, shipped: Mapping[str, Callable[[], dict[str, Path]]] | None = None):
+        """Keep the user's in `folder`, made by the first copy; `shipped` gives the package's of each kind, by name."""
+        self.folder = folder
+        self._shipped = shipped_with_the_package() if shipped is None else shipped
+        self._originals: dict[str, str] = {}  # of the user's own, as they were before the first change
+        self._writing = threading.Lock()  # two browsers may save at once
+
+    # ---- what there is
+
+    def scripts(self) -> list[ScriptFile]:
+        """Return all that there are now."""
+        shipped = [
+            ScriptFile(f"{kind}/{name}", path, False)
+            for kind, files in self._shipped.items()
+            for name, path in files().items()
+        ]
+        return [*shipped, *(self._own(name) for name in scripts_in(self.folder))]
+
+    def find(self, name: Any) -> ScriptFile:
+        """Return a script by its name. Raises ScriptStoreError."""
+        found = next((script for script in self.scripts() if script.name == name), None)
+        if found is None:
+            raise NoSuchScript(f"{str(name)[:80]!r}: no such script")
+        self._place(found)
+        return found
+
+    def _place(self, script: ScriptFile) -> Path:
+        """Return where a script is: a link in the folder may lead to another file there. Raises ScriptStoreError."""
+        if not script.is_own:
+            return script.path
+        try:
+            place = Path(os.path.realpath(script.path))
+        except ValueError as error:
+            raise ScriptStoreError(f"{script.name!r}: {error}") from None
+        if place.parent != self.folder.resolve():
+            raise ScriptStoreError(f"{script.name}: is a link that leads out of {self.folder}, and is left alone")
+        return place
+
+    def of_file(self, path: str) -> ScriptFile | None:
+        """Return the script whose file that is, None where it is none of these."""
+        return next((script for script in self.scripts() if str(script.path) == path), None)
+
+    def digest(self) -> str:
+        """Return what changes whenever a script comes or goes."""
+        names = "\n".join(script.name for script in self.scripts())
+        return hashlib.sha1(names.encode("utf-8", "surrogatepass"), usedforsecurity=False).hexdigest()[:12]
+
+    def version(self, name: Any) -> str:
+        """Return the version of a script's file now, '' where it is gone."""
+        found = next((script for script in self.scripts() if script.name == name), None)
+        return _version_of(found.path) if found else ""
+
+    # ---- text
+
+    def read(self, script: ScriptFile) -> tuple[str, str]:
+        """Return a script's text, and its version, which changes when the file does. Raises ScriptStoreError."""
+        return _read_text(script.name, script.path)
+
+    def save(self, script: ScriptFile, text: str, version: str) -> tuple[ScriptFile, str] | None:
+        """Write a script whose version the editor has; one of the package becomes a copy in the user's folder.
+
+        Return what has been written, and its version; None where another has changed the file, and nothing was
+        written. Raises ScriptStoreError.
+        """
+        with self._writing:
+            if not script.is_own:
+                original, script = self.read(script)[0], self._copy_of(script)
+                written = _write_text(script.name, script.path, text, is_new=True)
+                self._originals[script.name] = original
+                return script, written
+            if version != _version_of(script.path):
+                return None
+            place = self._place(script)
+            self._originals.setdefault(script.name, self.read(script)[0])
+            return script, _write_text(script.name, place, text)
+
+    def save_as(self, name: Any, text: str) -> tuple[ScriptFile, str]:
+        """Write a new script of the user's; return it, and its version. Raises ScriptStoreError."""
+        script = self._own(_checked(name))
+        with self._writing:
+            if os.path.lexists(script.path):
+                raise ScriptStoreError(f"{script.name}: is there already; take another name")
+            version = _write_text(script.name, script.path, text, is_new=True)
+            self._originals[script.name] = text
+            return script, version
+
+    def keep_both(self, name: Any, text: str, mine: bool) -> tuple[ScriptFile, str, str]:
+        """End a conflict about a script of the user's: `text`, or what the file holds, goes into another file.
+
+        The file itself holds the `text` in the end where that is `mine`, or where there was no file. Return the script,
+        its version, and the name of the other script, '' where there is none. Raises ScriptStoreError.
+        """
+        file_name = str(name).removeprefix(f"{OWN}/")
+        script = self._own(file_name if file_name in scripts_in(self.folder) else _checked(file_name))
+        with self._writing:
+            place = self._place(script)
+            if not os.path.lexists(place):
+                return script, _write_text(script.name, place, text, is_new=True), ""
+            second = self._copy_of(script)
+            if mine:
+                with _naming_errors(script.name):  # whatever it holds
+                    writing.write_new(second.path, read_bytes(place, _LARGEST_COPY))
+                return script, _write_text(script.name, place, text), second.name
+            _write_text(second.name, second.path, text, is_new=True)
+            return script, _version_of(script.path), second.name
+
+    def original(self, script: ScriptFile) -> str:
+        """Return what a script was before the first change, to go back to. Raises ScriptStoreError."""
+        known = self._originals.get(script.name)
+        return self.read(script)[0] if known is None else known
+
+    def _own(self, file_name: str) -> ScriptFile:
+        return ScriptFile(f"{OWN}/{file_name}", self.folder / file_name, True)
+
+    def _copy_of(self, script: ScriptFile) -> ScriptFile:
+        """Return a script of the user's that does not exist yet, named as another one."""
+        stem, ending = Path(script.file_name).stem, script.path.suffix
+        names = [stem, *(f"{stem}_{number}" for number in range(2, _MOST))]
+        name = next((one for one in names if not os.path.lexists(self.folder / f"{one}{ending}")), None)
+        if name is None:
+            raise ScriptStoreError(f"{script.name}: there are too many copies in {self.folder}")
+        return self._own(f"{name}{ending}")
+
+
+def shipped_with_the_package() -> dict[str, Callable[[], dict[str, Path]]]:
+    """Return what gives the package's scripts of each kind, by name."""
+    package = package_path()
+    return {
+        "built-in": lambda: scripts_in(BUILT_IN),
+        "tutorial": lambda: _stages(package / "docs" / "tutorial"),
+        "tasks": lambda: _starts(package / "docs" / "tutorial" / _LAST_STAGE),
+    }
+
+
+def scripts_in(folder: Path) -> dict[str, Path]:
+    """Return the scripts in a folder, by name."""
+    try:
+        files = sorted(folder.iterdir())[: 10 * _MOST]
+    except OSError:  # there is none yet
+        return {}
+    named = {file.name: file for file in files if file.suffix in _ENDINGS and not file.name.startswith(("_", "."))}
+    return dict(list(named.items())[:_MOST])
+
+
+def _stages(folder: Path) -> dict[str, Path]:
+    """Return the tutorial's stages, whose names begin with their numbers; the folder holds tools, too."""
+    return {name: path for name, path in scripts_in(folder).items() if name[0].isdigit()}
+
+
+def _starts(last_stage: Path) -> dict[str, Path]:
+    """Return what each task begins with, by the task's name: a file of its own, or the whole of the tutorial."""
+    own = {name: tasks.folder() / name / _START for name in tasks.names()}
+    found = {f"{name}.py": file if file.is_file() else last_stage for name, file in own.items()}
+    return {name: file for name, file in found.items() if file.is_file()}
+
+
+def _checked(name: Any) -> str:
+    """Return the name of a file that may be made. Raises ScriptStoreError."""
+    if not isinstance(name, str) or not 0 < len(name) <= _LONGEST:
+        raise ScriptStoreError(f"{str(name)[:80]!r}: a name has 1 to {_LONGEST} characters")
+    if Path(name).suffix not in _ENDINGS:
+        raise ScriptStoreError(f"{name!r}: a script's name ends in {' or '.join(_ENDINGS)}")
+    if "/" in name or name.startswith(("_", ".")) or not name.isprintable():
+        raise ScriptStoreError(f"{name!r}: a name is letters, digits, '-' and '_', and begins with neither '_' nor '.'")
+    return name
+
+
+def _read_text(name: str, path: Path) -> tuple[str, str]:
+    r"""Return the text in a file, its lines ended by \n, and its version. Raises ScriptStoreError."""
+    version = _version_of(path)
+    with _naming_errors(name):
+        content = read_bytes(path, LARGEST)
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n"), version
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ScriptStoreError(f"{name}: line {line}: is not UTF-8, and cannot be edited here") from None
+
+
+def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
+    r"""Write a file, with lines ended by \r\n where most were, and return its version.
+
+    No link is followed: neither one that `path` is, nor one that it becomes meanwhile. What `is_new` takes the place
+    of nothing. Raises ScriptStoreError.
+    """
+    try:
+        content = text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        line = text.count("\n", 0, error.start) + 1
+        raise ScriptStoreError(f"{name}: line {line}: holds half of a character, which no file can hold") from None
+    if len(content) > LARGEST:
+        raise ScriptStoreError(f"{name}: has {len(content)} bytes; at most {LARGEST} are kept")
+    if not is_new and _has_windows_line_ends(path):
+        text = text.replace("\n", "\r\n")
+    with _naming_errors(name):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        writing.write_new(path, text) if is_new else writing.write(path, text, through_links=False)
+    return _version_of(path)
+
+
+def _version_of(path: Path) -> str:
+    """Return what changes whenever the file does, '' where it is not there."""
+    try:
+        state = path.stat()
+    except (OSError, ValueError):
+        return ""
+    return f"{state.st_mtime_ns}-{state.st_size}-{state.st_ino}"
+
+
+def _has_windows_line_ends(path: Path) -> bool:
+    try:
+        content = read_bytes(path, LARGEST)
+    except (OSError, ValueError):
+        return False
+    return 2 * content.count(b"\r\n") > content.count(b"\n")
+
+
+@contextlib.contextmanager
+def _naming_errors(name: str) -> Iterator[None]:
+    """Let what goes wrong with a file be told in one line: errno's words with the file, or our own."""
+    try:
+        yield
+    except OSError as error:
+        said = f"{error.filename}: {os.strerror(error.errno)}" if error.errno and error.filename else str(error)
+        raise ScriptStoreError(f"{name}: {said}") from None
+    except ValueError as error:
+        raise ScriptStoreError(f"{name}: {error}") from None

@@ -1,1 +1,0 @@
-"""Keys, sticks and gamepads of the browsers, as commands."""

@@ -1,0 +1,71 @@
+"""`rosrun drone_sim cockpit`: its parameters are checked, the page is served, the rest is imported meanwhile."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import rospy
+
+from drone_sim.files.resources import locate
+from drone_sim.message_text import near_names, shown
+from drone_sim.ros.cockpit.server.address import address_file, print_to_terminal
+from drone_sim.ros.cockpit.server.page_server import PageServer
+from drone_sim.ros.core.shutdown import end_on_signals
+from drone_sim.ros.core.startup import from_shell, init_node, reported
+
+_NAME = "cockpit"
+_NODE = re.compile(r"[/A-Za-z][\w/]*", re.ASCII)
+
+
+class CockpitParameters(NamedTuple):
+    """Address and port as given, which `PageServer` checks; folder of scripts; the simulation's node."""
+
+    address: Any = "127.0.0.1"
+    port: Any = 8080
+    scripts: Path = Path("~/drone_scripts")  # not ~/drone_sim, where a checkout of this package may be
+    simulator: str = "drone_sim"
+
+
+def read_parameters(given: Any) -> CockpitParameters:
+    """Return what is set in a node's private parameters. Raises ValueError, and FileNotFoundError for a home."""
+    if not isinstance(given, Mapping):
+        raise ValueError(f"the node's parameters: must be a mapping, not {shown(given)}")
+    for name in given.keys() - set(CockpitParameters._fields):
+        raise ValueError(f"{name}: is no parameter of the cockpit; {near_names(name, CockpitParameters._fields)}")
+    folder = given.get("scripts", str(CockpitParameters().scripts))
+    if not isinstance(folder, str) or not folder:
+        raise ValueError(f"scripts = {shown(folder)}: must be the name of a folder")
+    node = given.get("simulator", CockpitParameters().simulator)
+    if not isinstance(node, str) or not _NODE.fullmatch(node):
+        raise ValueError(f"simulator = {shown(node)}: must be the name of a node, such as drone_sim")
+    scripts = locate(from_shell(folder if folder.startswith(("/", "~")) else f"./{folder}"))
+    return CockpitParameters(**{**given, "scripts": scripts, "simulator": node})
+
+
+def main() -> int:
+    """Serve until the node ends; return the exit status."""
+    # There may be several. Its time is the person's, who looks on while /clock stands still.
+    if not init_node(_NAME, anonymous=True, disable_rostime=True, disable_signals=True):
+        return 1
+    end_on_signals()
+    return reported(_NAME, _serve)
+
+
+def _serve() -> None:
+    parameters = read_parameters(rospy.get_param("~", {}))
+    server = PageServer(parameters.address, parameters.port)
+    with address_file(server.address, server.port) as where:
+        print_to_terminal(f"the cockpit is at {server.addresses}")
+        rospy.loginfo(f"the cockpit listens at {server.address.partition('?')[0]}; {where}")
+
+        from drone_sim.ros.cockpit.cockpit import Cockpit  # which takes a second and more
+
+        Cockpit(server, parameters.simulator, parameters.scripts).run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

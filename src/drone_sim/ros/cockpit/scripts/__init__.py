@@ -1,1 +1,0 @@
-"""The scripts: kept, edited, flown where their texts say, graded."""

@@ -1,0 +1,117 @@
+"""Keys, sticks and gamepads of the browsers, as commands to one vehicle."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Empty
+
+from drone_sim.ros.core.message_conversion import twist
+from drone_sim.ros.tools.commands import Command
+
+_PERIOD = 0.1  # s between two commands while keys are held
+_SILENCE = 1.5  # s without a word from a browser after which its keys are released
+_FASTEST = 20.0  # m/s, rad/s; more is no speed that a page of ours asks for
+REQUESTS = ("takeoff", "land", "home", "reset")
+
+
+class HeldCommands:
+    """What the browsers' keys ask for: the command that changed last counts. Any thread may call it."""
+
+    def __init__(self, send: Callable[[Command], None], clock: Callable[[], float] = time.monotonic):
+        """`send` takes a command to the vehicle; `clock` returns s."""
+        self._send = send
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._held: dict[int, tuple[Command, float]] = {}  # command, and when it was last said, by browser
+        self._sent = Command()
+
+    def hold(self, browser: int, command: Command) -> None:
+        """Take what a browser's keys ask for now; it says so again while it holds them."""
+        with self._lock:
+            before = self._held.pop(browser, (Command(), 0.0))[0]
+            if command != Command():
+                self._held[browser] = command, self._clock()
+            if command != before:
+                self._send_latest()
+
+    def release(self, browser: int) -> None:
+        """Release the keys of a browser that has closed its connection."""
+        self.hold(browser, Command())
+
+    def repeat(self) -> None:
+        """Repeat the command in force, and release the keys of browsers that have fallen silent."""
+        with self._lock:
+            now = self._clock()
+            silent = [one for one, (_, said) in self._held.items() if now - said > _SILENCE]
+            for browser in silent:
+                del self._held[browser]
+            if self._held or silent:
+                self._send_latest()
+
+    def _send_latest(self) -> None:
+        command = next(reversed(self._held.values()))[0] if self._held else Command()
+        if command != Command() or self._sent != Command():
+            self._sent = command
+            self._send(command)
+
+    def run(self, is_running: Callable[[], bool]) -> None:
+        """Repeat it again and again, as long as `is_running` says so."""
+        while is_running():
+            time.sleep(_PERIOD)
+            self.repeat()
+
+
+def read_command(given: Any) -> Command:
+    """Return the command in a browser's message: vx, vy, vz (m/s), wz (rad/s). Raises ValueError."""
+    if not isinstance(given, Mapping) or not set(given) <= set(Command._fields):
+        raise ValueError(f"hold: must be a mapping of {', '.join(Command._fields)}")
+    for name, value in given.items():
+        if not isinstance(value, (int, float)) or isinstance(value, bool) or not abs(value) <= _FASTEST:
+            raise ValueError(f"hold/{name}: must be a number from -{_FASTEST:g} to {_FASTEST:g}")
+    return Command(**{name: float(value) for name, value in given.items()})
+
+
+class CommandPublisher:
+    """Publishes to the chosen vehicle. A topic needs a moment until its publisher is heard: `choose` comes before."""
+
+    def __init__(self) -> None:
+        """Begin without a vehicle."""
+        self.vehicle = ""
+        self._lock = threading.Lock()  # or one thread sends by what another has just put away
+        self._command: rospy.Publisher | None = None
+        self._requests: dict[str, rospy.Publisher] = {}
+
+    def choose(self, vehicle: str) -> None:
+        """Tell another vehicle what to do from now on, '' for none; the last one is stopped."""
+        if vehicle == self.vehicle:
+            return
+        self.send(Command())
+        with self._lock:
+            old = (self._command, *self._requests.values())
+            self.vehicle, self._command, self._requests = vehicle, None, {}
+        for one in old:
+            if one is not None:
+                one.unregister()
+        if vehicle:
+            self._command = rospy.Publisher(f"/{vehicle}/cmd_vel", Twist, queue_size=1)
+            self._requests = {topic: rospy.Publisher(f"/{vehicle}/{topic}", Empty, queue_size=1) for topic in REQUESTS}
+
+    def send(self, command: Command) -> None:
+        """Send a command, m/s and rad/s in the frame Track_base."""
+        with self._lock:
+            if self._command is not None:
+                self._command.publish(twist(command[:3], (0.0, 0.0, command.wz)))
+
+    def request(self, topic: str) -> str:
+        """Ask for what one of `REQUESTS` does; return one line for the user."""
+        publisher = self._requests.get(topic)
+        if publisher is None or not publisher.get_num_connections():
+            return f"{topic}: nobody listens"
+        publisher.publish(Empty())
+        return f"{topic} sent to {self.vehicle}"

@@ -1,0 +1,98 @@
+"""What the master knows: where the simulation's topics are, vehicles, their cameras, and sensors to plot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from geometry_msgs.msg import PointStamped, Vector3Stamped, WrenchStamped
+from sensor_msgs.msg import BatteryState, FluidPressure, Imu, MagneticField, NavSatFix, Range
+
+from drone_sim.ros.core.message_conversion import xyz
+
+_VIEW, _ODOMETRY = "/view/bodies", "/odom"
+_PICTURES, _COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
+_TRANSPORT = "/compressed"
+_COMMANDS = ("/push", "/set_wind")  # by this page, too: no sensors
+
+
+class ImageTopic(NamedTuple):
+    """A topic of pictures, and where they come compressed, '' where they do not."""
+
+    topic: str
+    compressed: str = ""
+
+
+class FoundTopics(NamedTuple):
+    """Namespace of what is shown ('' where there is no simulation), vehicles, all topics of pictures.
+
+    And the topics of sensors, with their types.
+    """
+
+    namespace: str = ""
+    vehicles: tuple[str, ...] = ()
+    cameras: tuple[ImageTopic, ...] = ()
+    sensors: Mapping[str, str] = {}
+
+
+def find_topics(topics: Iterable[tuple[str, str]]) -> FoundTopics:
+    """Return what is among the published topics, given with their types."""
+    kinds = dict(topics)
+    views = [name.removesuffix(_VIEW) for name in kinds if name.endswith(_VIEW)]
+    if not views:
+        return FoundTopics()
+    vehicles = [name.removesuffix(_ODOMETRY).lstrip("/") for name in kinds if name.endswith(_ODOMETRY)]
+    own = [name for name in sorted(vehicles) if f"/{name}/propellers" in kinds]
+    inside = tuple(f"/{name}/" for name in own)
+    measured = (name for name in sorted(kinds) if name.startswith(inside) and not name.endswith(_COMMANDS))
+    sensors = {name: kinds[name] for name in measured if kinds[name] in PLOTTED}
+    return FoundTopics(sorted(views)[0], tuple(own), tuple(_cameras(kinds)), sensors)
+
+
+def _cameras(kinds: Mapping[str, str]) -> Iterator[ImageTopic]:
+    """Yield each topic of pictures once, however many transports it has."""
+    packed = {
+        name.removesuffix(_TRANSPORT): name
+        for name, kind in kinds.items()
+        if kind == _COMPRESSED and name.endswith(_TRANSPORT)
+    }
+    plain = {name for name, kind in kinds.items() if kind == _PICTURES}
+    for name in sorted(packed.keys() | plain):
+        yield ImageTopic(name, packed.get(name, ""))
+
+
+class PlottedMessage(NamedTuple):
+    """A kind of message, the names of its numbers, and what returns these."""
+
+    message: type
+    names: tuple[str, ...]
+    numbers: Callable[[Any], tuple[float, ...]]
+
+
+def _axes(what: str, unit: str) -> tuple[str, ...]:
+    return tuple(f"{what} {axis}, {unit}" for axis in "xyz")
+
+
+PLOTTED = {
+    one.message._type: one  # type: ignore[attr-defined]
+    for one in (
+        PlottedMessage(
+            Imu,
+            (*_axes("acceleration", "m/s²"), *_axes("rate", "rad/s")),
+            lambda m: (*xyz(m.linear_acceleration), *xyz(m.angular_velocity)),
+        ),
+        PlottedMessage(Range, ("range, m",), lambda m: (m.range if math.isfinite(m.range) else math.nan,)),
+        PlottedMessage(MagneticField, _axes("field", "T"), lambda m: xyz(m.magnetic_field)),
+        PlottedMessage(FluidPressure, ("pressure, Pa",), lambda m: (m.fluid_pressure,)),
+        PlottedMessage(NavSatFix, ("altitude, m",), lambda m: (m.altitude,)),
+        PlottedMessage(BatteryState, ("voltage, V", "current, A"), lambda m: (m.voltage, m.current)),
+        PlottedMessage(PointStamped, _axes("point", "m"), lambda m: xyz(m.point)),
+        PlottedMessage(Vector3Stamped, _axes("vector", "m/s"), lambda m: xyz(m.vector)),
+        PlottedMessage(
+            WrenchStamped,
+            (*_axes("force", "N"), *_axes("torque", "N m")),
+            lambda m: (*xyz(m.wrench.force), *xyz(m.wrench.torque)),
+        ),
+    )
+}

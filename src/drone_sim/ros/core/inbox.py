@@ -1,0 +1,68 @@
+"""Where ROS's threads leave work for the thread that owns the simulation."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future, wait
+from queue import SimpleQueue
+from typing import Any
+
+_PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
+
+
+class Inbox:
+    """Jobs from any thread, carried out between two steps, in the order in which they came."""
+
+    def __init__(
+        self,
+        patience: float = _PATIENCE,
+        sleep: Callable[[float], Any] | None = None,
+        wake: Callable[[], Any] = lambda: None,
+    ):
+        """Start empty; whoever asks waits for `patience` (s).
+
+        `wait` sleeps by `sleep`, which `wake` ends, where others are to be heard meanwhile.
+        """
+        self._patience = patience
+        self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._came = threading.Event()
+        self._sleep, self._wake = sleep or self._came.wait, wake
+
+    def put(self, job: Callable[[], None]) -> None:
+        """Leave a job and go on."""
+        self._jobs.put(job)
+        self._came.set()
+        self._wake()
+
+    def ask(self, job: Callable[[], str]) -> str:
+        """Leave a job, wait until it is done, and return its answer; raises what it raised.
+
+        Raises TimeoutError where the answer does not come in time; a job that has not begun by then never will.
+        """
+        answer: Future[str] = Future()
+
+        def carry_out() -> None:
+            if answer.set_running_or_notify_cancel():
+                try:
+                    answer.set_result(job())
+                except Exception as error:
+                    answer.set_exception(error)
+
+        self.put(carry_out)
+        if not wait([answer], self._patience).done:
+            late = "it will not be carried out" if answer.cancel() else "it is still being carried out"
+            raise TimeoutError(f"no answer within {self._patience:g} s: {late}")
+        return answer.result()
+
+    def wait(self, seconds: float) -> None:
+        """Sleep until a job comes, or for so long."""
+        self._sleep(seconds)
+
+    def empty(self) -> None:
+        """Carry out all that has come by now. The simulation's thread calls it."""
+        if not self._came.is_set():
+            return
+        self._came.clear()
+        for _ in range(self._jobs.qsize()):  # what comes meanwhile waits: a flood must not hold up the step
+            self._jobs.get_nowait()()

@@ -1,0 +1,44 @@
+"""Who connects to a node, to listen to a topic or to call a service: as many at once as come, none waits for another.
+
+rospy lets five callers wait at the door; TCP has whoever comes then try again after 1, 3 and 7 s. And one thread lets
+them in and hears them out in turn: a caller that says nothing, or stands still, keeps all others out for good.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rospy.impl import tcpros_base
+
+_WAITING = 128  # connections that may wait, as many as rospy's XML-RPC server allows
+_SAYS = 10.0  # s, until a connection must have said something
+
+_Inbound = Callable[[socket.socket, Any], None]
+
+
+def take_connections() -> None:
+    """Let each connection of this node be taken in a thread of its own; to be called once, after rospy.init_node."""
+    tcpros_base.start_tcpros_server()
+    server = tcpros_base._tcpros_server.tcp_ros_server  # rospy has no other way to either
+    server.server_sock.listen(_WAITING)
+    server.inbound_handler = _in_a_thread(server.inbound_handler)
+
+
+def _in_a_thread(inbound: _Inbound) -> _Inbound:
+    def heard(connection: socket.socket, address: Any) -> None:
+        with contextlib.suppress(OSError):
+            connection.settimeout(_SAYS)
+            connection.recv(1, socket.MSG_PEEK)
+            connection.settimeout(None)
+            return inbound(connection, address)
+        connection.close()
+        return None
+
+    def take(connection: socket.socket, address: Any) -> None:
+        threading.Thread(target=heard, args=(connection, address), daemon=True).start()
+
+    return take

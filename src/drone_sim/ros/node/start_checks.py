@@ -1,0 +1,93 @@
+"""What is checked before the node starts: roslaunch's arguments, and other simulators under the same master."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import rosgraph
+import rospy
+
+from drone_sim.files.resources import package_path
+from drone_sim.message_text import near_names
+from drone_sim.ros.core.network import answers, call
+from drone_sim.run.parameters import ParameterError
+
+_SUFFIXES = (".launch", ".xml", ".test")
+_OURS = "set_vehicles"  # a service that every simulator has, and nobody else
+_OF_A_VEHICLE = "odom"
+_CLOCK = "/clock"
+
+
+def check_launch_arguments() -> None:
+    """Raise ParameterError for an argument on roslaunch's command line that the launch file does not have.
+
+    roslaunch leaves such a one out, without a word. Looks only where this process's parent is a roslaunch of one of
+    ours alone: what another launch file, that includes it, does with its own arguments is not known here, and roslaunch
+    itself refuses wrong ones of an include.
+    """
+    parent = Path(f"/proc/{os.getppid()}")
+    try:
+        command = (parent / "cmdline").read_bytes().decode(errors="replace").split("\0")
+        folder = Path(os.readlink(parent / "cwd"))
+    except OSError:  # not on Linux, or the parent has ended
+        return
+    check(command, folder)
+
+
+def check(command: Sequence[str], folder: Path) -> None:
+    """Raise ParameterError for a wrong argument of a command that was given in a folder."""
+    arguments = _arguments(command)
+    files = [number for number, one in enumerate(arguments) if one.endswith(_SUFFIXES) and ":=" not in one]
+    for launch in sorted((package_path() / "launch").glob("*.launch")):
+        if len(files) == 1 and _is(launch, arguments, files[0], folder):
+            known = [str(one.get("name")) for one in ElementTree.parse(launch).getroot().findall("arg")]
+            for argument in arguments:
+                name, given, _ = argument.partition(":=")
+                if given and not name.startswith("__") and name not in known:
+                    raise ParameterError(f"{argument}: {launch.name} has no argument {name}; {near_names(name, known)}")
+
+
+def _arguments(command: Sequence[str]) -> list[str]:
+    """Return what follows `roslaunch`; nothing for another program."""
+    for number, word in enumerate(command[:2]):  # python may come first
+        if Path(word).name == "roslaunch":
+            return list(command[number + 1 :])
+    return []
+
+
+def _is(launch: Path, arguments: Sequence[str], number: int, folder: Path) -> bool:
+    """Whether an argument means that launch file, as a path or as `PACKAGE FILE`."""
+    if number and arguments[number - 1] == "drone_sim" and arguments[number] == launch.name:
+        return True
+    path = folder / arguments[number]
+    return path.is_file() and path.samefile(launch)
+
+
+# ---- other simulators
+
+
+def check_others(vehicles: Iterable[str], simulated: bool) -> None:
+    """Raise ValueError where another simulator flies one of `vehicles`, or tells the time that this one would tell.
+
+    No two may fly the same vehicle, and one alone tells the time.
+    """
+    uri = rosgraph.get_master_uri()
+    published, _, services = map(dict, call(uri, "getSystemState"))
+    own = rospy.get_name()
+
+    def others(topic: str) -> list[str]:
+        """Return the simulators that publish a topic, and still answer."""
+        nodes = [one for one in published.get(topic, ()) if one != own and one in services.get(f"{one}/{_OURS}", ())]
+        return [one for one in nodes if answers(uri, one)]
+
+    for name in vehicles:
+        there = others(rospy.resolve_name(f"{name}/{_OF_A_VEHICLE}"))
+        if there:
+            cure = "a namespace (__ns:=a, or ns of <include>), or another drone/name"
+            raise ValueError(f"vehicle {name} flies already, in {there[0]}: give one of the two {cure}")
+    if simulated and others(_CLOCK):
+        cure = "only in real time can two run under one master (use_sim_time:=false)"
+        raise ValueError(f"/use_sim_time is true, and {others(_CLOCK)[0]} tells the time already: {cure}")

@@ -1,0 +1,156 @@
+"""Topics, services, parameters and frames of child scripts through rospy: a Backend (scripting/api/backend.py)."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import genpy
+import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from rosgraph.names import is_legal_name
+from sensor_msgs.msg import Image as ImageMessage
+
+from drone_sim.ros.core.message_conversion import fill, message_class, service_class
+from drone_sim.scripting.api.backend import Ask, Image
+from drone_sim.scripting.api.service_servers import Unanswered
+
+_LONGEST = 1.0  # s: the simulation waits meanwhile
+
+
+class RosBackend:
+    """Subscribes and advertises any installed message type."""
+
+    def __init__(self, is_of_a_camera: Callable[[str], bool], stamp: Callable[[], rospy.Time]):
+        """Take what messages are stamped with.
+
+        `is_of_a_camera` tells the topics on which the node's own cameras publish already.
+        """
+        self._is_of_a_camera, self._stamp = is_of_a_camera, stamp
+        self._broadcaster: tf2_ros.TransformBroadcaster | None = None
+
+    def time(self) -> float:
+        """Return what messages are stamped with, in s."""
+        return float(self._stamp().to_sec())
+
+    def send_transforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
+        """Broadcast frames; what has no stamp gets that of the step."""
+        self._broadcaster = self._broadcaster or tf2_ros.TransformBroadcaster()
+        made = [fill(TransformStamped(), one, "geometry_msgs/TransformStamped") for one in transforms]
+        for one in made:
+            one.header.stamp = one.header.stamp or self._stamp()
+        self._broadcaster.sendTransform(made)
+
+    def parameter(self, name: str) -> Any:
+        """Return a parameter, None where it is not set."""
+        return rospy.get_param(name, None)
+
+    def set_parameter(self, name: str, value: Any) -> None:
+        """Set a parameter."""
+        rospy.set_param(name, value)
+
+    def delete_parameter(self, name: str) -> None:
+        """Forget a parameter, if it is set."""
+        with contextlib.suppress(KeyError):
+            rospy.delete_param(name)
+
+    def call_service(self, name: str, kind: str, request: Any) -> Any:
+        """Return the response of a service of a type such as std_srvs/Trigger.
+
+        Raises ValueError where the type is not installed, the request does not fit, or no answer comes within a second.
+        """
+        found = service_class(kind)
+        filled = fill(found._request_class(), request, f"{kind}Request")
+        answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+        def ask() -> None:
+            try:
+                rospy.wait_for_service(name, _LONGEST)
+                answers.put(rospy.ServiceProxy(name, found)(filled))
+            except (rospy.ROSException, rospy.ServiceException) as error:
+                answers.put(error)
+
+        threading.Thread(target=ask, name=f"service {name}", daemon=True).start()
+        try:
+            answer = answers.get(timeout=_LONGEST)
+        except queue.Empty:
+            raise ValueError(f"the service {name} does not answer within {_LONGEST:g} s") from None
+        if isinstance(answer, Exception):
+            raise ValueError(f"the service {name}: {' '.join(str(answer).split())}")
+        return answer
+
+    def serve(self, name: str, kind: str, ask: Ask) -> Callable[[], None]:
+        """Offer a service, each of whose requests is handed to `ask` in a thread of rospy's; return what ends that.
+
+        Raises ValueError where the type is not installed, or the name is none, or is this node's already.
+        """
+        found = service_class(kind)
+        if not is_legal_name(name) or name.endswith("/"):
+            raise ValueError(f"'{name:.80}' is no name of a service: letters, digits, _ and / are allowed")
+
+        def handle(request: genpy.Message) -> genpy.Message:
+            try:
+                return ask(request, lambda fields: fill(found._response_class(), fields, f"{kind}Response"))
+            except Unanswered as error:
+                raise rospy.ServiceException(str(error)) from None
+
+        try:
+            server = rospy.Service(name, found, handle)
+        except rospy.ServiceException as error:
+            raise ValueError(" ".join(str(error).split())) from None
+        return lambda: server.shutdown("the script ended")
+
+    def subscribe(self, topic: str, kind: str, take: Callable[[Any], None]) -> Callable[[], None]:
+        """Call `take` with every message, in rospy's thread; return what ends that."""
+        return rospy.Subscriber(topic, message_class(kind), take, queue_size=10).unregister
+
+    def advertise(self, topic: str, kind: str, queue: int, latch: bool) -> _Sender:
+        """Advertise a topic."""
+        made = message_class(kind)
+        return _Sender(rospy.Publisher(topic, made, queue_size=queue, latch=latch), made, self._stamp)
+
+    def advertise_image(self, topic: str, queue: int) -> Any:
+        """Advertise an image topic; one that a camera publishes already stays the camera's."""
+        if self._is_of_a_camera(topic):
+            rospy.loginfo(f"{topic}: the node's camera publishes it already; the script's images are not sent twice")
+            return _Silence()
+        return _ImageSender(rospy.Publisher(topic, ImageMessage, queue_size=queue), ImageMessage, self._stamp)
+
+
+class _Sender:
+    def __init__(self, publisher: rospy.Publisher, made: type[genpy.Message], stamp: Callable[[], rospy.Time]):
+        self._publisher, self._made, self._stamp = publisher, made, stamp
+
+    def publish(self, message: Any) -> None:
+        if self._publisher.get_num_connections():
+            self._stamp()  # /clock before the message
+        self._publisher.publish(fill(self._made(), message, self._made._type))
+
+    def subscribers(self) -> int:
+        return int(self._publisher.get_num_connections())
+
+    def shutdown(self) -> None:
+        self._publisher.unregister()
+
+
+class _ImageSender(_Sender):
+    def publish(self, image: Image) -> None:
+        message = self._made(width=image.width, height=image.height, encoding="rgb8", step=3 * image.width)
+        message.header.stamp, message.header.frame_id = self._stamp(), image.frame_id
+        message.data = image.data
+        self._publisher.publish(message)
+
+
+class _Silence:
+    def publish(self, _message: Any) -> None:
+        pass
+
+    def subscribers(self) -> int:
+        return 0
+
+    def shutdown(self) -> None:
+        pass

@@ -1,0 +1,336 @@
+"""`sim`: objects of the scene that a script makes, copies, names, and takes away; models of them in files.
+
+What is done in flight is undone by stop. A shape of a vehicle, and the floor, are none of the scene's objects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import atan2
+from typing import Any, TypeVar
+
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import CONSTANTS, bare
+from drone_sim.scripting.api.host import Operations, Surroundings
+from drone_sim.scripting.api.types import Handle, Name, Number, Numbers, SevenNumbers, ThreeNumbers, WrongValue, numbers
+
+_Value = TypeVar("_Value")
+_DENSITY = 1000.0  # kg/m³, of a shape without a mass of its own
+_RESPONDABLE, _STATIC = 8, 16  # options of createPureShape
+_PERSPECTIVE = 2  # an option of createVisionSensor
+_WHOLE_MODELS = 1  # an option of copyPasteObjects
+_THIN = 1e-3  # m, of planes and discs
+_PURE = ("cuboid", "sphere", "cylinder", "cone")  # by their numbers
+_PRIMITIVE = {
+    CONSTANTS[f"primitiveshape_{word}"]: word
+    for word in ("plane", "disc", "cuboid", "spheroid", "cylinder", "cone", "heightfield", "capsule")
+}
+_JOINTS = {CONSTANTS[f"joint_{word}_subtype"]: word for word in ("revolute", "prismatic", "spherical")}
+_VOLUMES = {
+    CONSTANTS[f"proximitysensor_{word}_subtype"]: word for word in ("pyramid", "cylinder", "disc", "cone", "ray")
+}
+
+
+class SceneObjects:
+    """Objects of the scene that a script makes, copies, names, and takes away; models of them in files."""
+
+    def __init__(self, surroundings: Surroundings):
+        """Take what may be done to the scene, and how something is done whole."""
+        self._operations, self._outside = surroundings.operations, surroundings.outside
+
+    def _do(self, action: Callable[[Operations], _Value]) -> _Value:
+        operations = self._operations
+        if operations is None:
+            raise ValueError("there is no scene here")
+        made: _Value = self._outside(lambda: action(operations))  # whole, whatever the script's time
+        return made
+
+    def _add(self, name: str, **said: Any) -> int:
+        return self._do(lambda scene: scene.add([{"name": scene.free_name(name), "alias": name, **said}])[0])
+
+    # ---- shapes
+
+    @sim("345")
+    def createPureShape(
+        self, primitiveType: int, options: int, sizes: ThreeNumbers, mass: Number, _precision: Any = None
+    ) -> int:
+        """Make a cuboid (0), sphere (1) or cylinder (2) of so many metres along x, y, z, and kg; return its handle.
+
+        `options`: 8 it is respondable, 16 static; the others change nothing. It stands at the origin of the world.
+        """
+        kind = _PURE[int(primitiveType)] if primitiveType in range(len(_PURE)) else ""
+        bits, (kilograms,) = int(options), numbers((mass,), 1)
+        shape = _shape(kind, numbers(sizes, 3), "0 (cuboid), 1 (sphere), 2 (cylinder)", primitiveType)
+        static, respondable = bool(bits & _STATIC), bool(bits & _RESPONDABLE)
+        return self._add(kind.capitalize(), **shape, mass=kilograms, static=static, respondable=respondable)
+
+    @sim("5")
+    def createPrimitiveShape(self, primitiveType: int, sizes: ThreeNumbers, _options: int = 0) -> int:
+        """Make a sim.primitiveshape_cuboid, _spheroid, _cylinder, _capsule, _plane or _disc; return its handle.
+
+        It stands at the origin of the world, static and not respondable, and weighs 1000 kg/m³.
+        """
+        kind = _PRIMITIVE.get(int(primitiveType), "")
+        x, y, z = numbers(sizes, 3)
+        flat = kind in ("plane", "disc")
+        known = "sim.primitiveshape_cuboid, _spheroid, _cylinder, _capsule, _plane, _disc"
+        shape = _shape(kind, (x, y, _THIN) if flat else (x, y, z), known, primitiveType)
+        mass = _DENSITY * x * y * (_THIN if flat else z)
+        return self._add(kind.capitalize(), **shape, mass=mass, static=True, respondable=False)
+
+    @sim("345", createShape="5")
+    def createMeshShape(
+        self, _options: int, _shadingAngle: Number, vertices: Numbers, indices: Numbers, *_: Any
+    ) -> int:
+        """Make a static shape of triangles, of vertices (m) and three of these each, from 0; return its handle."""
+        corners = [int(one) for one in indices]
+        if not vertices or len(vertices) % 3 or not corners or len(corners) % 3:
+            raise WrongValue("three numbers for each vertex, and three indices for each triangle, are expected")
+        points = numbers(vertices, len(vertices))
+        return self._do(lambda scene: scene.add_mesh(scene.free_name("Shape"), points, corners))
+
+    # ---- whatever else there is
+
+    @sim("345")
+    def createDummy(self, size: Number, _color: Any = None) -> int:
+        """Make a dummy at the origin of the world; return its handle.
+
+        Its name is Dummy, or Dummy0, Dummy1 and so on; setObjectPosition and setObjectParent put it somewhere.
+        """
+        (length,) = numbers((size,), 1)
+        return self._add("Dummy", kind="dummy", **({"size": length} if length else {}))
+
+    @sim("345")
+    def createJoint(
+        self, jointType: int, jointMode: int = 0, _options: int = 0, _sizes: Any = None, *_colors: Any
+    ) -> int:
+        """Make a sim.joint_revolute_subtype, _prismatic_ or _spherical_ at the origin; return its handle.
+
+        In sim.jointmode_force (4.x: _dynamic) it turns freely, in any other mode scripts move it.
+        """
+        if jointType not in _JOINTS:
+            raise ValueError(
+                f"no joint is of the type {jointType!r}: sim.joint_revolute_subtype, _prismatic_, _spherical_"
+            )
+        dynamic = jointMode == CONSTANTS["jointmode_force"]
+        return self._add("Joint", kind="joint", type=_JOINTS[jointType], mode="passive" if dynamic else "kinematic")
+
+    @sim("345")
+    def createForceSensor(self, _options: int, _intParams: Numbers, _floatParams: Numbers, *_color: Any) -> int:
+        """Make a force sensor at the origin; return its handle. It does not break."""
+        return self._add("Force_sensor", kind="force_sensor")
+
+    @sim("345")
+    def createProximitySensor(
+        self, sensorType: int, _subType: int, _options: int, _intParams: Numbers, floatParams: Numbers, *_color: Any
+    ) -> int:
+        """Make a sim.proximitysensor_ray_subtype, _cone_, _disc_, _cylinder_ or _pyramid_; return its handle.
+
+        Of `floatParams`, from 0: 0 offset and 1 range (m), 4 width of a pyramid's end (m), 7 radius (m), 9 angle (rad).
+        """
+        if sensorType not in _VOLUMES:
+            raise ValueError(
+                f"no proximity sensor is of the type {sensorType!r}: sim.proximitysensor_ray_subtype, _cone_"
+            )
+        kind, values = _VOLUMES[sensorType], numbers(floatParams, len(floatParams))
+        if len(values) < 10:
+            raise WrongValue("15 numbers are expected among floatParams")
+        said: dict[str, Any] = {"type": kind, "offset": values[0], "range": values[1]}
+        if kind in ("cone", "disc"):
+            said["angle"] = values[9]
+        if kind == "cylinder":
+            said["radius"] = values[7]
+        if kind == "pyramid":
+            said["angle"] = 2 * atan2(values[4] / 2, values[0] + values[1])
+        return self._add("Proximity_sensor", kind="proximity_sensor", **said)
+
+    @sim("345")
+    def createVisionSensor(self, options: int, intParams: Numbers, floatParams: Numbers, *_color: Any) -> int:
+        """Make a vision sensor; return its handle. `options`: 2 perspective, else orthographic.
+
+        `intParams`: width and height (px); `floatParams`: near and far plane (m), angle (rad), or size (m).
+        """
+        whole, values = numbers(intParams, len(intParams)), numbers(floatParams, len(floatParams))
+        if len(whole) < 2 or len(values) < 3:
+            raise WrongValue("width and height, and near, far and angle, are expected")
+        said = {"width": int(whole[0]), "height": int(whole[1]), "near": values[0], "far": values[1]}
+        key = "fov" if int(options) & _PERSPECTIVE else "size"
+        return self._add("Vision_sensor", kind="vision_sensor", **said, **{key: values[2]})
+
+    # ---- copies, names, removal
+
+    @sim("345")
+    def copyPasteObjects(self, handles: Sequence[Handle], options: int = 0) -> list[int]:
+        """Make copies of objects, in the same places; return their handles. What hung on another hangs on its copy.
+
+        `options`: 1 each with all that hangs on it. The copies of Ball are named Ball#0, Ball#1 and so on; a child
+        script on it is copied, too, and begins before the scripts are called the next time.
+        """
+        wanted = _handles(handles)
+        if int(options) & _WHOLE_MODELS:
+            return self._do(lambda scene: scene.copy([one for top in wanted for one in scene.model(top)]))
+        return self._do(lambda scene: scene.copy(wanted))
+
+    @sim("345")
+    def setObjectName(self, handle: Handle, name: Name) -> int:
+        """Give an object another name, which nothing else has (3.x). Return 1.
+
+        With sim.handleflag_altname it is the alias (4.2).
+        """
+        self._do(
+            lambda scene: scene.set_alias(bare(handle), name) if handle != bare(handle) else scene.rename(handle, name)
+        )
+        return 1
+
+    @sim("5")
+    def setObjectAlias(self, handle: Handle, alias: Name) -> None:
+        """Give an object another alias, which others may have, too (4.x)."""
+        self._do(lambda scene: scene.set_alias(handle, alias))
+
+    @sim("345")
+    def removeObject(self, handle: Handle) -> int:
+        """Take away an object, after its script's cleanup; what hangs on it stays. Return 1."""
+        return self.removeObjects([handle])
+
+    @sim("5")
+    def removeObjects(self, handles: Sequence[Handle], _later: bool = False) -> int:
+        """Take away objects; what hangs on them stays. Return 1."""
+        self._do(lambda scene: scene.remove(_handles(handles)))
+        return 1
+
+    @sim("345")
+    def removeModel(self, handle: Handle, _later: bool = False) -> int:
+        """Take away an object with all that hangs on it. Return how many objects are gone."""
+
+        def remove(scene: Operations) -> int:
+            going = scene.model(handle)
+            scene.remove(going)
+            return len(going)
+
+        return self._do(remove)
+
+    # ---- files
+
+    @sim("345")
+    def loadModel(self, filename: Name) -> int:
+        """Add the objects of a model (.ttm; .yaml) or scene file (.yaml), and the scripts on them; return a handle.
+
+        It is that of the first one. The file lies beside the scene file; what else it says is left aside.
+        """
+        return self._do(lambda scene: scene.load_model(filename))
+
+    @sim("345")
+    def saveModel(self, handle: Handle, filename: Name) -> int:
+        """Write an object and all that hangs on it into a file (.yaml) beside the scene file; return 1."""
+        self._do(lambda scene: scene.save_model(handle, filename))
+        return 1
+
+
+class Shapes:
+    """How shapes of the scene look, what they weigh, how large they are, and what they are made of."""
+
+    def __init__(self, surroundings: Surroundings):
+        """Take what may be done to the scene, and how something is done whole."""
+        self._do = SceneObjects(surroundings)._do
+
+    @sim("345")
+    def setShapeColor(self, handle: Handle, _colorName: Any, colorComponent: int, rgbData: Numbers) -> int:
+        """Give a shape, and all of its parts, another color: red, green, blue from 0 to 1. Return 1.
+
+        sim.colorcomponent_transparency takes one number, how opaque it is; other components change nothing.
+        """
+        if colorComponent == CONSTANTS["colorcomponent_transparency"]:
+            (opacity,) = numbers(rgbData if isinstance(rgbData, Sequence) else (rgbData,), 1)
+            self._do(lambda scene: scene.paint(handle, (None, None, None, opacity)))
+        elif colorComponent == CONSTANTS["colorcomponent_ambient_diffuse"]:
+            self._do(lambda scene: scene.paint(handle, (*numbers(rgbData, 3), None)))
+        return 1
+
+    @sim("345")
+    def getShapeColor(
+        self, handle: Handle, _colorName: Any = None, _colorComponent: int = 0
+    ) -> tuple[int, list[float]]:
+        """Return 1, and the color of a shape, of its first part: red, green, blue from 0 to 1."""
+        return 1, list(self._do(lambda scene: scene.color(handle))[:3])
+
+    @sim("345")
+    def setShapeMass(self, handle: Handle, mass: Number) -> None:
+        """Let a shape weigh so many kg; how they lie in it stays. What is static stays static."""
+        self._do(lambda scene: scene.change(handle, mass=numbers((mass,), 1)[0]))
+
+    @sim("45")
+    def getShapeBB(self, handle: Handle) -> tuple[ThreeNumbers, SevenNumbers]:
+        """Return the box around a shape along its own axes: its size (m), and position and quaternion in the shape."""
+        size, centre = self._do(lambda scene: scene.box(handle))
+        return list(size), [*centre, 0.0, 0.0, 0.0, 1.0]
+
+    @sim("45")
+    def setShapeBB(self, handle: Handle, size: ThreeNumbers) -> int:
+        """Scale a shape until the box around it has a size (m). Return 1."""
+        wanted = numbers(size, 3)
+
+        def scale(scene: Operations) -> None:
+            now, _ = scene.box(handle)
+            scene.scale([handle], [one / before for one, before in zip(wanted, now)])
+
+        self._do(scale)
+        return 1
+
+    @sim("345")
+    def scaleObject(self, handle: Handle, xScale: Number, yScale: Number, zScale: Number, _options: int = 0) -> None:
+        """Let an object be so many times as large along x, y and z; its mass grows with its volume."""
+        factors = numbers((xScale, yScale, zScale), 3)
+        self._do(lambda scene: scene.scale([handle], factors))
+
+    @sim("345")
+    def scaleObjects(self, handles: Sequence[Handle], scaleFactor: Number, scalePositionsToo: bool) -> None:
+        """Let objects be so many times as large, and as far from their parents if `scalePositionsToo`."""
+        (factor,) = numbers((scaleFactor,), 1)
+        self._do(lambda scene: scene.scale(_handles(handles), (factor, factor, factor), bool(scalePositionsToo)))
+
+    @sim("345")
+    def getObjectSizeFactor(self, handle: Handle) -> float:
+        """Return how much an object was scaled, along x."""
+        return self._do(lambda scene: scene.factors(handle)[0])
+
+    @sim("345")
+    def getObjectSizeValues(self, handle: Handle) -> list[float]:
+        """Return how much an object was scaled along x, y and z."""
+        return list(self._do(lambda scene: scene.factors(handle)))
+
+    @sim("345")
+    def groupShapes(self, handles: Sequence[Handle], _merge: bool = False) -> int:
+        """Make one rigid shape of several, with the name and the frame of the first; return its handle."""
+        return self._do(lambda scene: scene.group(_handles(handles)))
+
+    @sim("345")
+    def ungroupShape(self, handle: Handle) -> list[int]:
+        """Make a shape of each part of one; return their handles. Each weighs as much of it as it fills."""
+        return self._do(lambda scene: scene.ungroup(handle))
+
+
+def _handles(handles: Sequence[Handle]) -> list[int]:
+    if isinstance(handles, (int, float, str)):
+        raise WrongValue("a table of handles is expected")
+    return [int(one) for one in handles]
+
+
+def _shape(kind: str, sizes: tuple[float, ...], known: str, given: Any) -> dict[str, Any]:
+    """Return what a scene file says of a shape that fills so many metres along x, y, z. Raises ValueError."""
+    x, y, z = sizes
+    if kind in ("cuboid", "plane"):
+        return {"shape": "box", "size": [x, y, z]}
+    if kind in ("cylinder", "disc", "capsule", "sphere", "spheroid"):
+        ball = kind in ("sphere", "spheroid")
+        if x != y or (ball and x != z):
+            raise ValueError(
+                f"sizes = {x:g}, {y:g}, {z:g}: a {kind} here is round{' all over' if ball else ' about z'}"
+            )
+        if ball:
+            return {"shape": "sphere", "size": [x / 2]}
+        return (
+            {"shape": "capsule", "size": [x / 2, z - x]}
+            if kind == "capsule"
+            else {"shape": "cylinder", "size": [x / 2, z]}
+        )
+    raise ValueError(f"primitiveType = {given!r}: must be one of {known}")

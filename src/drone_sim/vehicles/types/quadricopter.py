@@ -1,0 +1,12 @@
+"""V-REP's quadricopter."""
+
+from __future__ import annotations
+
+from drone_sim.vehicles.types.vehicle_type import VehicleType
+
+
+class Quadricopter(VehicleType):
+    """V-REP's propellers 1 to 4."""
+
+    name = "quadricopter"
+    rotors = (("front_left", -1), ("back_left", +1), ("back_right", -1), ("front_right", +1))

@@ -1,0 +1,68 @@
+"""A scene that is changed while it lives, and how to see what it is like and what there is of everything."""
+
+import numpy as np
+import pybullet
+import yaml
+
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+SCENE = {
+    "objects": [
+        {"name": "Post", "shape": "box", "size": [0.2, 0.2, 2], "position": [3, 0, 1]},
+        {"name": "Hinge", "kind": "joint", "type": "revolute", "parent": "Post", "position": [0, -0.2, 0.9],
+         "rpy": [0, 1.5708, 0], "mode": "passive", "value": 0.3},
+        {"name": "Rod", "shape": "box", "size": [1, 0.05, 0.05], "parent": "Hinge", "position": [0.5, 0, 0],
+         "mass": 0.5},
+        {"name": "Ball", "shape": "sphere", "size": [0.2], "position": [5, 0, 2], "mass": 1},
+        {"name": "Sign", "shape": "box", "size": [0.1, 0.5, 0.5], "parent": "Ball", "position": [0, 0, 0.5]},
+        {"name": "Mark", "kind": "dummy", "parent": "Quadricopter_base", "position": [0, 0, 1]},
+        {"shape": "box", "size": [1, 1, 1], "position": [-5, 0, 0.5]},
+    ]
+}  # fmt: skip
+PART = {"shape": "box", "size": [0.1, 0.1, 0.1]}
+KINDS = {
+    "static": {"shape": "box", "size": [0.2, 0.3, 0.4]},
+    "free": {"shape": "cylinder", "size": [0.1, 0.3], "mass": 1.0},
+    "compound": {"shape": "compound", "parts": [PART, {**PART, "position": [0.2, 0, 0]}], "mass": 1.0},
+    "joint": {"kind": "joint", "type": "revolute", "mode": "passive"},
+    "dummy": {"kind": "dummy"},
+    "path": {"kind": "path", "points": [[0, 0, 0], [1, 0, 0]]},
+    "proximity sensor": {"kind": "proximity_sensor", "type": "ray", "range": 1.0},
+    "vision sensor": {"kind": "vision_sensor"},
+    "force sensor": {"kind": "force_sensor"},
+}
+
+
+def simulate(tmp_path, started=True):
+    """Return a simulation of the scene, flown by a script that does nothing."""
+    script = tmp_path / "still.py"
+    script.write_text("def sysCall_init(): pass\n", encoding="utf-8")
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(yaml.safe_dump(SCENE), encoding="utf-8")
+    loaded = parameters.load(
+        {"scene_file": str(scene), "drone": {"position": [0.0, 0.0, 2.0]}, "script_time_limit": 0.0}
+    )
+    return Simulation(loaded, script=str(script), started=started)
+
+
+def sizes(simulation):
+    """Return how much of everything there is, as far as one may count it."""
+    world, scene, tree = simulation.world, simulation.scene, simulation.context.objects
+    counted = (tree, list(tree.names), scene.entries, scene.objects, scene.visuals()[0], simulation.context.names)
+    inside = (scene._built, scene._places, scene._carried_bases, world._inertial_frames)
+    shared = (simulation.context.carried.shapes, simulation.context.link_names)
+    known = (world.joints._inertial, world.collision_filter._frozen, world.collision_filter._permeable)
+    return pybullet.getNumBodies(world._client), *(len(list(one)) for one in (*counted, *inside, *shared, *known))
+
+
+def picture(simulation):
+    """Return what the tree and the world are like: names, parents, places, looks, masses."""
+    tree, scene = simulation.context.objects, simulation.scene
+    objects = {
+        handle: (one.names, one.alias, one.kind, getattr(one.parent, "name", ""), getattr(one, "mass", 0.0))
+        for handle, one in ((handle, tree[handle]) for handle in tree)
+    }
+    visuals, poses = scene.visuals()
+    looks = [(visual.shape, visual.rgba) for visual in visuals]
+    return objects, looks, np.round([tree[handle].matrix() for handle in tree], 9).tolist(), np.round(poses, 6).tolist()

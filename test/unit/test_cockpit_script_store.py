@@ -1,0 +1,298 @@
+"""The cockpit's scripts and texts without a browser: what may be read and written, and what stands beside it."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_asked import LESSONS, Asked
+
+from drone_sim.files import writing
+from drone_sim.grading import tasks
+from drone_sim.ros.cockpit.editor.lessons import Lessons
+from drone_sim.ros.cockpit.editor.script_store import LARGEST, ScriptStore, ScriptStoreError
+
+STAGES = [
+    f"tutorial/{name}.py" for name in ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera")
+]
+
+
+@pytest.fixture(name="own")
+def _own(tmp_path):
+    """The user's folder, which is not there yet."""
+    return tmp_path / "mine"
+
+
+@pytest.fixture(name="store")
+def _store(tmp_path, own):
+    pilot = tmp_path / "pilot.py"
+    pilot.write_text("shipped", encoding="utf-8")
+    return ScriptStore(own, {"built-in": lambda: {"pilot.py": pilot}})
+
+
+@pytest.fixture(name="ask")
+def _ask(own, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    return Asked(ScriptStore(own))
+
+
+# ---- which files
+
+
+def test_a_script_of_the_package_becomes_a_copy(store, own):
+    pilot = store.find("built-in/pilot.py")
+    copy, version = store.save(pilot, "changed", "")
+    assert copy.name == "mine/pilot.py" and (own / "pilot.py").read_text() == "changed"
+    assert store.read(pilot)[0] == "shipped"
+    again, _ = store.save(copy, "changed again", version)
+    assert again == copy and store.original(copy) == "shipped"
+    assert store.save(pilot, "other", "")[0].name == "mine/pilot_2.py", "nothing is lost"
+
+
+def test_what_another_has_changed_is_not_overwritten_and_both_texts_can_be_kept(store, own):
+    script, version = store.save_as("x.py", "first")
+    assert store.version("mine/x.py") == version
+    (own / "x.py").write_text("theirs", encoding="utf-8")
+    assert store.version("mine/x.py") != version
+    assert store.save(script, "mine", version) is None and (own / "x.py").read_text() == "theirs"
+    _, version, other = store.keep_both("mine/x.py", "mine", True)
+    assert other == "mine/x_2.py" and (own / "x_2.py").read_text() == "theirs" and (own / "x.py").read_text() == "mine"
+    assert store.save(script, "mine again", version)
+    _, _, other = store.keep_both("mine/x.py", "third", False)
+    assert (
+        (own / "x.py").read_text() == "mine again"
+        and (own / "x_3.py").read_text() == "third"
+        and other == "mine/x_3.py"
+    )
+
+
+def test_a_file_that_is_gone_is_told_and_written_again(ask, own):
+    saved = ask("save_as", name="x.py", text="a")
+    digest = ask("look", script="mine/x.py")["digest"]
+    (own / "x.py").unlink()
+    assert ask("look", script="mine/x.py")["version"] == "" and ask("look", script="mine/x.py")["digest"] != digest
+    assert ask("save", script="mine/x.py", text="b", version=saved["version"]) == {"changed": True}
+    kept = ask("keep", script="mine/x.py", text="b", mine=False)
+    assert kept["text"] == "b" and kept["other"] == "" and (own / "x.py").read_text() == "b"
+
+
+@pytest.mark.parametrize(
+    "name", ["/etc/passwd", "mine/../../x.py", "built-in/../x", "tasks/hover/solution.py", "", None, 3, ["a"]]
+)
+def test_only_what_is_listed_is_read(ask, name):
+    with pytest.raises(ScriptStoreError, match="no such script"):
+        ask("open", script=name)
+
+
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        ("../x.py", "letters, digits"),
+        ("a/b.py", "letters, digits"),
+        (".x.py", "begins with neither"),
+        ("a\nb.py", "letters, digits"),
+        ("x.txt", "ends in .py or .lua"),
+        ("", "1 to 100"),
+        ("x" * 200 + ".py", "1 to 100"),
+        (None, "1 to 100"),
+    ],
+)
+def test_a_new_name_is_checked(store, own, name, words):
+    with pytest.raises(ScriptStoreError, match=words) as error:
+        store.save_as(name, "text")
+    assert "\n" not in str(error.value) and not own.exists()
+
+
+def test_a_name_that_is_taken_stays_as_it_is(store, own):
+    store.save_as("ü b.py", "first")
+    with pytest.raises(ScriptStoreError, match="is there already"):
+        store.save_as("ü b.py", "second")
+    assert (own / "ü b.py").read_text() == "first"
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda file: file.write_bytes(b"# fine\n\xff\xfe"), "line 2: is not UTF-8"),
+        (lambda file: file.write_bytes(b"#" * (LARGEST + 1)), "larger than 1 MiB"),
+        (os.mkfifo, "must be a regular file"),
+        (lambda file: file.mkdir(), "must be a regular file"),
+        (lambda file: file.symlink_to("/etc/hostname"), "a link that leads out of"),
+        (lambda file: file.symlink_to("nowhere.py"), "No such file"),
+    ],
+)
+def test_a_file_that_is_no_script_gets_one_line(ask, own, make, words):
+    own.mkdir()
+    make(own / "odd.py")
+    with pytest.raises(ScriptStoreError, match=words) as error:
+        ask("open", script="mine/odd.py")
+    assert "mine/odd.py" in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_name_that_is_no_utf8_is_opened_but_not_flown(ask, own):
+    own.mkdir()
+    Path(os.fsdecode(os.fsencode(own) + b"/\xff.py")).write_text("text")
+    name = ask("scripts")["groups"][-1]["scripts"][0]
+    assert json.loads(json.dumps(ask("open", script=name)))["text"] == "text" and ask("look", script=name)["version"]
+    with pytest.raises(ScriptStoreError, match="save it as another one"):
+        ask("run", script=name, lesson="")
+
+
+def test_lines_end_as_they_did(store, own):
+    own.mkdir()
+    (own / "dos.py").write_bytes(b"a\r\nb\r\n")
+    script = store.find("mine/dos.py")
+    text, version = store.read(script)
+    assert text == "a\nb\n"
+    store.save(script, "a\nc\nb\n", version)
+    assert (own / "dos.py").read_bytes() == b"a\r\nc\r\nb\r\n"
+
+
+def test_what_cannot_be_written_is_told(store, own, monkeypatch):
+    script, version = store.save_as("x.py", "kept")
+    with pytest.raises(ScriptStoreError, match="at most"):
+        store.save(script, "x" * (LARGEST + 1), version)
+    with pytest.raises(ScriptStoreError, match="half of a character"):
+        store.save(script, "\ud800", version)
+
+    def full(*_):
+        raise OSError(28, "No space left on device", str(own / "x.py"))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(ScriptStoreError, match=r"mine/x.py: .*No space left on device"):
+        store.save(script, "lost?", version)
+    assert (own / "x.py").read_text() == "kept" and len(list(own.iterdir())) == 1
+    with pytest.raises(ScriptStoreError, match=r"File exists|Not a directory"):
+        ScriptStore(own / "x.py", {}).save_as("y.py", "text")
+
+
+# ---- what is in the way
+
+
+def _link(place, outside):
+    place.symlink_to(outside)
+
+
+def _fifo(place, _outside):
+    os.mkfifo(place)
+
+
+def _folder(place, _outside):
+    place.mkdir()
+
+
+@pytest.mark.parametrize("put", [_link, _fifo, _folder])
+def test_whatever_has_the_name_nothing_is_written_through_it(store, own, tmp_path, put):
+    own.mkdir()
+    outside = tmp_path / "outside.py"
+    put(own / "pilot.py", outside)  # the link dangles
+    copy, version = store.save(store.find("built-in/pilot.py"), "text", "")
+    assert copy.name == "mine/pilot_2.py" and (own / "pilot_2.py").read_text() == "text"
+    put(own / "pilot_2_2.py", outside)
+    assert store.keep_both(copy.name, "mine", True)[2] == "mine/pilot_2_3.py"
+    put(own / "pilot_2_4.py", outside)
+    assert store.keep_both(copy.name, "other", False)[2] == "mine/pilot_2_5.py"
+    for name in ("mine/pilot.py", "mine/pilot_2_2.py"):
+        with pytest.raises(ScriptStoreError, match=rf"{name}: ") as error:
+            store.keep_both(name, "text", put is not _link)
+        assert "\n" not in str(error.value)
+    with pytest.raises(ScriptStoreError, match="is there already"):
+        store.save_as("pilot.py", "text")
+    assert not outside.exists() and version
+
+
+@pytest.mark.parametrize("put", [_link, _fifo, _folder])
+@pytest.mark.parametrize("how", ["save", "save as", "copy", "keep mine", "keep theirs"])
+def test_what_comes_between_look_and_write_leads_nowhere(store, own, tmp_path, monkeypatch, how, put):
+    """As when an archive is unpacked meanwhile: the last look is over, and the name is taken then."""
+    script, version = store.save_as("x.py", "first")
+    outside = tmp_path / "outside.py"
+    outside.write_text("theirs", encoding="utf-8")
+    acts = {
+        "save": ("x.py", lambda: store.save(script, "text", version)),
+        "save as": ("y.py", lambda: store.save_as("y.py", "text")),
+        "copy": ("pilot.py", lambda: store.save(store.find("built-in/pilot.py"), "text", "")),
+        "keep mine": ("x_2.py", lambda: store.keep_both("mine/x.py", "text", True)),
+        "keep theirs": ("x_2.py", lambda: store.keep_both("mine/x.py", "text", False)),
+    }
+    name, act = acts[how]
+
+    def before(function):
+        def meanwhile(*given, **options):
+            if not (own / name).is_symlink() and (not (own / name).exists() or name == "x.py"):
+                (own / name).unlink(missing_ok=True)
+                put(own / name, outside)
+            return function(*given, **options)
+
+        return meanwhile
+
+    for function in ("write", "write_new"):
+        monkeypatch.setattr(writing, function, before(getattr(writing, function)))
+    try:
+        act()
+    except ScriptStoreError as error:
+        assert "\n" not in str(error) and f"mine/{name}" in str(error)
+    assert outside.read_text() == "theirs"
+    assert not [one for one in own.iterdir() if one.name.startswith(".")], "no temporary file is left"
+
+
+def test_a_link_to_another_script_of_the_folder_stays_one(store, own):
+    script, _ = store.save_as("real.py", "first")
+    (own / "again.py").symlink_to("real.py")
+    again = store.find("mine/again.py")
+    assert store.save(again, "second", store.version(again.name))
+    assert (own / "again.py").is_symlink() and script.path.read_text() == "second"
+
+
+def test_a_folder_that_is_a_link_is_the_users_choice(tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to("real")
+    store = ScriptStore(tmp_path / "link", {})
+    script, version = store.save_as("x.py", "a")
+    assert store.save(script, "b", version) and (tmp_path / "real" / "x.py").read_text() == "b"
+
+
+# ---- texts beside them
+
+
+def test_every_stage_and_every_task_has_a_text_and_a_script(ask):
+    lists = ask("scripts")
+    groups = {one["name"]: one["scripts"] for one in lists["groups"]}
+    assert list(groups) == ["built-in", "tutorial", "tasks", "mine"] and lists["flown"] == "built-in/pilot.py"
+    assert groups["tutorial"] == STAGES and groups["tasks"] == [f"tasks/{name}.py" for name in tasks.names()]
+    for script in (*STAGES, *groups["tasks"]):
+        opened = ask("open", script=script)
+        lesson = ask("lesson", lesson=opened["lesson"])
+        assert lesson["script"] == script and lesson["text"].startswith("#") and len(lesson["text"]) > 500
+        assert "solution" not in opened["file"] and "solution" not in opened["text"].lower()
+    assert ask("open", script="built-in/pilot.py")["lesson"] == ""
+
+
+def test_ones_own_script_belongs_to_a_text_by_its_name(ask):
+    ask("save_as", name="2_elevation_of_mine.py", text="")
+    ask("save_as", name="hoverfly.py", text="")
+    assert ask("open", script="mine/2_elevation_of_mine.py")["lesson"] == "stage-2-elevation"
+    assert ask("lesson", lesson="stage-2-elevation")["script"] == "mine/2_elevation_of_mine.py"
+    assert ask("open", script="mine/hoverfly.py")["lesson"] == ""
+
+
+def test_a_section_ends_where_the_next_begins_and_code_is_no_heading(tmp_path):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "tutorial.md").write_text("# T\n## One\na\n```\n## no\n```\n## Two: b\n", encoding="utf-8")
+    found = [one for one in Lessons(tmp_path).all() if not one.task]
+    assert [(one.name, one.text) for one in found] == [("one", "## One\na\n```\n## no\n```"), ("two-b", "## Two: b")]
+
+
+def test_only_the_pictures_of_the_texts_are_served():
+    kind, content = LESSONS.picture("/docs/pictures/tutorial_loops.png")
+    assert kind == "image/png" and content.startswith(b"\x89PNG") and LESSONS.picture("/tasks/hover/picture.png")
+    for path in (
+        "/docs/pictures/../../setup.py",
+        "/tasks/hover/plan.yaml",
+        "/tasks/../../x/a.png",
+        "/docs/pictures/tutorial_no.png",
+    ):
+        assert LESSONS.picture(path) is None

@@ -1,0 +1,108 @@
+"""A second type of vehicle: six propellers, flown by the same script API."""
+
+import math
+
+import pytest
+
+from drone_sim.config.types import ParameterError
+from drone_sim.mechanics.state import Twist, Vector3
+from drone_sim.mechanics.urdf import UrdfError
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+HEXACOPTER = "package://drone_sim/config/hexacopter.yaml"
+
+
+@pytest.fixture(name="simulate")
+def _simulate():
+    made = []
+
+    def simulate(**overrides):
+        made.append(Simulation(parameters.load({"config": HEXACOPTER, **overrides})))
+        return made[-1]
+
+    yield simulate
+    for simulation in made:
+        simulation.close()
+
+
+def fly(simulation, seconds):
+    for _ in range(round(seconds / 0.05)):
+        simulation.step()
+    return simulation.drone.body.state
+
+
+def test_it_takes_off_and_hovers(simulate):
+    simulation = simulate(start="landed")
+    assert len(simulation.drone.propulsion.particle_velocities) == 6
+    assert str(simulation.drone.flight_state) == "landed" and simulation.drone.body.state.position[2] < 0.1
+    simulation.drone.ask("takeoff")
+    state = fly(simulation, 6.0)
+    assert str(simulation.drone.flight_state) == "flying"
+    assert state.position == pytest.approx((0, 0, 0.8), abs=0.05)
+    assert math.hypot(*state.linear_velocity) < 0.02
+
+
+@pytest.mark.parametrize("x, y, turn", [(0.5, 0, 0), (-0.3, 0.3, 0), (0, -0.5, 0), (0, 0, 0.5)])
+def test_it_follows_a_command(simulate, x, y, turn):
+    simulation = simulate()
+    simulation.drone.commands.receive(Twist(Vector3(x, y, 0), Vector3(0, 0, turn)))
+    state = fly(simulation, 4.0)
+    assert state.linear_velocity == pytest.approx((x, y, 0), abs=0.1)
+    assert state.angular_velocity[2] == pytest.approx(turn, abs=0.05)
+    assert state.position[2] == pytest.approx(0.8, abs=0.1)
+
+
+def test_each_propeller_has_a_script_and_blades(simulate):
+    simulation = simulate()
+    fly(simulation, 0.5)
+    objects, propulsion = simulation.context.objects, simulation.drone.propulsion
+    for number in range(1, 7):
+        name = f"Quadricopter_propeller_respondable{number}"
+        assert simulation.context.scripts.attached_to(name).parameters["particleVelocity"] > 4
+        assert name in objects and objects.path(objects.handle(name)).endswith(f"propeller[{number - 1}]/respondable")
+    assert list(propulsion.blades.angles) == [
+        f"blades_{place}_joint" for place in ("front_left", "left", "back_left", "back_right", "right", "front_right")
+    ]
+    assert sum(propulsion.law.thrusts) == pytest.approx(0.72 * 9.81, rel=0.05)
+
+
+def test_it_flies_beside_a_quadricopter(simulate):
+    simulation = simulate(
+        config="",
+        vehicles={
+            "four": {},
+            "six": {
+                "type": "hexacopter",
+                "urdf": "package://drone_sim/urdf/hexacopter.urdf",
+                "script": "hexacopter",
+                "control": {"thrust_gravity": 4.92},
+                "position": [0, 1.5, 0.8],
+            },
+        },
+    )
+    fly(simulation, 3.0)
+    assert [len(one.propulsion.particle_velocities) for one in simulation.vehicles.values()] == [4, 6]
+    assert [one.body.state.position[2] for one in simulation.vehicles.values()] == pytest.approx([0.8, 0.8], abs=0.05)
+
+
+def test_a_broken_propeller_is_one_of_the_first_four(simulate):
+    simulation = simulate(faults={"propellers": [1, 0.5, 1, 1]})
+    assert simulation.drone.propulsion.law.effectiveness == (1, 0.5, 1, 1, 1, 1)
+
+
+def test_a_snapshot_comes_again_to_the_bit(simulate):
+    simulation = simulate()
+    fly(simulation, 0.5)
+    simulation.drone.commands.receive(Twist(Vector3(1, 0, 0)))
+    snapshot = simulation.snapshot()
+    first = fly(simulation, 1.0)
+    simulation.restore(snapshot)
+    assert fly(simulation, 1.0) == first
+
+
+def test_a_type_that_there_is_not_and_a_urdf_of_another_are_named():
+    with pytest.raises(ParameterError, match=r"drone/type = .*hexacopte.*: no such type; .*hexacopter"):
+        parameters.load({"drone": {"type": "hexacopte"}})
+    with pytest.raises(UrdfError, match=r"drone\.urdf: no link propeller_left"):
+        Simulation(parameters.load({"drone": {"type": "hexacopter"}}))

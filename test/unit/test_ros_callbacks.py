@@ -1,0 +1,126 @@
+"""Callbacks run in rospy's threads: they read nothing of the simulation, check, and leave a job for its thread."""
+
+import threading
+from unittest import mock
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+import rospy
+from diagnostic_msgs.msg import KeyValue
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, Vector3Stamped, WrenchStamped
+from std_msgs.msg import Empty
+from visualization_msgs.msg import InteractiveMarkerFeedback
+
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.rviz import object_handles, vehicle_handles
+from drone_sim.ros.vehicle.inputs import VehicleInputs
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+from drone_sim.vehicles.commands import EMPTY, REQUESTS
+
+
+class OwnThreadOnly:
+    """A simulation that no other thread may look at."""
+
+    def __init__(self, simulation):
+        self._simulation, self._owner = simulation, threading.get_ident()
+
+    def __getattr__(self, name):
+        assert threading.get_ident() == self._owner, f"simulation.{name} is read in another thread"
+        return getattr(self._simulation, name)
+
+
+@pytest.fixture
+def simulation():
+    made = Simulation(parameters.load({"script": ""}))
+    yield OwnThreadOnly(made)
+    made.close()
+
+
+@pytest.fixture
+def callbacks(monkeypatch):
+    """Return what has been subscribed, by topic."""
+    found = {}
+
+    def subscriber(topic, _kind, callback, **_):
+        found[topic] = callback
+        return mock.MagicMock()
+
+    monkeypatch.setattr(rospy, "Subscriber", subscriber)
+    for module in (vehicle_handles, object_handles):
+        monkeypatch.setattr(module, "MarkerServer", mock.MagicMock())
+    return found
+
+
+def in_another_thread(callback, message):
+    failed = []
+
+    def run():
+        try:
+            callback(message)
+        except BaseException as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert not failed, failed[0]
+
+
+def placed(message, x=1.0):
+    pose = getattr(message.pose, "pose", message.pose)
+    pose.position.x, pose.position.z, pose.orientation.w = x, 1.0, 1.0
+    return message
+
+
+MESSAGES = {
+    "cmd_vel": Twist(),
+    "goto": placed(PoseStamped()),
+    **{topic: Empty() for topic, kind in REQUESTS.items() if kind == EMPTY},
+    "set_pose": placed(PoseStamped(), 2.0),
+    "initialpose": placed(PoseWithCovarianceStamped(), 3.0),
+    "target_pose": placed(PoseStamped()),
+    "push": WrenchStamped(),
+    "set_wind": Vector3Stamped(),
+    "weather": KeyValue("wind", "[1, 0, 0]"),
+    "faults": KeyValue("commands/loss", "0.2"),
+}
+
+
+def test_what_a_vehicle_listens_to_is_checked_without_the_simulation(simulation, callbacks):
+    inbox = Inbox()
+    inputs = VehicleInputs(simulation, simulation.drone.parameters, inbox)
+    assert callbacks.keys() == {f"drone/{topic}" for topic in MESSAGES}
+    for topic, message in MESSAGES.items():
+        in_another_thread(callbacks[f"drone/{topic}"], message)
+    assert inputs.log.taken.keys() == MESSAGES.keys() and not inputs.log.refused
+    inbox.empty()
+    assert simulation.drone.body.state.position[0] == pytest.approx(3.0)
+
+
+def test_a_command_is_checked_against_what_has_been_tuned(simulation, callbacks):
+    inputs = VehicleInputs(simulation, simulation.drone.parameters, Inbox())
+    fast = Twist()
+    fast.linear.x = simulation.drone.parameters.cmd_vel_limits.linear + 1
+    in_another_thread(callbacks["drone/cmd_vel"], fast)
+    assert inputs.log.is_refusing("cmd_vel")
+    simulation.child_scripts["drone"].tuning.change({"cmd_vel_limits/linear": fast.linear.x})
+    inputs.follow(simulation.drone)
+    in_another_thread(callbacks["drone/cmd_vel"], fast)
+    assert not inputs.log.is_refusing("cmd_vel")
+
+
+@pytest.mark.parametrize("made", [vehicle_handles.VehicleHandles, object_handles.ObjectHandles])
+def test_a_handle_is_dragged_without_the_simulation(simulation, callbacks, made):
+    inbox = Inbox()
+    handles = made(simulation, inbox)
+    for event in ("MOUSE_DOWN", "POSE_UPDATE", "MOUSE_UP"):
+        feedback = InteractiveMarkerFeedback(marker_name="Drone", client_id="rviz")
+        feedback.event_type = getattr(InteractiveMarkerFeedback, event)
+        feedback.pose.position.x, feedback.pose.position.z, feedback.pose.orientation.w = 2.0, 1.0, 1.0
+        in_another_thread(handles._on_feedback, feedback)
+    inbox.empty()
+    is_moved = made is vehicle_handles.VehicleHandles
+    assert simulation.drone.body.state.position[0] == pytest.approx(2.0 if is_moved else 0.0, abs=1e-3)

@@ -1,0 +1,95 @@
+// Keys, sticks and gamepad, held as in a game: what they ask for is said at once, and again while they are held.
+const SPEED = 1; // m/s, rad/s
+const FAST = 2.5; // times, with Shift
+const AGAIN = 100; // ms
+const DEAD = 0.1; // of a stick's way
+const KEYS = {
+  KeyW: ["vx", 1], KeyS: ["vx", -1], KeyA: ["vy", 1], KeyD: ["vy", -1], KeyQ: ["wz", 1], KeyE: ["wz", -1],
+  KeyR: ["vz", 1], KeyF: ["vz", -1], ArrowUp: ["vz", 1], ArrowDown: ["vz", -1], ArrowLeft: ["wz", 1], ArrowRight: ["wz", -1],
+};
+const PAD = { vx: [3, -1], vy: [2, -1], vz: [1, -1], wz: [0, -1] }; // the standard gamepad's axes: down and right are +1
+const AXES = ["vx", "vy", "vz", "wz"];
+
+export class Teleop {
+  constructor(hold, show) {
+    this.hold = hold;
+    this.show = show;
+    this.keys = new Set();
+    this.sticks = { vx: 0, vy: 0, vz: 0, wz: 0 };
+    this.said = "{}";
+    setInterval(() => this.tell(true), AGAIN);
+  }
+
+  // Keys count in the page and in the scene, but not where somebody writes, reads or moves a bar; a slider has its arrows.
+  listenTo(window) {
+    const writes = (target) => target.closest?.("input:not([type=checkbox], [type=radio]), textarea, select, article, [contenteditable], [role=separator]");
+    const takes = ({ code, target }) => writes(target) || (code.startsWith("Arrow") && target.closest?.("[role=slider]"));
+    window.addEventListener("keydown", (event) => {
+      if (event.key === "Shift") this.fast = true;
+      if (!(event.code in KEYS) || takes(event) || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      event.stopPropagation(); // viser moves its eyes by the same keys
+      this.keys.add(event.code);
+      this.tell();
+    }, true);
+    window.addEventListener("keyup", (event) => {
+      if (event.key === "Shift") this.fast = false;
+      this.keys.delete(event.code);
+      this.tell();
+    }, true);
+    window.addEventListener("blur", () => this.release());
+    window.document.addEventListener("visibilitychange", () => this.release());
+  }
+
+  release() {
+    this.keys.clear();
+    this.fast = false;
+    this.tell();
+  }
+
+  stick(element, across, along) {
+    const knob = element.firstElementChild;
+    const move = (x, y) => {
+      const far = Math.max(1, Math.hypot(x, y));
+      this.sticks[across] = -x / far;
+      this.sticks[along] = -y / far;
+      knob.style.transform = `translate(${(30 * x) / far}px, ${(30 * y) / far}px)`;
+      this.tell();
+    };
+    const follow = (event) => {
+      const box = element.getBoundingClientRect();
+      move((2 * (event.clientX - box.left)) / box.width - 1, (2 * (event.clientY - box.top)) / box.height - 1);
+    };
+    element.addEventListener("pointerdown", (event) => {
+      element.setPointerCapture(event.pointerId);
+      follow(event);
+    });
+    element.addEventListener("pointermove", (event) => event.buttons && follow(event));
+    for (const end of ["pointerup", "pointercancel"]) element.addEventListener(end, () => move(0, 0));
+  }
+
+  command() {
+    const command = { ...this.sticks };
+    for (const code of this.keys) command[KEYS[code][0]] += KEYS[code][1];
+    for (const pad of navigator.getGamepads?.() ?? []) {
+      if (!pad) continue;
+      for (const axis of AXES) {
+        const value = pad.axes[PAD[axis][0]] ?? 0;
+        if (Math.abs(value) > DEAD) command[axis] += PAD[axis][1] * value;
+      }
+    }
+    const speed = SPEED * (this.fast ? FAST : 1);
+    for (const axis of AXES) command[axis] = Math.max(-1, Math.min(1, command[axis])) * speed + 0;
+    return command;
+  }
+
+  tell(again = false) {
+    const command = this.command();
+    const text = JSON.stringify(command);
+    const moves = AXES.some((axis) => command[axis]);
+    if (text === this.said && !(again && moves)) return;
+    this.said = text;
+    this.hold(command);
+    this.show(command);
+  }
+}
