@@ -49,7 +49,7 @@ packages() {
   echo bubblewrap python3-scipy python3-venv python3-dev python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri \
     catkin ros-environment librostest-dev python3-rospy python3-roslaunch python3-rostest rosbash \
     python3-rosbag python3-rostopic python3-rosnode python3-rosmsg python3-rosservice python3-cv-bridge python3-tf2-ros \
-    python3-tf2-msgs rviz python3-dynamic-reconfigure python3-geometry-msgs \
+    python3-tf2-msgs rviz python3-diagnostic-msgs python3-dynamic-reconfigure python3-geometry-msgs \
     python3-nav-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs python3-interactive-markers \
     python3-visualization-msgs python3-setuptools python3-yaml libdynamic-reconfigure-config-init-mutex-dev
 }
