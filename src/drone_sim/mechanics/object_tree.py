@@ -168,6 +168,10 @@ class ObjectTree:
         """Tell whether an object has that name."""
         return name in self._handles
 
+    def has(self, handle: int) -> bool:
+        """Tell whether an object has that handle."""
+        return handle in self._objects
+
     def handle_of(self, sought: SceneObject | None) -> int:
         """Return the handle of an object, WORLD for None."""
         return WORLD if sought is None else self._handles[sought.name]

@@ -113,14 +113,20 @@ class SceneObject:
         """Return a function that puts it back where it is now, under its present parent."""
         return saved(self, "parent", "local")
 
+    @property
+    def carrier(self) -> DynamicBody | None:
+        """The body that takes it along: its own, or that of what it hangs on; None where the dynamics moves none."""
+        one: SceneObject | None = self
+        while one is not None and one.body is None:
+            one = one.parent
+        return None if one is None else one.body
+
     def velocity(self) -> tuple[Vector, Vector]:
         """Return linear (m/s) and angular (rad/s) velocity in the world; zero where no body carries it."""
-        carrier = self
-        while carrier.body is None:
-            if carrier.parent is None:
-                return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-            carrier = carrier.parent
-        (x, y, z), _, linear, angular = carrier.body.state
+        carrier = self.carrier
+        if carrier is None:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        (x, y, z), _, linear, angular = carrier.state
         m, (wx, wy, wz) = self.matrix(), angular
         x, y, z = m[3] - x, m[7] - y, m[11] - z  # from the body's frame to this one
         return (linear[0] + wy * z - wz * y, linear[1] + wz * x - wx * z, linear[2] + wx * y - wy * x), angular

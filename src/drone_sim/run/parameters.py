@@ -61,6 +61,12 @@ class PaceParameters(Checked):
     real_time_factor: Annotated[Finite, Within(1e-3, 1e3, or_zero=True)]
 
 
+class PhysicsParameters(Checked):
+    """What of the textbook's dynamics V-REP leaves out."""
+
+    gyroscopic: Switch
+
+
 class Parameters(PaceParameters, EquipmentParameters):
     """Everything in config/drone.yaml."""
 
@@ -71,6 +77,7 @@ class Parameters(PaceParameters, EquipmentParameters):
     time_step: Annotated[Finite, Within(1e-4, 1)]
     sub_step: Annotated[Finite, Within(1e-5, 1)]
     gravity: Annotated[Finite, Within(-100, 100)]
+    physics: PhysicsParameters
     scene_file: FileName
     scene: SceneParameters
     drone: DroneParameters

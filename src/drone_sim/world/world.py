@@ -27,6 +27,7 @@ from drone_sim.world import assemblies, bodies
 from drone_sim.world.assemblies import Link
 from drone_sim.world.bullet_files import BulletFiles
 from drone_sim.world.collision_filter import CollisionFilter
+from drone_sim.world.gyroscopic_term import GyroscopicTerm, NoGyroscopicTerm
 from drone_sim.world.initial_poses import InitialPoses
 from drone_sim.world.joints import Joints
 from drone_sim.world.pictures import Pictures, Textures
@@ -50,8 +51,10 @@ def connect_ahead() -> None:
 class World:
     """A floor, objects and rigid bodies under gravity."""
 
-    def __init__(self, sub_step: float, gravity: float, gui: bool = False):
+    def __init__(self, sub_step: float, gravity: float, gui: bool = False, *, gyroscopic: bool = False):
         """Make an empty world that steps by `sub_step` (s); `gui` opens PyBullet's window.
+
+        `gyroscopic`: bodies turn as Euler's equations say, and not as in V-REP, which leaves out their term ω × Iω.
 
         Raises RuntimeError where `gui` finds no display.
         """
@@ -63,7 +66,7 @@ class World:
             raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
         # Of each file it reads PyBullet would keep the content for good, and none of ours is read twice.
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
-        self._sub_step, self._gravity = sub_step, gravity
+        self._sub_step, self._gravity, self._gyroscopic = sub_step, gravity, gyroscopic
         self._snapshots: set[int] = set()
         self._gui = gui
         if gui:
@@ -85,6 +88,9 @@ class World:
         self.pictures = Pictures(self._client, self._files.origin)
         self._textures = Textures(self._client, self._files)
         self.joints = Joints(self._client, self._look_anew)
+        self._gyroscopic_term = (
+            GyroscopicTerm(self._client, self._sub_step) if self._gyroscopic else NoGyroscopicTerm(self._client)
+        )
         self.collision_filter = CollisionFilter(self._client, self.pictures.moved)
         self.queries = Queries(self._client, self.collision_filter)
 
@@ -185,6 +191,7 @@ class World:
         del self._inertial_frames[body]
         self._initial_poses.forget(body)
         self.joints.forget(body)
+        self._gyroscopic_term.forget(body)
         self.collision_filter.forget(body)
         self._textures.forget(body)
         self._centres.pop(body, None)
@@ -219,6 +226,7 @@ class World:
             backwards = Pose(backwards.position, _NO_TURN)  # the very same one: `state` looks in every step
         self.changes = next(_changes)
         self._inertial_frames[number] = (inertial, backwards)
+        self._gyroscopic_term.add(number)
 
     # ---- dynamics
 
@@ -290,13 +298,16 @@ class World:
             pybullet.applyExternalTorque,
             pybullet.stepSimulation,
         )
+        begin, end = self._gyroscopic_term.begin_sub_step, self._gyroscopic_term.end_sub_step
+        turns: dict[int, Quaternion] = {}
         known = self._centres  # in the first sub-step
         loads = [(body, wrench.force, *wrench.terms) for body, wrench in wrenches.items()]
         if between is not None:
             between(0)
         for count in range(1, sub_steps + 1):
             for body, force, (torque_x, torque_y, torque_z), levers in loads:
-                centre, (x, y, z, w) = (known and known.get(body)) or where(body, client)
+                centre, turned_now = (known and known.get(body)) or where(body, client)
+                x, y, z, w = turns[body] = turned_now
                 pull(body, -1, force, centre, in_world, client)
                 for lx, ly, lz, ax, ay, az in levers:  # Wrench.torque_under, without a call
                     tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
@@ -305,7 +316,9 @@ class World:
                     torque_y += uz * ax - ux * az
                     torque_z += ux * ay - uy * ax
                 turn(body, -1, (torque_x, torque_y, torque_z), in_world, client)
+            begin(turns)
             step(client)
+            end()
             known = {}
             if between is not None:
                 between(count)

@@ -181,13 +181,13 @@ class Dynamics(Functions):
     @sim("345")
     def getObjectFloatParameter(self, handle: Handle, parameter: int) -> tuple[int, float]:
         """Return 1 and what getObjectFloatParam does; 0 and 0 for a parameter that is not known here."""
-        found = self._objects[handle]
+        found, moving = self._objects[handle], self._context.velocities.velocity
         known: dict[str, Callable[[], float]] = {
             "shapefloatparam_mass": lambda: self.getShapeMass(handle),
-            "objfloatparam_abs_x_velocity": lambda: found.velocity()[0][0],
-            "objfloatparam_abs_y_velocity": lambda: found.velocity()[0][1],
-            "objfloatparam_abs_z_velocity": lambda: found.velocity()[0][2],
-            "objfloatparam_abs_rot_velocity": lambda: sum(one * one for one in found.velocity()[1]) ** 0.5,
+            "objfloatparam_abs_x_velocity": lambda: moving(handle)[0][0],
+            "objfloatparam_abs_y_velocity": lambda: moving(handle)[0][1],
+            "objfloatparam_abs_z_velocity": lambda: moving(handle)[0][2],
+            "objfloatparam_abs_rot_velocity": lambda: sum(one * one for one in moving(handle)[1]) ** 0.5,
             "objfloatparam_size_factor": lambda: self._factor(handle),
             **(self._corners(handle) if isinstance(found, Freezable) else {}),
             **readable(found),

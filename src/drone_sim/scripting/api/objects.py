@@ -108,20 +108,17 @@ class Objects(Functions):
 
     @sim("345")
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame.
+        """Return the mean linear (m/s) and angular velocity (rad/s) of an object over the last step, in the world frame.
 
-        sim.handleflag_axis may be added to the handle, and changes nothing. V-REP takes the means over the last step,
-        and without the flag the Euler angles of the turn in the frame that the object had before it, over the step.
-        Here both are the angular velocity at the end of the step: see "Where this differs" in docs/scripts.md.
+        The angular velocity is the turn of that step as a rotation vector, over the step, with sim.handleflag_axis added
+        to the handle and without. See "Velocities and time" in docs/scripts.md.
         """
-        if handle >= AXIS:
-            handle = bare(handle)
-        linear, angular = self._objects[handle].velocity()
+        linear, angular = self._host.context.velocities.velocity(bare(handle) if handle >= AXIS else handle)
         return list(linear), list(angular)
 
     @sim("345")
     def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame."""
+        """Return what linear (m/s) and angular velocity (rad/s) an object has reached by now, in the world frame."""
         linear, angular = self._objects[handle].velocity()
         return list(linear), list(angular)
 

@@ -217,7 +217,7 @@ class ScriptCalls(_OnScripts):
     @sim("345")
     def getScriptExecutionCount(self) -> int:
         """Return in how many steps this script has been called before: 0 in the first one (3.0)."""
-        return round((self._context.clock.time - self._own.began) / self._context.clock.time_step)
+        return round((self._context.clock.script_time - self._own.began) / self._context.clock.time_step)
 
     @sim("345")
     def callScriptFunction(self, function: Name, script: Handle, *arguments: Any) -> Any:

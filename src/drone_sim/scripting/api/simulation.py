@@ -76,8 +76,8 @@ class SimulationFunctions(Functions):
 
     @sim("345")
     def getSimulationTime(self) -> float:
-        """Return the simulated time in seconds."""
-        return self._context.clock.time
+        """Return the simulated time in seconds; in the sensing phase that at which the step began."""
+        return self._context.clock.script_time
 
     @sim("345")
     def getSimulationTimeStep(self) -> float:
