@@ -15,7 +15,6 @@ from drone_sim.vrep_files.model import VrepScript
 
 _NUMBER = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*")
 _MOST_PARAMETERS = 256
-_IDLE = "-- The file's own scripts push this drone: nothing else is to.\nfunction sysCall_init()\nend\n"
 
 
 class ScriptFiles:
@@ -34,13 +33,7 @@ class ScriptFiles:
     def write(self, name: str, script: VrepScript) -> str:
         """Return the name of the file with a script of the object `name`."""
         suffix = ".py" if script.language == "python" else ".lua"
-        return self._file(name, script.text if script.text.endswith("\n") else f"{script.text}\n", suffix)
-
-    def idle(self) -> str:
-        """Return the name of a script that does nothing."""
-        return self._file("idle", _IDLE, ".lua")
-
-    def _file(self, name: str, text: str, suffix: str) -> str:
+        text = script.text if script.text.endswith("\n") else f"{script.text}\n"
         if (text, suffix) not in self._written:
             file = self._folder.free_name(name, suffix)
             self._folder.write(file, text)

@@ -144,10 +144,8 @@ class ImportedVehicle:
             parameters = values(own[0].parameters or self.root.object.parameters)
             script = {"script": files.write(self.root.name, own[0])}
             return {**script, "script_parameters": parameters} if parameters else script
-        if any("ddForce" in script.text for several in self._scripts.values() for script in several):
-            return {"script": files.idle()}
-        report.add(self.root.name, "has no child script: the built-in one flies it, or the one that is given")
-        return {}
+        report.add(self.root.name, "has no child script: only one that is given, as in script:=pilot, flies it")
+        return {"script": "none"}
 
     def _object(self, ours: str, one: Placed) -> dict[str, Any]:
         """Return how one of its objects is called, and where it is on what it hangs on in ours."""

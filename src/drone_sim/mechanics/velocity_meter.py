@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.clock import Clock
@@ -10,8 +11,15 @@ from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.saved_state import Restore, saved
 
-Velocity = tuple[Vector, Vector]  # m/s and rad/s, world frame
-_SMALL = 1e-12  # of the sine of half an angle
+
+class MeasuredVelocity(NamedTuple):
+    """linear: m/s, world; euler: V-REP's Euler angles of the turn, in the object's frame before it, rad/s;
+    rotation: the turn as a rotation vector, world, rad/s.
+    """
+
+    linear: Vector
+    euler: Vector
+    rotation: Vector
 
 
 class VelocityMeter:
@@ -30,7 +38,7 @@ class VelocityMeter:
         """Measure nothing yet."""
         self._before: dict[int, Matrix] = {}  # world from object, by handle
         self._now: dict[int, Matrix] = {}
-        self._measured: dict[int, Velocity] = {}  # of this step, as far as asked for
+        self._measured: dict[int, MeasuredVelocity] = {}  # of this step, as far as asked for
 
     def begin_step(self) -> None:
         """Look where everything is that the dynamics is about to move."""
@@ -46,15 +54,17 @@ class VelocityMeter:
             self._before, self._measured = self._now, {}
             self._now = {handle: self._objects[handle].matrix() for handle in self._now}
 
-    def velocity(self, handle: int) -> Velocity:
-        """Return linear and angular velocity; the first time in a run, those that the dynamics has reached.
+    def velocity(self, handle: int) -> MeasuredVelocity:
+        """Return the velocities; of what was put elsewhere since, and at first, those of the dynamics.
 
-        The angular velocity is the turn of the step as a rotation vector, over the step. Raises ValueError.
+        Raises ValueError.
         """
         found = self._objects[handle]
-        self._now.setdefault(handle, found.matrix())
-        if handle not in self._before:
-            return found.velocity()
+        matrix = found.matrix()
+        is_elsewhere = matrix != self._now.setdefault(handle, matrix)
+        if handle not in self._before or is_elsewhere:
+            linear, angular = found.velocity()
+            return MeasuredVelocity(linear, frames.rotate(frames.invert(matrix), angular), angular)
         if handle not in self._measured:
             self._measured[handle] = _mean(self._before[handle], self._now[handle], self._clock.time_step)
         return self._measured[handle]
@@ -64,9 +74,12 @@ class VelocityMeter:
         return saved(self, "_before", "_now", "_measured")
 
 
-def _mean(before: Matrix, now: Matrix, duration: float) -> Velocity:
-    x, y, z, w = frames.to_quaternion(frames.relative_turn(before, now))
+def _mean(before: Matrix, now: Matrix, duration: float) -> MeasuredVelocity:
+    turn = frames.relative_turn(before, now)
+    x, y, z, w = frames.to_quaternion(turn)
     sine = math.sqrt(x * x + y * y + z * z)
-    scale = (2 * math.atan2(sine, w) / sine if sine > _SMALL else 2.0) / duration
+    scale = (2 * math.atan2(sine, w) / sine if sine else 2.0) / duration
     linear = (now[3] - before[3]) / duration, (now[7] - before[7]) / duration, (now[11] - before[11]) / duration
-    return linear, frames.rotate(before, (x * scale, y * scale, z * scale))
+    alpha, beta, gamma = frames.to_euler(turn)
+    euler = alpha / duration, beta / duration, gamma / duration
+    return MeasuredVelocity(linear, euler, frames.rotate(before, (x * scale, y * scale, z * scale)))

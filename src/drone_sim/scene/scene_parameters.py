@@ -37,7 +37,8 @@ from drone_sim.scene.kinds import KINDS
 from drone_sim.scene.object_parameters import SHAPES, ObjectParameters
 
 MAX_OBJECTS = 1000
-WORLD = ("time_step", "sub_step", "gravity", "physics")  # what a scene file may say of these comes before the parameters
+# What a scene file may say of these comes before the parameters.
+WORLD = ("time_step", "sub_step", "gravity", "physics")
 BESIDE = ("drone", "vehicles", "weather", *WORLD)  # what a scene file holds besides the scene
 MAX_TRIANGLES = 500_000  # of all meshes of a scene, each counted as often as it stands there
 MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all its textures

@@ -18,6 +18,7 @@ from drone_sim.scripting.python.script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
 
 DEFAULT = "pilot"
+NO_SCRIPT = "none"  # what a vehicle says that has none, for others to fly it: the one that is given, or a client
 
 
 class Script(Protocol):

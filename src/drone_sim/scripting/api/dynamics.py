@@ -7,6 +7,7 @@ V-REP 3.x has it.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping
 from typing import Protocol, runtime_checkable
 
@@ -184,10 +185,10 @@ class Dynamics(Functions):
         found, moving = self._objects[handle], self._context.velocities.velocity
         known: dict[str, Callable[[], float]] = {
             "shapefloatparam_mass": lambda: self.getShapeMass(handle),
-            "objfloatparam_abs_x_velocity": lambda: moving(handle)[0][0],
-            "objfloatparam_abs_y_velocity": lambda: moving(handle)[0][1],
-            "objfloatparam_abs_z_velocity": lambda: moving(handle)[0][2],
-            "objfloatparam_abs_rot_velocity": lambda: sum(one * one for one in moving(handle)[1]) ** 0.5,
+            "objfloatparam_abs_x_velocity": lambda: moving(handle).linear[0],
+            "objfloatparam_abs_y_velocity": lambda: moving(handle).linear[1],
+            "objfloatparam_abs_z_velocity": lambda: moving(handle).linear[2],
+            "objfloatparam_abs_rot_velocity": lambda: math.hypot(*moving(handle).rotation),
             "objfloatparam_size_factor": lambda: self._factor(handle),
             **(self._corners(handle) if isinstance(found, Freezable) else {}),
             **readable(found),

@@ -43,17 +43,13 @@ class ScriptContext:
     gravity: float
     drawings: Drawings
     windows: Windows
-    objects: ObjectTree = field(default_factory=ObjectTree)
+    objects: ObjectTree
+    velocities: VelocityMeter  # of the objects
     scripts: Scripts = field(default_factory=Scripts)
     signals: Signals = field(default_factory=Signals)
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
-    velocities: VelocityMeter = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Measure the velocities of its objects."""
-        self.velocities = VelocityMeter(self.objects, self.clock)
 
     def clear(self) -> None:
         """Leave nothing there, as before a run; whoever holds one of them may go on to do so."""

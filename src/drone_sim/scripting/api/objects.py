@@ -108,13 +108,13 @@ class Objects(Functions):
 
     @sim("345")
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return the mean linear (m/s) and angular velocity (rad/s) of an object over the last step, in the world frame.
+        """Return an object's velocity (m/s, world) and angular velocity (rad/s): the means over the last step.
 
-        The angular velocity is the turn of that step as a rotation vector, over the step, with sim.handleflag_axis added
-        to the handle and without. See "Velocities and time" in docs/scripts.md.
+        The latter has the Euler angles of the step's turn, in the frame that the object had before it, over the step.
+        With sim.handleflag_axis added to the handle it is that turn as a rotation vector, in the world frame.
         """
-        linear, angular = self._host.context.velocities.velocity(bare(handle) if handle >= AXIS else handle)
-        return list(linear), list(angular)
+        measured = self._context.velocities.velocity(bare(handle) if handle >= AXIS else handle)
+        return list(measured.linear), list(measured.rotation if handle >= AXIS else measured.euler)
 
     @sim("345")
     def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
