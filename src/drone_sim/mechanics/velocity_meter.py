@@ -23,7 +23,7 @@ class MeasuredVelocity(NamedTuple):
 
 
 class VelocityMeter:
-    """Measures the objects that somebody has asked about: their mean velocities over the last step.
+    """Measures vehicles, and what else somebody has asked about: their mean velocities over the last step.
 
     What a script or a person puts elsewhere has not moved there, if the dynamics moves it or what carries it: only what
     happens between `begin_step` and `end_step` counts. All else moves whenever it is put.
@@ -39,6 +39,10 @@ class VelocityMeter:
         self._before: dict[int, Matrix] = {}  # world from object, by handle
         self._now: dict[int, Matrix] = {}
         self._measured: dict[int, MeasuredVelocity] = {}  # of this step, as far as asked for
+
+    def follow(self, handle: int) -> None:
+        """Measure an object from now on, before anybody asks."""
+        self._now.setdefault(handle, self._objects[handle].matrix())
 
     def begin_step(self) -> None:
         """Look where everything is that the dynamics is about to move."""
@@ -61,13 +65,26 @@ class VelocityMeter:
         """
         found = self._objects[handle]
         matrix = found.matrix()
-        is_elsewhere = matrix != self._now.setdefault(handle, matrix)
-        if handle not in self._before or is_elsewhere:
+        if handle not in self._now:
+            self._begin(handle, matrix)
+        if handle not in self._before or matrix != self._now[handle]:
             linear, angular = found.velocity()
             return MeasuredVelocity(linear, frames.rotate(frames.invert(matrix), angular), angular)
         if handle not in self._measured:
             self._measured[handle] = _mean(self._before[handle], self._now[handle], self._clock.time_step)
         return self._measured[handle]
+
+    def _begin(self, handle: int, now: Matrix) -> None:
+        """Measure one more object, which was carried through the last step like what it hangs on."""
+        above = self._objects[handle].parent
+        while above is not None:
+            carrier = self._objects.handle_of(above)
+            if carrier in self._before:
+                local = frames.relative(self._now[carrier], now)
+                self._before[handle] = frames.multiply(self._before[carrier], local)
+                break
+            above = above.parent
+        self._now[handle] = now
 
     def save_state(self) -> Restore:
         """Return a function that brings back what has been measured."""

@@ -84,6 +84,9 @@ class Vehicle:
         objects.add(self.body, rigid.links, self.propulsion.rotors.links, own.cameras, own.sensors)
         names = (one + self.suffix for one in (DRONE, TRACK_BASE, TARGET))
         self.object, self.track, self.target = (tree[tree.handle(name)] for name in names)
+        for handle in self.handles:
+            if tree[handle].body is not None:
+                self.context.velocities.follow(handle)
         self.propulsion.attach(own.propellers)
         self.commands.listening = []
         for camera in self.cameras.values():
