@@ -19,7 +19,6 @@ from drone_sim.run import parameters
 
 MASS, GRAVITY, ARM = 0.52, 9.81, 0.13  # kg, m/s², m: the recorded program's
 STRONGEST = 1.5 * MASS * GRAVITY  # N
-INERTIALESS = 1.0  # 1/(kg m²): the program's model takes torques for angular accelerations
 HORIZON = 10  # steps
 STATE_COST = (0.3, 0.3, 3.0, 0.01, 0.01, 0.1, 0.25, 0.25, 0.1, 0.0, 0.0, 0.0)
 CONTROL_COST = (0.1, 0.4, 0.4, 0.1)
@@ -83,7 +82,7 @@ class Controller:
         slope[3, 7], slope[4, 6] = GRAVITY, -GRAVITY
         effect = np.zeros((12, 4))
         effect[5, 0] = 1.0 / MASS
-        effect[[9, 10, 11], [1, 2, 3]] = INERTIALESS
+        effect[[9, 10, 11], [1, 2, 3]] = 1.0  # its model takes torques for angular accelerations
         self._model = np.eye(12) + slope * time_step, effect * time_step
         self._costs = np.diag(STATE_COST), np.diag(CONTROL_COST)
 
