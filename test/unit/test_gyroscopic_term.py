@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY
 from drone_sim.mechanics.state import Pose
+from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.box import Box
 from drone_sim.shapes.compound import Part
 from drone_sim.shapes.mass import inertia_of
@@ -59,18 +60,20 @@ def turning(world, body):
     return np.array(velocity), momentum, momentum @ velocity / 2
 
 
+@pytest.mark.parametrize("pushed", [False, True])
 @pytest.mark.parametrize("add", [add_box, add_box_on_a_hinge])
-def test_what_tumbles_keeps_its_angular_velocity_as_in_vrep(add):
+def test_what_tumbles_keeps_its_angular_velocity_as_in_vrep(add, pushed):
     with tumbling(False, add) as (world, body):
-        world.advance({}, 2000)
+        world.advance({body: Wrench()} if pushed else {}, 2000)
         assert turning(world, body)[0] == pytest.approx(TUMBLE, abs=1e-8)
 
 
-def test_the_textbooks_tumble_keeps_momentum_and_energy_over_10_s():
+@pytest.mark.parametrize("pushed", [False, True])
+def test_the_textbooks_tumble_keeps_momentum_and_energy_over_10_s(pushed):
     with tumbling(True, add_box) as (world, body):
         _, momentum, energy = turning(world, body)
         for _ in range(20):
-            world.advance({}, 100)
+            world.advance({body: Wrench()} if pushed else {}, 100)
             _, momentum_now, energy_now = turning(world, body)
             assert momentum_now == pytest.approx(momentum, abs=1e-5 * np.linalg.norm(momentum))
             assert energy_now == pytest.approx(energy, rel=0.01)

@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.saved_state import Restore, saved
-
-
-class MeasuredVelocity(NamedTuple):
-    """linear: m/s, world; euler: V-REP's Euler angles of the turn, in the object's frame before it, rad/s;
-    rotation: the turn as a rotation vector, world, rad/s.
-    """
-
-    linear: Vector
-    euler: Vector
-    rotation: Vector
 
 
 class VelocityMeter:
@@ -38,7 +27,6 @@ class VelocityMeter:
         """Measure nothing yet."""
         self._before: dict[int, Matrix] = {}  # world from object, by handle
         self._now: dict[int, Matrix] = {}
-        self._measured: dict[int, MeasuredVelocity] = {}  # of this step, as far as asked for
 
     def follow(self, handle: int) -> None:
         """Measure an object from now on, before anybody asks."""
@@ -55,24 +43,41 @@ class VelocityMeter:
     def end_step(self) -> None:
         """Look where everything is after it."""
         if self._now:
-            self._before, self._measured = self._now, {}
+            self._before = self._now
             self._now = {handle: self._objects[handle].matrix() for handle in self._now}
 
-    def velocity(self, handle: int) -> MeasuredVelocity:
-        """Return the velocities; of what was put elsewhere since, and at first, those of the dynamics.
+    def velocity(self, handle: int) -> tuple[Vector, Vector]:
+        """Return linear (m/s, world) and angular velocity (rad/s): the Euler angles of the turn over the step.
 
-        Raises ValueError.
+        They are of the object's own frame before it. Of what was put elsewhere since, and at first, both are those that
+        the dynamics has reached. Raises ValueError.
         """
-        found = self._objects[handle]
-        matrix = found.matrix()
+        turn = self._turn(handle)
+        if turn is None:
+            linear, angular = self._objects[handle].velocity()
+            return linear, frames.rotate(frames.invert(self._objects[handle].matrix()), angular)
+        before, now, duration = self._before[handle], self._now[handle], self._clock.time_step
+        alpha, beta, gamma = frames.to_euler(turn)
+        linear = (now[3] - before[3]) / duration, (now[7] - before[7]) / duration, (now[11] - before[11]) / duration
+        return linear, (alpha / duration, beta / duration, gamma / duration)
+
+    def rotation(self, handle: int) -> Vector:
+        """Return the turn over the step as a rotation vector in the world (rad/s). Raises ValueError."""
+        turn = self._turn(handle)
+        if turn is None:
+            return self._objects[handle].velocity()[1]
+        x, y, z, w = frames.to_quaternion(turn)
+        sine = math.hypot(x, y, z)
+        scale = (2 * math.atan2(sine, w) / sine if sine else 2.0) / self._clock.time_step
+        return frames.rotate(self._before[handle], (x * scale, y * scale, z * scale))
+
+    def _turn(self, handle: int) -> Matrix | None:
+        """Return how it has turned within the step, None where nobody knows."""
+        matrix = self._objects[handle].matrix()
         if handle not in self._now:
             self._begin(handle, matrix)
-        if handle not in self._before or matrix != self._now[handle]:
-            linear, angular = found.velocity()
-            return MeasuredVelocity(linear, frames.rotate(frames.invert(matrix), angular), angular)
-        if handle not in self._measured:
-            self._measured[handle] = _mean(self._before[handle], self._now[handle], self._clock.time_step)
-        return self._measured[handle]
+        before = self._before.get(handle)
+        return None if before is None or matrix != self._now[handle] else frames.relative_turn(before, matrix)
 
     def _begin(self, handle: int, now: Matrix) -> None:
         """Measure one more object, which was carried through the last step like what it hangs on."""
@@ -88,15 +93,4 @@ class VelocityMeter:
 
     def save_state(self) -> Restore:
         """Return a function that brings back what has been measured."""
-        return saved(self, "_before", "_now", "_measured")
-
-
-def _mean(before: Matrix, now: Matrix, duration: float) -> MeasuredVelocity:
-    turn = frames.relative_turn(before, now)
-    x, y, z, w = frames.to_quaternion(turn)
-    sine = math.sqrt(x * x + y * y + z * z)
-    scale = (2 * math.atan2(sine, w) / sine if sine else 2.0) / duration
-    linear = (now[3] - before[3]) / duration, (now[7] - before[7]) / duration, (now[11] - before[11]) / duration
-    alpha, beta, gamma = frames.to_euler(turn)
-    euler = alpha / duration, beta / duration, gamma / duration
-    return MeasuredVelocity(linear, euler, frames.rotate(before, (x * scale, y * scale, z * scale)))
+        return saved(self, "_before", "_now")

@@ -26,6 +26,7 @@ class NoGyroscopicTerm:
         self._client = client
         self._roots: dict[int, Vector] = {}  # moments of inertia (kg m², along the principal axes), by body
         self._links: dict[int, dict[int, Vector]] = {}  # the same of all other links, by PyBullet's number
+        self._before: dict[int, Quaternion] = {}  # attitudes of roots a step of PyBullet's ago, in the same `advance`
 
     def add(self, body: int) -> None:
         """Know a body."""
@@ -44,26 +45,42 @@ class NoGyroscopicTerm:
         self._roots.pop(body, None)
         self._links.pop(body, None)
 
-    def begin_sub_step(self, known: Mapping[int, Quaternion]) -> None:
-        """Let torques act in the sub-step that comes; `known` are attitudes of roots that need not be asked for."""
-        client = self._client
+    def begin_step(self) -> None:
+        """Ask for velocities once: before this nobody can tell them from attitudes."""
+        self._before.clear()
+
+    def begin_sub_step(self, known: Mapping[int, Quaternion], duration: float) -> None:
+        """Let torques act in the step of PyBullet's that comes, of that duration (s), as the last one.
+
+        `known` are attitudes of roots that need not be asked for.
+        """
+        client, attitudes = self._client, self._before
         for body, moments in self._roots.items():
-            velocity = pybullet.getBaseVelocity(body, client)[1]
+            now, before = known.get(body), attitudes.get(body)
+            velocity = self._velocity(body, now) if now is None or before is None else _rate(before, now, duration)
+            if now is not None:
+                attitudes[body] = now
             if _turns(velocity):
-                turn = known.get(body) or pybullet.getBasePositionAndOrientation(body, client)[1]
-                torque = self._torque(moments, _seen_from(turn, velocity))
+                torque = self._torque(moments, velocity, duration)
                 pybullet.applyExternalTorque(body, -1, torque, pybullet.LINK_FRAME, client)
         for body, links in self._links.items():
             states = pybullet.getLinkStates(body, list(links), 1, 1, client)  # with velocities, and attitudes of now
             for (number, moments), state in zip(links.items(), states):
                 if _turns(state[7]):
-                    torque = self._torque(moments, _seen_from(state[1], state[7]))
+                    torque = self._torque(moments, _seen_from(state[1], state[7]), duration)
                     pybullet.applyExternalTorque(body, number, torque, pybullet.LINK_FRAME, client)
 
-    def end_sub_step(self) -> None:
+    def _velocity(self, body: int, turn: Quaternion | None) -> Vector:
+        """Return the angular velocity of a root along its principal axes (rad/s), or roughly where it hardly turns."""
+        velocity = pybullet.getBaseVelocity(body, self._client)[1]
+        if not _turns(velocity):
+            return velocity
+        return _seen_from(turn or pybullet.getBasePositionAndOrientation(body, self._client)[1], velocity)
+
+    def end_sub_step(self, duration: float) -> None:
         """Do what is to be done once PyBullet has stepped."""
 
-    def _torque(self, moments: Vector, velocity: Vector) -> Vector:
+    def _torque(self, moments: Vector, velocity: Vector, _duration: float) -> Vector:
         """Return ω × Iω (N m), everything along the principal axes."""
         (a, b, c), (p, q, r) = moments, velocity
         return (c - b) * q * r, (a - c) * r * p, (b - a) * p * q
@@ -77,29 +94,25 @@ class GyroscopicTerm(NoGyroscopicTerm):
     Joints are PyBullet's own: a link below one has the first half twice.
     """
 
-    def __init__(self, client: int, sub_step: float):
-        """Take PyBullet's client, and the sub-step (s)."""
-        super().__init__(client)
-        self._sub_step = sub_step
-
-    def end_sub_step(self) -> None:
+    def end_sub_step(self, duration: float) -> None:
         """Turn every root's velocity by the second half of the term."""
         client = self._client
+        self._before.clear()  # attitudes do not tell of this half
         for body, moments in self._roots.items():
             linear, velocity = pybullet.getBaseVelocity(body, client)
             if _turns(velocity):
                 turn = pybullet.getBasePositionAndOrientation(body, client)[1]
                 between = _seen_from(turn, velocity)
-                after = _velocity(moments, _turned_back(between, self._sub_step / 2, _momentum(moments, between)))
+                after = _velocity(moments, _turned_back(between, duration / 2, _momentum(moments, between)))
                 pybullet.resetBaseVelocity(body, linear, turned(turn, after), client)
 
-    def _torque(self, moments: Vector, velocity: Vector) -> Vector:
+    def _torque(self, moments: Vector, velocity: Vector, duration: float) -> Vector:
         momentum, between = _momentum(moments, velocity), velocity
         for _ in range(_ITERATIONS):
-            half = _turned_back(between, self._sub_step / 2, momentum)
+            half = _turned_back(between, duration / 2, momentum)
             between = _velocity(moments, half)
-        changes = zip(super()._torque(moments, velocity), half, momentum)
-        x, y, z = (torque + (new - old) / self._sub_step for torque, new, old in changes)
+        changes = zip(super()._torque(moments, velocity, duration), half, momentum)
+        x, y, z = (torque + (new - old) / duration for torque, new, old in changes)
         return x, y, z
 
 
@@ -112,6 +125,20 @@ def _seen_from(turn: Quaternion, vector: Vector) -> Vector:
     """Return a vector of the world in a frame that is turned so."""
     x, y, z, w = turn
     return turned((-x, -y, -z, w), vector)
+
+
+def _rate(before: Quaternion, now: Quaternion, duration: float) -> Vector:
+    """Return with which angular velocity a body has turned, in its own frame: quicker than to ask for it.
+
+    Bullet turns it by the whole of that in one go; the axis is the same before and after.
+    """
+    (x0, y0, z0, w0), (x1, y1, z1, w1) = before, now
+    x = w0 * x1 - w1 * x0 - y0 * z1 + z0 * y1
+    y = w0 * y1 - w1 * y0 - z0 * x1 + x0 * z1
+    z = w0 * z1 - w1 * z0 - x0 * y1 + y0 * x1
+    sine = math.sqrt(x * x + y * y + z * z)
+    scale = 2.0 * math.asin(sine) / (sine * duration) if 0.0 < sine < 1.0 else 0.0
+    return x * scale, y * scale, z * scale
 
 
 def _momentum(moments: Vector, velocity: Vector) -> Vector:

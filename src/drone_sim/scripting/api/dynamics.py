@@ -182,13 +182,13 @@ class Dynamics(Functions):
     @sim("345")
     def getObjectFloatParameter(self, handle: Handle, parameter: int) -> tuple[int, float]:
         """Return 1 and what getObjectFloatParam does; 0 and 0 for a parameter that is not known here."""
-        found, moving = self._objects[handle], self._context.velocities.velocity
+        found, velocities = self._objects[handle], self._context.velocities
         known: dict[str, Callable[[], float]] = {
             "shapefloatparam_mass": lambda: self.getShapeMass(handle),
-            "objfloatparam_abs_x_velocity": lambda: moving(handle).linear[0],
-            "objfloatparam_abs_y_velocity": lambda: moving(handle).linear[1],
-            "objfloatparam_abs_z_velocity": lambda: moving(handle).linear[2],
-            "objfloatparam_abs_rot_velocity": lambda: math.hypot(*moving(handle).rotation),
+            "objfloatparam_abs_x_velocity": lambda: velocities.velocity(handle)[0][0],
+            "objfloatparam_abs_y_velocity": lambda: velocities.velocity(handle)[0][1],
+            "objfloatparam_abs_z_velocity": lambda: velocities.velocity(handle)[0][2],
+            "objfloatparam_abs_rot_velocity": lambda: math.hypot(*velocities.rotation(handle)),
             "objfloatparam_size_factor": lambda: self._factor(handle),
             **(self._corners(handle) if isinstance(found, Freezable) else {}),
             **readable(found),

@@ -113,8 +113,12 @@ class Objects(Functions):
         The latter has the Euler angles of the step's turn, in the frame that the object had before it, over the step.
         With sim.handleflag_axis added to the handle it is that turn as a rotation vector, in the world frame.
         """
-        measured = self._context.velocities.velocity(bare(handle) if handle >= AXIS else handle)
-        return list(measured.linear), list(measured.rotation if handle >= AXIS else measured.euler)
+        meter = self._context.velocities
+        if handle < AXIS:
+            linear, angular = meter.velocity(handle)
+        else:
+            linear, angular = meter.velocity(bare(handle))[0], meter.rotation(bare(handle))
+        return list(linear), list(angular)
 
     @sim("345")
     def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
