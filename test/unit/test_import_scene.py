@@ -72,7 +72,13 @@ def test_shapes_in_their_tree(imported):
     }
     assert found["Ball"]["alias"] == "ball" and found["Ball"]["size"] == [0.1] and found["Ball"]["mass"] == 0.5
     assert found["Ball"]["inertia"] == {"moments": [0.005, 0.01, 0.015], "position": [0.0, 0.0, 0.05]}
-    assert found["Ball"]["position"] == [5.0, 0.0, 1.0] and "parent" not in found["Ball"], "the tree does not weld"
+    assert found["Ball"]["position"] == [0.0, 0.0, 1.0] and found["Ball"]["parent"] == "Box"
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    for _ in range(40):
+        simulation.step()
+    matrix = simulation.scene.things()["Ball"].matrix()
+    simulation.close()
+    assert matrix[11] == pytest.approx(0.1, abs=0.01), "the tree does not weld"
 
 
 def test_a_compound_keeps_its_parts_and_what_is_no_simple_form_is_a_mesh(imported):
@@ -177,8 +183,90 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
 def test_scripts_lie_on_their_objects(imported):
     lamp = scene_object("DMY", 3, "Lamp", base=chunk("Lsp", integers("Par", 0)[:0]))
     content = imported(lamp, script(3, "-- é\nfunction sysCall_init() end", parameters=[("on", "true"), ("n", "3")]))
-    assert content["scripts"] == [{"object": "Lamp", "script": "Lamp.lua", "parameters": {"on": True, "n": 3.0}}]
+    assert content["scripts"] == [
+        {"object": "Lamp", "script": "Lamp.lua", "embedded": True, "parameters": {"on": True, "n": 3.0}}
+    ]
     assert (imported.scene.parent / "Lamp.lua").read_text() == "-- é\nfunction sysCall_init() end\n"
+
+
+TELL = """
+function sysCall_init()
+    local paths = {'.', '..', './Eye', '../Eye', '../Eye[1]', ':', ':/Eye', '::', '/Robot/*/Eye', '/R*t/Eye[1]'}
+    for _, path in pairs(paths) do
+        local found = sim.getObject(path, {noError = true})
+        sim.setStringSignal(NAME .. path, found == -1 and 'none' or sim.getObjectAlias(found, 1))
+    end
+end
+"""
+
+
+def _told(scene, name):
+    """What the script `name` found under each path."""
+    simulation = Simulation(parameters.load({"scene_file": str(scene)}))
+    signals = simulation.context.signals
+    paths = ".", "..", "./Eye", "../Eye", "../Eye[1]", ":", ":/Eye", "::", "/Robot/*/Eye", "/R*t/Eye[1]"
+    found = {path: signals.find(f"{name}{path}") for path in paths}
+    simulation.close()
+    return found
+
+
+def _robots(*more):
+    """Two robots as of CoppeliaSim 4.3: models with an arm each, whose second eye is its own."""
+    for index, name in ((0, "Robot"), (10, "Robot#0")):
+        base, end = chunk("Var", b"\1"), name[5:]
+        yield scene_object("DMY", index, name, at=(index, 0, 0), base=base, alias="Robot")
+        yield scene_object("DMY", index + 1, f"Arm{end}", index, alias="Arm")
+        yield scene_object("DMY", index + 2, f"Eye{end}", index + 1, alias="Eye")
+        yield scene_object("DMY", index + 3, f"Left{end}", index, alias="Eye")
+        yield scene_object("DMY", index + 4, f"Right{end}", index, alias="Eye")
+    yield from more
+
+
+def test_paths_of_a_script_of_up_to_4_8_begin_at_its_object(imported):
+    imported(*_robots(script(11, TELL.replace("NAME", "'arm'"))))
+    assert _told(imported.scene, "arm") == {
+        ".": "/Robot[1]/Arm",
+        "..": "/Robot[1]",
+        "./Eye": "/Robot[1]/Arm/Eye",
+        "../Eye": "/Robot[1]/Eye[0]",
+        "../Eye[1]": "/Robot[1]/Eye[1]",
+        ":": "/Robot[1]",
+        ":/Eye": "/Robot[1]/Eye[0]",
+        "::": "none",
+        "/Robot/*/Eye": "/Robot[0]/Arm/Eye",
+        "/R*t/Eye[1]": "/Robot[0]/Eye[1]",
+    }
+
+
+def test_paths_of_a_script_of_4_9_begin_at_the_script_which_is_an_object(imported):
+    own = script(99, TELL.replace("NAME", "'arm'"), tag="Soo")
+    scripted = scene_object("SCT", 20, "Script", parent=11, own=own, alias="Script")
+    found = objects(imported(*_robots(scripted)))
+    assert found["Script"]["kind"] == "script" and found["Script"]["parent"] == "Arm#0"
+    told = _told(imported.scene, "arm")
+    assert told[".."] == "/Robot[1]/Arm" and told["../Eye"] == "/Robot[1]/Arm/Eye" and told[":"] == "/Robot[1]"
+
+
+def test_a_script_object_is_a_script_where_one_is_asked_for(imported):
+    own = script(99, "function twice(x) return 2 * x end", tag="Soo")
+    scripted = scene_object("SCT", 20, "Script", parent=11, own=own, alias="Script")
+    code = """
+    function sysCall_sensing()
+        local script = sim.getObject('/Robot[1]/Arm/Script')
+        sim.setInt32Signal('type', sim.getObjectType(script) == sim.sceneobject_script and 1 or 0)
+        sim.setInt32Signal('by handle', sim.callScriptFunction('twice', script, 4))
+        sim.setInt32Signal('by path', sim.callScriptFunction('twice@/Robot[1]/Arm/Script', 1, 5))
+        local of = sim.getScript(sim.scripttype_simulation, sim.getObject('/Robot[1]/Arm'))
+        sim.setInt32Signal('by object', sim.callScriptFunction('twice', of, 6))
+    end
+    """
+    imported(*_robots(scripted, script(0, code)))
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    simulation.step()
+    signals = simulation.context.signals
+    found = [signals.get(int, name) for name in ("type", "by handle", "by path", "by object")]
+    simulation.close()
+    assert found == [1, 8, 10, 12]
 
 
 # ---- quadricopters

@@ -198,10 +198,12 @@ class _Import:
                 if on is None:
                     self._report.add(one.name, "has a second child script: not brought")
                 elif index > 0 or id(one) not in roots:
-                    yield self._entry_of(script, on)
+                    yield self._entry_of(script, on, index > 0 or script.is_embedded)
 
-    def _entry_of(self, script: VrepScript, on: Placed) -> dict[str, Any]:
-        entry = {"object": on.name, "script": self.script_files.write(on.name, script)}
+    def _entry_of(self, script: VrepScript, on: Placed, embedded: bool) -> dict[str, Any]:
+        entry: dict[str, Any] = {"object": on.name, "script": self.script_files.write(on.name, script)}
+        if embedded:
+            entry["embedded"] = True
         parameters = values(script.parameters or on.object.parameters)
         return {**entry, "parameters": parameters} if parameters else entry
 
@@ -255,7 +257,7 @@ class _Import:
         if isinstance(of, VrepDummy):
             return bool(one.children) and not of.path  # it held nothing but what is left out
         return (isinstance(of, VrepCamera) and of.resolution is None) or (
-            isinstance(of, Other) and of.kind in (*_ONLY_LOOKED_THROUGH, "script", "force sensor")
+            isinstance(of, Other) and of.kind in (*_ONLY_LOOKED_THROUGH, "force sensor")
         )
 
     def _is_mentioned(self, one: Placed) -> bool:
@@ -264,8 +266,6 @@ class _Import:
 
     def _hangs_on(self, one: Placed) -> tuple[str, frames.Matrix]:
         """Return the nearest object above that is there, '' for the world, and the pose in its frame."""
-        if one.is_dynamic and one.above is not None and one.above.object.shape is not None:
-            return "", one.matrix  # the tree alone does not hold it
         here = one.above
         while here is not None and id(here) not in self._kept and id(here) not in self._of_vehicles:
             here = here.above

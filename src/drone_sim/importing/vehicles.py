@@ -17,7 +17,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_names import split
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS
-from drone_sim.vehicles.quadricopter_objects import DRONE, TARGET, TRACK_BASE, joint, respondable
+from drone_sim.vehicles.quadricopter_objects import DRONE, SCRIPT, TARGET, TRACK_BASE, joint, respondable
 from drone_sim.vrep_files.model import VrepCamera, VrepJoint, VrepScript
 
 _OWN_CAMERAS = {"FrontVision": "front", "DepthVision": "depth", "TrackCam": "track", "FloorVision": "floor"}
@@ -59,6 +59,10 @@ class ImportedVehicle:
             found["Quadricopter_base"] = quadricopter.base
         if quadricopter.target is not None:
             found[TARGET] = quadricopter.target
+        own = [script.own_object for script in self._scripts.get(quadricopter.root.object.handle, ())[:1]]
+        script = next((one for one in quadricopter.root.children if one.object.handle in own), None)
+        if script is not None:
+            found[SCRIPT] = script
         for one in quadricopter.inside():
             ours = next((name for end, name in _BY_NAME.items() if plain_name(one).lower().endswith(end)), None)
             if ours is not None and ours not in found and one.object.shape is None:

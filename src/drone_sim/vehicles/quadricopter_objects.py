@@ -10,6 +10,7 @@
       one for every sensor                       /range and so on
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
       DronePosition                              /target                 the green sphere
+      Drone_script                               /Quadcopter/Script      its child script, as an object of 4.9
 
 Each name that begins with Quadricopter_ stands there with Quadcopter_, too, as in CoppeliaSim 4.0.
 The names of the second vehicle end in #0, those of the third in #1, and so on, as those of V-REP's copies do.
@@ -52,6 +53,7 @@ NOWHERE_ELSE = ObjectPlace()
 DRONE = "Drone"
 TARGET = "DronePosition"  # the green sphere
 TRACK_BASE = "Track_base"
+SCRIPT = "Drone_script"
 FLOOR_CAMERA, FRONT_CAMERA = "Quadricopter_floorCamera", "Quadricopter_frontCamera"
 BASE = frames.from_rpy((0.0, 0.0, -0.01), (0.0, 0.0, 0.0))  # Quadricopter_base in the root's frame
 _ALONG_X = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)  # z forward, y up, x left
@@ -76,6 +78,7 @@ OWN_NAMES = (
     TARGET,
     FLOOR_CAMERA,
     FRONT_CAMERA,
+    SCRIPT,
     *_PROPELLERS,
 )  # of every vehicle
 
@@ -120,6 +123,7 @@ class QuadricopterObjects:
         front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
         self._add(FRONT_CAMERA, DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera", kind="camera")
         self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"), kind="shape")
+        self._add(SCRIPT, DRONE, alias="Script", kind="script")
         for camera in cameras.values():
             self._add_camera(links, camera)
         for name, sensor in sensors.items():
@@ -152,6 +156,7 @@ class QuadricopterObjects:
             )
         except ValueError as error:  # one of the scene has that name
             raise ParameterError(str(error)) from None
+        self._objects[handle].is_model = name == DRONE
         self._handles.append(handle)
 
     def _add_sensor(self, links: Mapping[str, Matrix], name: str, sensor: SensorParameters) -> None:

@@ -130,7 +130,10 @@ Kind = VrepShape | VrepJoint | VrepDummy | VrepCamera | VrepProximitySensor | Ot
 
 @dataclass(frozen=True)
 class VrepScript:
-    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own."""
+    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own.
+
+    `parent_is_proxy`: of that, whether its paths begin from its parent, as of one that came from an older file.
+    """
 
     object: int
     kind: str  # main, child or customization, or another's number
@@ -140,6 +143,12 @@ class VrepScript:
     parameters: tuple[tuple[str, str], ...] = ()
     is_stock_main: bool = False
     own_object: int = -1  # handle of the script as an object, -1 where it is none
+    parent_is_proxy: bool = False
+
+    @property
+    def is_embedded(self) -> bool:
+        """Whether it is, for its paths, no object of its own."""
+        return self.own_object == -1 or self.parent_is_proxy
 
 
 @dataclass(frozen=True)
