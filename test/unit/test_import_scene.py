@@ -173,11 +173,58 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
     listed = (imported.scene.parent / "IMPORT.txt").read_text()
     for line in (
         "Way: a path: only its place is brought",
-        "Drone: is called Drone_2 here",
+        "Drone: is called Drone#0 here",
         "Drone: its customization script is not brought",
     ):
         assert line in listed and line in imported.said
     assert "No quadricopter is in the file: none flies, unless `vehicles` says so" in imported.said
+
+
+PUSH = """
+function sysCall_actuation()
+    local body = sim.getObjectHandle('Quadricopter_propeller_respondable{}')
+    sim.setStringSignal('{}', sim.getObjectName(body)..' of '..sim.getObjectName(sim.getObjectHandle('Quadricopter')))
+end
+"""
+
+
+def _rigid(end=""):
+    """A quadricopter of one piece, as no vehicle is: its propellers have scripts, and nothing else."""
+    yield shape(0, f"Quadricopter{end}", mesh(size=(0.3, 0.3, 0.05)), at=(3, 0, 1), base=chunk("Var", b"\1"))
+    for number in (1, 2):
+        name = f"Quadricopter_propeller_respondable{number}{end}"
+        yield scene_object("DMY", number, name, 0, (0.1, 0, 0))
+        yield script(number, PUSH.format(number, number))
+
+
+@pytest.mark.parametrize("end", ["", "#0", "#3"])
+def test_a_model_whose_names_a_drone_has_is_a_copy_and_its_scripts_find_its_own_objects(imported, end):
+    copy = end or "#0"
+    found = objects(imported(*_rigid(end), suffix=".ttm"))
+    assert [*found] == [f"Quadricopter{copy}", *(f"Quadricopter_propeller_respondable{n}{copy}" for n in (1, 2))]
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1}))
+    simulation.step()
+    told = [simulation.context.signals.find(str(n)) for n in (1, 2)]
+    simulation.close()
+    assert told == [f"Quadricopter_propeller_respondable{n}{copy} of Quadricopter{copy}" for n in (1, 2)]
+
+
+def test_a_propeller_without_a_drone_finds_none_of_another_ones(imported, caplog):
+    """V-REP's rule: the script of a copy does not find the original's objects."""
+    code = "function sysCall_init() sim.getObjectHandle('Quadricopter_base') end"
+    imported(*_rigid("#0"), scene_object("DMY", 7, "Eye"), script(0, code))
+    Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1})).close()
+    assert "no object named 'Quadricopter_base#0'" in caplog.text
+
+
+def test_names_of_a_tree_that_has_a_suffix_here_are_found_from_outside_of_it(imported):
+    code = "sim.setStringSignal('found', sim.getObjectName(sim.getObjectHandle('Arm')))"
+    robot = scene_object("DMY", 0, "Drone"), scene_object("DMY", 1, "Arm", 0), scene_object("DMY", 2, "Eye")
+    imported(*robot, script(2, f"function sysCall_init() {code} end"))
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1}))
+    found = simulation.context.signals.find("found")
+    simulation.close()
+    assert found == "Arm#0"
 
 
 def test_scripts_lie_on_their_objects(imported):

@@ -19,7 +19,7 @@ from drone_sim.importing.shapes import MeshWriter
 from drone_sim.importing.vehicles import ImportedVehicle, suffixes, vehicle_names
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY
-from drone_sim.mechanics.object_names import suffixed
+from drone_sim.mechanics.object_names import shifted, suffixed
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.message_text import MAX_NAME
 from drone_sim.scene.scene_parameters import MAX_OBJECTS
@@ -51,10 +51,21 @@ class UniqueNames:
     def give(self, objects: Iterable[Placed], report: Report) -> None:
         """Name every object as in the file, where that can be."""
         for one in objects:
-            wanted = one.object.name or one.object.alias or f"object_{one.object.handle}"
-            one.name = self.free(wanted)
-            if one.name != wanted:
-                report.add(wanted, f"is called {one.name} here")
+            one.name = self.free(one.wanted_name)
+            if one.name != one.wanted_name:
+                report.add(one.wanted_name, f"is called {one.name} here")
+
+    def give_in_trees(self, objects: Iterable[Placed], report: Report) -> None:
+        """Name the objects of each tree as in the file, or, where one of these names is taken, all as a copy's."""
+        trees: dict[int, list[Placed]] = defaultdict(list)
+        for one in objects:
+            trees[id(one.top)].append(one)
+        for tree in trees.values():
+            wanted = [label(one.wanted_name) or "object" for one in tree]
+            for one, name in zip(tree, shifted(wanted, self._taken)):
+                one.name = self.free(name)
+                if one.name != one.wanted_name:
+                    report.add(one.wanted_name, f"is called {one.name} here")
 
     def free(self, wanted: str) -> str:
         """Return a name like the one wanted, and take it."""
@@ -115,7 +126,11 @@ class _Import:
             taken |= {one.name for one in vehicle.objects.values()}
         taken |= reserved_names([vehicle.suffix for vehicle in self._vehicles])
         ours = self._of_vehicles | {id(one) for one in self._floor}
-        UniqueNames(taken).give((one for one in self._objects if id(one) not in ours), self._report)
+        others = [one for one in self._objects if id(one) not in ours]
+        flown = {id(vehicle.root.top) for vehicle in self._vehicles}
+        names = UniqueNames(taken)
+        names.give((one for one in others if id(one.top) in flown), self._report)
+        names.give_in_trees((one for one in others if id(one.top) not in flown), self._report)
 
     def run(self) -> Imported:
         content: dict[str, Any] = {**self._world()}

@@ -148,7 +148,9 @@ def _full_name(objects: ObjectTree, name: str, own: str, suffix: int) -> str:
         is_its_own = suffix == split(own)[1]  # and not one that setNameSuffix has set
         by_its_names = (suffixed(name, split(one)[1]) for one in _names(objects, own) if is_its_own)
         found = next((one for one in by_its_names if one in objects and one != name), None)
-        return found or (full if not _is_of_the_scene(objects, name, own) else name)
+        if found or not _is_of_the_scene(objects, name, own):
+            return found or full
+        return name if name in objects else _only_copy(objects, name, own)
     # A script that is copied out of a scene with several models names its own with a suffix.
     is_meant = name in objects or (match.group(2) and objects.is_copied(match.group(1)))
     return name if is_meant else match.group(1)
@@ -164,4 +166,14 @@ def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
     original = plain(own)
     if name not in objects or original not in objects or not objects.is_copied(original):
         return True
-    return not objects[objects.handle(name)].is_part_of(objects[objects.handle(original)])
+    twin = objects[objects.handle(original)]
+    return not objects[objects.handle(name)].is_part_of(twin.model() or twin)
+
+
+def _only_copy(objects: ObjectTree, name: str, own: str) -> str:
+    """Return the first of the objects of which an import has made copies, but none of a copy of `own`; else the name.
+
+    Where a file's names are ours, all of that tree have a suffix (importing/scene_folder.py).
+    """
+    copies = sorted(split(one)[1] for one in objects.names if plain(one) == name) if objects.is_copied(name) else []
+    return next((suffixed(name, end) for end in copies if suffixed(own, end) not in objects), name)
