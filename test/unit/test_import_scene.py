@@ -518,9 +518,29 @@ def _beside(tmp_path, monkeypatch):
 def test_files_of_lua_beside_a_scene_are_brought(beside, capsys):
     out = beside / "out"
     assert main([str(beside / "a.ttt"), str(out)]) == 0
-    assert (out / "MODULES.txt").read_text().split() == ["scripts/fly.lua", "more.lua"]
-    assert (out / "own.lua").read_text() == ASKS, "the scene's own script"
-    assert sorted(str(one.relative_to(out)) for one in out.rglob("*.lua")) == ["more.lua", "own.lua", "scripts/fly.lua"]
+    assert (out / "MODULES.txt").read_text().split() == ["scripts/fly.lua", "own.lua", "more.lua"]
+    assert (out / "own_2.lua").read_text() == ASKS, "the scene's own script"
+    assert sorted(str(one.relative_to(out)) for one in out.rglob("*.lua")) == [
+        "more.lua",
+        "own.lua",
+        "own_2.lua",
+        "scripts/fly.lua",
+    ]
+
+
+def test_a_script_is_not_called_as_the_helper_that_it_asks_for(imported, tmp_path, caplog):
+    (tmp_path / "blimp.lua").write_text("return {lift = 3}")
+    code = "function sysCall_init() sim.setInt32Signal('lift', require('blimp').lift) end"
+    content = imported(scene_object("DMY", 0, "blimp"), script(0, code))
+    assert content["scripts"][0]["script"] == "blimp_2.lua"
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    assert simulation.context.signals.get(int, "lift") == 3
+    simulation.close()
+    for folder in (tmp_path, tmp_path / "out"):
+        (folder / "blimp.lua").unlink()
+    imported(scene_object("DMY", 0, "blimp"), script(0, code))
+    Simulation(parameters.load({"scene_file": str(imported.scene)})).close()
+    assert "no module 'blimp': no file blimp.lua beside the script" in caplog.text
 
 
 def test_they_are_brought_anew_whenever_the_scene_is_asked_for(beside):
@@ -528,7 +548,7 @@ def test_they_are_brought_anew_whenever_the_scene_is_asked_for(beside):
         (beside / "more.lua").write_text(content)
         scene = parameters.load({"scene_file": str(beside / "a.ttt")}).scene_file
         assert Path(scene).with_name("more.lua").read_text() == content
-        assert Path(scene).with_name("own.lua").read_text() == ASKS
+        assert Path(scene).with_name("own_2.lua").read_text() == ASKS
 
 
 def test_a_broken_file_as_a_scene_gets_one_line(tmp_path, monkeypatch):

@@ -14,7 +14,7 @@ from drone_sim.importing.entries import Entries
 from drone_sim.importing.folder import Folder, Report, label, number, pose_keys
 from drone_sim.importing.placing import Placed, floor_parts, floor_size, placed
 from drone_sim.importing.quadricopters import find, plain_name
-from drone_sim.importing.scripts import ScriptFiles, bring, values
+from drone_sim.importing.scripts import ScriptFiles, asked_for, bring, values
 from drone_sim.importing.shapes import MeshWriter
 from drone_sim.importing.vehicles import ImportedVehicle, suffixes, vehicle_names
 from drone_sim.mechanics import frames
@@ -58,8 +58,8 @@ class UniqueNames:
     def give_in_trees(self, objects: Iterable[Placed], report: Report) -> None:
         """Name the objects of each tree as in the file, or, where one of these names is taken, all as a copy's."""
         trees: dict[int, list[Placed]] = defaultdict(list)
-        for one in objects:
-            trees[id(one.top)].append(one)
+        for placed_one in objects:
+            trees[id(placed_one.top)].append(placed_one)
         for tree in trees.values():
             wanted = [label(one.wanted_name) or "object" for one in tree]
             for one, name in zip(tree, shifted(wanted, self._taken)):
@@ -108,6 +108,7 @@ class _Import:
         self._name = name
         self._folder = folder
         self._report = Report()
+        folder.keep_free(one for script in file.scripts for files in asked_for(script.text) for one in files)
         self._writer = MeshWriter(folder)
         self.script_files = ScriptFiles(folder)
         self._objects = placed(file)
@@ -121,8 +122,9 @@ class _Import:
         self._of_vehicles = {id(one) for vehicle in self._vehicles for one in vehicle.objects.values()}
         taken: set[str] = set()
         for vehicle in self._vehicles:  # whose objects have our names, too, which no other vehicle's may have
-            others = [one.suffix for one in self._vehicles if one is not vehicle]
-            UniqueNames(taken | reserved_names(others) if others else ()).give(vehicle.objects.values(), self._report)
+            suffixes_of_others = [one.suffix for one in self._vehicles if one is not vehicle]
+            taken_by_others = taken | reserved_names(suffixes_of_others) if suffixes_of_others else set()
+            UniqueNames(taken_by_others).give(vehicle.objects.values(), self._report)
             taken |= {one.name for one in vehicle.objects.values()}
         taken |= reserved_names([vehicle.suffix for vehicle in self._vehicles])
         ours = self._of_vehicles | {id(one) for one in self._floor}

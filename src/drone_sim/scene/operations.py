@@ -152,7 +152,7 @@ class SceneOperations:
     ) -> list[int]:
         """Add entries, and scripts on them, under their names, or, where one is taken, all of them as copies."""
         tree, new, names = self._scene.tree, {"": ""}, []
-        for one, wanted in zip(entries, shifted([one.name for one in entries], self._scene.tree)):
+        for one, wanted in zip(entries, shifted([one.name for one in entries], {*tree.names})):
             free = itertools.chain([wanted], (suffixed(plain(wanted), number) for number in itertools.count()))
             names.append(next(name for name in free if name not in tree and name not in names))
             new.setdefault(one.name, names[-1])
