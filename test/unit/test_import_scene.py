@@ -7,7 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from vrep_encoder import chunk, container, file, integers, mesh, numbers, scene_object, script, shape, text, weight
+from vrep_encoder import (
+    chunk,
+    collection_item,
+    container,
+    file,
+    integers,
+    mesh,
+    numbers,
+    scene_object,
+    script,
+    shape,
+    text,
+    weight,
+)
 from vrep_quadricopter import PROPELLER, quadricopter
 
 from drone_sim.importing.main import main
@@ -314,6 +327,35 @@ def test_a_script_object_is_a_script_where_one_is_asked_for(imported):
     found = [signals.get(int, name) for name in ("type", "by handle", "by path", "by object")]
     simulation.close()
     assert found == [1, 8, 10, 12]
+
+
+def test_collections_are_found_by_their_names(imported, tmp_path):
+    items = collection_item(0, 1) + collection_item(2, 0, removes=True) + collection_item(77, 0)
+    arm = chunk("GRP", chunk("Grn", text("arm")) + items + b"EOO")
+    code = """
+    function sysCall_init()
+        for _, one in pairs(simGetCollectionObjects(simGetCollectionHandle('arm'))) do
+            simSetStringSignal(simGetObjectName(one), 'in the arm')
+        end
+    end
+    """
+    content = imported(*_robots(script(10, code), arm))
+    assert content["collections"] == [
+        {
+            "name": "arm",
+            "items": [{"what": "tree", "object": "Robot"}, {"what": "single", "object": "Eye", "removes": True}],
+        }
+    ]
+    assert "arm: a collection: some of its objects are not brought" in imported.said
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    simulation.save_scene(tmp_path / "saved.yaml")
+    found = [name for name in simulation.context.objects.names if simulation.context.signals.find(name)]
+    simulation.stop()
+    simulation.start()
+    assert found == ["Robot", "Arm", "Left", "Right"]
+    assert [name for name in simulation.context.objects.names if simulation.context.signals.find(name)] == found
+    simulation.close()
+    assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.collections[0].name == "arm"
 
 
 # ---- quadricopters

@@ -52,6 +52,16 @@ def test_a_ray_is_exact(simulation, sim):
     assert normal == pytest.approx([0, 0, -1], abs=1e-3)
 
 
+def test_a_collection_is_looked_for_as_one(sim):
+    ray, boxes = sim.getObject("/Ray"), sim.createCollection(0)
+    assert sim.checkProximitySensor(ray, boxes)[0] == 0, "nothing is in it"
+    sim.addItemToCollection(boxes, sim.handle_all, -1, 0)
+    assert sim.checkProximitySensor(ray, boxes) == sim.readProximitySensor(ray)
+    sim.addItemToCollection(boxes, sim.handle_single, sim.getObject("/RayBox"), 1)
+    state, distance, _, met, _ = sim.checkProximitySensor(ray, boxes)
+    assert (state, met) == (1, sim.getObject("/Floor")) and distance == pytest.approx(3, abs=1e-3)
+
+
 def nearest(x, y, z):
     """Return how near a ball of 0.2 m radius is to a sensor, and which of its points."""
     length = math.hypot(x, y, z)

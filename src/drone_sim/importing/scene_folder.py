@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from drone_sim.importing import object_collections
 from drone_sim.importing.entries import Entries
 from drone_sim.importing.folder import Folder, Report, label, number, pose_keys
 from drone_sim.importing.placing import Placed, floor_parts, floor_size, placed
@@ -146,6 +147,11 @@ class _Import:
         scripts = list(self._attached())
         if scripts:
             content["scripts"] = scripts
+        there = self._kept | self._of_vehicles
+        brought = {one.object.handle: one.name for one in self._objects if id(one) in there}
+        collections = list(object_collections.entries(self._file.collections, brought, self._report))
+        if collections:
+            content["collections"] = collections
         self._write(content)
         return Imported(self._folder.path / SCENE, len(entries), len(vehicles), len(scripts), self._report)
 

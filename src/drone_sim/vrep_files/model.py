@@ -152,6 +152,24 @@ class VrepScript:
 
 
 @dataclass(frozen=True)
+class VrepCollectionItem:
+    """What belongs to a collection: an object by its handle, what hangs on it, what it hangs on, or all there are."""
+
+    what: str  # single, tree, chain or all
+    object: int
+    removes: bool  # from what the items before it say
+    without: bool  # of a tree or chain: whether it leaves out the object itself
+
+
+@dataclass(frozen=True)
+class VrepCollection:
+    """Objects under a name."""
+
+    name: str
+    items: tuple[VrepCollectionItem, ...]
+
+
+@dataclass(frozen=True)
 class VrepObject:
     """An object: its handle in the file, its parent's (-1 for none), and its pose in the parent's frame."""
 
@@ -193,3 +211,4 @@ class VrepFile:
     objects: tuple[VrepObject, ...]  # a parent before its children
     scripts: tuple[VrepScript, ...]
     settings: VrepSettings
+    collections: tuple[VrepCollection, ...] = ()

@@ -11,6 +11,7 @@ import numpy as np
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.inertia import Inertia
+from drone_sim.mechanics.object_collections import Collections
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.scripting.api.control import Control, Turns
 from drone_sim.scripting.api.custom_data import CustomData
@@ -48,10 +49,12 @@ class ScriptContext:
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
+    collections: Collections = field(default_factory=Collections)
 
     def clear(self) -> None:
         """Leave nothing there, as before a run; whoever holds one of them may go on to do so."""
-        for one in (self.objects, self.scripts, self.signals, self.control, self.data, self.tubes):
+        parts = self.objects, self.scripts, self.signals, self.control, self.data, self.tubes, self.collections
+        for one in parts:
             one.clear()
 
 

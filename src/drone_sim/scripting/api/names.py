@@ -38,7 +38,7 @@ class NameFunctions:
         """`host` is the drone that the script flies, or what else it is on."""
         self._objects = host.context.objects
         self._host = host  # its object may get another name
-        self._suffix = split(host.own_script)[1]
+        self.suffix = split(host.own_script)[1]  # that names without one have
 
     @sim("5")
     def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
@@ -61,7 +61,7 @@ class NameFunctions:
     def _find(self, name: str, index: int, proxy: int) -> int:
         objects, own_name = self._objects, self._host.own_script
         if not (isinstance(name, str) and object_paths.is_path(name)):
-            return find(objects, name, own_name, self._suffix)
+            return find(objects, name, own_name, self.suffix)
         own = objects[objects.handle(own_name)] if own_name in objects else None
         above = own
         if proxy != WORLD:
@@ -109,21 +109,21 @@ class NameFunctions:
         Without a name, return the suffix of the script's own objects.
         """
         if name is None:
-            return self._suffix
+            return self.suffix
         bare, suffix = split(name)
         return suffix, bare.removesuffix("#")
 
     @sim("345")
     def setNameSuffix(self, suffix: int) -> None:
         """Let names without a suffix mean those with this one, -1 for none."""
-        self._suffix = max(NO_SUFFIX, int(numbers((suffix,), 1)[0]))
+        self.suffix = max(NO_SUFFIX, int(numbers((suffix,), 1)[0]))
 
     def save_state(self) -> Callable[[], None]:
         """Return a function that brings back the suffix that setNameSuffix has set."""
-        kept = self._suffix
+        kept = self.suffix
 
         def restore() -> None:
-            self._suffix = kept
+            self.suffix = kept
 
         return restore
 

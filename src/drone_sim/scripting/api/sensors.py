@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.object_collections import members
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
@@ -99,13 +100,14 @@ class ProximitySensors(Functions):
 
     @sim("345")
     def checkProximitySensor(self, handle: Handle, entity: Handle) -> _Detection:
-        """Return what readProximitySensor does of one object alone, or of sim.handle_all."""
+        """Return what readProximitySensor does of one object or collection alone, or of sim.handle_all."""
         sensor = self._objects[handle]
         if not isinstance(sensor, Detector):
             raise WrongValue(f"'{sensor.name}' is no proximity sensor of the scene: {self._known()}")
         if entity == _EVERYTHING:
             return self._seen(sensor.detect())
-        names = self._objects[entity].names
+        detectable = members(entity, self._objects, self._context.collections)
+        names = {name for one in detectable for name in self._objects[one].names}
         return self._seen(sensor.detect(names.__contains__))
 
     @sim("345")
