@@ -46,6 +46,8 @@ def _find(simulation, objects):
         ("Quadricopter_target", "DronePosition"),
         ("/Quadcopter", "Drone"),
         ("/Quadcopter/base", "Quadricopter_base"),
+        ("/Quadcopter/base/target", "DronePosition"),
+        ("/propeller[0]/respondable/body/joint", "Quadricopter_propeller_joint1"),
         ("/Drone/base", "Quadricopter_base"),
         ("/Quadricopter/Quadricopter_base", "Quadricopter_base"),
         ("/base", "Quadricopter_base"),
@@ -64,7 +66,7 @@ def _find(simulation, objects):
         ("/Quadcopter/propeller/joint", "Quadricopter_propeller_joint1"),
         ("/propeller[1]", "Quadricopter_propeller2"),
         ("/Quadcopter/respondable", "Quadricopter_propeller_respondable1"),
-        ("/Quadcopter/respondable/../joint", "Quadricopter_propeller_joint1"),
+        ("/Quadcopter/body/../../joint", "Quadricopter_propeller_joint1"),
         ("/*/base", "Quadricopter_base"),
         ("/Quad*/prop*[2]/j?int", "Quadricopter_propeller_joint3"),
         ("./pro*[1]/*[0]", "Quadricopter_propeller_respondable2"),
@@ -113,7 +115,7 @@ def test_paths_are_found_again(find, objects):
 def test_the_index_of_a_path_counts_all_that_it_means(find):
     found = [find("/Quadcopter/respondable", index=index, noError=True) for index in range(5)]
     assert found == [f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4)] + [-1]
-    assert find("/Quadcopter/propeller[2]/*", index=1) == "Quadricopter_propeller_joint3"
+    assert find("/Quadcopter/propeller[2]/*", index=2) == "Quadricopter_propeller_joint3"
     assert find("/*/*/respondable", index=3) == "Quadricopter_propeller_respondable4", "each counts once"
     with pytest.raises(ValueError, match=r"no object '/Quadcopter/base' with the index 1, from 0"):
         find("/Quadcopter/base", index=1)
@@ -136,7 +138,7 @@ def test_parents(objects):
     assert parent("Drone") is None
     assert parent("TrackCam").name == "Track_base"
     assert parent("Quadricopter_propeller_respondable2").name == "Quadricopter_propeller2"
-    assert parent("DronePosition").name == "Drone"
+    assert parent("DronePosition").name == "Quadricopter_base"
 
 
 def test_a_target_without_parent_stays(simulation, objects):

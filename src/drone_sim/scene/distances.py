@@ -15,7 +15,7 @@ from drone_sim.scene.bodies import ShapeObject
 from drone_sim.scripting.api.distances import Nearest
 from drone_sim.world.queries import Gap
 
-_BASE = "Quadricopter_base"
+_PARTS = ("Quadricopter_base", "Quadricopter_propeller")  # of a vehicle's body
 _Solid = tuple[int, int]  # a body in the world and its link, -1 the root
 
 
@@ -118,5 +118,5 @@ def _carrier(one: SceneObject) -> SceneObject:
     above = one.parent
     if one.body is not None or above is None:
         return one
-    is_part = above.kind == "force_sensor" or plain(one.name) == _BASE
-    return _carrier(above) if is_part or one.kind == "force_sensor" else one
+    is_part = plain(one.name).startswith(_PARTS)
+    return _carrier(above) if is_part or "force_sensor" in (one.kind, above.kind) else one

@@ -62,13 +62,12 @@ class NameFunctions:
         objects, own_name = self._objects, self._host.own_script
         if not (isinstance(name, str) and object_paths.is_path(name)):
             return find(objects, name, own_name, self.suffix)
-        own = objects[objects.handle(own_name)] if own_name in objects else None
-        above = own
+        scripts = self._host.context.scripts
+        own = objects[objects.handle(own_name)] if scripts.are_own else None
+        is_embedded = own is not None and scripts.attached_to(own_name).is_embedded
         if proxy != WORLD:
-            own = objects[proxy]
-            above = own.parent
-        elif own is not None and self._host.context.scripts.attached_to(own_name).is_embedded:
-            above = own.parent
+            own, is_embedded = objects[proxy], True
+        above = own.parent if own is not None and is_embedded else own
         found = object_paths.find(objects, name, own, above, max(0, index))
         if found is None:
             known = [*objects.names, *(objects.path(handle) for handle in objects)]

@@ -48,7 +48,12 @@ class Attachment:
 
 
 class Scripts:
-    """Attachments by handle (a small number that no other one of the run has had) and by object."""
+    """Attachments by handle (a number that nothing else of the run has had) and by object.
+
+    `are_own`: whether who asks is one of them; the paths of a client outside begin at no object.
+    """
+
+    are_own = True
 
     def __init__(self) -> None:
         """Start with none."""
