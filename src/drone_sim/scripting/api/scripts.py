@@ -54,8 +54,11 @@ class _OnScripts(Functions):
             return self._own
         if not isinstance(handle, (int, float)):
             raise WrongValue("the handle of a script is expected")
-        on = self._on_object(int(handle)) if int(handle) in {*self._objects} else None
-        return self._scripts[int(handle)] if on is None else on
+        number = int(handle)
+        found = self._scripts.get(number)
+        if found is None and number in {*self._objects} and self._objects[number].kind == "script":
+            found = self._script_of(number)
+        return self._scripts[number] if found is None else found
 
     def _script_of(self, handle: int) -> Attachment:
         """Return the script of an object. Raises ValueError where it has none."""
