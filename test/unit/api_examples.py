@@ -91,6 +91,15 @@ SIM: dict[str, list[Example]] = {
         Example("REFUSED(NAME, DRONE, BASE)", ["'Drone' and 'Quadricopter_base' are parts of one rigid body"]),
     ],
     "checkCollision": [Example("NAME(DRONE, sim.handle_all)", [0, [-1, -1]])],
+    # ---- collections
+    "createCollection": [Example("NAME(0) >= 700000", [True])],
+    "addItemToCollection": [Example("NAME(sim.createCollection(0), sim.handle_tree, DRONE, 0)", [])],
+    "addObjectToCollection": [Example("NAME(sim.createCollection(0), DRONE, sim.handle_single, 0)", [1])],
+    "getCollectionHandle": [Example("NAME('nothing@silentError')", [-1])],
+    "getCollectionName": [Example("NAME(sim.createCollection(0))", [""])],
+    "getCollectionObjects": [Example("NAME(sim.createCollection(0))", [[]])],
+    "emptyCollection": [Example("NAME(sim.createCollection(0))", [])],
+    "destroyCollection": [Example("NAME(sim.createCollection(0))", [])],
     "getObjectUid": [Example("NAME(BASE) == BASE", [True])],
     # ---- where objects are
     "setObjectPosition": [Example("NAME(TARGET, -1, {1,2,3})", []), Example("NAME(TARGET, {4,5,6}, -1)", [])],

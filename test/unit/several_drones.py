@@ -39,6 +39,7 @@ class Drone:
             add(respondable, propeller, alias="respondable"),
             *(add(name, self.own_script) for name in others),
         ]
+        scene.objects[self.handles[0]].is_model = True
         self.script_parameters = {
             self.own_script: {"gain": 2.0, **(own or {})},
             respondable: {"particleVelocity": 0.0},

@@ -105,7 +105,7 @@ def _simulation(tmp_path_factory):
 def _modules(simulation):
     own, drone, shared = simulation.child_scripts["drone"], simulation.drone.propulsion, simulation.context
     shared.gravity = -9.81  # as scripts see it
-    for one in (shared.control, shared.data, shared.tubes):
+    for one in (shared.control, shared.data, shared.tubes, shared.collections):
         one.clear()
     weights = {"masses": drone.masses, "inertias": drone.inertias, "nearest": Distances(shared).nearest}
     around = Surroundings(PICTURES, planes={"TrackCam": (1.0, 5.0)}, operations=simulation.operations, **weights)

@@ -126,6 +126,33 @@ def test_functions_return_nothing_one_or_several_values(stage):
     assert client.sim("getObjectPosition", drone, None) == [0, 0, 1]
 
 
+def test_relative_paths_begin_at_the_root_as_nobody_asks(stage):
+    client = stage.client()
+    floor, other = client.sim("getObject", "/Floor"), client.sim("getObject", "Quadricopter#0")
+    assert client.sim("getObject", ":/Floor") == client.sim("getObject", "./Floor") == floor
+    assert client.sim("getObject", ":/Quadcopter[1]") == other
+    assert client.sim("getObject", "./base/target", {"index": 1}) == client.sim("getObject", "DronePosition#0")
+    assert client.sim("getObject", "./base", {"proxy": other}) == client.sim("getObject", "/Quadcopter[1]/base")
+
+
+def test_a_script_is_an_object_below_its_vehicle(stage):
+    client = stage.client()
+    stage.player.start()
+    script = client.sim("getObject", "/Quadcopter/Script")
+    assert client.sim("callScriptFunction", "turned", script, "abc", 1, 2) == ("cba", [2, 1])
+    assert client.sim("getObjectParent", script) == client.sim("getObject", "/Quadcopter")
+
+
+def test_collections(stage):
+    client = stage.client()
+    drone, whole, tree = client.sim("getObject", "/Quadcopter"), client.sim("createCollection", 0), -6
+    client.sim("addItemToCollection", whole, tree, drone, 0)
+    assert drone in client.sim("getCollectionObjects", whole)
+    other = client.sim("getObject", "/Quadcopter[1]")
+    assert client.sim("checkDistance", whole, other)[2] == [drone, other]
+    client.sim("destroyCollection", whole)
+
+
 def test_the_objects_of_every_vehicle_are_there(stage):
     client = stage.client()
     other = client.sim("getObject", "Quadricopter#0")

@@ -18,8 +18,8 @@ def _run(tmp_path, caplog):
 
     def run(text, **files):
         """Run a script beside files; return what it printed."""
-        (tmp_path / "parts").mkdir(exist_ok=True)
         for name, contents in files.items():
+            (tmp_path / name.replace("__", "/")).parent.mkdir(exist_ok=True)
             (tmp_path / name.replace("__", "/")).with_suffix(".lua").write_text(contents, encoding="utf-8")
         path = tmp_path / "main.lua"
         path.write_text(text, encoding="utf-8")
@@ -103,6 +103,19 @@ def test_a_helper_may_be_a_module_of_lua_5_1(run):
     main = FLAT + "local q = require 'quad'\nprint(q.new(0.5).height, quad == q, new)"
     assert run(main, quad=helper) == ["1\ttrue\tnil"]
     assert "module is of Lua 5.1: let the file return a table instead" in refused(run, "require 'quad'", quad=helper)
+
+
+@DIALECTS
+def test_a_script_is_no_helper_of_its_own(run, dialect):
+    said = refused(run, dialect + "require 'main'")
+    assert "no module 'main': main.lua is this script itself; a helper needs another name" in said and "\n" not in said
+    assert run(dialect + "print(require 'main')", main__init="return 7") == ["7"]
+
+
+def test_flat_names_and_operators_of_newer_luas_may_stand_in_one_script(run):
+    assert run(FLAT + "print(5 | 2, 1 << 3)") == ["7\t8"]
+    assert run(FLAT + "print('5 | 2', table.getn({1, 2}))") == ["5 | 2\t2"], "in 5.1, where nothing else is asked for"
+    assert "main.lua:2: unexpected symbol near '='" in refused(run, FLAT + "= 1")
 
 
 @DIALECTS

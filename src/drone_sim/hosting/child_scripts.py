@@ -221,7 +221,7 @@ class AttachedScript(HostedScript):
         self.parameters: dict[str, Any] = {} if law is None else law
         self.parameters.update({} if law is None else {**_PROPELLER_SCRIPT, **law})
         self.parameters.update(copy.deepcopy(parameters.parameters))
-        context.scripts.add(self.own_script, self.parameters)
+        context.scripts.add(self.own_script, self.parameters).is_embedded = parameters.embedded
 
     def seen(self) -> Sequence[Vehicle]:
         """Return its vehicle, or all."""

@@ -65,6 +65,10 @@ class Folder:
         self._taken.add(name.lower())
         return name
 
+    def keep_free(self, names: Iterable[str]) -> None:
+        """Give no file one of these names."""
+        self._taken.update(name.lower() for name in names)
+
     def write(self, name: str, content: str) -> None:
         """Write a text file. Raises OSError."""
         path = self.path / name

@@ -89,14 +89,19 @@ def bring(beside: Path, folder: Path, own: Collection[str]) -> None:
         writing.write(folder / LIST, "".join(f"{name}\n" for name in brought))
 
 
-def _asked(text: str, beside: Path) -> list[str]:
-    """Return the names of the files that a script asks for."""
+def asked_for(text: str) -> list[list[str]]:
+    """Return the files of Lua that a script asks for, the names that each may have."""
     found = []
     for how, name in _ASKED.findall(text):
         inner = name.replace(".", "/")
         files = [f"{inner}.lua", f"{inner}/init.lua"] if how == "require" else [name]
-        found += [file for file in files if file.endswith(".lua") and (beside / file).is_file()][:1]
+        found.append([file for file in files if file.endswith(".lua")])
     return found
+
+
+def _asked(text: str, beside: Path) -> list[str]:
+    """Return the names of the files beside it that a script asks for."""
+    return [file for files in asked_for(text) for file in [one for one in files if (beside / one).is_file()][:1]]
 
 
 def _text(beside: Path, name: str) -> str | None:

@@ -151,7 +151,7 @@ class ObjectTree:
         return ((handle, child) for handle, child in self._objects.items() if child.parent is parent)
 
     def path(self, handle: int) -> str:
-        """Return the 4.x path of an object from the root, such as /Quadcopter/propeller[0]/joint."""
+        """Return the 4.x path of an object from the root, such as /Quadcopter/propeller[0]/respondable."""
         parts = []
         here: SceneObject | None = self[handle]
         while here is not None:

@@ -10,7 +10,7 @@ from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.mechanics.state import Pose, State
 
-KINDS = ("shape", "joint", "dummy", "proximity_sensor", "vision_sensor", "path", "camera", "force_sensor")
+KINDS = ("shape", "joint", "dummy", "proximity_sensor", "vision_sensor", "path", "camera", "force_sensor", "script")
 
 
 class DynamicBody(Protocol):
@@ -52,6 +52,7 @@ class SceneObject:
         self._added_below = parent
         self.local = local
         self.body = body
+        self.is_model = False  # whether it is the base of a model
         self.kind = kind or ("dummy" if body is None else "shape")
         self._above: Matrix | None = None
         self._below: Matrix | None = None
@@ -77,6 +78,13 @@ class SceneObject:
         while part is not None and part is not whole:
             part = part._added_below
         return part is whole
+
+    def model(self) -> SceneObject | None:
+        """Return the base of the model that it is part of, itself perhaps; None where it is part of none."""
+        here: SceneObject | None = self
+        while here is not None and not here.is_model:
+            here = here.parent
+        return here
 
     def hangs_on(self, other: SceneObject) -> bool:
         """Tell whether that object is its parent, or its parent's, and so on."""

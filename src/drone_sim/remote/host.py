@@ -61,6 +61,8 @@ class ClientHost:
 class _FromOutside(Scripts):
     """The scripts of a simulation, called by somebody who is none of them."""
 
+    are_own = False
+
     _NOBODY = Attachment(-1, "", {}, is_law=False)
 
     def __init__(self, scripts: Scripts):

@@ -20,6 +20,7 @@ from drone_sim.mechanics.object_tree import NO_HANDLES, Handles, ObjectTree
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.run.parameters import Parameters
+from drone_sim.scene import object_collections
 from drone_sim.scene.operations import SceneOperations
 from drone_sim.scene.scene import Scene
 from drone_sim.scripting.load import NO_SCRIPT
@@ -92,9 +93,9 @@ class SimulationSetup:
     def save_state(self) -> Restore:
         """Return a function that brings back all but what the world itself does."""
         own, scripts = self.context, self.scripts
-        kept = (own.objects, own.signals, own.data, own.tubes, own.drawings, own.windows, own.velocities)
+        left = (own.signals, own.data, own.tubes, own.collections, own.drawings, own.windows)
         hosted = (*scripts.child_scripts.values(), *scripts.attached)
-        parts: list[Any] = [*kept, *hosted, *self.vehicles.values(), self.scene, own.weather]
+        parts: list[Any] = [own.objects, own.velocities, *left, *hosted, *self.vehicles.values(), self.scene, own.weather]
         return in_turn(saved(own.clock, "steps"), *(one.save_state() for one in parts))
 
     def tune_as(self, before: SimulationSetup) -> None:
@@ -177,6 +178,7 @@ class SimulationSetup:
             self.scene.name_objects()
         except ParameterError as error:
             raise ParameterError(f"{self.parameters.scene_place(error.location)}: {error.problems[0].reason}") from None
+        object_collections.begin(self.parameters.scene.collections, self.context)
 
     def _check(self) -> None:
         if not self._world.is_finite():

@@ -130,7 +130,10 @@ Kind = VrepShape | VrepJoint | VrepDummy | VrepCamera | VrepProximitySensor | Ot
 
 @dataclass(frozen=True)
 class VrepScript:
-    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own."""
+    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own.
+
+    `parent_is_proxy`: of that, whether its paths begin from its parent, as of one that came from an older file.
+    """
 
     object: int
     kind: str  # main, child or customization, or another's number
@@ -140,6 +143,30 @@ class VrepScript:
     parameters: tuple[tuple[str, str], ...] = ()
     is_stock_main: bool = False
     own_object: int = -1  # handle of the script as an object, -1 where it is none
+    parent_is_proxy: bool = False
+
+    @property
+    def is_embedded(self) -> bool:
+        """Whether it is, for its paths, no object of its own."""
+        return self.own_object == -1 or self.parent_is_proxy
+
+
+@dataclass(frozen=True)
+class VrepCollectionItem:
+    """What belongs to a collection: an object by its handle, what hangs on it, what it hangs on, or all there are."""
+
+    what: str  # single, tree, chain or all
+    object: int
+    removes: bool  # from what the items before it say
+    without: bool  # of a tree or chain: whether it leaves out the object itself
+
+
+@dataclass(frozen=True)
+class VrepCollection:
+    """Objects under a name."""
+
+    name: str
+    items: tuple[VrepCollectionItem, ...]
 
 
 @dataclass(frozen=True)
@@ -184,3 +211,4 @@ class VrepFile:
     objects: tuple[VrepObject, ...]  # a parent before its children
     scripts: tuple[VrepScript, ...]
     settings: VrepSettings
+    collections: tuple[VrepCollection, ...] = ()

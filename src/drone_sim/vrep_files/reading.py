@@ -11,7 +11,16 @@ import numpy as np
 from drone_sim.files.resources import read_bytes
 from drone_sim.vrep_files.chunks import finite, level, singles, top, unpack
 from drone_sim.vrep_files.container import MAX_SIZE, open_container
-from drone_sim.vrep_files.model import VrepFile, VrepFileError, VrepObject, VrepScript, VrepSettings, within
+from drone_sim.vrep_files.model import (
+    VrepCollection,
+    VrepFile,
+    VrepFileError,
+    VrepObject,
+    VrepScript,
+    VrepSettings,
+    within,
+)
+from drone_sim.vrep_files.object_collections import read_collection
 from drone_sim.vrep_files.objects import SCRIPT, is_object, read_object, script_of
 from drone_sim.vrep_files.scripts import read_script
 from drone_sim.vrep_files.shapes import Pools
@@ -79,6 +88,7 @@ def read(content: bytes) -> VrepFile:
     pools, settings = Pools(), VrepSettings()
     objects: list[VrepObject] = []
     scripts: list[VrepScript] = []
+    collections: list[VrepCollection] = []
     for tag, data in top(container.payload):
         if is_object(tag):
             objects.append(read_object(tag, data, pools))
@@ -89,13 +99,16 @@ def read(content: bytes) -> VrepFile:
         elif tag == "LST":
             with within(f"script {len(scripts) + 1}"):
                 scripts.append(read_script(data))
+        elif tag == "GRP":
+            with within(f"collection {len(collections) + 1}"):
+                collections.append(read_collection(data))
         elif tag in _SETTINGS:
             with within(tag):
                 settings = _SETTINGS[tag](settings, data)
         if len(objects) > MAX_OBJECTS:
             raise VrepFileError(f"holds more than {MAX_OBJECTS} objects")
     program = f"{container.program // 10000}.{container.program // 100 % 100}.{container.program % 100}"
-    return VrepFile(container.version, program, _tree(objects), tuple(scripts), settings)
+    return VrepFile(container.version, program, _tree(objects), tuple(scripts), settings, tuple(collections))
 
 
 def _script_in(tag: str, data: bytes, one: VrepObject) -> list[VrepScript]:

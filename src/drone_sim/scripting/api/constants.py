@@ -22,7 +22,7 @@ handleflag assembly=0x400000 togglevisibility=0x400000 extended=0x400000 greysca
 handle chain=-7 app=-13
 # what getObjectType returns
 object shape_type joint_type graph_type camera_type dummy_type proximitysensor_type path_type=8 visionsensor_type
-    mill_type=11 forcesensor_type light_type mirror_type octree_type pointcloud_type
+    mill_type=11 forcesensor_type light_type mirror_type octree_type pointcloud_type script_type
 sceneobject shape joint graph camera dummy proximitysensor visionsensor=9 forcesensor=12 light octree=15 pointcloud
     script
 object no_subtype=200

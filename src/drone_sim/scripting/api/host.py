@@ -11,6 +11,7 @@ import numpy as np
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.inertia import Inertia
+from drone_sim.mechanics.object_collections import Collections
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.scripting.api.control import Control, Turns
@@ -50,10 +51,12 @@ class ScriptContext:
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
+    collections: Collections = field(default_factory=Collections)
 
     def clear(self) -> None:
         """Leave nothing there, as before a run; whoever holds one of them may go on to do so."""
-        for one in (self.objects, self.scripts, self.signals, self.control, self.data, self.tubes, self.velocities):
+        parts = self.objects, self.velocities, self.scripts, self.signals, self.control, self.data, self.tubes
+        for one in (*parts, self.collections):
             one.clear()
 
 

@@ -21,6 +21,7 @@ from drone_sim.scripting.api.joints import JointFunctions
 from drone_sim.scripting.api.matrices import Matrices, Poses
 from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.names import NameFunctions
+from drone_sim.scripting.api.object_collections import CollectionFunctions
 from drone_sim.scripting.api.objects import ObjectKinds, Objects
 from drone_sim.scripting.api.packing import Bits, Packing
 from drone_sim.scripting.api.paths import Paths
@@ -45,7 +46,8 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         Objects(*seen),
         JointFunctions(*seen),
         ProximitySensors(*seen),
-        DistanceFunctions(context.objects, surroundings.nearest),
+        DistanceFunctions(context.objects, context.collections, surroundings.nearest),
+        CollectionFunctions(names, context.objects, context.collections),
         Paths(*seen),
         ObjectKinds(*seen),
         SceneObjects(surroundings),

@@ -14,6 +14,7 @@ from drone_sim.message_text import near_names
 
 ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
 
+FIRST = 500_000  # the first handle: no object has one that large
 DEEPEST = 8  # scripts that wait for each other
 
 
@@ -37,6 +38,7 @@ class Attachment:
         self.parameters = parameters
         self.read: frozenset[str] = frozenset(parameters)
         self.is_law = is_law
+        self.is_embedded = False  # whether `..` in its paths is the parent of its object, as up to CoppeliaSim 4.8
         self.began = 0.0  # s, simulated, when it was loaded
         self.script: Callee | None = None
 
@@ -46,7 +48,12 @@ class Attachment:
 
 
 class Scripts:
-    """Attachments by handle (a small number that no other one of the run has had) and by object."""
+    """Attachments by handle (a number that nothing else of the run has had) and by object.
+
+    `are_own`: whether who asks is one of them; the paths of a client outside begin at no object.
+    """
+
+    are_own = True
 
     def __init__(self) -> None:
         """Start with none."""
@@ -56,7 +63,7 @@ class Scripts:
         """Forget all; handles are given out anew."""
         self._by_handle: dict[int, Attachment] = {}
         self._by_name: dict[str, Attachment] = {}
-        self._numbers = itertools.count()
+        self._numbers = itertools.count(FIRST)
         self._waiting: list[Attachment] = []  # callers, and what they called
 
     def add(self, name: str, parameters: ScriptParameters, *, is_law: bool = False) -> Attachment:

@@ -54,7 +54,23 @@ class _OnScripts(Functions):
             return self._own
         if not isinstance(handle, (int, float)):
             raise WrongValue("the handle of a script is expected")
-        return self._scripts[int(handle)]
+        number = int(handle)
+        found = self._scripts.get(number)
+        if found is None and number in {*self._objects} and self._objects[number].kind == "script":
+            found = self._script_of(number)
+        return self._scripts[number] if found is None else found
+
+    def _script_of(self, handle: int) -> Attachment:
+        """Return the script of an object. Raises ValueError where it has none."""
+        if handle == _SELF:
+            return self._own
+        return self._on_object(handle) or self._scripts.attached_to(self._objects[handle].name)
+
+    def _on_object(self, handle: int) -> Attachment | None:
+        """Return the script that is on an object, or that a script object is; None for none."""
+        one = self._objects[handle]
+        there = (each for each in (one, one.parent if one.kind == "script" else None) if each is not None)
+        return next((self._scripts.attached_to(each.name) for each in there if each.name in self._scripts), None)
 
 
 class ScriptFunctions(_OnScripts):
@@ -68,10 +84,10 @@ class ScriptFunctions(_OnScripts):
         if name is None or name == _SELF:
             return self._own.handle
         try:
-            found = self._objects[self._find(name)].name
+            handle = self._find(name)
         except ValueError:
-            found = name
-        return self._scripts.attached_to(found).handle
+            return self._scripts.attached_to(name).handle
+        return self._script_of(handle).handle
 
     @sim("345")
     def getObjectAssociatedWithScript(self, script: Handle) -> int:
@@ -113,9 +129,6 @@ class ScriptFunctions(_OnScripts):
     def setUserParameter(self, handle: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of the script that is attached to an object (4.x)."""
         self.setScriptSimulationParameter(self._script_of(handle).handle, name, value)
-
-    def _script_of(self, handle: int) -> Attachment:
-        return self._own if handle == _SELF else self._scripts.attached_to(self._objects[handle].name)
 
     def _tree(self) -> list[Attachment]:
         """Return this script and those below it."""
@@ -228,7 +241,7 @@ class ScriptCalls(_OnScripts):
         if not isinstance(function, str):
             raise WrongValue("the name of a function is expected")
         name, at, of = function.partition("@")
-        callee = self._script(script) if not at else self._scripts.attached_to(self._objects[self._find(of)].name)
+        callee = self._script_of(self._find(of)) if at else self._script(script)
         values = list(arguments)
         refuse_if_too_large(values)
         try:
@@ -246,8 +259,7 @@ class ScriptCalls(_OnScripts):
     def _attached(self, object: Handle | Name) -> Attachment | None:
         if object == _SELF:
             return self._own
-        name = self._objects[self._find(object) if isinstance(object, str) else object].name
-        return self._scripts.attached_to(name) if name in self._scripts else None
+        return self._on_object(self._find(object) if isinstance(object, str) else object)
 
 
 class _Functions:

@@ -53,7 +53,7 @@ ABSENT: dict[str, str] = {
     r"sim\.\w*(?:Collision|Distance)\w*": (
         "there are no collision and distance objects; checkCollision and checkDistance measure between two objects"
     ),
-    r"sim\.\w*(?:Mill|Mechanism|Collection)\w*": "there are no collections and no mills",
+    r"sim\.\w*(?:Mill|Mechanism)\w*": "there are no mills",
     r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
     r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",

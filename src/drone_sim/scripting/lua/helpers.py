@@ -76,11 +76,19 @@ class LuaHelpers:
             raise ValueError("a module's name is made of letters, digits, _ and -; dots stand for folders")
         inner = name.replace(".", "/")
         for file in (f"{inner}.lua", f"{inner}/init.lua"):
-            if (self._folder / file).exists():
+            if (self._folder / file).exists() and not self._is_script(file):
                 return file
         beside = [path.stem for path in self._folder.glob("*.lua") if str(path) not in self._paths.values()]
         near = near_names(name, beside)
+        if self._is_script(f"{inner}.lua"):
+            raise ValueError(
+                f"{inner}.lua is this script itself; a helper needs another name, or lies in {inner}/init.lua"
+            )
         raise ValueError(f"no file {inner}.lua beside the script{f'; {near}' if beside else ''}")
+
+    def _is_script(self, file: str) -> bool:
+        """Tell whether a file in the folder is the script, which is no helper of its own."""
+        return (self._folder / file) == Path(self._paths[self.chunk])
 
     @staticmethod
     def _chunk(file: str) -> str:

@@ -59,7 +59,7 @@ class LuaScript:
             raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
         self._thread: Executor = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
-            dialect = state.OLDEST if text.flat or "phases" in text.form else state.newest()
+            dialect = state.dialect_for(text.text, text.flat or "phases" in text.form)
             self._has_coroutines = text.coroutines
             self._lua = self._thread.run(self._build, dialect, text.threads)
             self._run("load", self._lua["open"], text.text, text.form.encode())
