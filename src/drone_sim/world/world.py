@@ -31,6 +31,7 @@ from drone_sim.world.initial_poses import InitialPoses
 from drone_sim.world.joints import Joints
 from drone_sim.world.pictures import Pictures, Textures
 from drone_sim.world.queries import Queries
+from drone_sim.world.shape_forces import ShapeForces
 
 _changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -87,6 +88,7 @@ class World:
         self.joints = Joints(self._client, self._look_anew)
         self.collision_filter = CollisionFilter(self._client, self.pictures.moved)
         self.queries = Queries(self._client, self.collision_filter)
+        self.shape_forces = ShapeForces(self._client)
 
     def _look_anew(self) -> None:
         self.changes = next(_changes)
@@ -186,6 +188,7 @@ class World:
         self._initial_poses.forget(body)
         self.joints.forget(body)
         self.collision_filter.forget(body)
+        self.shape_forces.forget(body)
         self._textures.forget(body)
         self._centres.pop(body, None)
         self.pictures.remove(body)
@@ -290,7 +293,7 @@ class World:
             pybullet.applyExternalTorque,
             pybullet.stepSimulation,
         )
-        known = self._centres  # in the first sub-step
+        known, pushed = self._centres, bool(self.shape_forces.sums)  # the former in the first sub-step
         loads = [(body, wrench.force, *wrench.terms) for body, wrench in wrenches.items()]
         if between is not None:
             between(0)
@@ -305,10 +308,13 @@ class World:
                     torque_y += uz * ax - ux * az
                     torque_z += ux * ay - uy * ax
                 turn(body, -1, (torque_x, torque_y, torque_z), in_world, client)
+            if pushed:
+                self.shape_forces.apply()
             step(client)
             known = {}
             if between is not None:
                 between(count)
+        self.shape_forces.sums.clear()
         self._centres.clear()
         self.changes = next(_changes)
 
@@ -333,6 +339,7 @@ class World:
         """Put everything where it stood, at rest."""
         self.changes = next(_changes)
         self._centres.clear()
+        self.shape_forces.sums.clear()
         self.pictures.all_moved()
         self._initial_poses.bring_back()
 
@@ -345,6 +352,7 @@ class World:
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
         self._centres.clear()
+        self.shape_forces.sums.clear()
         self.changes = next(_changes)
         self.pictures.all_moved()
         pybullet.restoreState(number, physicsClientId=self._client)

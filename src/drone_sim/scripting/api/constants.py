@@ -178,15 +178,17 @@ PHASES = ("init", "actuation", "sensing", "cleanup")
 CALL_TYPES = {phase: CONSTANTS[f"syscb_{phase}"] for phase in PHASES} | {"thread": CONSTANTS["syscb_threadmain"]}
 
 AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, which each function understands in its own way
+BASE, WXYZ = CONSTANTS["handleflag_reljointbaseframe"], CONSTANTS["handleflag_wxyzquat"]
 METRES = CONSTANTS["handleflag_depthbuffermeters"]
-_FIRST_FLAG = 1 << 20
+RESET_FORCE, RESET_TORQUE = CONSTANTS["handleflag_resetforce"], CONSTANTS["handleflag_resettorque"]
+_FIRST_FLAG, _BEYOND_FLAGS = 1 << 20, 1 << 31
 
 
 def bare(handle: int) -> int:
     """Return a handle without its flags."""
-    return int(handle) % _FIRST_FLAG if handle >= _FIRST_FLAG else handle
+    return int(handle) % _FIRST_FLAG if _FIRST_FLAG <= handle < _BEYOND_FLAGS else handle
 
 
 def has(handle: int, flag: int) -> bool:
     """Tell whether a flag was added to a handle."""
-    return handle >= _FIRST_FLAG and bool(int(handle) & flag)
+    return _FIRST_FLAG <= handle < _BEYOND_FLAGS and bool(int(handle) & flag)

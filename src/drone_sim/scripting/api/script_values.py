@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 DEEPEST = 16  # levels of nested tables, lists and mappings
-MOST_VALUES = 1_000_000  # in one call or message
+MOST_VALUES = 3 * 2048 * 2048  # in one call or message: the largest picture of a vision sensor, as numbers
 MOST_BYTES = 64 * 1024 * 1024  # of all its strings
 
 _PLAIN = frozenset((float, int, bool, type(None)))
