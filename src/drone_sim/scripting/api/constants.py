@@ -126,7 +126,8 @@ boolparam hierarchy_visible console_visible collision_handling_enabled distance_
 stringparam application_path video_filename app_arg1 app_arg2 app_arg3 app_arg4 app_arg5 app_arg6 app_arg7 app_arg8
     app_arg9 additional_addonscript_firstscene additional_addonscript scene_path_and_name scene_path scene_name
     scene_unique_id=118 additional_addonscript1=11 additional_addonscript2 verbosity=121 statusbarverbosity
-    dlgverbosity consolelogfilter startupscriptstring uniqueid
+    dlgverbosity consolelogfilter startupscriptstring uniqueid tempdir tempscenedir datadir importexportdir addonpath
+    scenedefaultdir modeldefaultdir
 arrayparam gravity fog fog_color background_color1 background_color2 ambient_light random_euler
 # what a buffer holds
 buffer uint8 int8 uint16 int16 uint32 int32 float double uint8rgb uint8bgr uint8rgba uint8argb base64 split

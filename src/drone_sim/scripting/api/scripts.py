@@ -7,6 +7,7 @@ one's answer cannot be called meanwhile.
 from __future__ import annotations
 
 import difflib
+import functools
 import logging
 from collections.abc import Callable, Collection
 from math import isfinite
@@ -50,7 +51,11 @@ class _OnScripts(Functions):
         super().__init__(host, surroundings, ignored)
         self._find = names.getObject
         self._scripts = host.context.scripts
-        self._own = self._scripts.attached_to(host.own_script)
+
+    @functools.cached_property
+    def _own(self) -> Attachment:
+        """This script; a client outside has none where nobody flies. Raises ValueError."""
+        return self._scripts.attached_to(self._host.own_script)
 
     def _script(self, handle: int) -> Attachment:
         if handle == _SELF:
