@@ -599,6 +599,7 @@ def test_a_scene_of_coppeliasim_is_loaded_from_the_folder_of_scenes(tmp_path):
         assert client.sim("getJointPosition", joint) == 0
         with pytest.raises(Refusal, match="no script is attached to 'Drone'"):
             client.sim("getScriptHandle")
+        assert client.sim("loadScene", "") == 1 and list(simulation.vehicles) == ["drone"]
     finally:
         client.vanish()
         server.close()

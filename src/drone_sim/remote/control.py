@@ -145,11 +145,11 @@ class ClientControl:
         """Let another scene file take the last one's place while the simulation is stopped; return 1.
 
         It may be one of V-REP's (.ttt), and lies in sim.stringparam_scenedefaultdir: beside the last one, or in
-        `remote_api: {scenes: ...}`.
+        `remote_api: {scenes: ...}`. '' is the scene that there is without a file.
         """
         if self._simulation.running:
             raise ValueError("a scene is loaded while the simulation is stopped: call stopSimulation first")
-        self._simulation.load_scene(str(inside(self._folder(), filename, ".ttt")))
+        self._simulation.load_scene(str(inside(self._folder(), filename, ".ttt")) if filename != "" else "")
         return 1
 
     @sim("345")
