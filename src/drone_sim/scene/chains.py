@@ -92,8 +92,8 @@ class _Search:
         chains: list[Chain] = []
         for joint in self._held:
             self._put(joint, chains)
-        for one in chains:
-            self._check(one)
+        for chain in chains:
+            self._check(chain)
         return Chains(chains, reasons)
 
     def _check(self, chain: Chain) -> None:
