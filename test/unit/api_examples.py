@@ -16,8 +16,9 @@ POSE = f"{{1,2,3, 0,0,{HALF},{HALF}}}"
 POSE_BACK = [-2, 1, -3, 0, 0, -HALF, HALF]
 STRING = "'\\1\\0\\0\\0\\2\\0\\0\\0'"
 NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
-CALLED = "it waits for this call to end"
+NO_FUNCTION = "the script has no function 'nothing' to call back"
 ANY = object()  # whatever comes
+STEP_STAYS = "`time_step` of the scene file says it"
 NO_SCENE_FILE = "a model lies beside the scene file, and there is no scene file"
 
 
@@ -37,6 +38,8 @@ def near(*values: float) -> Any:
 ALONG_X = near(8e-6, 0, 0, 0, 9.04e-4, 0, 0, 0, 9.04e-4)  # kg m², of a drone without its propellers
 
 
+# Intensity, red, green and blue of the two pixels (3, 4, 5) and (0, 1, 2).
+DARKEST, LIGHTEST, MEAN = ([one / 255 for one in (g - 0.185, g - 1, g, g + 1)] for g in (1, 4, 2.5))
 BOX = [near(1, 1, 1), near(0.5, 0.5, 0.5, 0, 0, 0, 1)]
 
 
@@ -168,6 +171,8 @@ SIM: dict[str, list[Example]] = {
     "multiplyVector": [
         Example(f"NAME({TURNED}, {{1,0,0}})", [near(1, 3, 3)]),
         Example(f"NAME({TURNED}, {{1,0,0, 0,1,0}})", [near(1, 3, 3, 0, 2, 3)]),
+        Example(f"NAME({POSE}, {{1,0,0, 0,1,0}})", [near(1, 3, 3, 0, 2, 3)]),
+        Example(f"NAME({{0,0,{HALF},{HALF}}}, {{1,0,0}})", [near(0, 1, 0)]),
     ],
     "multiplyMatrices": [Example(f"NAME({TURNED}, sim.getMatrixInverse({TURNED}))", [ANY])],
     "buildIdentityMatrix": [Example("NAME()", [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]])],
@@ -235,7 +240,7 @@ SIM: dict[str, list[Example]] = {
     "getCustomizationScriptAssociatedWithObject": [Example("NAME(DRONE)", [-1])],
     "getScriptName": [Example("NAME(sim.handle_self)", ["Drone"])],
     "getScriptExecutionCount": [Example("NAME()", [0])],
-    "callScriptFunction": [Example("REFUSED(NAME, 'nothing', sim.handle_self)", [CALLED])],
+    "callScriptFunction": [Example("REFUSED(NAME, 'nothing', sim.handle_self)", [NO_FUNCTION])],
     "getScriptFunctions": [Example("NAME(sim.handle_self) ~= nil", [True], "NAME(sim.handle_self) is not None")],
     # ---- threads, of a script that has none
     "switchThread": [Example("REFUSED(NAME)", [NO_THREAD])],
@@ -267,7 +272,12 @@ SIM: dict[str, list[Example]] = {
     "getInt32Param": [Example("NAME(sim.intparam_program_version)", [40600])],
     "setInt32Param": [Example("NAME(sim.intparam_visible_layers, 1)", [])],
     "getFloatParam": [Example("NAME(sim.floatparam_simulation_time_step)", [0.05])],
-    "setFloatParam": [Example("NAME(sim.floatparam_simulation_time_step, 1)", [])],
+    "setFloatParam": [
+        Example("NAME(sim.floatparam_simulation_time_step, 0.05)", []),
+        Example("NAME(sim.floatparam_stereo_distance, 1)", []),
+        Example("REFUSED(NAME, sim.floatparam_simulation_time_step, 0.01)", [STEP_STAYS]),
+    ],
+    "setSimulationTimeStep": [Example("NAME(0.05)", []), Example("REFUSED(NAME, 0.01)", [STEP_STAYS])],
     "getBoolParam": [Example("NAME(sim.boolparam_dynamics_handling_enabled)", [True])],
     "setBoolParam": [Example("NAME(sim.boolparam_display_enabled, false)", [])],
     "getStringParam": [Example("NAME(sim.stringparam_scene_path)", [""])],
@@ -280,8 +290,8 @@ SIM: dict[str, list[Example]] = {
     "setInt32Signal": [Example("NAME('i', 2)", [])],
     "getInt32Signal": [Example("NAME('i')", [2])],
     "clearInt32Signal": [Example("NAME('i')", []), Example("sim.getInt32Signal('i')", [])],
-    "setStringSignal": [Example("NAME('s', 'text')", [])],
-    "getStringSignal": [Example("NAME('s')", ["text"])],
+    "setStringSignal": [Example("NAME('n', 2.5)", []), Example("NAME('s', 'text')", [])],
+    "getStringSignal": [Example("NAME('n')", ["2.5"]), Example("NAME('s')", ["text"])],
     "clearStringSignal": [Example("NAME('s')", []), Example("sim.getStringSignal('s')", [])],
     "tubeOpen": [Example("NAME(0, 'a', 1)", [1]), Example("NAME(0, 'a', 1)", [2])],
     "tubeWrite": [Example("NAME(1, 'x')", [1]), Example("NAME(1, 'y')", [1])],
@@ -330,7 +340,7 @@ SIM: dict[str, list[Example]] = {
     ],
     "getVisionSensorResolution": [Example("NAME(CAMERA)", [[1, 2]])],
     "handleVisionSensor": [Example("NAME(CAMERA)", [0])],
-    "readVisionSensor": [Example("NAME(DEPTH)", [0, near(0, 0, 0, 0, 2, 0, 0, 0, 0, 4, 0, 0, 0, 0, 3)])],
+    "readVisionSensor": [Example("NAME(DEPTH)", [0, approx([*DARKEST, 0.25, *LIGHTEST, 0.75, *MEAN, 0.5])])],
     "readProximitySensor": [Example("NAME(RANGE)", [-1, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "handleProximitySensor": [Example("NAME(FEELER)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "checkProximitySensor": [Example("NAME(FEELER, FLOOR)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],

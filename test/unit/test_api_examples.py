@@ -29,7 +29,10 @@ import make_api  # noqa: E402
 EXAMPLES = {"sim": SIM, "simROS": ROS}
 COLORS = np.array([[[3, 4, 5]], [[0, 1, 2]]], np.uint8)  # the top row first
 DISTANCES = np.array([[2.0, 4.0]], np.float32)
-PICTURES = {"FrontVision": lambda: COLORS, "TrackCam": lambda: DISTANCES}
+PICTURES = {
+    "FrontVision": lambda kind="color": COLORS if kind == "color" else DISTANCES,
+    "TrackCam": lambda kind="depth": DISTANCES if kind == "depth" else COLORS,
+}
 OBJECTS = {
     "DRONE": "/Quadcopter",
     "BASE": "/Quadcopter/base",

@@ -1,6 +1,7 @@
 """A file of V-REP's becomes a scene that flies here, with its own masses, places and scripts."""
 
 import logging
+import math
 import struct
 from pathlib import Path
 
@@ -23,11 +24,14 @@ from vrep_encoder import (
 )
 from vrep_quadricopter import PROPELLER, quadricopter
 
+from drone_sim.files import mesh_files
 from drone_sim.importing.main import main
 from drone_sim.mechanics import frames, urdf
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import Place
+from drone_sim.vrep_files.model import VrepFileError
+from drone_sim.vrep_files.reading import read
 
 HOVER = """
 function sysCall_init()
@@ -101,6 +105,54 @@ def test_a_compound_keeps_its_parts_and_what_is_no_simple_form_is_a_mesh(importe
     assert found["Cabin"]["parts"][1]["shape"] == "cylinder" and found["Cabin"]["parts"][1]["size"] == [1.0, 5.0]
     assert found["Egg"]["shape"] == "mesh"
     assert (imported.scene.parent / found["Egg"]["file"]).read_text().count("\nf ") == 1
+
+
+RED, GREEN, BLUE, GREY = (255, 0, 0), (0, 255, 0), (0, 0, 255), (9, 9, 9)
+IMAGE = np.array([[RED, GREEN], [BLUE, GREY]], np.uint8)  # the bottom row first, as in the file
+_IMAGE = chunk("Gon", text("tiles.jpg")) + chunk("Img", IMAGE.tobytes())
+TEXTURE = chunk("TEX", integers("Ipa", 77, 2, 2) + _IMAGE + b"EOO")
+AS_IS = struct.pack("<7d", 1, 0, 0, 0, 0, 0, 0)
+
+
+def cover(*more, number=77, way=0, scaling=(1.0, 1.0)):
+    ob = chunk("_ob", struct.pack("<2i2d", number, way, *scaling))
+    return chunk("Toj", ob + chunk("_rc", AS_IS) + b"".join(more) + b"EOO")
+
+
+@pytest.mark.parametrize(
+    "covered, corners",
+    [
+        (cover(chunk("Ftc", struct.pack("<6f", 0, 0, 1, 0, 0.25, 1))), [[0, 0], [1, 0], [0.25, 1]]),
+        (cover(scaling=(2.0, 4.0)), [[0.5, 0.5], [1, 0.5], [0.5, 0.75]]),
+        (cover(way=3), [[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]]),
+    ],
+    ids=["as the file says", "seen along z", "on a cube"],
+)
+def test_a_mesh_is_covered_with_its_texture(imported, covered, corners):
+    """Of a triangle (0, 0, 0), (1, 0, 0), (0, 1, 0)."""
+    leaf = objects(imported(TEXTURE, shape(0, "Leaf", mesh("none", more=covered))))["Leaf"]
+    assert leaf["shape"] == "mesh" and "color" not in leaf
+    (part,) = mesh_files.read(str(imported.scene.parent / leaf["file"]))
+    assert part.texture.tolist() == IMAGE[::-1].tolist()
+    assert np.allclose(part.uv[part.faces[0]], corners)
+    assert np.allclose(part.vertices[part.faces[0]], [(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+
+
+@pytest.mark.parametrize(
+    "covered",
+    [cover(number=78), cover(way=1), cover(chunk("Ftc", struct.pack("<6f", 0, 0, math.nan, 0, 0, 1)))],
+    ids=["no such texture", "round a cylinder", "not finite"],
+)
+def test_what_covers_a_mesh_in_another_way_is_left_out(imported, covered):
+    leaf = objects(imported(TEXTURE, shape(0, "Leaf", mesh("none", more=covered))))["Leaf"]
+    (part,) = mesh_files.read(str(imported.scene.parent / leaf["file"]))
+    assert part.texture is None and "color" in leaf
+
+
+def test_a_texture_that_is_cut_is_one_line():
+    cut = chunk("TEX", integers("Ipa", 77, 2, 2) + chunk("Img", bytes(11)) + b"EOO")
+    with pytest.raises(VrepFileError, match=r"^TEX: a texture of 2 x 2 px in 11 bytes$"):
+        read(file(cut))
 
 
 def test_joints_and_what_hangs_on_them(imported):

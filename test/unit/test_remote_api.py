@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import zmq
 from remote_client import Client, Refusal, official_client
+from vrep_encoder import chunk, file, integers, mesh, numbers, scene_object, shape
 
 from drone_sim.remote.conversation import RemoteApi
 from drone_sim.remote.remote_api import start_server
@@ -587,3 +588,58 @@ def test_the_official_client_flies_by_its_own_calls():
     finally:
         over.set()
         thread.join()
+
+
+# ---- CoppeliaSim's own scenes
+
+
+def test_a_scene_of_coppeliasim_is_loaded_from_the_folder_of_scenes(tmp_path):
+    """As CoppeliaSim's example pController does; nobody flies there."""
+    (tmp_path / "messaging").mkdir()
+    motor = integers("Jtt", 10) + numbers("_mp", "Dmp", 0, 100) + chunk("Va9", b"\x11") + integers("Jmd", 5)
+    arm = shape(2, "Arm", mesh(size=(1, 0.1, 0.1)), parent=1, at=(0.5, 0, 0.2), dynamic=True)
+    posts = (
+        shape(number, name, mesh(), at=(0, 3.0 * number, 1), alias="Post") for number, name in ((0, "A"), (3, "B"))
+    )
+    scene = file(*posts, scene_object("JNT", 1, "joint", 0, own=motor), arm)
+    (tmp_path / "messaging" / "arm.ttt").write_bytes(scene)
+    loaded = parameters.load({"remote_api": {"scenes": str(tmp_path)}})
+    simulation = Simulation(loaded, started=False)
+    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    server = RemoteApiServer(player, "127.0.0.1", 0)
+    client = Client(server)
+    try:
+        constants = client.call("zmqRemoteApi.info", "sim")
+        folder = client.sim("getStringParam", constants["stringparam_scenedefaultdir"]["const"])
+        with pytest.raises(Refusal, match=r"'../arm.ttt': the name of a .yaml or .ttt file beside the scene file"):
+            client.sim("loadScene", "../arm.ttt")
+        assert client.sim("loadScene", f"{folder}/messaging/arm.ttt") == 1
+        assert not simulation.vehicles
+        joint = client.sim("getObject", "/Post[0]/joint")
+        client.sim("setJointTargetVelocity", joint, 1.0)
+        client.sim("setStepping", True)
+        client.sim("startSimulation")
+        for _ in range(20):
+            player.step()
+        assert client.sim("getJointPosition", joint) == pytest.approx(1.0, abs=0.1)
+        client.sim("stopSimulation")
+        assert client.sim("getJointPosition", joint) == 0
+        with pytest.raises(Refusal, match="no script is attached to 'Drone'"):
+            client.sim("getScriptHandle")
+        assert client.sim("loadScene", "") == 1 and list(simulation.vehicles) == ["drone"]
+    finally:
+        client.vanish()
+        server.close()
+        simulation.close()
+
+
+def test_what_is_made_while_stopped_stays_through_start_and_stop(stage):
+    client = stage.client()
+    made = client.sim("createDummy", 0.01)
+    client.sim("setObjectPosition", made, -1, [0.1, 0.2, 0.3])
+    client.sim("startSimulation")
+    stage.go(2)
+    client.sim("setObjectPosition", made, -1, [5, 5, 5])
+    client.sim("stopSimulation")
+    assert client.sim("getObjectPosition", made, -1) == pytest.approx([0.1, 0.2, 0.3])
+    client.sim("removeObject", made)

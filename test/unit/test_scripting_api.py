@@ -31,7 +31,7 @@ def _simulation(tmp_path):
 def _sim(simulation):
     return make_sim(
         simulation.child_scripts["drone"],
-        Surroundings({"FrontVision": lambda: PICTURE}, operations=simulation.operations),
+        Surroundings({"FrontVision": lambda *_: PICTURE}, operations=simulation.operations),
     )
 
 
@@ -116,7 +116,7 @@ def test_signals(sim):
     sim.clearStringSignal("a")
     assert sim.getStringSignal("a") is None
     with pytest.raises(TypeError, match="a string is expected"):
-        sim.setStringSignal("a", 1)
+        sim.setStringSignal("a", [1])
 
 
 def test_a_force_accelerates_and_lasts_one_step(simulation, sim):
@@ -252,7 +252,7 @@ def test_a_script_sees_each_step_once(tmp_path):
     simulation = Simulation(parameters.load({"cameras": SMALL}), script=str(script))
     camera, taken = simulation.drone.cameras["front"], []
     take = camera.take
-    camera.take = lambda: taken.append(simulation.steps) or take()
+    camera.take = lambda *kind: taken.append(simulation.steps) or take(*kind)
     simulation.step()
     simulation.step()
     camera.viewers.add(lambda: True)

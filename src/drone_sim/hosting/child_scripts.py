@@ -64,6 +64,13 @@ class HostedScript(ABC):
         """
         self._owner(shape, lambda one: shape in one.shapes).add_force(shape, force, torque, offset)
 
+    def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
+        """Forget the forces on a shape, or the torques, or both, that were added since the last step.
+
+        Raises ValueError for what is no dynamic shape of a vehicle that it may push.
+        """
+        self._owner(shape, lambda one: shape in one.shapes).drop_forces(shape, forces, torques)
+
     def turn_joint(self, joint: str, angle: float | None = None) -> float:
         """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError for what is none."""
         return self._owner(joint, lambda one: one.blades.has(joint)).blades.turn(joint, angle)

@@ -69,11 +69,12 @@ class Folder:
         """Give no file one of these names."""
         self._taken.update(name.lower() for name in names)
 
-    def write(self, name: str, content: str) -> None:
-        """Write a text file. Raises OSError."""
+    def write(self, name: str, content: str | bytes) -> None:
+        """Write a file, text in UTF-8. Raises OSError."""
         path = self.path / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        writing.write(path, content)
+        with writing.replacing(path, binary=isinstance(content, bytes)) as file:
+            file.write(content)
 
 
 class Report:

@@ -40,6 +40,9 @@ class Script(Protocol):
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
 
+    def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message. Raises ScriptError."""
 

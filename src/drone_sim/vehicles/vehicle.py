@@ -175,7 +175,7 @@ class Vehicle:
     def wrench(self) -> Wrench:
         """Return what pushes the body through this step, the forces of single sub-steps aside."""
         body = self.body
-        wrench, body.wrench = body.wrench, Wrench()
+        wrench = body.take_pushes()
         for force in self._forces:
             force.add_to(wrench, body)
         if self.pushes.lasting:

@@ -39,6 +39,26 @@ class VrepPrimitive:
     pose: Pose
 
 
+@dataclass(frozen=True, eq=False)
+class VrepTexture:
+    """An image (h, w, 3 or 4), 0..255, top row first."""
+
+    name: str
+    image: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class VrepCover:
+    """A texture on a mesh: where each corner of its faces lies on it, (m, 3, 2), 0..1, v upwards.
+
+    `is_decal`: the mesh's own colour does not show.
+    """
+
+    texture: VrepTexture
+    corners: np.ndarray
+    is_decal: bool
+
+
 @dataclass(frozen=True)
 class VrepMesh:
     """One surface of a shape: vertices (n, 3), m, in the shape's frame; faces (m, 3); colour 0..1."""
@@ -47,6 +67,7 @@ class VrepMesh:
     faces: np.ndarray
     color: Rgba
     primitive: VrepPrimitive | None = None
+    cover: VrepCover | None = None
 
 
 @dataclass(frozen=True)

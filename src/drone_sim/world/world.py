@@ -33,6 +33,7 @@ from drone_sim.world.initial_poses import InitialPoses
 from drone_sim.world.joints import Joints
 from drone_sim.world.pictures import Pictures, Textures
 from drone_sim.world.queries import Queries
+from drone_sim.world.shape_forces import ShapeForces
 
 _changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -101,6 +102,7 @@ class World:
         self._turns: dict[int, Quaternion] = {}  # attitudes, read since the last (part of a) sub-step
         self.collision_filter = CollisionFilter(self._client, self.pictures.moved)
         self.queries = Queries(self._client, self.collision_filter)
+        self.shape_forces = ShapeForces(self._client)
 
     def _look_anew(self) -> None:
         self.changes = next(_changes)
@@ -202,6 +204,7 @@ class World:
         self._gyroscopic_term.forget(body)
         self._impacts.forget(body)
         self.collision_filter.forget(body)
+        self.shape_forces.forget(body)
         self._textures.forget(body)
         self._centres.pop(body, None)
         self.pictures.remove(body)
@@ -310,6 +313,7 @@ class World:
             self._step(loads, parts)
             if between is not None:
                 between(count)
+        self.shape_forces.sums.clear()
         self._centres.clear()
         self.changes = next(_changes)
 
@@ -338,6 +342,8 @@ class World:
                 torque_y += uz * ax - ux * az
                 torque_z += ux * ay - uy * ax
             _turn(body, -1, (torque_x, torque_y, torque_z), _IN_WORLD, client)
+        if self.shape_forces.sums:
+            self.shape_forces.apply()
         self._gyroscopic_term.begin_sub_step(turns, duration)
         _step(client)
         self._gyroscopic_term.end_sub_step(duration)
@@ -365,6 +371,7 @@ class World:
         """Put everything where it stood, at rest."""
         self.changes = next(_changes)
         self._centres.clear()
+        self.shape_forces.sums.clear()
         self.pictures.all_moved()
         self._initial_poses.bring_back()
 
@@ -377,6 +384,7 @@ class World:
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
         self._centres.clear()
+        self.shape_forces.sums.clear()
         self.changes = next(_changes)
         self.pictures.all_moved()
         pybullet.restoreState(number, physicsClientId=self._client)

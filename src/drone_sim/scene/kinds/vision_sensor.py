@@ -55,7 +55,7 @@ class VisionSensor(SceneObject):
         self.orthographic_size = parameters.size  # m, of the larger side; None where it is perspective
         self._context = context
 
-    def picture(self, kind: str) -> np.ndarray:
+    def picture(self, kind: str = "color") -> np.ndarray:
         """Return what it sees: "color" or "depth", as sensors.camera.Vision has it. Raises ValueError."""
         self._context.carried.follow()
         pose = np.reshape((*frames.multiply(self.matrix(), _OPTICAL), 0, 0, 0, 1), (4, 4))

@@ -126,7 +126,8 @@ boolparam hierarchy_visible console_visible collision_handling_enabled distance_
 stringparam application_path video_filename app_arg1 app_arg2 app_arg3 app_arg4 app_arg5 app_arg6 app_arg7 app_arg8
     app_arg9 additional_addonscript_firstscene additional_addonscript scene_path_and_name scene_path scene_name
     scene_unique_id=118 additional_addonscript1=11 additional_addonscript2 verbosity=121 statusbarverbosity
-    dlgverbosity consolelogfilter startupscriptstring uniqueid
+    dlgverbosity consolelogfilter startupscriptstring uniqueid tempdir tempscenedir datadir importexportdir addonpath
+    scenedefaultdir modeldefaultdir
 arrayparam gravity fog fog_color background_color1 background_color2 ambient_light random_euler
 # what a buffer holds
 buffer uint8 int8 uint16 int16 uint32 int32 float double uint8rgb uint8bgr uint8rgba uint8argb base64 split
@@ -178,15 +179,17 @@ PHASES = ("init", "actuation", "sensing", "cleanup")
 CALL_TYPES = {phase: CONSTANTS[f"syscb_{phase}"] for phase in PHASES} | {"thread": CONSTANTS["syscb_threadmain"]}
 
 AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, which each function understands in its own way
+BASE, WXYZ = CONSTANTS["handleflag_reljointbaseframe"], CONSTANTS["handleflag_wxyzquat"]
 METRES = CONSTANTS["handleflag_depthbuffermeters"]
-_FIRST_FLAG = 1 << 20
+RESET_FORCE, RESET_TORQUE = CONSTANTS["handleflag_resetforce"], CONSTANTS["handleflag_resettorque"]
+_FIRST_FLAG, _BEYOND_FLAGS = 1 << 20, 1 << 31
 
 
 def bare(handle: int) -> int:
     """Return a handle without its flags."""
-    return int(handle) % _FIRST_FLAG if handle >= _FIRST_FLAG else handle
+    return int(handle) % _FIRST_FLAG if _FIRST_FLAG <= handle < _BEYOND_FLAGS else handle
 
 
 def has(handle: int, flag: int) -> bool:
     """Tell whether a flag was added to a handle."""
-    return handle >= _FIRST_FLAG and bool(int(handle) & flag)
+    return _FIRST_FLAG <= handle < _BEYOND_FLAGS and bool(int(handle) & flag)

@@ -81,6 +81,12 @@ class Host(Protocol):
         Raises ValueError for what is none of the drone's.
         """
 
+    def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
+        """Forget the forces on a shape, or the torques, or both, that were added since the last step.
+
+        Raises ValueError for what is none of the drone's.
+        """
+
     def turn_joint(self, joint: str, angle: float | None) -> float:
         """Turn a joint to an angle (rad), unless None; return the angle. Raises ValueError for what is none."""
 
@@ -153,7 +159,7 @@ class Operations(Protocol):
 class Surroundings:
     """What the API needs besides the drone: how a script is run, and what it sees, by object name."""
 
-    pictures: Mapping[str, Callable[[], np.ndarray]] = field(default_factory=dict)
+    pictures: Mapping[str, Callable[..., np.ndarray]] = field(default_factory=dict)  # of a kind, or without one its own
     outside: Caller = lambda function: function()  # calls a function where OpenGL is, on nobody's time limit
     inside: Caller = lambda function: function()  # the same, on this script's time limit
     operations: Operations | None = None  # on the objects of the scene, where there is one

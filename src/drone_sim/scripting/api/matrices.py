@@ -29,9 +29,12 @@ class Matrices:
     """Matrices, 12 numbers each, and rotations."""
 
     @sim("345")
-    def multiplyVector(self, matrix: TwelveNumbers, vector: Numbers) -> list[float]:
-        """Return matrix · vector, of one vector or of several, one after the other."""
-        m = numbers(matrix, 12)
+    def multiplyVector(self, matrix: Numbers, vector: Numbers) -> list[float]:
+        """Return matrix · vector, of one vector or of several, one after the other.
+
+        `matrix` may be a pose (7 numbers), or a quaternion (x, y, z, w).
+        """
+        m = _transform(matrix)
         if len(vector) == 3:
             return list(frames.transform(m, numbers(vector, 3)))
         values = numbers(vector, len(vector))
@@ -121,6 +124,13 @@ class Matrices:
     def yawPitchRollToAlphaBetaGamma(self, yaw: Number, pitch: Number, roll: Number) -> tuple[float, float, float]:
         """Return V-REP's Euler angles of yaw, pitch and roll (R = Rz Ry Rx), in rad."""
         return frames.to_euler(frames.from_rpy((0.0, 0.0, 0.0), numbers((roll, pitch, yaw), 3)))
+
+
+def _transform(values: Numbers) -> Matrix:
+    """Return the transform of 12 numbers, of a pose (7), or of a quaternion (4)."""
+    if len(values) == 4:
+        return built((0.0, 0.0, 0.0), values)
+    return _matrix(values) if len(values) == 7 else numbers(values, 12)
 
 
 def built(position: Sequence[float], turn: Sequence[float]) -> Matrix:

@@ -24,6 +24,9 @@ class Callee(Protocol):
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Return what a global function returns: None, a value, or a tuple of several. Raises ScriptError."""
 
+    def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+
 
 class Attachment:
     """A script on an object; `script` is set while it is loaded."""
@@ -113,12 +116,16 @@ class Scripts:
         """Return the parameters that built-in laws read, by name."""
         return {name: None for one in self if one.is_law for name in one.read}
 
+    def is_own(self, caller: Attachment, callee: Attachment) -> bool:
+        """Tell whether a script calls itself."""
+        return caller is callee
+
     def call(self, caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
-        """Let one script call another. Raises ValueError for one that waits for this call itself, or is too deep."""
+        """Let a script call another, or itself. Raises ValueError for one that waits for this call, or is too deep."""
         if callee.script is None:
             why = "is a built-in law, and has no functions" if callee.is_law else "is loaded after this one"
             raise ValueError(f"the script of '{callee.name}' {why}")
-        if callee is caller or callee in self._waiting:
+        if callee is not caller and callee in self._waiting:
             raise ValueError(f"the script of '{callee.name}' is being called already: it waits for this call to end")
         if len(self._waiting) >= DEEPEST:
             raise ValueError(f"scripts call each other more than {DEEPEST} deep")

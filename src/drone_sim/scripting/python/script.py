@@ -137,6 +137,11 @@ class PythonScript:
         self.check(name)
         return self._run(name, self._globals[name], *arguments)
 
+    def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Do what `call_function` does, for the script itself, which runs now: on its time."""
+        self.check(name)
+        return self._globals[name](*arguments)
+
     def callback(self, callback: Callback, message: Any) -> Any:
         """Call the script's function (or that of this name) with a message, or a request; return its value.
 
