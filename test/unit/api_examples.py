@@ -243,6 +243,38 @@ SIM: dict[str, list[Example]] = {
     "getThreadExitRequest": [Example("NAME()", [False])],
     "setThreadResumeLocation": [Example("NAME(0, 0)", [1])],
     "delegateChildScriptExecution": [Example("NAME()", [1])],
+    # ---- motions, which wait for steps; and trajectories, which a script follows by itself
+    "moveToConfig": [Example("REFUSED(NAME, {pos={0}, targetPos={1}})", [NO_THREAD], "REFUSED(NAME, PARAMETERS)")],
+    "moveToPose": [
+        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` is expected"], "REFUSED(NAME, PARAMETERS)")
+    ],
+    "moveToConfig_init": [Example("NAME({pos={0}, targetPos={1}}).timeLeft", [0], "NAME(PARAMETERS)['timeLeft']")],
+    "moveToPose_init": [
+        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` is expected"], "REFUSED(NAME, PARAMETERS)")
+    ],
+    "moveToConfig_step": [
+        Example(
+            "NAME(sim.moveToConfig_init({pos={0}, targetPos={1}}))", [1, ANY], "NAME(sim.moveToConfig_init(PARAMETERS))"
+        )
+    ],
+    "moveToConfig_cleanup": [
+        Example("NAME(sim.moveToConfig_init({pos={0}, targetPos={1}}))", [], "NAME(sim.moveToConfig_init(PARAMETERS))")
+    ],
+    "rmlMoveToJointPositions": [Example("REFUSED(NAME, {HINGE}, -1, {0}, {0}, {1}, {1}, {1}, {0.1})", [NO_THREAD])],
+    "rmlMoveToPosition": [
+        Example(
+            "REFUSED(NAME, TARGET, -1, -1, {0,0,0,0}, {0,0,0,0}, {1,1,1,1}, {1,1,1,1}, {1,1,1,1}, {0,0,1}, {0,0,0,1})",
+            [NO_THREAD],
+        )
+    ],
+    "moveToPosition": [Example("REFUSED(NAME, TARGET, -1, {0,0,1}, {0,0,0}, 1)", [NO_THREAD])],
+    "moveToObject": [Example("REFUSED(NAME, TARGET, DRONE, 3, 0, 1)", [NO_THREAD])],
+    "followPath": [Example("REFUSED(NAME, TARGET, LINE, 3, 0, 1)", [NO_THREAD])],
+    "moveToJointPositions": [Example("REFUSED(NAME, {HINGE}, {1}, 1)", [NO_THREAD])],
+    "ruckigPos": [Example("NAME(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0})", [ANY])],
+    "ruckigVel": [Example("NAME(1, 0.001, -1, {0,1,0}, {2,10}, {1}, {3})", [ANY])],
+    "ruckigStep": [Example("NAME(sim.ruckigPos(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0}), 2)", [1, [1, 0, 0], ANY])],
+    "ruckigRemove": [Example("NAME(sim.ruckigPos(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0}))", [])],
     # ---- the simulation
     "getSimulationState": [Example("NAME() == sim.simulation_advancing_firstafterstop", [True])],
     "stopSimulation": [Example("NAME()", [1])],

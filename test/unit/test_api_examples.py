@@ -75,6 +75,7 @@ PYTHON = """
 def check(number, result): out.take(number, list(result) if isinstance(result, tuple) else [result])
 sim.setInt32Signal('there', 1)
 NOERROR, MESSAGE, FIRST = {"noError": True}, {"data": "x"}, 0
+PARAMETERS = {"pos": [0], "targetPos": [1]}
 IDENTITY = sim.buildIdentityMatrix()
 def INVERTED():
     m = [0,-1,0,1, 1,0,0,2, 0,0,1,3]

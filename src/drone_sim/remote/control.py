@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from drone_sim.files.resources import resolve
 from drone_sim.mechanics.frames import Matrix
-from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Until
+from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Until, name_of
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.models import inside
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.control import Wait, has_passed
+from drone_sim.scripting.api.control import Action, Wait, has_passed
 from drone_sim.scripting.api.types import Name, Number, WrongValue, numbers
 
 _STOPPED, _PAUSED, _RUNNING = (CONSTANTS[f"simulation_{one}"] for one in ("stopped", "paused", "advancing_running"))
@@ -188,6 +189,9 @@ class ClientControl:
         script fails in such a step.
         """
         simulation, run = self._simulation, self._simulation.run
+        if isinstance(wait, Action):
+            yield from self._carry_out(wait)
+            return wait.value()
         if wait.by_steps and not self._player.playing:
             return wait.value()
         if not wait.over():
@@ -195,3 +199,22 @@ class ClientControl:
         if wait.by_steps and simulation.run != run and self._player.failure:
             raise RequestRefused(str(self._player.failure))
         return wait.value()
+
+    def _carry_out(self, action: Action) -> Task:
+        """Let an action be done, and the simulation go on in between, if it is playing, until it is stopped."""
+        simulation, run, answer = self._simulation, self._simulation.run, None
+        steps = iter(action)
+        while simulation.run == run:
+            try:
+                asked = steps.send(answer)
+            except StopIteration:
+                return
+            answer, now = None, simulation.context.clock.steps
+            if asked:
+                answer = yield Call(name_of(asked.callback), asked.arguments)
+            elif self._player.playing:
+                yield self._stepping.wait(Until(partial(self._has_left, run, now)))
+
+    def _has_left(self, run: int, steps: int) -> bool:
+        """Tell whether the simulation is in another step, or another run."""
+        return self._simulation.run != run or self._simulation.context.clock.steps != steps

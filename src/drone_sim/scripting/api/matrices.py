@@ -172,38 +172,40 @@ class Poses:
     @sim("5")
     def buildPose(self, position: ThreeNumbers, angles: Numbers) -> list[float]:
         """Return the pose of a position and Euler angles, or a quaternion (x, y, z, w)."""
-        return _pose(built(position, angles))
+        return to_pose(built(position, angles))
 
     @sim("5")
     def multiplyPoses(self, first: SevenNumbers, second: SevenNumbers) -> list[float]:
         """Return the pose first · second."""
-        return _pose(frames.multiply(_matrix(first), _matrix(second)))
+        return to_pose(frames.multiply(from_pose(first), from_pose(second)))
 
     @sim("5", getPoseInverse="5")
     def invertPose(self, pose: SevenNumbers) -> list[float]:
         """Return the pose that undoes another."""
-        return _pose(frames.invert(_matrix(pose)))
+        return to_pose(frames.invert(from_pose(pose)))
 
     @sim("5")
     def interpolatePoses(self, first: SevenNumbers, second: SevenNumbers, part: Number) -> list[float]:
         """Return the pose so far (0 to 1) between two, the rotation on the shortest way."""
-        return _pose(between(_matrix(first), _matrix(second), numbers((part,), 1)[0]))
+        return to_pose(between(from_pose(first), from_pose(second), numbers((part,), 1)[0]))
 
     @sim("5")
     def poseToMatrix(self, pose: SevenNumbers) -> list[float]:
         """Return the 12 numbers of a pose's transform."""
-        return list(_matrix(pose))
+        return list(from_pose(pose))
 
     @sim("5")
     def matrixToPose(self, matrix: TwelveNumbers) -> list[float]:
         """Return the pose of a transform's 12 numbers."""
-        return _pose(numbers(matrix, 12))
+        return to_pose(numbers(matrix, 12))
 
 
-def _matrix(pose: SevenNumbers) -> Matrix:
+def from_pose(pose: SevenNumbers) -> Matrix:
+    """Return the transform of a pose."""
     values = numbers(pose, 7)
     return frames.from_quaternion(values[:3], unit(values[3:]))
 
 
-def _pose(matrix: Matrix) -> list[float]:
+def to_pose(matrix: Sequence[float]) -> list[float]:
+    """Return the pose of a transform."""
     return [*frames.position(matrix), *frames.to_quaternion(matrix)]

@@ -54,10 +54,9 @@ ABSENT: dict[str, str] = {
         "there are no collision and distance objects; checkCollision and checkDistance measure between two objects"
     ),
     r"sim\.\w*(?:Mill|Mechanism|Collection)\w*": "there are no collections and no mills",
-    r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
     r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
-    r"sim\.followPath|sim\.\w*PathTarget\w*": "there is no trajectory generator: set the target in every step",
+    r"sim\.\w*PathTarget\w*": "a path has no target of its own: followPath moves an object along it",
     r"sim\.(?:sendData|receiveData)": "there is no wireless transmission: use signals or tubes",
     r"sim\.\w+ObjectCustomData": "use writeCustomDataBlock and readCustomDataBlock",
     r"sim\.launchExecutable": "a child script starts no programs: use a launch file",

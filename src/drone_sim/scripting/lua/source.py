@@ -15,7 +15,8 @@ _PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|thre
 _THREAD_TYPE = re.compile(rb"\b(?:syscb_thread(?:main)?|childscriptcall_threaded)\b")
 _IN_THREAD = re.compile(
     rb"\bsim\.?(?:[sS]etThread(?:SwitchTiming|AutomaticSwitch|IsFree|ResumeLocation)|[sS]witchThread|"
-    rb"[gG]etThread(?:Id|Exis?tRequest)|[wW]ait(?:ForSignal)?|[dD]elegateChildScriptExecution)\b"
+    rb"[gG]etThread(?:Id|Exis?tRequest)|[wW]ait(?:ForSignal)?|[dD]elegateChildScriptExecution|"
+    rb"(?:[mM]oveTo|RMLMoveTo|rmlMoveTo)\w+|[fF]ollowPath)\b"
     rb"|\bsim[._]simulation_advancing_abouttostop\b|\bthreadFunction\b"
 )
 _COROUTINES = re.compile(rb"\bcoroutine\b")
