@@ -311,6 +311,11 @@ SIM: dict[str, list[Example]] = {
     "tubeStatus": [Example("NAME(1)", [1, 0, 1])],
     "tubeRead": [Example("NAME(2)", ["y"]), Example("NAME(2)", [])],
     "tubeClose": [Example("NAME(2)", []), Example("sim.tubeStatus(1)", [0, 0, 0])],
+    "sendData": [
+        Example("NAME(sim.handle_all, 0, 'a', 'x')", [1]),
+        Example("NAME(sim.handle_tree, 0, 'a', 'x', TARGET, 5, 1, 2, 10)", [1]),
+    ],
+    "receiveData": [Example("NAME(0, 'a')", [])],
     "writeCustomDataBlock": [Example("NAME(DRONE, 'tag', 'text')", [])],
     "readCustomDataBlock": [Example("NAME(DRONE, 'tag')", ["text"]), Example("NAME(BASE, 'tag')", [])],
     "readCustomDataBlockTags": [Example("NAME(DRONE)", [["tag"]])],

@@ -88,7 +88,7 @@ class SimulationSetup:
     def save_state(self) -> Restore:
         """Return a function that brings back all but what the world itself does."""
         own, scripts = self.context, self.scripts
-        kept = (own.objects, own.signals, own.data, own.tubes, own.drawings, own.windows)
+        kept = (own.objects, own.signals, own.data, own.tubes, own.broadcasts, own.drawings, own.windows)
         hosted = (*scripts.child_scripts.values(), *scripts.attached)
         parts: list[Any] = [*kept, *hosted, *self.vehicles.values(), self.scene, own.weather]
         return in_turn(saved(own.clock, "steps"), *(one.save_state() for one in parts))

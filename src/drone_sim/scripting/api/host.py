@@ -12,6 +12,7 @@ from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.scripting.api.broadcasts import Broadcasts
 from drone_sim.scripting.api.control import Control, Turns
 from drone_sim.scripting.api.custom_data import CustomData
 from drone_sim.scripting.api.distances import MeasureWay
@@ -48,10 +49,11 @@ class ScriptContext:
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
+    broadcasts: Broadcasts = field(default_factory=Broadcasts)
 
     def clear(self) -> None:
         """Leave nothing there, as before a run; whoever holds one of them may go on to do so."""
-        for one in (self.objects, self.scripts, self.signals, self.control, self.data, self.tubes):
+        for one in (self.objects, self.scripts, self.signals, self.control, self.data, self.tubes, self.broadcasts):
             one.clear()
 
 

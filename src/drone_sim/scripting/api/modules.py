@@ -37,6 +37,7 @@ from drone_sim.scripting.api.threads import Threads
 from drone_sim.scripting.api.trajectories import TrajectoryFunctions
 from drone_sim.scripting.api.vision import VisionSensors
 from drone_sim.scripting.api.windows import Dialogs, Views
+from drone_sim.scripting.api.wireless import Wireless
 
 
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
@@ -68,6 +69,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         names,
         SignalFunctions(context.signals),
         TubeFunctions(context.tubes),
+        Wireless(*seen),
         CustomDataFunctions(context.objects, context.data),
         Packing(),
         Threads(*seen),

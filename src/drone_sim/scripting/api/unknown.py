@@ -57,7 +57,6 @@ ABSENT: dict[str, str] = {
     r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
     r"sim\.\w*PathTarget\w*": "a path has no target of its own: followPath moves an object along it",
-    r"sim\.(?:sendData|receiveData)": "there is no wireless transmission: use signals or tubes",
     r"sim\.\w+ObjectCustomData": "use writeCustomDataBlock and readCustomDataBlock",
     r"sim\.launchExecutable": "a child script starts no programs: use a launch file",
 }
