@@ -210,6 +210,7 @@ SIM: dict[str, list[Example]] = {
     "unpackUInt8Table": [Example("NAME('AB')", [[65, 66]])],
     "packTable": [Example("sim.unpackTable(NAME({1,{2,'x'},true}))", [[1, [2, "x"], True]])],
     "unpackTable": [Example("NAME(sim.packTable({1.5}))", [[1.5]])],
+    "copyTable": [Example("NAME({1,{2,3}})", [[1, [2, 3]]]), Example("NAME('x')", ["x"])],
     "transformBuffer": [
         Example("sim.unpackFloatTable(NAME('AB', sim.buffer_uint8, 2, 1, sim.buffer_float))", [[131, 133]]),
     ],

@@ -152,7 +152,7 @@ def test_the_objects_of_every_vehicle_are_there(stage):
         ("sim.handle_world", [], "handle_world is no function"),
         ("os.system", ["ls"], "no function 'os.system'"),
         ("__import__", ["os"], "no function '__import__'"),
-        ("zmqRemoteApi.require", ["simIK"], "no module 'simIK'; near names are sim"),
+        ("zmqRemoteApi.require", ["simIK"], "there is no plugin simIK here: there is no inverse kinematics"),
         ("zmqRemoteApi.info", [[1]], "expected (module: Name)"),
         ("sim.getObjectPosition", [10**400], "no object has the handle"),
         ("sim.wait", ["long"], "sim.wait: a number is expected"),

@@ -21,7 +21,7 @@ from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
 from drone_sim.scripting.api.service_servers import ServiceRequest
 from drone_sim.scripting.api.types import Name
-from drone_sim.scripting.api.unknown import not_there
+from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError
 
 _IS_FUNCTION = "@func"  # what the name of a client's own function ends in, among the arguments
@@ -143,6 +143,8 @@ class Client:
 
     def require(self, module: Name) -> None:
         """Raise ValueError for a module that there is not."""
+        if module in PLUGINS:
+            raise ValueError(not_there("", module, ()))
         if module not in self._modules:
             raise ValueError(f"no module '{module}'; {near_names(str(module), self._modules)}")
 

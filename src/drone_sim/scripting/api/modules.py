@@ -25,7 +25,7 @@ from drone_sim.scripting.api.motions import MotionFunctions
 from drone_sim.scripting.api.names import NameFunctions
 from drone_sim.scripting.api.objects import ObjectKinds, Objects
 from drone_sim.scripting.api.older_motions import OlderMotions
-from drone_sim.scripting.api.packing import Bits, Packing
+from drone_sim.scripting.api.packing import Bits, Packing, Tables
 from drone_sim.scripting.api.paths import Paths
 from drone_sim.scripting.api.ros_functions import RosFunctions, ServiceFunctions, TopicFunctions
 from drone_sim.scripting.api.scene_objects import SceneObjects, Shapes
@@ -72,6 +72,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         Wireless(*seen),
         CustomDataFunctions(context.objects, context.data),
         Packing(),
+        Tables(),
         Threads(*seen),
         trajectories,
         motions,

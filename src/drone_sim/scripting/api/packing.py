@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import struct
 from collections.abc import Mapping, Sequence
@@ -124,6 +125,15 @@ def _table(value: Any) -> Any:
             return value["bytes"].encode("latin-1")
         return {_table(key): _table(one) for key, one in value["table"]}
     return value
+
+
+class Tables:
+    """Tables of a script's own."""
+
+    @sim("45")
+    def copyTable(self, table: Any) -> Any:
+        """Return a copy of a table and of all tables in it; of anything else the value itself."""
+        return copy.deepcopy(table)
 
 
 class Bits:

@@ -58,6 +58,7 @@ ABSENT: dict[str, str] = {
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
     r"sim\.\w*PathTarget\w*": "a path has no target of its own: followPath moves an object along it",
     r"sim\.\w+ObjectCustomData": "use writeCustomDataBlock and readCustomDataBlock",
+    r"sim\.execute(?:ScriptString|LuaCode)": "text is not run as code: callScriptFunction calls a script's function",
     r"sim\.launchExecutable": "a child script starts no programs: use a launch file",
 }
 _FLAT = re.compile(r"sim([A-Z]\w*)")

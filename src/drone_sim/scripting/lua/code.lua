@@ -2,6 +2,7 @@
 local bridge, sandbox = ...
 
 local error, type, tostring, select, setmetatable = error, type, tostring, select, setmetatable
+local next, rawset, getmetatable = next, rawset, sandbox.debug.getmetatable
 local byte = string.byte
 local load, loadstring, setfenv = load, loadstring, setfenv
 local newer = _VERSION ~= 'Lua 5.1'
@@ -62,6 +63,24 @@ function env.require(name)
   if module == nil then module = load_module(name) end
   return module
 end
+
+---- copies of tables, which cannot be made in Python: functions stay what they are, and what is one table stays one
+
+local function copied(value, copies)
+  if type(value) ~= 'table' then return value end
+  local copy = copies[value]
+  if not copy then
+    copy = {}
+    copies[value] = copy
+    for key, one in next, value do rawset(copy, copied(key, copies), copied(one, copies)) end
+    setmetatable(copy, getmetatable(value))
+  end
+  return copy
+end
+
+local function copy_table(value) return copied(value, {}) end
+
+sandbox.own['sim.copyTable'], sandbox.own.simCopyTable = copy_table, copy_table
 
 ---- other scripts' functions, as if they were a table's
 

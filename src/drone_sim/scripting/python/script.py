@@ -18,6 +18,7 @@ from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api, Function, UnknownName, contents, mistake, save_state
 from drone_sim.scripting.api.control import Call, NoThread, Turns, waits
 from drone_sim.scripting.api.types import Callback
+from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS, THREADS
 from drone_sim.scripting.python.helpers import Helpers
@@ -224,6 +225,8 @@ class PythonScript:
         return result
 
     def _require(self, name: str) -> Api:
+        if name in PLUGINS:
+            raise UnknownName(not_there("", name, ()))
         if name not in self._found:
             raise UnknownName(f"no module '{name}'; {near_names(str(name), self._found)}")
         return self._found[name]
