@@ -137,6 +137,11 @@ SIM: dict[str, list[Example]] = {
     "getPathPosition": [Example("NAME(LINE)", [1.5])],
     "getPathLengths": [Example("NAME({0,0,0, 3,4,0}, 3)", [[0, 5], 5])],
     "getPathInterpolatedConfig": [Example("NAME({0,0,0, 3,4,0}, {0,5}, 2.5)", [near(1.5, 2, 0)])],
+    "getDataOnPath": [Example("NAME(LINE, 0.25)", [0, [0, 0, 0, 0]])],
+    "getClosestPositionOnPath": [Example("NAME(LINE, {0.5,3,0})", [approx(0.25)])],
+    "createPath": [
+        Example("sim.getPathLength(NAME({0,0,0,0,0,0,1, 3,4,0,0,0,0,1}))", [approx(5)]),
+    ],
     "resetDynamicObject": [Example("NAME(BASE)", [])],
     "isDynamicallyEnabled": [Example("NAME(BASE)", [True]), Example("NAME(FLOOR)", [False])],
     "getShapeMass": [Example("NAME(DRONE)", [approx(0.12)]), Example("NAME(FLOOR)", [0])],

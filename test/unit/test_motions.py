@@ -356,3 +356,35 @@ def test_what_is_wrong_is_said_in_one_line(fly, call, said):
 def test_it_needs_a_thread(fly):
     with pytest.raises(ScriptError, match="moveToConfig: only in a thread"):
         fly("function sysCall_actuation() sim.moveToConfig{pos={0}, targetPos={1}} end")
+
+
+def made(fly, call):
+    """Return the points of a path that a call makes."""
+    return found(fly(LUA.replace("{}", call))[0], "Path").points
+
+
+SQUARE = "{0,0,0, 0,0,0,1, 2,0,0, 0,0,0,1, 2,2,0, 0,0,0,1, 0,2,0, 0,0,0,1}"
+
+
+def test_a_path_rounds_its_corners_off_as_parabolas(fly):
+    corner = SQUARE.replace(", 0,2,0, 0,0,0,1", "")
+    points = made(fly, f"sim.createPath({corner}, 0, 101, 1)")
+    assert [points[0], points[-1]] == [approx((0, 0, 0)), approx((2, 2, 0))]
+    parabola = [one for one in points if 1 < one[0] < 2 and one[1] < 1]
+    assert len(parabola) > 20
+    for x, y, _ in parabola:  # tangents at (1, 0) and (2, 1): sqrt(1 - (x - 1)) + sqrt(y) = 1
+        assert math.sqrt(2 - x) + math.sqrt(y) == approx(1)
+    straight = made(fly, f"sim.createPath({corner}, 0, 5, 0)")
+    assert straight == [approx(one) for one in [(0, 0, 0), (1, 0, 0), (2, 0, 0), (2, 1, 0), (2, 2, 0)]]
+
+
+def test_a_closed_path_is_round_where_it_begins_too(fly):
+    points = made(fly, f"sim.createPath({SQUARE}, 2, 401, 1)")
+    assert [points[0], points[-1]] == [approx((0.25, 0.25, 0))] * 2
+    assert max(math.dist(one, other) for one, other in itertools.pairwise(points)) < 0.021
+
+
+def test_what_comes_nearest_on_a_path(fly):
+    call = "sim.setFloatSignal('near', sim.getClosestPositionOnPath(line, {1.8, 0.5, 9}))"
+    simulation, _ = fly(LUA.replace("{}", call))
+    assert simulation.context.signals.get(float, "near") == approx(2.5 / 3)

@@ -10,10 +10,12 @@ local sources, protected = sandbox.sources, sandbox.protected
 
 local env = {} -- the script's globals
 local modules, loaded = {}, {} -- the API's and Lua's own; what the script required, by name
+local own_modules = {} -- CoppeliaSim's
 local texts = {} -- of the script and what it requires
 local chunk -- the file that is being required
 local seen, made, LOADING = {}, {}, {}
 sandbox.globals, sandbox.modules, sandbox.loaded, sandbox.texts = env, modules, loaded, texts
+sandbox.own_modules = own_modules
 
 local function compile(text, name)
   if byte(text) == 27 then return nil, 'precompiled code' end
@@ -31,6 +33,7 @@ sandbox.compile = compile
 local function load_module(name)
   if type(name) ~= 'string' then error("no module '" .. tostring(name) .. "'", 3) end
   local found, text, chunk_name = bridge.module(name)
+  if not found and own_modules[name] then return own_modules[name] end
   if not found then error(text, 3) end
   if byte(text) == 27 then error('precompiled code: ' .. chunk_name, 3) end
   local f, message = compile(text, '=' .. chunk_name)
