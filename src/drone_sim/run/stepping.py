@@ -107,7 +107,7 @@ class Stepper:
             vehicle.take_pictures(self._clock.steps)
         self._follow_scripts()
         for script in self._alone or self._scripts.all():
-            script.script.call("sensing")
+            script.sensing()
 
     def _follow_scripts(self) -> None:
         """Begin and end the scripts of objects that have come and gone."""

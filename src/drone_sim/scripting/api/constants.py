@@ -182,7 +182,7 @@ PHASES = ("init", "actuation", "sensing", "cleanup")
 CALL_TYPES = {phase: CONSTANTS[f"syscb_{phase}"] for phase in PHASES} | {"thread": CONSTANTS["syscb_threadmain"]}
 
 AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, which each function understands in its own way
-METRES = CONSTANTS["handleflag_depthbuffermeters"]
+METRES = ABSOLUTE = CONSTANTS["handleflag_depthbuffermeters"]  # ABSOLUTE: handleflag_abscoords
 _FIRST_FLAG = 1 << 20
 
 

@@ -18,6 +18,7 @@ from drone_sim.scripting.api.drawings import DrawingFunctions
 from drone_sim.scripting.api.dynamics import Dynamics
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import PLUGINS, Ignored
+from drone_sim.scripting.api.image_filters import ImageFilters
 from drone_sim.scripting.api.joints import JointFunctions
 from drone_sim.scripting.api.matrices import Matrices, Poses
 from drone_sim.scripting.api.messages import MessageBus
@@ -92,6 +93,12 @@ def _both(names: NameFunctions, trajectories: TrajectoryFunctions) -> Restore:
 def make_sim_ros(bus: MessageBus, clock: Clock) -> Api:
     """Return `simROS` for the script that flies a drone, by the simulation's clock."""
     return Api("simROS", functions_of(TopicFunctions(bus), ServiceFunctions(bus), RosFunctions(bus, clock)), {})
+
+
+def make_sim_vision(host: Host, surroundings: Surroundings) -> Api:
+    """Return `simVision` for a script, on what it is attached to."""
+    filters = ImageFilters(host, surroundings, _ignored(host))
+    return Api("simVision", functions_of(filters), {}, filters.save_state)
 
 
 def make_plugins(host: Host) -> dict[str, Api]:
