@@ -188,6 +188,10 @@ SIM: dict[str, list[Example]] = {
             "NAME({1,0,0,2, 0,1,0,0, 0,0,1,0}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
             [near(0, -1, 0, 1, 1, 0, 0, 1, 0, 0, 1, 0)],
         ),
+        Example(
+            "NAME({2,0,0, 0,0,0,1}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
+            [near(1, 1, 0, 0, 0, HALF, HALF)],
+        ),
     ],
     "alphaBetaGammaToYawPitchRoll": [Example("NAME(0.1, 0, 0)", [approx(0), approx(0), approx(0.1)])],
     "yawPitchRollToAlphaBetaGamma": [Example("NAME(0.3, 0, 0)", [approx(0), approx(0), approx(0.3)])],

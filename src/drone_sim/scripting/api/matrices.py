@@ -101,9 +101,11 @@ class Matrices:
 
     @sim("345")
     def rotateAroundAxis(
-        self, matrix: TwelveNumbers, axis: ThreeNumbers, position: ThreeNumbers, angle: Number
+        self, matrix: Numbers, axis: ThreeNumbers, position: ThreeNumbers, angle: Number
     ) -> list[float]:
-        """Return a transform turned by an angle (rad) about an axis through a position, both in the world."""
+        """Return a transform, or a pose, turned by an angle (rad) about an axis through a position, in the world."""
+        if len(matrix) == 7:
+            return to_pose(self.rotateAroundAxis(from_pose(matrix), axis, position, angle))
         there = numbers(position, 3)
         turn = frames.from_quaternion((0.0, 0.0, 0.0), about(numbers(axis, 3), numbers((angle,), 1)[0]))
         x, y, z = frames.rotate(turn, there)
