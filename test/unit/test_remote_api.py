@@ -456,6 +456,12 @@ def test_a_motion_while_the_simulation_is_stopped_is_made_at_once(stage):
     assert reply["ret"][0] == position == [1.0]
 
 
+def test_an_endless_motion_while_the_simulation_is_stopped_is_refused(stage):
+    slow = {"pos": [0.0], "targetPos": [1.0], "maxVel": [1e-6], "maxAccel": [1.0], "maxJerk": [1.0]}
+    reply = stage.client().ask("sim.moveToConfig", slow)
+    assert "sim.moveToConfig: more than 10000 steps: start the simulation first" in reply["err"]
+
+
 def test_a_function_of_the_client_that_fails_leaves_it_as_it_was(stage):
     client = stage.client()
     for _ in range(40):

@@ -201,9 +201,12 @@ class ClientControl:
         return wait.value()
 
     def _carry_out(self, action: Action) -> Task:
-        """Let an action be done, and the simulation go on in between, if it is playing, until it is stopped."""
+        """Let an action be done, and the simulation go on in between, if it is playing, until it is stopped.
+
+        Raises ValueError for one that takes too many steps, where it is not.
+        """
         simulation, run, answer = self._simulation, self._simulation.run, None
-        steps = iter(action)
+        steps, at_once = iter(action), 0
         while simulation.run == run:
             try:
                 asked = steps.send(answer)
@@ -212,7 +215,11 @@ class ClientControl:
             answer, now = None, simulation.context.clock.steps
             if asked:
                 answer = yield Call(name_of(asked.callback), asked.arguments)
-            elif self._player.playing:
+            elif not self._player.playing:
+                at_once += 1
+                if at_once > _MOST_CALLS:
+                    raise ValueError(f"more than {_MOST_CALLS} steps: start the simulation first")
+            else:
                 yield self._stepping.wait(Until(partial(self._has_left, run, now)))
 
     def _has_left(self, run: int, steps: int) -> bool:
