@@ -19,7 +19,7 @@ from drone_sim.scripting.api.calls import Api, Declaration, contents, declaratio
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import ScriptContext, Surroundings
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.windows import Windows
 
@@ -59,8 +59,9 @@ def apis() -> dict[str, Api]:
         sensors={},
         own_script="Drone",
     )
-    sim = make_sim(host, Surroundings())
-    return {"sim": sim, "simROS": make_sim_ros(MessageBus("drone"), host.context.clock), **make_plugins(host)}
+    ros = make_sim_ros(MessageBus("drone"), host.context.clock)
+    vision = make_sim_vision(host, Surroundings())
+    return {"sim": make_sim(host, Surroundings()), "simROS": ros, "simVision": vision, **make_plugins(host)}
 
 
 def declared(api: Api) -> Iterator[tuple[Declaration, Any]]:

@@ -149,6 +149,11 @@ SIM: dict[str, list[Example]] = {
     "getPathPosition": [Example("NAME(LINE)", [1.5])],
     "getPathLengths": [Example("NAME({0,0,0, 3,4,0}, 3)", [[0, 5], 5])],
     "getPathInterpolatedConfig": [Example("NAME({0,0,0, 3,4,0}, {0,5}, 2.5)", [near(1.5, 2, 0)])],
+    "getDataOnPath": [Example("NAME(LINE, 0.25)", [0, [0, 0, 0, 0]])],
+    "getClosestPositionOnPath": [Example("NAME(LINE, {0.5,3,0})", [approx(0.25)])],
+    "createPath": [
+        Example("sim.getPathLength(NAME({0,0,0,0,0,0,1, 3,4,0,0,0,0,1}))", [approx(5)]),
+    ],
     "resetDynamicObject": [Example("NAME(BASE)", [])],
     "isDynamicallyEnabled": [Example("NAME(BASE)", [True]), Example("NAME(FLOOR)", [False])],
     "getShapeMass": [Example("NAME(DRONE)", [approx(0.12)]), Example("NAME(FLOOR)", [0])],
@@ -197,6 +202,10 @@ SIM: dict[str, list[Example]] = {
             "NAME({1,0,0,2, 0,1,0,0, 0,0,1,0}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
             [near(0, -1, 0, 1, 1, 0, 0, 1, 0, 0, 1, 0)],
         ),
+        Example(
+            "NAME({2,0,0, 0,0,0,1}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
+            [near(1, 1, 0, 0, 0, HALF, HALF)],
+        ),
     ],
     "alphaBetaGammaToYawPitchRoll": [Example("NAME(0.1, 0, 0)", [approx(0), approx(0), approx(0.1)])],
     "yawPitchRollToAlphaBetaGamma": [Example("NAME(0.3, 0, 0)", [approx(0), approx(0), approx(0.3)])],
@@ -224,6 +233,7 @@ SIM: dict[str, list[Example]] = {
     "unpackUInt8Table": [Example("NAME('AB')", [[65, 66]])],
     "packTable": [Example("sim.unpackTable(NAME({1,{2,'x'},true}))", [[1, [2, "x"], True]])],
     "unpackTable": [Example("NAME(sim.packTable({1.5}))", [[1.5]])],
+    "copyTable": [Example("NAME({1,{2,3}})", [[1, [2, 3]]]), Example("NAME('x')", ["x"])],
     "transformBuffer": [
         Example("sim.unpackFloatTable(NAME('AB', sim.buffer_uint8, 2, 1, sim.buffer_float))", [[131, 133]]),
     ],
@@ -257,6 +267,38 @@ SIM: dict[str, list[Example]] = {
     "getThreadExitRequest": [Example("NAME()", [False])],
     "setThreadResumeLocation": [Example("NAME(0, 0)", [1])],
     "delegateChildScriptExecution": [Example("NAME()", [1])],
+    # ---- motions, which wait for steps; and trajectories, which a script follows by itself
+    "moveToConfig": [Example("REFUSED(NAME, {pos={0}, targetPos={1}})", [NO_THREAD], "REFUSED(NAME, PARAMETERS)")],
+    "moveToPose": [
+        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` is expected"], "REFUSED(NAME, PARAMETERS)")
+    ],
+    "moveToConfig_init": [Example("NAME({pos={0}, targetPos={1}}).timeLeft", [0], "NAME(PARAMETERS)['timeLeft']")],
+    "moveToPose_init": [
+        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` is expected"], "REFUSED(NAME, PARAMETERS)")
+    ],
+    "moveToConfig_step": [
+        Example(
+            "NAME(sim.moveToConfig_init({pos={0}, targetPos={1}}))", [1, ANY], "NAME(sim.moveToConfig_init(PARAMETERS))"
+        )
+    ],
+    "moveToConfig_cleanup": [
+        Example("NAME(sim.moveToConfig_init({pos={0}, targetPos={1}}))", [], "NAME(sim.moveToConfig_init(PARAMETERS))")
+    ],
+    "rmlMoveToJointPositions": [Example("REFUSED(NAME, {HINGE}, -1, {0}, {0}, {1}, {1}, {1}, {0.1})", [NO_THREAD])],
+    "rmlMoveToPosition": [
+        Example(
+            "REFUSED(NAME, TARGET, -1, -1, {0,0,0,0}, {0,0,0,0}, {1,1,1,1}, {1,1,1,1}, {1,1,1,1}, {0,0,1}, {0,0,0,1})",
+            [NO_THREAD],
+        )
+    ],
+    "moveToPosition": [Example("REFUSED(NAME, TARGET, -1, {0,0,1}, {0,0,0}, 1)", [NO_THREAD])],
+    "moveToObject": [Example("REFUSED(NAME, TARGET, DRONE, 3, 0, 1)", [NO_THREAD])],
+    "followPath": [Example("REFUSED(NAME, TARGET, LINE, 3, 0, 1)", [NO_THREAD])],
+    "moveToJointPositions": [Example("REFUSED(NAME, {HINGE}, {1}, 1)", [NO_THREAD])],
+    "ruckigPos": [Example("NAME(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0})", [ANY])],
+    "ruckigVel": [Example("NAME(1, 0.001, -1, {0,1,0}, {2,10}, {1}, {3})", [ANY])],
+    "ruckigStep": [Example("NAME(sim.ruckigPos(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0}), 2)", [1, [1, 0, 0], ANY])],
+    "ruckigRemove": [Example("NAME(sim.ruckigPos(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0}))", [])],
     # ---- the simulation
     "getSimulationState": [Example("NAME() == sim.simulation_advancing_firstafterstop", [True])],
     "stopSimulation": [Example("NAME()", [1])],
@@ -298,6 +340,11 @@ SIM: dict[str, list[Example]] = {
     "tubeStatus": [Example("NAME(1)", [1, 0, 1])],
     "tubeRead": [Example("NAME(2)", ["y"]), Example("NAME(2)", [])],
     "tubeClose": [Example("NAME(2)", []), Example("sim.tubeStatus(1)", [0, 0, 0])],
+    "sendData": [
+        Example("NAME(sim.handle_all, 0, 'a', 'x')", [1]),
+        Example("NAME(sim.handle_tree, 0, 'a', 'x', TARGET, 5, 1, 2, 10)", [1]),
+    ],
+    "receiveData": [Example("NAME(0, 'a')", [])],
     "writeCustomDataBlock": [Example("NAME(DRONE, 'tag', 'text')", [])],
     "readCustomDataBlock": [Example("NAME(DRONE, 'tag')", ["text"]), Example("NAME(BASE, 'tag')", [])],
     "readCustomDataBlockTags": [Example("NAME(DRONE)", [["tag"]])],

@@ -180,7 +180,7 @@ def test_the_objects_of_every_vehicle_are_there(stage):
         ("sim.handle_world", [], "handle_world is no function"),
         ("os.system", ["ls"], "no function 'os.system'"),
         ("__import__", ["os"], "no function '__import__'"),
-        ("zmqRemoteApi.require", ["simIK"], "no module 'simIK'; near names are sim"),
+        ("zmqRemoteApi.require", ["simIK"], "there is no plugin simIK here: there is no inverse kinematics"),
         ("zmqRemoteApi.info", [[1]], "expected (module: Name)"),
         ("sim.getObjectPosition", [10**400], "no object has the handle"),
         ("sim.wait", ["long"], "sim.wait: a number is expected"),
@@ -453,6 +453,41 @@ def test_a_function_of_the_client_is_called_and_may_call(stage):
     assert client.sim("getSimulationTime") == 0.0  # within it
     assert client.ask("_*executed*_", 1) == asked
     assert client.ask("_*executed*_", 1, 2)["ret"] == [1, 2]
+
+
+def test_a_motion_calls_a_function_of_the_client_in_every_step(stage):
+    client = stage.client()
+    client.sim("startSimulation")
+    most = {"maxVel": [1.0], "maxAccel": [2.0], "maxJerk": [10.0]}
+    reply = client.ask("sim.moveToConfig", {"pos": [0.0], "targetPos": [1.0], **most, "callback": "moved@func"})
+    seen, waiting = [], stage.server._waiting
+    while "func" in reply:
+        assert reply["func"] == "moved"
+        seen.append((stage.simulation.time, reply["args"][0]["pos"][0]))
+        client.send("_*executed*_", False)
+        assert stage.settled(lambda: waiting)
+        stage.go()
+        reply = client.reply()
+    assert [time for time, _ in seen] == pytest.approx([0.05 * step for step in range(34)])
+    assert seen[-1][1] == reply["ret"][0]["pos"][0] == 1.0
+
+
+def test_a_motion_while_the_simulation_is_stopped_is_made_at_once(stage):
+    client = stage.client()
+    most = [[1.0], [2.0], [10.0]]
+    reply = client.ask("sim.moveToConfig", -1, [0.0], None, None, *most, [1.0], None, "moved@func")
+    calls = 0
+    while "func" in reply:
+        calls, (position, _, _, _) = calls + 1, reply["args"]
+        reply = client.ask("_*executed*_")
+    assert calls == 34
+    assert reply["ret"][0] == position == [1.0]
+
+
+def test_an_endless_motion_while_the_simulation_is_stopped_is_refused(stage):
+    slow = {"pos": [0.0], "targetPos": [1.0], "maxVel": [1e-6], "maxAccel": [1.0], "maxJerk": [1.0]}
+    reply = stage.client().ask("sim.moveToConfig", slow)
+    assert "sim.moveToConfig: more than 10000 steps: start the simulation first" in reply["err"]
 
 
 def test_a_function_of_the_client_that_fails_leaves_it_as_it_was(stage):

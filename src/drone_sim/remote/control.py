@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,13 +11,13 @@ from drone_sim.files.resources import locate, resolve
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.joint import Joint, JointControl
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Until
+from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Until, name_of
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.models import inside
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.control import Wait, has_passed
+from drone_sim.scripting.api.control import Action, Wait, has_passed
 from drone_sim.scripting.api.types import Name, Number, WrongValue, numbers
 
 _STOPPED, _PAUSED, _RUNNING = (CONSTANTS[f"simulation_{one}"] for one in ("stopped", "paused", "advancing_running"))
@@ -224,6 +225,9 @@ class ClientControl:
         script fails in such a step.
         """
         simulation, run = self._simulation, self._simulation.run
+        if isinstance(wait, Action):
+            yield from self._carry_out(wait)
+            return wait.value()
         if wait.by_steps and not self._player.playing:
             return wait.value()
         if not wait.over():
@@ -231,3 +235,29 @@ class ClientControl:
         if wait.by_steps and simulation.run != run and self._player.failure:
             raise RequestRefused(str(self._player.failure))
         return wait.value()
+
+    def _carry_out(self, action: Action) -> Task:
+        """Let an action be done, and the simulation go on in between, if it is playing, until it is stopped.
+
+        Raises ValueError for one that takes too many steps, where it is not.
+        """
+        simulation, run, answer = self._simulation, self._simulation.run, None
+        steps, at_once = iter(action), 0
+        while simulation.run == run:
+            try:
+                asked = steps.send(answer)
+            except StopIteration:
+                return
+            answer, now = None, simulation.context.clock.steps
+            if asked:
+                answer = yield Call(name_of(asked.callback), asked.arguments)
+            elif not self._player.playing:
+                at_once += 1
+                if at_once > _MOST_CALLS:
+                    raise ValueError(f"more than {_MOST_CALLS} steps: start the simulation first")
+            else:
+                yield self._stepping.wait(Until(partial(self._has_left, run, now)))
+
+    def _has_left(self, run: int, steps: int) -> bool:
+        """Tell whether the simulation is in another step, or another run."""
+        return self._simulation.run != run or self._simulation.context.clock.steps != steps

@@ -93,9 +93,10 @@ class SimulationSetup:
     def save_state(self) -> Restore:
         """Return a function that brings back all but what the world itself does."""
         own, scripts = self.context, self.scripts
-        left = (own.signals, own.data, own.tubes, own.collections, own.drawings, own.windows)
+        left = (own.signals, own.data, own.tubes, own.collections, own.broadcasts, own.drawings, own.windows)
         hosted = (*scripts.child_scripts.values(), *scripts.attached)
-        parts: list[Any] = [own.objects, own.velocities, *left, *hosted, *self.vehicles.values(), self.scene, own.weather]
+        carried = (*self.vehicles.values(), self.scene, own.weather)
+        parts: list[Any] = [own.objects, own.velocities, *left, *hosted, *carried]
         return in_turn(saved(own.clock, "steps"), *(one.save_state() for one in parts))
 
     def tune_as(self, before: SimulationSetup) -> None:

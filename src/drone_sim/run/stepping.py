@@ -115,7 +115,7 @@ class Stepper:
         self._clock.is_sensing = True
         try:
             for script in self._alone or self._scripts.all():
-                script.script.call("sensing")
+                script.sensing()
         finally:
             self._clock.is_sensing = False
 

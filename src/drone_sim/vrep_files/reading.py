@@ -24,7 +24,6 @@ from drone_sim.vrep_files.object_collections import read_collection
 from drone_sim.vrep_files.objects import SCRIPT, is_object, read_object, script_of
 from drone_sim.vrep_files.scripts import read_script
 from drone_sim.vrep_files.shapes import Pools
-from drone_sim.vrep_files.textures import read_texture
 
 _PRESET_STEPS = (0.2, 0.1, 0.05, 0.025, 0.01)  # s, of `Spi` 0 to 4
 _PRESETS = 5  # modes of the dynamics below this have a step of their own
@@ -94,12 +93,9 @@ def read(content: bytes) -> VrepFile:
         if is_object(tag):
             objects.append(read_object(tag, data, pools))
             scripts += _script_in(tag, data, objects[-1])
-        elif tag == "VIN":
-            with within("VIN"):
-                pools.add(data)
-        elif tag == "TEX":
-            with within("TEX"):
-                pools.textures.update([read_texture(data)])
+        elif tag in ("VIN", "TEX"):
+            with within(tag):
+                pools.add(data, tag)
         elif tag == "LST":
             with within(f"script {len(scripts) + 1}"):
                 scripts.append(read_script(data))

@@ -21,7 +21,7 @@ from drone_sim.vrep_files.model import (
     VrepShape,
     VrepTexture,
 )
-from drone_sim.vrep_files.textures import read_cover
+from drone_sim.vrep_files.textures import read_cover, read_texture
 
 MAX_TRIANGLES = 3_000_000  # of a file
 _WORDS = ("", "plane", "disc", "cuboid", "spheroid", "cylinder", "cone", "heightfield", "capsule")
@@ -39,8 +39,11 @@ class Pools:
     textures: dict[int, VrepTexture] = field(default_factory=dict)
     triangles: int = 0  # read so far, each mesh counted
 
-    def add(self, data: bytes) -> None:
-        """Take the pools of a `VIN`. Raises VrepFileError."""
+    def add(self, data: bytes, tag: str) -> None:
+        """Take the pools of a `VIN`, or the texture of a `TEX`. Raises VrepFileError."""
+        if tag == "TEX":
+            self.textures.update([read_texture(data)])
+            return
         for one in level(data).chunks:
             if one.tag == "Ver":
                 self.vertices.append(_vertices(one.data))

@@ -129,6 +129,10 @@ stringparam application_path video_filename app_arg1 app_arg2 app_arg3 app_arg4 
     dlgverbosity consolelogfilter startupscriptstring uniqueid tempdir tempscenedir datadir importexportdir addonpath
     scenedefaultdir modeldefaultdir
 arrayparam gravity fog fog_color background_color1 background_color2 ambient_light random_euler
+# how degrees of freedom of a trajectory go together, and what 3.x calls the distance of two poses
+ruckig phasesync timesync nosync=3 minvel=0x100 minaccel=0x200
+rml phase_sync_if_possible only_time_sync only_phase_sync no_sync
+distcalcmethod dl dac max_dl_dac dl_and_dac sqrt_dl2_and_dac2 dl_if_nonzero dac_if_nonzero
 # what a buffer holds
 buffer uint8 int8 uint16 int16 uint32 int32 float double uint8rgb uint8bgr uint8rgba uint8argb base64 split
     clamp=0x100
@@ -180,7 +184,7 @@ CALL_TYPES = {phase: CONSTANTS[f"syscb_{phase}"] for phase in PHASES} | {"thread
 
 AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, which each function understands in its own way
 BASE, WXYZ = CONSTANTS["handleflag_reljointbaseframe"], CONSTANTS["handleflag_wxyzquat"]
-METRES = CONSTANTS["handleflag_depthbuffermeters"]
+METRES = ABSOLUTE = CONSTANTS["handleflag_depthbuffermeters"]  # ABSOLUTE: handleflag_abscoords
 RESET_FORCE, RESET_TORQUE = CONSTANTS["handleflag_resetforce"], CONSTANTS["handleflag_resettorque"]
 _FIRST_FLAG, _BEYOND_FLAGS = 1 << 20, 1 << 31
 

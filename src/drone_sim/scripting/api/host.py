@@ -14,6 +14,7 @@ from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.object_collections import Collections
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.mechanics.velocity_meter import VelocityMeter
+from drone_sim.scripting.api.broadcasts import Broadcasts
 from drone_sim.scripting.api.control import Control, Turns
 from drone_sim.scripting.api.custom_data import CustomData
 from drone_sim.scripting.api.distances import MeasureWay
@@ -52,11 +53,12 @@ class ScriptContext:
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
     collections: Collections = field(default_factory=Collections)
+    broadcasts: Broadcasts = field(default_factory=Broadcasts)
 
     def clear(self) -> None:
         """Leave nothing there, as before a run; whoever holds one of them may go on to do so."""
         parts = self.objects, self.velocities, self.scripts, self.signals, self.control, self.data, self.tubes
-        for one in (*parts, self.collections):
+        for one in (*parts, self.collections, self.broadcasts):
             one.clear()
 
 

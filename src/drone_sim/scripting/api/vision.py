@@ -9,7 +9,7 @@ Every sensor has both, whichever of them it publishes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -23,6 +23,13 @@ _ALL = (0, 0)  # the corner and size of a whole picture
 _LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601
 
 
+class Detected(NamedTuple):
+    """What a sensor's own script has found in its picture: whether it triggers, and packets of floats, as strings."""
+
+    trigger: bool = False
+    packets: tuple[bytes, ...] = ()
+
+
 @runtime_checkable
 class Eye(Protocol):
     """A vision sensor of the scene: its picture in px, its near and far planes in m, the angle of its larger side."""
@@ -32,6 +39,8 @@ class Eye(Protocol):
     near: float
     far: float
     angle: float
+    orthographic_size: float | None  # m, of its larger side, where it is orthographic
+    detected: Detected
 
     def picture(self, kind: str = "color") -> np.ndarray:
         """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane."""
@@ -101,14 +110,15 @@ class VisionSensors(Functions):
         return [width, height]
 
     @sim("345")
-    def handleVisionSensor(self, handle: Handle) -> int:
-        """Take the picture; return the number of detections: 0, there are no filters."""
+    def handleVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
+        """Take the picture; return whether the sensor's own script triggers, 1 or 0, and what it found: its packets."""
         self._picture(handle)
-        return 0
+        detected = self._detected(handle)
+        return int(detected.trigger), *(np.frombuffer(one, "<f4").tolist() for one in detected.packets)
 
     @sim("345")
-    def readVisionSensor(self, handle: Handle) -> tuple[int, list[float]]:
-        """Return 0, as there are no filters that detect anything, and 15 numbers.
+    def readVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
+        """Return whether the sensor's own script triggers, 1 or 0, 15 numbers, and what that script found: its packets.
 
         They are intensity, red, green, blue and depth (0 to 1): the least, the largest, and the mean of each. Depth is
         0 at the near plane, and 1 at the far one.
@@ -116,7 +126,12 @@ class VisionSensors(Functions):
         colors = self._colors(handle).reshape(-1, 3) / np.float32(255)
         depths = self._depths(bare(handle))[::-1].ravel()
         channels = np.column_stack([colors @ _LUMINANCE, colors, depths])
-        return 0, [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()]
+        trigger, *packets = self.handleVisionSensor(handle)
+        return trigger, [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()], *packets
+
+    def _detected(self, handle: int) -> Detected:
+        found = self._objects[bare(handle)]
+        return found.detected if isinstance(found, Eye) else Detected()
 
     def _colors(self, handle: int, pos: Sequence[float] = _ALL, size: Sequence[float] = _ALL) -> np.ndarray:
         """Return colours (height, width, 3)."""

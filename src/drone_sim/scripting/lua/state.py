@@ -117,6 +117,7 @@ class LuaState:
             "longest_ms": LONGEST_MS,
             "module": self._reader(helpers.read),
             "file": self._reader(helpers.read_file),
+            "data": self._reader(helpers.read_data),
         }
         table = self.runtime.table_from({key.encode(): value for key, value in bridge.items()})
         self.sandbox: Any = self.runtime.table()
