@@ -20,9 +20,14 @@ import matplotlib.pyplot as plt
 ROOT = Path(__file__).resolve().parents[2]
 PAGE, PICTURE = ROOT / "docs" / "fidelity.md", ROOT / "docs" / "pictures" / "recordings.png"
 TABLE = re.compile(r"(<!-- recordings: begin[^\n]*-->\n).*?(<!-- recordings: end -->)", re.DOTALL)
-COMMIT = "a8b05b1"  # which has the scene, both recordings, and the controller that flew them
 SCENE = "drone_scene.ttt"
-RECORDINGS = {"flight 1": "simulation_logs.csv", "flight 2": "simulation_logs_25032025-173337.csv"}
+CLOSED, AXIS, OWN = "closed loop", "recorded forces along the recorded axis", "recorded forces along its own axis"
+# The commit that has scene and recording, its file, and how it is flown: of the third the controller is another.
+RECORDINGS = {
+    "flight 1": ("a8b05b1", "simulation_logs.csv", (CLOSED, AXIS, OWN)),
+    "flight 2": ("a8b05b1", "simulation_logs_25032025-173337.csv", (CLOSED, AXIS, OWN)),
+    "flight 3 (ODE)": ("702d3d4", "simulation_logs.csv", (AXIS, OWN)),
+}
 SPANS = (10, 20, 50)  # s
 
 
@@ -32,14 +37,11 @@ def main() -> int:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="clone of OBulun/Coppelia-Quad")
     parser.add_argument("--docs", action="store_true", help="write table and plot into docs/")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as kept:
-        folder = Path(kept)
-        try:
-            unpack(options.folder, folder)
-        except OSError as error:
-            print(f"{options.folder}: {error}", file=sys.stderr)
-            return 2
-        compared = dict(compare(folder))
+    try:
+        compared = {key: flown for name in RECORDINGS for key, flown in compare(options.folder, name)}
+    except OSError as error:
+        print(f"{options.folder}: {error}", file=sys.stderr)
+        return 2
     lines = table(compared)
     print("\n".join(lines))
     if options.docs:
@@ -49,27 +51,30 @@ def main() -> int:
     return 0
 
 
-def unpack(clone: Path, folder: Path) -> None:
-    """Put the files of the recordings' commit into a folder. Raises OSError."""
-    packed = subprocess.run(["git", "-C", clone, "archive", COMMIT], capture_output=True, check=False)
+def unpack(clone: Path, commit: str, folder: Path) -> None:
+    """Put the files of a commit into a folder. Raises OSError."""
+    packed = subprocess.run(["git", "-C", clone, "archive", commit], capture_output=True, check=False)
     if packed.returncode:
-        raise OSError(f"no clone with the commit {COMMIT} of OBulun/Coppelia-Quad")
+        raise OSError(f"no clone with the commit {commit} of OBulun/Coppelia-Quad")
     subprocess.run(["tar", "-x", "-C", folder], input=packed.stdout, check=True)
 
 
-def compare(folder: Path):
-    """Yield for each way of flying each recording: its name, the recording, and the states flown."""
-    with flights.simulation(folder / SCENE) as sim:
-        for name, file in RECORDINGS.items():
-            recording = flights.read(folder / file)
-            ways = {
-                "closed loop": flights.closed_loop(folder, recording),
-                "recorded forces along the recorded axis": flights.recorded_attitude(recording),
-                "recorded forces along its own axis": flights.open_loop(recording),
-            }
-            for way, choose in ways.items():
+def compare(clone: Path, name: str):
+    """Yield for each way of flying a recording: its name and the way, the recording, and the states flown."""
+    commit, file, ways = RECORDINGS[name]
+    with tempfile.TemporaryDirectory() as kept:
+        folder = Path(kept)
+        unpack(clone, commit, folder)
+        recording = flights.read(folder / file)
+        choices = {
+            CLOSED: lambda: flights.closed_loop(folder, recording),
+            AXIS: lambda: flights.recorded_attitude(recording),
+            OWN: lambda: flights.open_loop(recording),
+        }
+        with flights.simulation(folder / SCENE) as sim:
+            for way in ways:
                 print(f"  {name}, {way}", file=sys.stderr, flush=True)
-                yield (name, way), (recording, flights.fly(sim, recording, choose))
+                yield (name, way), (recording, flights.fly(sim, recording, choices[way]()))
 
 
 def errors(recording: flights.Recording, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -83,12 +88,13 @@ def table(compared) -> list[str]:
     """Return the rows of a Markdown table: the largest errors until so many seconds."""
     spans = " | ".join(f"{span} s" for span in SPANS)
     lines = [
-        f"| | position, until {spans} | roll, pitch, yaw over {SPANS[-1]} s |",
+        f"| | position, until {spans} | roll, pitch, yaw in all |",
         "|---|" + "---|" * (len(SPANS) + 1),
     ]
     for (name, way), (recording, states) in compared.items():
         far, turned = errors(recording, states)
-        within = " | ".join(length(far[recording.times <= span].max()) for span in SPANS)
+        lasts = recording.times[-1]
+        within = " | ".join(length(far[recording.times <= one].max()) if one < lasts + 0.2 else "" for one in SPANS)
         angles = ", ".join(f"{rounded(angle)}°" for angle in turned.max(axis=0))
         lines.append(f"| {name}, {way} | {within} | {angles} |")
     return lines
@@ -105,10 +111,11 @@ def rounded(number: float) -> str:
 
 
 def plot(compared, path: Path) -> None:
-    """Draw both flights, recorded and flown in closed loop, and how far they are apart."""
-    figure, axes = plt.subplots(3, len(RECORDINGS), figsize=(11, 8), sharex=True, layout="constrained")
-    for column, name in zip(axes.T, RECORDINGS):
-        recording, states = compared[name, "closed loop"]
+    """Draw the flights in closed loop, recorded and flown in closed loop, and how far they are apart."""
+    drawn = [name for name, way in compared if way == CLOSED]
+    figure, axes = plt.subplots(3, len(drawn), figsize=(11, 8), sharex=True, layout="constrained")
+    for column, name in zip(axes.T, drawn):
+        recording, states = compared[name, CLOSED]
         for index, axis in enumerate("xyz"):
             (line,) = column[0].plot(recording.times, recording.states[:, index], lw=3, alpha=0.35)
             column[0].plot(recording.times, states[:, index], lw=1, color=line.get_color(), label=axis)

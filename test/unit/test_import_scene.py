@@ -195,6 +195,14 @@ def test_a_path_of_4_x_is_a_path(imported):
     assert struct.pack("<21d", *path.table) == content
 
 
+@pytest.mark.parametrize("engine, turns", [(0, False), (1, True), (4, True)], ids=["Bullet", "ODE", "MuJoCo"])
+def test_bodies_tumble_as_in_the_files_engine(imported, engine, turns):
+    imported(
+        shape(0, "Mark", mesh(size=(1, 1, 1))), chunk("DYN", chunk("En3", struct.pack("<i3fi", engine, 0, 0, -9.81, 0)))
+    )
+    assert parameters.load({"scene_file": str(imported.scene)}).physics.gyroscopic == turns
+
+
 def test_the_floor_the_step_and_gravity(imported):
     flat = shape(1, "Floor_part", mesh(size=(2, 2, 0.1)), parent=0)
     chunks = [shape(0, "ResizableFloor_5_25", mesh(size=(1, 1, 1))), flat]
@@ -550,7 +558,7 @@ def test_one_that_begins_tilted_and_without_a_script(imported):
         turned=(np.cos(0.1), np.sin(0.1), 0, 0),
     )
     vehicle = imported(*chunks)["vehicles"]["drone"]
-    assert vehicle["tilt"] == pytest.approx([0.2, 0.0], abs=1e-6) and "script" not in vehicle
+    assert vehicle["tilt"] == pytest.approx([0.2, 0.0], abs=1e-6) and vehicle["script"] == "none"
     assert "Quadricopter: has no child script" in imported.said
 
 

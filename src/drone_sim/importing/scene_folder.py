@@ -25,7 +25,7 @@ from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.message_text import MAX_NAME
 from drone_sim.scene.scene_parameters import MAX_OBJECTS
 from drone_sim.vehicles.quadricopter_objects import QuadricopterObjects
-from drone_sim.vrep_files.model import Other, VrepCamera, VrepDummy, VrepFile, VrepScript
+from drone_sim.vrep_files.model import BULLET, Other, VrepCamera, VrepDummy, VrepFile, VrepScript
 from drone_sim.vrep_files.reading import read_file
 
 _CAMERAS = ("FrontVision", "DepthVision", "TrackCam", "FloorVision")
@@ -168,6 +168,8 @@ class _Import:
         sub_step = step / max(1, round(step / min(max(wanted, 1e-4), step)))
         if abs(sub_step - _SUB_STEP) > 1e-9:
             world["sub_step"] = number(sub_step, 12)
+        if settings.engine != BULLET:
+            world["physics"] = {"gyroscopic": True}  # CoppeliaSim's Bullet alone leaves that term out
         if settings.gravity is not None and abs(settings.gravity[2] - _GRAVITY) > 1e-6:
             world["gravity"] = number(settings.gravity[2])
         if settings.gravity is not None and any(settings.gravity[:2]):

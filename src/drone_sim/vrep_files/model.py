@@ -213,6 +213,9 @@ class VrepObject:
         return self.of if isinstance(self.of, VrepShape) else None
 
 
+BULLET = 0  # the number of that physics engine; 1 is ODE, others Vortex, Newton, MuJoCo
+
+
 @dataclass(frozen=True)
 class VrepSettings:
     """What a file says of the world: steps (s), gravity (m/s²); None where it says nothing, as models do."""
@@ -220,6 +223,7 @@ class VrepSettings:
     time_step: float | None = None
     dynamics_step: float | None = None
     gravity: tuple[float, float, float] | None = None
+    engine: int = BULLET
     visible_layers: int = 0x00FF
 
 

@@ -55,13 +55,13 @@ def with_dynamics(settings: VrepSettings, data: bytes) -> VrepSettings:
     found = own.find("_n3", "En3", "En2", "Eng")
     if found is None:
         return settings
-    _engine, x, y, z, mode = unpack(f"<i3{width}i", found, "_n3")
+    engine, x, y, z, mode = unpack(f"<i3{width}i", found, "_n3")
     if own.find("_n3", "En3") is None:
         mode += 1
     gravity = finite((x, y, z) if width == "d" else tuple(float(str(np.float32(one))) for one in (x, y, z)), "_n3")
     step = own.numbers("_tp", "Stp", 1)
     seconds = step[0] if step is not None else _PRESET_DYNAMICS_STEP if mode < _PRESETS else None
-    return replace(settings, gravity=(gravity[0], gravity[1], gravity[2]), dynamics_step=seconds)
+    return replace(settings, engine=engine, gravity=(gravity[0], gravity[1], gravity[2]), dynamics_step=seconds)
 
 
 SUFFIXES = (".ttt", ".ttm")
