@@ -19,7 +19,7 @@ for _, phase in ipairs{'init', 'sensing', 'cleanup'} do _G['sysCall_' .. phase] 
 """
 GOES = """
 def sysCall_sensing():
-    if sim.getSimulationTime() > 0.06:
+    if sim.getSimulationTime() > 0.03:
         sim.removeObject(sim.getObject("."))
         sim.setStringSignal("told", (sim.getStringSignal("told") or "") + "goes ")
 

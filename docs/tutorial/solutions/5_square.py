@@ -6,7 +6,7 @@ Without a law for the place, the times have to be found by trying.
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
 
 # vx, vy (m/s), for how long (s): flying backward or to the right, the drone brakes harder, and stops sooner
-SIDES = ((1, 0, 3.55), (0, 1, 3.55), (-1, 0, 4), (0, -1, 4))
+SIDES = ((1, 0, 3.4), (0, 1, 3.4), (-1, 0, 4.05), (0, -1, 4))
 
 
 def sysCall_init():

@@ -7,7 +7,7 @@ In its own frame the drone does the same four times over: one time does for all 
 
 import math
 
-SIDE, TURN, REST = 3.55, 3.0, 6.0  # s
+SIDE, TURN, REST = 3.35, 3.0, 6.0  # s
 
 
 def sysCall_init():
