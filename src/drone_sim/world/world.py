@@ -40,9 +40,6 @@ _NO_TURN = (0.0, 0.0, 0.0, 1.0)
 # (N s)², the square of the last change of an impulse after which Bullet holds the contacts for solved. With PyBullet's
 # 1e-7 what lies still rattles at some 1e-3 m/s², which only an accelerometer feels; this is less than 1e-6 m/s².
 _SOLVED = 1e-18
-# Of how deep two bodies are in each other Bullet takes back this share in each of its steps. That is a velocity, with
-# which what was fast rebounds: with PyBullet's 0.08 at up to 8 % of its own where restitution is 0.
-_RECOVERY = 0.008
 _FAR_UP = 1e6  # m
 _Load = tuple[int, Vector, Vector, Sequence[tuple[float, ...]]]  # a body, and what Wrench has
 _where, _pull, _turn = pybullet.getBasePositionAndOrientation, pybullet.applyExternalForce, pybullet.applyExternalTorque
@@ -87,7 +84,6 @@ class World:
         pybullet.resetSimulation(physicsClientId=self._client)  # its first argument is another
         pybullet.setGravity(0, 0, self._gravity, self._client)
         pybullet.setTimeStep(self._sub_step, self._client)
-        pybullet.setPhysicsEngineParameter(contactERP=_RECOVERY, physicsClientId=self._client)
         self._inertial_frames: dict[int, tuple[Pose, Pose]] = {}  # root from inertial, and its inverse
         self._centres: dict[int, tuple[Vector, Quaternion]] = {}  # inertial frames' poses, read since the last step
         self._initial_poses = InitialPoses(self._client)
@@ -323,10 +319,9 @@ class World:
             self._step_once(loads, self._sub_step)
             return
         part = self._sub_step / parts
-        pybullet.setTimeStep(part, self._client)
-        for _ in range(parts):
-            self._step_once(loads, part)
-        pybullet.setTimeStep(self._sub_step, self._client)
+        with self._impacts.divided(part):
+            for _ in range(parts):
+                self._step_once(loads, part)
 
     def _step_once(self, loads: Sequence[_Load], duration: float) -> None:
         # Positional arguments: this is most of a step.
