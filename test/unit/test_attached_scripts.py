@@ -74,7 +74,7 @@ def test_they_are_called_from_the_root_to_the_leaves(build):
     scripts = {last: TELL_PYTHON, target: TELL_LUA, first: TELL_LUA}
     box = {"shape": "box", "size": [1, 1, 1], "position": [3, 0, 0.5], "name": "Box"}
     simulation = build(scripts, TELL_LUA, scene={"objects": [box]})
-    expected = ["Drone", first, target, last]
+    expected = ["Drone", target, first, last]
     assert order(simulation) == [f"{name}:init" for name in expected]
     simulation.step()
     assert order(simulation) == [f"{name}:{phase}" for phase in ("actuation", "sensing") for name in expected]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Matrix, Vector
@@ -66,10 +64,9 @@ class VelocityMeter:
         turn = self._turn(handle)
         if turn is None:
             return self._objects[handle].velocity()[1]
-        x, y, z, w = frames.to_quaternion(turn)
-        sine = math.hypot(x, y, z)
-        scale = (2 * math.atan2(sine, w) / sine if sine else 2.0) / self._clock.time_step
-        return frames.rotate(self._before[handle], (x * scale, y * scale, z * scale))
+        x, y, z = frames.rotate(self._before[handle], frames.rotation_vector(turn))
+        duration = self._clock.time_step
+        return x / duration, y / duration, z / duration
 
     def _turn(self, handle: int) -> Matrix | None:
         """Return how it has turned within the step, None where nobody knows."""
