@@ -13,7 +13,7 @@ from drone_sim.shapes.box import Box
 from drone_sim.shapes.sphere import Sphere
 from drone_sim.world import World
 
-KEYS = "collections, datum, drone, floor, gravity, magnetic_field, objects, scripts, " + (
+KEYS = "collections, datum, drone, floor, gravity, magnetic_field, objects, physics, scripts, " + (
     "sub_step, time_step, vehicles, weather"
 )
 

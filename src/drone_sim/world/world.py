@@ -301,12 +301,16 @@ class World:
         """
         loads = [(body, wrench.force, *wrench.terms) for body, wrench in wrenches.items()]
         any_fast = self._impacts.begin_step()
+        if not any_fast:
+            self.queries.begin_sub_step()
         self._gyroscopic_term.begin_step()
         if between is not None:
             between(0)
         for count in range(1, sub_steps + 1):
-            parts = self._impacts.parts() if any_fast else 1
-            self._step(loads, parts)
+            if any_fast:
+                self._step(loads, self._impacts.parts())
+            else:
+                self._step_once(loads, self._sub_step)
             if between is not None:
                 between(count)
         self.shape_forces.sums.clear()
@@ -316,12 +320,15 @@ class World:
     def _step(self, loads: Sequence[_Load], parts: int) -> None:
         """Do a sub-step, in equal parts."""
         if parts == 1:
+            self.queries.begin_sub_step()
             self._step_once(loads, self._sub_step)
             return
+        self.queries.begin_sub_step(body for body, *_ in loads)
         part = self._sub_step / parts
         with self._impacts.divided(part):
             for _ in range(parts):
                 self._step_once(loads, part)
+                self.queries.end_part(1 / parts)
 
     def _step_once(self, loads: Sequence[_Load], duration: float) -> None:
         # Positional arguments: this is most of a step.
