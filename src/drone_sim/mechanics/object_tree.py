@@ -168,9 +168,9 @@ class ObjectTree:
         """Tell whether an object has that name."""
         return name in self._handles
 
-    def has(self, handle: int) -> bool:
-        """Tell whether an object has that handle."""
-        return handle in self._objects
+    def get(self, handle: int) -> SceneObject | None:
+        """Return the object of a handle, None where there is none."""
+        return self._objects.get(handle)
 
     def handle_of(self, sought: SceneObject | None) -> int:
         """Return the handle of an object, WORLD for None."""

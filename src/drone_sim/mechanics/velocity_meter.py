@@ -32,11 +32,12 @@ class VelocityMeter:
 
     def begin_step(self) -> None:
         """Look where everything is that the dynamics is about to move."""
-        for handle in list(self._now):
-            if not self._objects.has(handle):
+        for handle, last in list(self._now.items()):
+            one = self._objects.get(handle)
+            if one is None:
                 del self._now[handle]
-            elif self._objects[handle].carrier is not None:
-                self._now[handle] = self._objects[handle].matrix()
+            elif (matrix := one.matrix()) is not last and one.carrier is not None:
+                self._now[handle] = matrix
 
     def end_step(self) -> None:
         """Look where everything is after it."""

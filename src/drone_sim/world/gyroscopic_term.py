@@ -14,6 +14,7 @@ import pybullet
 from drone_sim.mechanics.frames import Quaternion, Vector, cross, turned
 
 _SLOW = 1e-8  # (rad/s)²; slower, the term is below the noise of what moves
+_STILL: Vector = (0.0, 0.0, 0.0)
 _ROUND = 1e-9  # of its largest moment of inertia by which others may differ: a cube or a sphere has no such term
 _ITERATIONS = 6  # each leaves h |ω| / 2 of the error: 1e-10 of it at 9 rad/s and 5 ms
 
@@ -46,7 +47,7 @@ class NoGyroscopicTerm:
         self._links.pop(body, None)
 
     def begin_step(self) -> None:
-        """Ask for velocities once: before this nobody can tell them from attitudes."""
+        """Ask for velocities in the next step of PyBullet's: attitudes of before do not tell them."""
         self._before.clear()
 
     def begin_sub_step(self, known: Mapping[int, Quaternion], duration: float) -> None:
@@ -60,7 +61,7 @@ class NoGyroscopicTerm:
             velocity = self._velocity(body, now) if now is None or before is None else _rate(before, now, duration)
             if now is not None:
                 attitudes[body] = now
-            if _turns(velocity):
+            if velocity is not _STILL:
                 torque = self._torque(moments, velocity, duration)
                 pybullet.applyExternalTorque(body, -1, torque, pybullet.LINK_FRAME, client)
         for body, links in self._links.items():
@@ -71,10 +72,10 @@ class NoGyroscopicTerm:
                     pybullet.applyExternalTorque(body, number, torque, pybullet.LINK_FRAME, client)
 
     def _velocity(self, body: int, turn: Quaternion | None) -> Vector:
-        """Return the angular velocity of a root along its principal axes (rad/s), or roughly where it hardly turns."""
+        """Return the angular velocity of a root along its principal axes (rad/s), _STILL where it hardly turns."""
         velocity = pybullet.getBaseVelocity(body, self._client)[1]
         if not _turns(velocity):
-            return velocity
+            return _STILL
         return _seen_from(turn or pybullet.getBasePositionAndOrientation(body, self._client)[1], velocity)
 
     def end_sub_step(self, duration: float) -> None:
@@ -136,8 +137,11 @@ def _rate(before: Quaternion, now: Quaternion, duration: float) -> Vector:
     x = w0 * x1 - w1 * x0 - y0 * z1 + z0 * y1
     y = w0 * y1 - w1 * y0 - z0 * x1 + x0 * z1
     z = w0 * z1 - w1 * z0 - x0 * y1 + y0 * x1
-    sine = math.sqrt(x * x + y * y + z * z)
-    scale = 2.0 * math.asin(sine) / (sine * duration) if 0.0 < sine < 1.0 else 0.0
+    square = x * x + y * y + z * z
+    if square < _SLOW * duration * duration / 4 or square >= 1.0:
+        return _STILL
+    sine = math.sqrt(square)
+    scale = 2.0 * math.asin(sine) / (sine * duration)
     return x * scale, y * scale, z * scale
 
 

@@ -95,7 +95,10 @@ class World:
         self.joints = Joints(self._client, self._look_anew)
         self._gyroscopic_term = GyroscopicTerm(self._client) if self._gyroscopic else NoGyroscopicTerm(self._client)
         self._impacts = Impacts(self._client, self._sub_step)
-        self._turns: dict[int, Quaternion] = {}  # attitudes, read since the last (part of a) sub-step
+        self._turns: dict[
+            int, Quaternion
+        ] = {}  # attitudes before the last (part of a) sub-step of what a wrench acts on
+        self._speeds: dict[int, Vector] = {}  # the same of velocities
         self.collision_filter = CollisionFilter(self._client, self.pictures.moved)
         self.queries = Queries(self._client, self.collision_filter)
         self.shape_forces = ShapeForces(self._client)
@@ -198,11 +201,13 @@ class World:
         self._initial_poses.forget(body)
         self.joints.forget(body)
         self._gyroscopic_term.forget(body)
+        self._turns.pop(body, None)
         self._impacts.forget(body)
         self.collision_filter.forget(body)
         self.shape_forces.forget(body)
         self._textures.forget(body)
         self._centres.pop(body, None)
+        self._speeds.pop(body, None)
         self.pictures.remove(body)
         self._files.drop_old()
 
@@ -259,6 +264,7 @@ class World:
         """Return pose and velocity of a body's root link."""
         centre, turn = self._centres[body] = pybullet.getBasePositionAndOrientation(body, self._client)
         (vx, vy, vz), angular = pybullet.getBaseVelocity(body, self._client)
+        self._speeds[body] = vx, vy, vz
         inertial, backwards = self._inertial_frames[body]
         orientation = turn if backwards.orientation is _NO_TURN else multiply_quaternions(turn, backwards.orientation)
         arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
@@ -277,6 +283,7 @@ class World:
         centre, turn = compose(pose, inertial)
         self.changes = next(_changes)
         self._centres.pop(body, None)
+        self._speeds.pop(body, None)
         self.pictures.moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
@@ -286,6 +293,7 @@ class World:
         arm = turned(self.state(body).orientation, self._inertial_frames[body][0].position)
         velocity = [one + more for one, more in zip(linear, cross(angular, arm))]
         pybullet.resetBaseVelocity(body, velocity, angular, self._client)
+        self._speeds.pop(body, None)
 
     def part(self, body: int) -> None:
         """Take a body out of every contact, which Bullet would remember wherever it goes; it is far up then."""
@@ -300,7 +308,7 @@ class World:
         `between` is called with 0 before the first of these sub-steps, and after each with how many there have been.
         """
         loads = [(body, wrench.force, *wrench.terms) for body, wrench in wrenches.items()]
-        any_fast = self._impacts.begin_step()
+        any_fast = self._impacts.begin_step(sub_steps, self._speeds)
         if not any_fast:
             self.queries.begin_sub_step()
         self._gyroscopic_term.begin_step()
@@ -315,10 +323,12 @@ class World:
                 between(count)
         self.shape_forces.sums.clear()
         self._centres.clear()
+        self._speeds.clear()
         self.changes = next(_changes)
 
     def _step(self, loads: Sequence[_Load], parts: int) -> None:
         """Do a sub-step, in equal parts."""
+        self._gyroscopic_term.begin_step()  # the last one's parts may have been others
         if parts == 1:
             self.queries.begin_sub_step()
             self._step_once(loads, self._sub_step)
@@ -349,8 +359,8 @@ class World:
         self._gyroscopic_term.begin_sub_step(turns, duration)
         _step(client)
         self._gyroscopic_term.end_sub_step(duration)
-        known.clear()
-        turns.clear()
+        if known:
+            known.clear()
 
     def apply(self, body: int, wrench: Wrench) -> None:
         """Let a wrench act on a body in the next sub-step, beside what `advance` applies."""
@@ -373,6 +383,7 @@ class World:
         """Put everything where it stood, at rest."""
         self.changes = next(_changes)
         self._centres.clear()
+        self._speeds.clear()
         self.shape_forces.sums.clear()
         self.pictures.all_moved()
         self._initial_poses.bring_back()
@@ -386,6 +397,7 @@ class World:
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
         self._centres.clear()
+        self._speeds.clear()
         self.shape_forces.sums.clear()
         self.changes = next(_changes)
         self.pictures.all_moved()
