@@ -95,9 +95,7 @@ class World:
         self.joints = Joints(self._client, self._look_anew)
         self._gyroscopic_term = GyroscopicTerm(self._client) if self._gyroscopic else NoGyroscopicTerm(self._client)
         self._impacts = Impacts(self._client, self._sub_step)
-        self._turns: dict[
-            int, Quaternion
-        ] = {}  # attitudes before the last (part of a) sub-step of what a wrench acts on
+        self._turns: dict[int, Quaternion] = {}  # before the last (part of a) sub-step, of what wrenches act on
         self._speeds: dict[int, Vector] = {}  # the same of velocities
         self.collision_filter = CollisionFilter(self._client, self.pictures.moved)
         self.queries = Queries(self._client, self.collision_filter)
