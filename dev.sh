@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | test-web | lint | bench [NAME...] |
-#   docs-commands [--all] [PAGE...] | fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | tasks [TASK...] | pythons [VERSION...] | deb
+#   docs-commands [--all] [PAGE...] | fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | recordings FOLDER | tasks [TASK...] | pythons [VERSION...] | deb
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
 # build/ and devel/. What is there already is left alone, so a second run takes seconds. Where another ROS 1 has
@@ -300,6 +300,12 @@ case "$command" in
   docs-commands) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/docs/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
   soak-web) setup; exec .venv/bin/python test/soak/web.py "$@" ;;
+  recordings)
+    setup
+    make_venv requirements-dev.txt requirements-recordings.txt
+    cd "$here"
+    exec "$venv/bin/python" "$root/test/recordings/run.py" "$@"
+    ;;
   two-hosts) setup; exec .venv/bin/python test/two_hosts/run.py "$@" ;;
   tasks) setup; PYTHONPATH=$root/src:$PYTHONPATH exec .venv/bin/python test/tasks/check.py "$@" ;;
   pythons) # shellcheck disable=SC2046 # one word each

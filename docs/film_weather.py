@@ -37,7 +37,7 @@ def main():
     first, *others = changes([one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures])
     times = [round(1000 * STEP * SLOWER)] * len(others) + [STANDS]
     path = folder / "weather_propeller.gif"
-    kept = {"transparency": UNCHANGED, "disposal": 1, "optimize": False}
+    kept = {"transparency": int(UNCHANGED), "disposal": 1, "optimize": False}
     first.save(path, save_all=True, append_images=others, duration=times, loop=0, **kept)
     print(f"{path}: {len(pictures)} pictures, {path.stat().st_size / 1000:.0f} kB")
 

@@ -14,12 +14,14 @@ from types import SimpleNamespace
 from typing import Any
 
 from drone_sim.mechanics.clock import Clock
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.scripting.api import ignored, unknown
 from drone_sim.scripting.api.calls import Api, Declaration, contents, declaration_of, flat_name
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import ScriptContext, Surroundings
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
 from drone_sim.scripting.api.registry import Scripts
 from drone_sim.scripting.api.windows import Windows
 
@@ -36,9 +38,8 @@ every generation of V-REP and CoppeliaSim. All names work at any time: `simGetOb
 where it is read; but `if simROS2 then` asks for a plugin, and is answered with nil.
 
 - Positions are in m, angles in rad, forces in N. Orientations are Euler angles (alpha, beta, gamma; R = Rx Ry Rz) or
-  quaternions (x, y, z, w), matrices 12 numbers, poses 7. Velocities are in the world frame. A relative name of a topic
-  or parameter stands in the drone's namespace: `pose` is `/drone/pose`. Both differ from CoppeliaSim's in part:
-  [scripts.md](scripts.md#where-this-differs).
+  quaternions (x, y, z, w), matrices 12 numbers, poses 7. A relative name of a topic or parameter stands in the drone's
+  namespace: `pose` is `/drone/pose`, which differs from CoppeliaSim's: [scripts.md](scripts.md#where-this-differs).
 - A field of the type uint8[], such as a picture's, arrives as a string, and goes as a string or a table:
   `string.byte(data, 1)` is its first byte.
 - `sim.` and a constant's name, or `sim_` and the name: both have CoppeliaSim's value (simConst.h).
@@ -52,15 +53,23 @@ def apis() -> dict[str, Api]:
     """Return every module of the script API, of a drone that is not there."""
     scripts = Scripts()
     scripts.add("Drone", {})
+    clock, objects = Clock(0.05), ObjectTree()
     host: Any = SimpleNamespace(
         context=ScriptContext(
-            clock=Clock(0.05), gravity=-9.81, drawings=Drawings(shown=False), windows=Windows(), scripts=scripts
+            clock=clock,
+            gravity=-9.81,
+            drawings=Drawings(shown=False),
+            windows=Windows(),
+            objects=objects,
+            velocities=VelocityMeter(objects, clock),
+            scripts=scripts,
         ),
         sensors={},
         own_script="Drone",
     )
-    sim = make_sim(host, Surroundings())
-    return {"sim": sim, "simROS": make_sim_ros(MessageBus("drone"), host.context.clock), **make_plugins(host)}
+    ros = make_sim_ros(MessageBus("drone"), host.context.clock)
+    vision = make_sim_vision(host, Surroundings())
+    return {"sim": make_sim(host, Surroundings()), "simROS": ros, "simVision": vision, **make_plugins(host)}
 
 
 def declared(api: Api) -> Iterator[tuple[Declaration, Any]]:

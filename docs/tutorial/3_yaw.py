@@ -47,7 +47,7 @@ def sysCall_sensing():
     sim.setObjectOrientation(self.trackBase, -1, [0, 0, ori[2]])
 
     twist = flight_plan(sim.getSimulationTime())
-    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # world frame: linear and angular velocity
+    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # linear in the world frame, angular in its own
 
     if twist[2] == 0:
         self.thrust = self.thrust_gravity + self.Kzref * (self.zref - pos[2]) - self.Dzref * d_global_pos[2]

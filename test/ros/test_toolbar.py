@@ -248,7 +248,7 @@ class Toolbar(unittest.TestCase):
         self.assertAlmostEqual(saved["drone"]["yaw"], 0.5, places=3)
         self.scene.write_text("object: []\n")
         said = self.call("load_scene", expected=False)
-        self.assertIn("parameter object: unknown key; known are datum, drone, floor, gravity, magnetic_field", said)
+        self.assertIn("parameter object: unknown key; known are collections, datum, drone, floor, gravity", said)
 
     def test_rviz_sees_the_objects_and_where_they_go(self):
         trimesh.creation.box().export(str(self.scene.parent / "one.stl"))

@@ -14,8 +14,8 @@ SLIPS = {
     "yaw speed not measured": ("(twist[5] - d_global_ori[2])", "twist[5]", ["turn settles"], ["forward settles"]),
     "no front speed": ("target_angle(twist[0], d_local_pos[0])", "0", ["forward rises"], ["left settles"]),
     "no lateral speed": ("target_angle(twist[1], d_local_pos[1])", "0", ["left rises"], ["forward settles"]),
-    "pitch not damped": ("- self.Dangle * dpitch", "", ["forward settles"], []),
-    "a lean to the wrong side": ("roll = -local_ori[0]", "roll = local_ori[0]", ["left settles", "no_contact"], []),
+    "pitch not damped": ("- self.Dangle * dpitch", "", ["forward overshoots"], []),
+    "a lean to the wrong side": ("roll = -local_ori[0]", "roll = local_ori[0]", ["no_contact"], []),
     "no subscription": ('simROS.subscribe("/drone/cmd_vel"', 'simROS.subscribe("/other"', ["forward rises"], []),
 }
 

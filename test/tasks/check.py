@@ -88,10 +88,10 @@ def check_broken(pool, folder):
 def check_starts(pool):
     """Displace the drone in many ways; return what is not as the tutorial's law is known to do it.
 
-    Measured for the bare law: 138 of 180 displacements return, depending on the last digits; with the guards, all.
+    Measured for the bare law: 134 of 180 displacements return, depending on the last digits; with the guards, all.
     """
     wrong = []
-    for what, changes, least, most in (("bare", broken.BARE, 133, 143), ("built-in", {}, 180, 180)):
+    for what, changes, least, most in (("bare", broken.BARE, 129, 139), ("built-in", {}, 180, 180)):
         returned = sum(pool.starmap(starts.returns, [(start, changes) for start in starts.ALL], chunksize=10))
         print(f"the {what} law returns to rest from {returned} of {len(starts.ALL)} displacements")
         if not least <= returned <= most:

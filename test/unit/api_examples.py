@@ -16,8 +16,9 @@ POSE = f"{{1,2,3, 0,0,{HALF},{HALF}}}"
 POSE_BACK = [-2, 1, -3, 0, 0, -HALF, HALF]
 STRING = "'\\1\\0\\0\\0\\2\\0\\0\\0'"
 NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
-CALLED = "it waits for this call to end"
+NO_FUNCTION = "the script has no function 'nothing' to call back"
 ANY = object()  # whatever comes
+STEP_STAYS = "`time_step` of the scene file says it"
 NO_SCENE_FILE = "a model lies beside the scene file, and there is no scene file"
 
 
@@ -37,6 +38,8 @@ def near(*values: float) -> Any:
 ALONG_X = near(8e-6, 0, 0, 0, 9.04e-4, 0, 0, 0, 9.04e-4)  # kg m², of a drone without its propellers
 
 
+# Intensity, red, green and blue of the two pixels (3, 4, 5) and (0, 1, 2).
+DARKEST, LIGHTEST, MEAN = ([one / 255 for one in (g - 0.185, g - 1, g, g + 1)] for g in (1, 4, 2.5))
 BOX = [near(1, 1, 1), near(0.5, 0.5, 0.5, 0, 0, 0, 1)]
 
 
@@ -91,6 +94,15 @@ SIM: dict[str, list[Example]] = {
         Example("REFUSED(NAME, DRONE, BASE)", ["'Drone' and 'Quadricopter_base' are parts of one rigid body"]),
     ],
     "checkCollision": [Example("NAME(DRONE, sim.handle_all)", [0, [-1, -1]])],
+    # ---- collections
+    "createCollection": [Example("NAME(0) >= 700000", [True])],
+    "addItemToCollection": [Example("NAME(sim.createCollection(0), sim.handle_tree, DRONE, 0)", [])],
+    "addObjectToCollection": [Example("NAME(sim.createCollection(0), DRONE, sim.handle_single, 0)", [1])],
+    "getCollectionHandle": [Example("NAME('nothing@silentError')", [-1])],
+    "getCollectionName": [Example("NAME(sim.createCollection(0))", [""])],
+    "getCollectionObjects": [Example("NAME(sim.createCollection(0))", [[]])],
+    "emptyCollection": [Example("NAME(sim.createCollection(0))", [])],
+    "destroyCollection": [Example("NAME(sim.createCollection(0))", [])],
     "getObjectUid": [Example("NAME(BASE) == BASE", [True])],
     # ---- where objects are
     "setObjectPosition": [Example("NAME(TARGET, -1, {1,2,3})", []), Example("NAME(TARGET, {4,5,6}, -1)", [])],
@@ -137,6 +149,11 @@ SIM: dict[str, list[Example]] = {
     "getPathPosition": [Example("NAME(LINE)", [1.5])],
     "getPathLengths": [Example("NAME({0,0,0, 3,4,0}, 3)", [[0, 5], 5])],
     "getPathInterpolatedConfig": [Example("NAME({0,0,0, 3,4,0}, {0,5}, 2.5)", [near(1.5, 2, 0)])],
+    "getDataOnPath": [Example("NAME(LINE, 0.25)", [0, [0, 0, 0, 0]])],
+    "getClosestPositionOnPath": [Example("NAME(LINE, {0.5,3,0})", [approx(0.25)])],
+    "createPath": [
+        Example("sim.getPathLength(NAME({0,0,0,0,0,0,1, 3,4,0,0,0,0,1}))", [approx(5)]),
+    ],
     "resetDynamicObject": [Example("NAME(BASE)", [])],
     "isDynamicallyEnabled": [Example("NAME(BASE)", [True]), Example("NAME(FLOOR)", [False])],
     "getShapeMass": [Example("NAME(DRONE)", [approx(0.12)]), Example("NAME(FLOOR)", [0])],
@@ -159,6 +176,8 @@ SIM: dict[str, list[Example]] = {
     "multiplyVector": [
         Example(f"NAME({TURNED}, {{1,0,0}})", [near(1, 3, 3)]),
         Example(f"NAME({TURNED}, {{1,0,0, 0,1,0}})", [near(1, 3, 3, 0, 2, 3)]),
+        Example(f"NAME({POSE}, {{1,0,0, 0,1,0}})", [near(1, 3, 3, 0, 2, 3)]),
+        Example(f"NAME({{0,0,{HALF},{HALF}}}, {{1,0,0}})", [near(0, 1, 0)]),
     ],
     "multiplyMatrices": [Example(f"NAME({TURNED}, sim.getMatrixInverse({TURNED}))", [ANY])],
     "buildIdentityMatrix": [Example("NAME()", [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]])],
@@ -182,6 +201,10 @@ SIM: dict[str, list[Example]] = {
         Example(
             "NAME({1,0,0,2, 0,1,0,0, 0,0,1,0}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
             [near(0, -1, 0, 1, 1, 0, 0, 1, 0, 0, 1, 0)],
+        ),
+        Example(
+            "NAME({2,0,0, 0,0,0,1}, {0,0,2}, {1,0,0}, 1.5707963267948966)",
+            [near(1, 1, 0, 0, 0, HALF, HALF)],
         ),
     ],
     "alphaBetaGammaToYawPitchRoll": [Example("NAME(0.1, 0, 0)", [approx(0), approx(0), approx(0.1)])],
@@ -210,6 +233,7 @@ SIM: dict[str, list[Example]] = {
     "unpackUInt8Table": [Example("NAME('AB')", [[65, 66]])],
     "packTable": [Example("sim.unpackTable(NAME({1,{2,'x'},true}))", [[1, [2, "x"], True]])],
     "unpackTable": [Example("NAME(sim.packTable({1.5}))", [[1.5]])],
+    "copyTable": [Example("NAME({1,{2,3}})", [[1, [2, 3]]]), Example("NAME('x')", ["x"])],
     "transformBuffer": [
         Example("sim.unpackFloatTable(NAME('AB', sim.buffer_uint8, 2, 1, sim.buffer_float))", [[131, 133]]),
     ],
@@ -226,7 +250,7 @@ SIM: dict[str, list[Example]] = {
     "getCustomizationScriptAssociatedWithObject": [Example("NAME(DRONE)", [-1])],
     "getScriptName": [Example("NAME(sim.handle_self)", ["Drone"])],
     "getScriptExecutionCount": [Example("NAME()", [0])],
-    "callScriptFunction": [Example("REFUSED(NAME, 'nothing', sim.handle_self)", [CALLED])],
+    "callScriptFunction": [Example("REFUSED(NAME, 'nothing', sim.handle_self)", [NO_FUNCTION])],
     "getScriptFunctions": [Example("NAME(sim.handle_self) ~= nil", [True], "NAME(sim.handle_self) is not None")],
     # ---- threads, of a script that has none
     "switchThread": [Example("REFUSED(NAME)", [NO_THREAD])],
@@ -243,6 +267,38 @@ SIM: dict[str, list[Example]] = {
     "getThreadExitRequest": [Example("NAME()", [False])],
     "setThreadResumeLocation": [Example("NAME(0, 0)", [1])],
     "delegateChildScriptExecution": [Example("NAME()", [1])],
+    # ---- motions, which wait for steps; and trajectories, which a script follows by itself
+    "moveToConfig": [Example("REFUSED(NAME, {pos={0}, targetPos={1}})", [NO_THREAD], "REFUSED(NAME, PARAMETERS)")],
+    "moveToPose": [
+        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` is expected"], "REFUSED(NAME, PARAMETERS)")
+    ],
+    "moveToConfig_init": [Example("NAME({pos={0}, targetPos={1}}).timeLeft", [0], "NAME(PARAMETERS)['timeLeft']")],
+    "moveToPose_init": [
+        Example("REFUSED(NAME, {pos={0}})", ["`object` or `pose` is expected"], "REFUSED(NAME, PARAMETERS)")
+    ],
+    "moveToConfig_step": [
+        Example(
+            "NAME(sim.moveToConfig_init({pos={0}, targetPos={1}}))", [1, ANY], "NAME(sim.moveToConfig_init(PARAMETERS))"
+        )
+    ],
+    "moveToConfig_cleanup": [
+        Example("NAME(sim.moveToConfig_init({pos={0}, targetPos={1}}))", [], "NAME(sim.moveToConfig_init(PARAMETERS))")
+    ],
+    "rmlMoveToJointPositions": [Example("REFUSED(NAME, {HINGE}, -1, {0}, {0}, {1}, {1}, {1}, {0.1})", [NO_THREAD])],
+    "rmlMoveToPosition": [
+        Example(
+            "REFUSED(NAME, TARGET, -1, -1, {0,0,0,0}, {0,0,0,0}, {1,1,1,1}, {1,1,1,1}, {1,1,1,1}, {0,0,1}, {0,0,0,1})",
+            [NO_THREAD],
+        )
+    ],
+    "moveToPosition": [Example("REFUSED(NAME, TARGET, -1, {0,0,1}, {0,0,0}, 1)", [NO_THREAD])],
+    "moveToObject": [Example("REFUSED(NAME, TARGET, DRONE, 3, 0, 1)", [NO_THREAD])],
+    "followPath": [Example("REFUSED(NAME, TARGET, LINE, 3, 0, 1)", [NO_THREAD])],
+    "moveToJointPositions": [Example("REFUSED(NAME, {HINGE}, {1}, 1)", [NO_THREAD])],
+    "ruckigPos": [Example("NAME(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0})", [ANY])],
+    "ruckigVel": [Example("NAME(1, 0.001, -1, {0,1,0}, {2,10}, {1}, {3})", [ANY])],
+    "ruckigStep": [Example("NAME(sim.ruckigPos(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0}), 2)", [1, [1, 0, 0], ANY])],
+    "ruckigRemove": [Example("NAME(sim.ruckigPos(1, 0.001, -1, {0,0,0}, {1,2,10}, {1}, {1,0}))", [])],
     # ---- the simulation
     "getSimulationState": [Example("NAME() == sim.simulation_advancing_firstafterstop", [True])],
     "stopSimulation": [Example("NAME()", [1])],
@@ -258,7 +314,12 @@ SIM: dict[str, list[Example]] = {
     "getInt32Param": [Example("NAME(sim.intparam_program_version)", [40600])],
     "setInt32Param": [Example("NAME(sim.intparam_visible_layers, 1)", [])],
     "getFloatParam": [Example("NAME(sim.floatparam_simulation_time_step)", [0.05])],
-    "setFloatParam": [Example("NAME(sim.floatparam_simulation_time_step, 1)", [])],
+    "setFloatParam": [
+        Example("NAME(sim.floatparam_simulation_time_step, 0.05)", []),
+        Example("NAME(sim.floatparam_stereo_distance, 1)", []),
+        Example("REFUSED(NAME, sim.floatparam_simulation_time_step, 0.01)", [STEP_STAYS]),
+    ],
+    "setSimulationTimeStep": [Example("NAME(0.05)", []), Example("REFUSED(NAME, 0.01)", [STEP_STAYS])],
     "getBoolParam": [Example("NAME(sim.boolparam_dynamics_handling_enabled)", [True])],
     "setBoolParam": [Example("NAME(sim.boolparam_display_enabled, false)", [])],
     "getStringParam": [Example("NAME(sim.stringparam_scene_path)", [""])],
@@ -271,14 +332,19 @@ SIM: dict[str, list[Example]] = {
     "setInt32Signal": [Example("NAME('i', 2)", [])],
     "getInt32Signal": [Example("NAME('i')", [2])],
     "clearInt32Signal": [Example("NAME('i')", []), Example("sim.getInt32Signal('i')", [])],
-    "setStringSignal": [Example("NAME('s', 'text')", [])],
-    "getStringSignal": [Example("NAME('s')", ["text"])],
+    "setStringSignal": [Example("NAME('n', 2.5)", []), Example("NAME('s', 'text')", [])],
+    "getStringSignal": [Example("NAME('n')", ["2.5"]), Example("NAME('s')", ["text"])],
     "clearStringSignal": [Example("NAME('s')", []), Example("sim.getStringSignal('s')", [])],
     "tubeOpen": [Example("NAME(0, 'a', 1)", [1]), Example("NAME(0, 'a', 1)", [2])],
     "tubeWrite": [Example("NAME(1, 'x')", [1]), Example("NAME(1, 'y')", [1])],
     "tubeStatus": [Example("NAME(1)", [1, 0, 1])],
     "tubeRead": [Example("NAME(2)", ["y"]), Example("NAME(2)", [])],
     "tubeClose": [Example("NAME(2)", []), Example("sim.tubeStatus(1)", [0, 0, 0])],
+    "sendData": [
+        Example("NAME(sim.handle_all, 0, 'a', 'x')", [1]),
+        Example("NAME(sim.handle_tree, 0, 'a', 'x', TARGET, 5, 1, 2, 10)", [1]),
+    ],
+    "receiveData": [Example("NAME(0, 'a')", [])],
     "writeCustomDataBlock": [Example("NAME(DRONE, 'tag', 'text')", [])],
     "readCustomDataBlock": [Example("NAME(DRONE, 'tag')", ["text"]), Example("NAME(BASE, 'tag')", [])],
     "readCustomDataBlockTags": [Example("NAME(DRONE)", [["tag"]])],
@@ -321,7 +387,7 @@ SIM: dict[str, list[Example]] = {
     ],
     "getVisionSensorResolution": [Example("NAME(CAMERA)", [[1, 2]])],
     "handleVisionSensor": [Example("NAME(CAMERA)", [0])],
-    "readVisionSensor": [Example("NAME(DEPTH)", [0, near(0, 0, 0, 0, 2, 0, 0, 0, 0, 4, 0, 0, 0, 0, 3)])],
+    "readVisionSensor": [Example("NAME(DEPTH)", [0, approx([*DARKEST, 0.25, *LIGHTEST, 0.75, *MEAN, 0.5])])],
     "readProximitySensor": [Example("NAME(RANGE)", [-1, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "handleProximitySensor": [Example("NAME(FEELER)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "checkProximitySensor": [Example("NAME(FEELER, FLOOR)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],

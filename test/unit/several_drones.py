@@ -4,6 +4,8 @@ from typing import ClassVar
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.clock import Clock
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.scripting import load
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import ScriptContext, Surroundings
@@ -19,7 +21,9 @@ class Scene(ScriptContext):
     """What drones share."""
 
     def __init__(self, shown=True):
-        super().__init__(clock=Clock(0.05), gravity=-9.81, drawings=Drawings(shown), windows=Windows())
+        clock, objects = Clock(0.05), ObjectTree()
+        measured = {"objects": objects, "velocities": VelocityMeter(objects, clock)}
+        super().__init__(clock=clock, gravity=-9.81, drawings=Drawings(shown), windows=Windows(), **measured)
         self.objects.add("Floor", also=("ResizableFloor_5_25",))
 
 
@@ -39,6 +43,7 @@ class Drone:
             add(respondable, propeller, alias="respondable"),
             *(add(name, self.own_script) for name in others),
         ]
+        scene.objects[self.handles[0]].is_model = True
         self.script_parameters = {
             self.own_script: {"gain": 2.0, **(own or {})},
             respondable: {"particleVelocity": 0.0},

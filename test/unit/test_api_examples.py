@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from api_examples import ANY, SIM
 from api_examples_ros import ROS
+from api_examples_vision import VISION
 
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -19,17 +20,20 @@ from drone_sim.scripting.api.calls import Api, flat_name
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.host import Surroundings
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
 from drone_sim.scripting.time_limit import TimeLimit
 
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.insert(0, str(DOCS))
 import make_api  # noqa: E402
 
-EXAMPLES = {"sim": SIM, "simROS": ROS}
+EXAMPLES = {"sim": SIM, "simROS": ROS, "simVision": VISION}
 COLORS = np.array([[[3, 4, 5]], [[0, 1, 2]]], np.uint8)  # the top row first
 DISTANCES = np.array([[2.0, 4.0]], np.float32)
-PICTURES = {"FrontVision": lambda: COLORS, "TrackCam": lambda: DISTANCES}
+PICTURES = {
+    "FrontVision": lambda kind="color": COLORS if kind == "color" else DISTANCES,
+    "TrackCam": lambda kind="depth": DISTANCES if kind == "depth" else COLORS,
+}
 OBJECTS = {
     "DRONE": "/Quadcopter",
     "BASE": "/Quadcopter/base",
@@ -69,18 +73,21 @@ local function REFUSED(f, ...)
   local _, why = pcall(f, ...)
   return (string.match(why, '[^:]+$'):sub(2))
 end
+local function SECOND(_, value) return value end
 local DRAWN = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 1)
 """
 PYTHON = """
 def check(number, result): out.take(number, list(result) if isinstance(result, tuple) else [result])
 sim.setInt32Signal('there', 1)
 NOERROR, MESSAGE, FIRST = {"noError": True}, {"data": "x"}, 0
+PARAMETERS = {"pos": [0], "targetPos": [1]}
 IDENTITY = sim.buildIdentityMatrix()
 def INVERTED():
     m = [0,-1,0,1, 1,0,0,2, 0,0,1,3]
     sim.invertMatrix(m)
     return m
 DRAWN = sim.addDrawingObject(sim.drawing_points, 1, 0, -1, 1)
+def SECOND(values): return values[1]
 def REFUSED(f, *values):
     try:
         f(*values)
@@ -105,7 +112,7 @@ def _simulation(tmp_path_factory):
 def _modules(simulation):
     own, drone, shared = simulation.child_scripts["drone"], simulation.drone.propulsion, simulation.context
     shared.gravity = -9.81  # as scripts see it
-    for one in (shared.control, shared.data, shared.tubes):
+    for one in (shared.control, shared.data, shared.tubes, shared.collections):
         one.clear()
     weights = {"masses": drone.masses, "inertias": drone.inertias, "nearest": Distances(shared).nearest}
     around = Surroundings(PICTURES, planes={"TrackCam": (1.0, 5.0)}, operations=simulation.operations, **weights)
@@ -113,6 +120,7 @@ def _modules(simulation):
     yield {
         "sim": make_sim(own, around),
         "simROS": make_sim_ros(MessageBus("drone"), simulation.clock),
+        "simVision": make_sim_vision(own, around),
         **make_plugins(own),
     }
     simulation.operations.remove(set(shared.objects) - before)

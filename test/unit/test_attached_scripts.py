@@ -74,7 +74,7 @@ def test_they_are_called_from_the_root_to_the_leaves(build):
     scripts = {last: TELL_PYTHON, target: TELL_LUA, first: TELL_LUA}
     box = {"shape": "box", "size": [1, 1, 1], "position": [3, 0, 0.5], "name": "Box"}
     simulation = build(scripts, TELL_LUA, scene={"objects": [box]})
-    expected = ["Drone", first, target, last]
+    expected = ["Drone", target, first, last]
     assert order(simulation) == [f"{name}:init" for name in expected]
     simulation.step()
     assert order(simulation) == [f"{name}:{phase}" for phase in ("actuation", "sensing") for name in expected]
@@ -289,6 +289,87 @@ def test_a_call_that_fails_gets_one_line(build, call, words):
     with pytest.raises(ScriptError, match=words) as caught:
         simulation.step()
     assert "\n" not in str(caught.value)
+
+
+OWN = {
+    "lua": """
+    function add(a, list) return a + list[1], list end
+    function fails() error('no') end
+    function deep(n) return n == 0 and 0 or 1 + sim.callScriptFunction('deep', sim.handle_self, n - 1) end
+    local function try()
+        local sum, list = sim.callScriptFunction('add@Floor', sim.scripttype_childscript, 1, {2.5})
+        assert(sum == 3.5 and list[1] == 2.5)
+        assert(sim.callScriptFunction('deep', sim.getScriptHandle(), 5) == 5)
+        for _, call in ipairs{{'fails', sim.handle_self}, {'nothing', sim.handle_self}, {'deep', sim.handle_self, 50},
+                              {'add@Floor', sim.scripttype_customizationscript}} do
+            local ok, why = pcall(sim.callScriptFunction, call[1], call[2], call[3])
+            sim.setStringSignal('told', (sim.getStringSignal('told') or '') .. why .. ';')
+        end
+    end
+    function sysCall_thread() try() sim.step() end
+    """,
+    "py": """
+def add(a, more): return a + more[0], more
+def fails(): raise RuntimeError("no")
+def deep(n): return 1 + sim.callScriptFunction("deep", sim.handle_self, n - 1) if n else 0
+def sysCall_actuation():
+    assert sim.callScriptFunction("add@Floor", sim.scripttype_childscript, 1, [2.5]) == (3.5, [2.5])
+    assert sim.callScriptFunction("deep", sim.getScriptHandle(), 5) == 5
+    calls = ("fails", sim.handle_self), ("nothing", sim.handle_self), ("deep", sim.handle_self, 50)
+    for one in (*calls, ("add@Floor", sim.scripttype_customizationscript)):
+        try:
+            sim.callScriptFunction(*one)
+        except Exception as error:
+            sim.setStringSignal("told", (sim.getStringSignal("told") or "") + f"{error};")
+""",
+}
+
+
+@pytest.mark.parametrize("language", OWN)
+def test_a_script_calls_its_own_functions(build, language):
+    simulation = build({"Floor": OWN[language]})
+    simulation.step()
+    *told, _ = simulation.context.signals.get(str, "told").split(";")
+    failed, nothing, deep, customization = told
+    assert failed.endswith("no")
+    assert "the script has no function 'nothing' to call back" in nothing
+    assert "deep" in deep, "and it ends"
+    assert customization.endswith("'Floor': those of V-REP's files are not brought")
+
+
+def test_a_call_of_ones_own_is_on_ones_own_time(build):
+    own = """
+    function hangs() while true do end end
+    function sysCall_init() end
+    function sysCall_actuation() while true do pcall(sim.callScriptFunction, 'hangs', sim.handle_self) end end
+    """
+    with pytest.raises(ScriptError, match=r"stopped after 0.2 s without returning"):
+        build({}, own, script_time_limit=0.2).step()
+
+
+def test_special_handles_stand_for_several_scripts(build):
+    own = """
+    function sysCall_init()
+        sim.setScriptSimulationParameter(sim.handle_all, 'everybody', 1)
+        sim.setScriptSimulationParameter(sim.handle_tree, 'below', 2)
+    end
+    """
+    mark = """
+    function sysCall_init()
+        sim.setScriptSimulationParameter(sim.handle_chain, 'above', 3)
+        sim.setFloatSignal('found', sim.getScriptSimulationParameter(sim.handle_chain, 'below'))
+        local _, why = pcall(sim.getScriptSimulationParameter, sim.handle_main_script, 'x')
+        sim.setStringSignal('main', why)
+    end
+    """
+    simulation = build({"DronePosition": mark, "Floor": "function sysCall_init() end"}, own)
+    names = {"everybody", "below", "above"}
+    said = {one.name: names & set(one.parameters) for one in simulation.context.scripts}
+    assert said["Drone"] == {"everybody", "below", "above"}
+    assert said["DronePosition"] == {"everybody", "below", "above"}
+    assert said["Floor"] == {"everybody"} and said[PROPELLERS[0]] == {"everybody", "below"}
+    assert simulation.context.signals.get(float, "found") == 2
+    assert "the main script is the simulation itself" in simulation.context.signals.get(str, "main")
 
 
 # ---- propellers

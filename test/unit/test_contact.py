@@ -37,7 +37,9 @@ class Flight:
 
     def assert_comes_free(self):
         x = self.simulation.drone.body.state.position[0]
-        for _ in range(6):  # a wall that one leans on turns the drone, and a pilot aims again
+        for _ in range(
+            9
+        ):  # a wall that one leans on turns the drone, and a pilot aims again: it hangs there for 2 to 4 s
             away = self.fly((-1, 0, 0, 0), 1)
         assert away.position[0] < x - 1.5
         rest = self.fly((0, 0, 0, 0), 9)

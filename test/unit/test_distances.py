@@ -131,9 +131,88 @@ def test_collisions(simulation, sim):
     assert sim.checkCollision(drone) == (1, [drone, sim.getObject("/Cuboid")]), "what has no name in the scene file"
 
 
+# ---- collections
+
+
+def collected(sim, *items):
+    made = sim.createCollection(0)
+    for what, path, *options in items:
+        sim.addItemToCollection(made, what, sim.getObject(path), *options)
+    return made
+
+
+def paths(sim, collection):
+    return [sim.getObjectAlias(one, 1) for one in sim.getCollectionObjects(collection)]
+
+
+def test_what_belongs_to_a_collection(sim):
+    frame = collected(sim, (sim.handle_tree, "/Frame"))
+    assert paths(sim, frame) == ["/Frame", "/Frame/Arm"]
+    assert paths(sim, collected(sim, (sim.handle_tree, "/Frame", 2))) == ["/Frame/Arm"]
+    assert paths(sim, collected(sim, (sim.handle_chain, "/Frame/Arm"))) == ["/Frame/Arm", "/Frame"]
+    assert paths(sim, collected(sim, (sim.handle_chain, "/Frame/Arm", 2))) == ["/Frame"]
+    most = collected(sim, (sim.handle_single, "/Wall"), (sim.handle_tree, "/Frame"), (sim.handle_single, "/Frame", 1))
+    assert paths(sim, most) == ["/Wall", "/Frame/Arm"]
+    sim.addItemToCollection(most, sim.handle_all)
+    assert len(sim.getCollectionObjects(most)) == len(sim.getObjectsInTree(sim.handle_scene))
+    sim.setObjectParent(sim.getObject("/Frame/Arm"), -1, True)
+    assert paths(sim, frame) == ["/Frame"], "a tree is that of the moment"
+    sim.setObjectParent(sim.getObject("/Arm"), sim.getObject("/Frame"), True)
+    sim.emptyCollection(most)
+    assert sim.getCollectionObjects(most) == []
+    sim.removeCollection(most)
+    with pytest.raises(ValueError, match=f"no collection has the handle {most}"):
+        sim.getCollectionObjects(most)
+    sim.destroyCollection(sim.handle_all)
+
+
+def test_collections_of_3_x_have_names(sim):
+    made = sim.createCollection("walls", 0)
+    assert sim.addObjectToCollection(made, sim.getObject("/Wall"), sim.handle_single, 0) == 1
+    assert sim.getCollectionHandle("walls") == sim.getCollectionHandle("walls#") == made
+    assert sim.getCollectionName(made) == "walls" and paths(sim, made) == ["/Wall"]
+    with pytest.raises(ValueError, match="a collection named 'walls' is there already"):
+        sim.createCollection("walls", 0)
+    with pytest.raises(ValueError, match="no collection named 'wall'; near names are walls"):
+        sim.getCollectionHandle("wall")
+    sim.destroyCollection(sim.handle_all)
+
+
+def test_the_shortest_way_to_a_collection_and_its_objects(simulation, sim):
+    drone, obstacles = sim.getObject("/Quadcopter"), collected(sim, (sim.handle_all, "/Wall"))
+    sim.addItemToCollection(obstacles, sim.handle_tree, drone, 1)
+    for path in ("/target", "/Quadcopter[1]"):
+        sim.addItemToCollection(obstacles, sim.handle_tree, sim.getObject(path), 1)
+    simulation.drone.body.move(Pose((2.0, -5.0, 0.5)))
+    _, way, pair = sim.checkDistance(drone, obstacles)
+    assert pair == [drone, sim.getObject("/Floor")] and way == between(sim, "/Quadcopter", "/Floor")[1]
+    poles = collected(sim, (sim.handle_single, "/Pole"), (sim.handle_single, "/Wall"))
+    _, way, pair = sim.checkDistance(poles, sim.getObject("/Near"))
+    assert pair == [sim.getObject("/Wall"), sim.getObject("/Near")] and way == between(sim, "/Wall", "/Near")[1]
+    _, way, pair = sim.checkDistance(poles, sim.handle_all)
+    assert pair[1] == sim.getObject("/Floor") and way[6] == pytest.approx(0, abs=1e-6), "not from one to the other"
+    _, way, pair = sim.checkDistance(poles, poles)
+    assert pair == [sim.getObject("/Pole"), sim.getObject("/Wall")] and way == between(sim, "/Pole", "/Wall")[1]
+    assert sim.checkDistance(collected(sim), sim.handle_all) == (0, [0.0] * 7, [-1, -1])
+
+
+def test_a_collection_collides_where_one_of_its_objects_does(simulation, sim):
+    robot = collected(sim, (sim.handle_tree, "/Quadcopter"))
+    walls = collected(sim, (sim.handle_single, "/Pole"), (sim.handle_single, "/Wall"))
+    assert sim.checkCollision(robot, walls) == (0, [-1, -1])
+    simulation.drone.body.move(Pose((2.95, 0.0, 2.0)))
+    pair = [sim.getObject("/Quadcopter"), sim.getObject("/Wall")]
+    assert sim.checkCollision(robot, walls) == sim.checkCollision(robot, sim.handle_all) == (1, pair)
+    assert sim.checkCollision(walls, robot) == (1, pair[::-1])
+    assert sim.checkCollision(pair[1], robot) == (1, pair[::-1])
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
+        ("sim.addItemToCollection(sim.createCollection(0), 7, sim.getObject('/Wall'), 0)", "handle_single, _tree"),
+        ("sim.addItemToCollection(4711, sim.handle_single, sim.getObject('/Wall'), 0)", "no collection has the handle"),
+        ("sim.addItemToCollection(sim.createCollection(0), sim.handle_tree, 4711, 0)", "no object has the handle 4711"),
         ("sim.checkCollision(sim.getObject('/Wall'), sim.getObject('/Wall'))", "parts of one rigid body"),
         ("sim.checkDistance(sim.getObject('/Near'), sim.handle_all)", "'Near' is a point"),
         ("sim.checkDistance(99999, sim.handle_all)", "no object has the handle 99999"),

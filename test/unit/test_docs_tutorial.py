@@ -74,7 +74,7 @@ def test_elevation_climbs_holds_and_returns():
 
 def test_yaw_follows_its_command_and_the_rest_stays():
     flight = fly_timeline("3_yaw", "3_yaw.yaml")
-    assert at(flight.wz, 1.2) / 0.5 == pytest.approx(2 / 3, abs=0.03)
+    assert at(flight.wz, 1.2) / 0.5 == pytest.approx(0.6, abs=0.01)  # three steps after it is heard
     assert at(flight.wz, 4) == pytest.approx(0.5, abs=0.005)
     assert at(flight.yaw, 6) == pytest.approx(1.5, abs=0.02)
     assert abs(flight.wz[-1]) < 1e-3
@@ -88,8 +88,9 @@ def test_a_speed_is_reached_held_and_braked_and_a_gust_is_taken(stage, along, ac
     flight = fly_timeline(stage, f"{stage}.yaml")
     speed = getattr(flight, f"v{along}")
     assert 1.3 < max(speed) < 1.7
-    assert np.allclose(speed[round(5 / 0.05) : round(7 / 0.05)], 1, atol=0.1)
-    assert at(speed, 13.5) == pytest.approx(0, abs=0.03)
+    settling = speed[round(5 / 0.05) : round(7 / 0.05)]
+    assert max(abs(settling - 1)) < (max(speed) - 1) / 4
+    assert max(abs(speed[round(13 / 0.05) : round(14 / 0.05)])) < 0.05
     assert at(speed, 14.2) > 0.3
     assert abs(speed[-1]) < 0.05
     assert np.allclose([getattr(flight, across), flight.yaw], 0, atol=1e-6)
@@ -106,10 +107,12 @@ def test_the_finished_control_survives_being_thrown_about():
 
 
 def test_the_bare_law_falls_where_the_limits_hold():
-    fallen = fly_timeline("5_roll", "fall.yaml", "drone.position=[0, 0, 5]")
+    unlimited = "propellers.velocity_limits=null"
+    fallen = fly_timeline("5_roll", "fall.yaml", "drone.position=[0, 0, 5]", unlimited)
     assert fallen.propellers.min() < 0
-    assert fallen.z[-1] < 2
+    assert fallen.z[round(14 / 0.05) :].min() < 0.5
     held = fly_timeline("tutorial", "fall.yaml", "drone.position=[0, 0, 5]", seconds=26)
+    assert held.z[round(14 / 0.05) :].min() > 4.98
     assert held.z[-1] == pytest.approx(5, abs=0.01)
 
 

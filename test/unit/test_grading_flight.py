@@ -178,10 +178,10 @@ def test_what_a_script_says_and_that_it_ends_the_flight(written):
     talking = written(TALKING, counting=COUNTING)
     result = flight.grade(talking)
     assert {one.name for one in result.outcomes if one.passed} == {"signal", "topic", "state", "drawn"}
-    assert said(result)["topic"] == "seen was 5 from 1.05 s on; expected is 5"
+    assert said(result)["topic"] == "seen was 5 from 1.10 s on; expected is 5"
     assert said(result)["mute"] == "nothing was said by counter until 2.00 s"
-    assert said(result)["low"] == "the flight was over at 2.05 s, too early for this"
-    assert (result.error, round(result.flown, 9), result.points, result.of) == (None, 2.05, 4.0, 6.0)
+    assert said(result)["low"] == "the flight was over at 2.10 s, too early for this"
+    assert (result.error, round(result.flown, 9), result.points, result.of) == (None, 2.1, 4.0, 6.0)
     assert flight.grade(talking) == result  # a script that draws draws the same again
     assert said(flight.grade(talking, seed=1))["drawn"] != said(result)["drawn"]
     assert Result.from_json(json.loads(json.dumps(result.to_json()))) == result
@@ -193,7 +193,7 @@ def test_what_a_script_says_and_that_it_ends_the_flight(written):
         ("def sysCall_init(:", "[load] {}:1: SyntaxError", 0),
         ("def sysCall_init():\n    sim.getObjectHandel('x')", "[init] {}:2: ", 0),
         ("def sysCall_sensing():\n    if sim.getSimulationTime() > 1: raise ValueError('a\\nb')",
-         "[sensing] {}:2: ValueError: a b", 1.0),
+         "[sensing] {}:2: ValueError: a b", 1.05),
         ("def sysCall_sensing(): pass\ndef sysCall_cleanup():\n    1 / 0", "[cleanup] {}:3: ZeroDivisionError", 4.0),
     ],
 )  # fmt: skip
@@ -209,7 +209,7 @@ def test_a_script_that_fails_is_named_in_one_line(written, tmp_path, source, err
 def test_who_flies(written, tmp_path):
     of_config = TALKING.replace("script: counting.py", "config: {script: counting.py}")
     plain, inside = written(of_config.replace("counting.py", "''"), counting=COUNTING), written(of_config)
-    assert flight.grade(inside).flown == pytest.approx(2.05)
+    assert flight.grade(inside).flown == pytest.approx(2.1)
     assert flight.grade(inside).script == str(tmp_path / "counting.py")
     assert flight.grade(inside, "").digest == flight.grade(plain).digest
     assert flight.grade(plain, str(tmp_path / "counting.py")).digest == flight.grade(inside).digest

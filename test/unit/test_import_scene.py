@@ -1,20 +1,37 @@
 """A file of V-REP's becomes a scene that flies here, with its own masses, places and scripts."""
 
 import logging
+import math
 import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
-from vrep_encoder import chunk, container, file, integers, mesh, numbers, scene_object, script, shape, text, weight
+from vrep_encoder import (
+    chunk,
+    collection_item,
+    container,
+    file,
+    integers,
+    mesh,
+    numbers,
+    scene_object,
+    script,
+    shape,
+    text,
+    weight,
+)
 from vrep_quadricopter import PROPELLER, quadricopter
 
+from drone_sim.files import mesh_files
 from drone_sim.importing.main import main
 from drone_sim.mechanics import frames, urdf
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.entry import Place
+from drone_sim.vrep_files.model import VrepFileError
+from drone_sim.vrep_files.reading import read
 
 HOVER = """
 function sysCall_init()
@@ -72,7 +89,13 @@ def test_shapes_in_their_tree(imported):
     }
     assert found["Ball"]["alias"] == "ball" and found["Ball"]["size"] == [0.1] and found["Ball"]["mass"] == 0.5
     assert found["Ball"]["inertia"] == {"moments": [0.005, 0.01, 0.015], "position": [0.0, 0.0, 0.05]}
-    assert found["Ball"]["position"] == [5.0, 0.0, 1.0] and "parent" not in found["Ball"], "the tree does not weld"
+    assert found["Ball"]["position"] == [0.0, 0.0, 1.0] and found["Ball"]["parent"] == "Box"
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    for _ in range(40):
+        simulation.step()
+    matrix = simulation.scene.things()["Ball"].matrix()
+    simulation.close()
+    assert matrix[11] == pytest.approx(0.1, abs=0.01), "the tree does not weld"
 
 
 def test_a_compound_keeps_its_parts_and_what_is_no_simple_form_is_a_mesh(imported):
@@ -82,6 +105,54 @@ def test_a_compound_keeps_its_parts_and_what_is_no_simple_form_is_a_mesh(importe
     assert found["Cabin"]["parts"][1]["shape"] == "cylinder" and found["Cabin"]["parts"][1]["size"] == [1.0, 5.0]
     assert found["Egg"]["shape"] == "mesh"
     assert (imported.scene.parent / found["Egg"]["file"]).read_text().count("\nf ") == 1
+
+
+RED, GREEN, BLUE, GREY = (255, 0, 0), (0, 255, 0), (0, 0, 255), (9, 9, 9)
+IMAGE = np.array([[RED, GREEN], [BLUE, GREY]], np.uint8)  # the bottom row first, as in the file
+_IMAGE = chunk("Gon", text("tiles.jpg")) + chunk("Img", IMAGE.tobytes())
+TEXTURE = chunk("TEX", integers("Ipa", 77, 2, 2) + _IMAGE + b"EOO")
+AS_IS = struct.pack("<7d", 1, 0, 0, 0, 0, 0, 0)
+
+
+def cover(*more, number=77, way=0, scaling=(1.0, 1.0)):
+    ob = chunk("_ob", struct.pack("<2i2d", number, way, *scaling))
+    return chunk("Toj", ob + chunk("_rc", AS_IS) + b"".join(more) + b"EOO")
+
+
+@pytest.mark.parametrize(
+    "covered, corners",
+    [
+        (cover(chunk("Ftc", struct.pack("<6f", 0, 0, 1, 0, 0.25, 1))), [[0, 0], [1, 0], [0.25, 1]]),
+        (cover(scaling=(2.0, 4.0)), [[0.5, 0.5], [1, 0.5], [0.5, 0.75]]),
+        (cover(way=3), [[0.5, 0.5], [1.5, 0.5], [0.5, 1.5]]),
+    ],
+    ids=["as the file says", "seen along z", "on a cube"],
+)
+def test_a_mesh_is_covered_with_its_texture(imported, covered, corners):
+    """Of a triangle (0, 0, 0), (1, 0, 0), (0, 1, 0)."""
+    leaf = objects(imported(TEXTURE, shape(0, "Leaf", mesh("none", more=covered))))["Leaf"]
+    assert leaf["shape"] == "mesh" and "color" not in leaf
+    (part,) = mesh_files.read(str(imported.scene.parent / leaf["file"]))
+    assert part.texture.tolist() == IMAGE[::-1].tolist()
+    assert np.allclose(part.uv[part.faces[0]], corners)
+    assert np.allclose(part.vertices[part.faces[0]], [(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+
+
+@pytest.mark.parametrize(
+    "covered",
+    [cover(number=78), cover(way=1), cover(chunk("Ftc", struct.pack("<6f", 0, 0, math.nan, 0, 0, 1)))],
+    ids=["no such texture", "round a cylinder", "not finite"],
+)
+def test_what_covers_a_mesh_in_another_way_is_left_out(imported, covered):
+    leaf = objects(imported(TEXTURE, shape(0, "Leaf", mesh("none", more=covered))))["Leaf"]
+    (part,) = mesh_files.read(str(imported.scene.parent / leaf["file"]))
+    assert part.texture is None and "color" in leaf
+
+
+def test_a_texture_that_is_cut_is_one_line():
+    cut = chunk("TEX", integers("Ipa", 77, 2, 2) + chunk("Img", bytes(11)) + b"EOO")
+    with pytest.raises(VrepFileError, match=r"^TEX: a texture of 2 x 2 px in 11 bytes$"):
+        read(file(cut))
 
 
 def test_joints_and_what_hangs_on_them(imported):
@@ -122,6 +193,14 @@ def test_a_path_of_4_x_is_a_path(imported):
     loaded = parameters.load({"scene_file": str(imported.scene)})
     path = loaded.scene.objects[0].make(Place(("Track",), "Track", None, frames.IDENTITY), None)
     assert struct.pack("<21d", *path.table) == content
+
+
+@pytest.mark.parametrize("engine, turns", [(0, False), (1, True), (4, True)], ids=["Bullet", "ODE", "MuJoCo"])
+def test_bodies_tumble_as_in_the_files_engine(imported, engine, turns):
+    imported(
+        shape(0, "Mark", mesh(size=(1, 1, 1))), chunk("DYN", chunk("En3", struct.pack("<i3fi", engine, 0, 0, -9.81, 0)))
+    )
+    assert parameters.load({"scene_file": str(imported.scene)}).physics.gyroscopic == turns
 
 
 def test_the_floor_the_step_and_gravity(imported):
@@ -167,18 +246,176 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
     listed = (imported.scene.parent / "IMPORT.txt").read_text()
     for line in (
         "Way: a path: only its place is brought",
-        "Drone: is called Drone_2 here",
+        "Drone: is called Drone#0 here",
         "Drone: its customization script is not brought",
     ):
         assert line in listed and line in imported.said
     assert "No quadricopter is in the file: none flies, unless `vehicles` says so" in imported.said
 
 
+PUSH = """
+function sysCall_actuation()
+    local body = sim.getObjectHandle('Quadricopter_propeller_respondable{}')
+    sim.setStringSignal('{}', sim.getObjectName(body)..' of '..sim.getObjectName(sim.getObjectHandle('Quadricopter')))
+end
+"""
+
+
+def _rigid(end=""):
+    """A quadricopter of one piece, as no vehicle is: its propellers have scripts, and nothing else."""
+    yield shape(0, f"Quadricopter{end}", mesh(size=(0.3, 0.3, 0.05)), at=(3, 0, 1), base=chunk("Var", b"\1"))
+    for number in (1, 2):
+        name = f"Quadricopter_propeller_respondable{number}{end}"
+        yield scene_object("DMY", number, name, 0, (0.1, 0, 0))
+        yield script(number, PUSH.format(number, number))
+
+
+@pytest.mark.parametrize("end", ["", "#0", "#3"])
+def test_a_model_whose_names_a_drone_has_is_a_copy_and_its_scripts_find_its_own_objects(imported, end):
+    copy = end or "#0"
+    found = objects(imported(*_rigid(end), suffix=".ttm"))
+    assert [*found] == [f"Quadricopter{copy}", *(f"Quadricopter_propeller_respondable{n}{copy}" for n in (1, 2))]
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1}))
+    simulation.step()
+    told = [simulation.context.signals.find(str(n)) for n in (1, 2)]
+    simulation.close()
+    assert told == [f"Quadricopter_propeller_respondable{n}{copy} of Quadricopter{copy}" for n in (1, 2)]
+
+
+def test_a_propeller_without_a_drone_finds_none_of_another_ones(imported, caplog):
+    """V-REP's rule: the script of a copy does not find the original's objects."""
+    code = "function sysCall_init() sim.getObjectHandle('Quadricopter_base') end"
+    imported(*_rigid("#0"), scene_object("DMY", 7, "Eye"), script(0, code))
+    Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1})).close()
+    assert "no object named 'Quadricopter_base#0'" in caplog.text
+
+
+def test_names_of_a_tree_that_has_a_suffix_here_are_found_from_outside_of_it(imported):
+    code = "sim.setStringSignal('found', sim.getObjectName(sim.getObjectHandle('Arm')))"
+    robot = scene_object("DMY", 0, "Drone"), scene_object("DMY", 1, "Arm", 0), scene_object("DMY", 2, "Eye")
+    imported(*robot, script(2, f"function sysCall_init() {code} end"))
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene), "vehicles": 1}))
+    found = simulation.context.signals.find("found")
+    simulation.close()
+    assert found == "Arm#0"
+
+
 def test_scripts_lie_on_their_objects(imported):
     lamp = scene_object("DMY", 3, "Lamp", base=chunk("Lsp", integers("Par", 0)[:0]))
     content = imported(lamp, script(3, "-- é\nfunction sysCall_init() end", parameters=[("on", "true"), ("n", "3")]))
-    assert content["scripts"] == [{"object": "Lamp", "script": "Lamp.lua", "parameters": {"on": True, "n": 3.0}}]
+    assert content["scripts"] == [
+        {"object": "Lamp", "script": "Lamp.lua", "embedded": True, "parameters": {"on": True, "n": 3.0}}
+    ]
     assert (imported.scene.parent / "Lamp.lua").read_text() == "-- é\nfunction sysCall_init() end\n"
+
+
+TELL = """
+function sysCall_init()
+    local paths = {'.', '..', './Eye', '../Eye', '../Eye[1]', ':', ':/Eye', '::', '/Robot/*/Eye', '/R*t/Eye[1]'}
+    for _, path in pairs(paths) do
+        local found = sim.getObject(path, {noError = true})
+        sim.setStringSignal(NAME .. path, found == -1 and 'none' or sim.getObjectAlias(found, 1))
+    end
+end
+"""
+
+
+def _told(scene, name):
+    """What the script `name` found under each path."""
+    simulation = Simulation(parameters.load({"scene_file": str(scene)}))
+    signals = simulation.context.signals
+    paths = ".", "..", "./Eye", "../Eye", "../Eye[1]", ":", ":/Eye", "::", "/Robot/*/Eye", "/R*t/Eye[1]"
+    found = {path: signals.find(f"{name}{path}") for path in paths}
+    simulation.close()
+    return found
+
+
+def _robots(*more):
+    """Two robots as of CoppeliaSim 4.3: models with an arm each, whose second eye is its own."""
+    for index, name in ((0, "Robot"), (10, "Robot#0")):
+        base, end = chunk("Var", b"\1"), name[5:]
+        yield scene_object("DMY", index, name, at=(index, 0, 0), base=base, alias="Robot")
+        yield scene_object("DMY", index + 1, f"Arm{end}", index, alias="Arm")
+        yield scene_object("DMY", index + 2, f"Eye{end}", index + 1, alias="Eye")
+        yield scene_object("DMY", index + 3, f"Left{end}", index, alias="Eye")
+        yield scene_object("DMY", index + 4, f"Right{end}", index, alias="Eye")
+    yield from more
+
+
+def test_paths_of_a_script_of_up_to_4_8_begin_at_its_object(imported):
+    imported(*_robots(script(11, TELL.replace("NAME", "'arm'"))))
+    assert _told(imported.scene, "arm") == {
+        ".": "/Robot[1]/Arm",
+        "..": "/Robot[1]",
+        "./Eye": "/Robot[1]/Arm/Eye",
+        "../Eye": "/Robot[1]/Eye[0]",
+        "../Eye[1]": "/Robot[1]/Eye[1]",
+        ":": "/Robot[1]",
+        ":/Eye": "/Robot[1]/Eye[0]",
+        "::": "none",
+        "/Robot/*/Eye": "/Robot[0]/Arm/Eye",
+        "/R*t/Eye[1]": "/Robot[0]/Eye[1]",
+    }
+
+
+def test_paths_of_a_script_of_4_9_begin_at_the_script_which_is_an_object(imported):
+    own = script(99, TELL.replace("NAME", "'arm'"), tag="Soo")
+    scripted = scene_object("SCT", 20, "Script", parent=11, own=own, alias="Script")
+    found = objects(imported(*_robots(scripted)))
+    assert found["Script"]["kind"] == "script" and found["Script"]["parent"] == "Arm#0"
+    told = _told(imported.scene, "arm")
+    assert told[".."] == "/Robot[1]/Arm" and told["../Eye"] == "/Robot[1]/Arm/Eye" and told[":"] == "/Robot[1]"
+
+
+def test_a_script_object_is_a_script_where_one_is_asked_for(imported):
+    own = script(99, "function twice(x) return 2 * x end", tag="Soo")
+    scripted = scene_object("SCT", 20, "Script", parent=11, own=own, alias="Script")
+    code = """
+    function sysCall_sensing()
+        local script = sim.getObject('/Robot[1]/Arm/Script')
+        sim.setInt32Signal('type', sim.getObjectType(script) == sim.sceneobject_script and 1 or 0)
+        sim.setInt32Signal('by handle', sim.callScriptFunction('twice', script, 4))
+        sim.setInt32Signal('by path', sim.callScriptFunction('twice@/Robot[1]/Arm/Script', 1, 5))
+        local of = sim.getScript(sim.scripttype_simulation, sim.getObject('/Robot[1]/Arm'))
+        sim.setInt32Signal('by object', sim.callScriptFunction('twice', of, 6))
+    end
+    """
+    imported(*_robots(scripted, script(0, code)))
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    simulation.step()
+    signals = simulation.context.signals
+    found = [signals.get(int, name) for name in ("type", "by handle", "by path", "by object")]
+    simulation.close()
+    assert found == [1, 8, 10, 12]
+
+
+def test_collections_are_found_by_their_names(imported, tmp_path):
+    items = collection_item(0, 1) + collection_item(2, 0, removes=True) + collection_item(77, 0)
+    arm = chunk("GRP", chunk("Grn", text("arm")) + items + b"EOO")
+    code = """
+    function sysCall_init()
+        for _, one in pairs(simGetCollectionObjects(simGetCollectionHandle('arm'))) do
+            simSetStringSignal(simGetObjectName(one), 'in the arm')
+        end
+    end
+    """
+    content = imported(*_robots(script(10, code), arm))
+    assert content["collections"] == [
+        {
+            "name": "arm",
+            "items": [{"what": "tree", "object": "Robot"}, {"what": "single", "object": "Eye", "removes": True}],
+        }
+    ]
+    assert "arm: a collection: some of its objects are not brought" in imported.said
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    simulation.save_scene(tmp_path / "saved.yaml")
+    found = [name for name in simulation.context.objects.names if simulation.context.signals.find(name)]
+    simulation.stop()
+    simulation.start()
+    assert found == ["Robot", "Arm", "Left", "Right"]
+    assert [name for name in simulation.context.objects.names if simulation.context.signals.find(name)] == found
+    simulation.close()
+    assert parameters.load({"scene_file": str(tmp_path / "saved.yaml")}).scene.collections[0].name == "arm"
 
 
 # ---- quadricopters
@@ -321,7 +558,7 @@ def test_one_that_begins_tilted_and_without_a_script(imported):
         turned=(np.cos(0.1), np.sin(0.1), 0, 0),
     )
     vehicle = imported(*chunks)["vehicles"]["drone"]
-    assert vehicle["tilt"] == pytest.approx([0.2, 0.0], abs=1e-6) and "script" not in vehicle
+    assert vehicle["tilt"] == pytest.approx([0.2, 0.0], abs=1e-6) and vehicle["script"] == "none"
     assert "Quadricopter: has no child script" in imported.said
 
 
@@ -383,9 +620,29 @@ def _beside(tmp_path, monkeypatch):
 def test_files_of_lua_beside_a_scene_are_brought(beside, capsys):
     out = beside / "out"
     assert main([str(beside / "a.ttt"), str(out)]) == 0
-    assert (out / "MODULES.txt").read_text().split() == ["scripts/fly.lua", "more.lua"]
-    assert (out / "own.lua").read_text() == ASKS, "the scene's own script"
-    assert sorted(str(one.relative_to(out)) for one in out.rglob("*.lua")) == ["more.lua", "own.lua", "scripts/fly.lua"]
+    assert (out / "MODULES.txt").read_text().split() == ["scripts/fly.lua", "own.lua", "more.lua"]
+    assert (out / "own_2.lua").read_text() == ASKS, "the scene's own script"
+    assert sorted(str(one.relative_to(out)) for one in out.rglob("*.lua")) == [
+        "more.lua",
+        "own.lua",
+        "own_2.lua",
+        "scripts/fly.lua",
+    ]
+
+
+def test_a_script_is_not_called_as_the_helper_that_it_asks_for(imported, tmp_path, caplog):
+    (tmp_path / "blimp.lua").write_text("return {lift = 3}")
+    code = "function sysCall_init() sim.setInt32Signal('lift', require('blimp').lift) end"
+    content = imported(scene_object("DMY", 0, "blimp"), script(0, code))
+    assert content["scripts"][0]["script"] == "blimp_2.lua"
+    simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
+    assert simulation.context.signals.get(int, "lift") == 3
+    simulation.close()
+    for folder in (tmp_path, tmp_path / "out"):
+        (folder / "blimp.lua").unlink()
+    imported(scene_object("DMY", 0, "blimp"), script(0, code))
+    Simulation(parameters.load({"scene_file": str(imported.scene)})).close()
+    assert "no module 'blimp': no file blimp.lua beside the script" in caplog.text
 
 
 def test_they_are_brought_anew_whenever_the_scene_is_asked_for(beside):
@@ -393,7 +650,7 @@ def test_they_are_brought_anew_whenever_the_scene_is_asked_for(beside):
         (beside / "more.lua").write_text(content)
         scene = parameters.load({"scene_file": str(beside / "a.ttt")}).scene_file
         assert Path(scene).with_name("more.lua").read_text() == content
-        assert Path(scene).with_name("own.lua").read_text() == ASKS
+        assert Path(scene).with_name("own_2.lua").read_text() == ASKS
 
 
 def test_a_broken_file_as_a_scene_gets_one_line(tmp_path, monkeypatch):

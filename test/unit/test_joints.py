@@ -5,6 +5,7 @@ import math
 
 import pytest
 
+from drone_sim.config.types import ParameterError
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.mechanics.state import Twist, Vector3
@@ -235,3 +236,22 @@ objects:
             assert there == pytest.approx(frames.position(tree.matrix(tree.handle(name))), abs=1e-9)
     assert there[0] > 0.2
     simulation.close()
+
+
+def caterpillar(count):
+    """Rings of ten joints each around a body, one of them a force sensor."""
+    yield {"name": "Body", "shape": "box", "size": [0.1, 0.1, 0.1], "position": [0, 0, 1], "mass": 1}
+    for number in range(count):
+        above = f"Link{number - 1}" if number % 10 else "Body"
+        kind = {"kind": "joint", "type": "revolute", "mode": "passive"} if number % 10 else {"kind": "force_sensor"}
+        yield {"name": f"Joint{number}", **kind, "parent": above, "position": [0.11, 0.01 * (number // 10), 0]}
+        link = {"shape": "box", "size": [0.1, 0.005, 0.1], "mass": 0.1, "parent": f"Joint{number}"}
+        yield {"name": f"Link{number}", **link, "position": [0, 0, 0]}
+
+
+def test_as_many_joints_hang_together_as_pybullet_counts():
+    simulation = Simulation(parameters.load({"scene": {"objects": list(caterpillar(127))}}))
+    simulation.step()
+    simulation.close()
+    with pytest.raises(ParameterError, match="128 joints and force sensors hang together, from 'Body' on: at most 127"):
+        Simulation(parameters.load({"scene": {"objects": list(caterpillar(128))}}))

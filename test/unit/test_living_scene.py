@@ -118,7 +118,8 @@ def test_shapes_without_a_name_come_with_a_model(tmp_path):
         "Cuboid#0",
         "Cuboid#1",
     ]  # the scene has one
-    assert {"Cuboid0", "Cuboid0#0"} <= set(tree.names) and tree[tree.handle("Cuboid0")].alias == "Cuboid"
+    assert {"Cuboid0#0", "Cuboid0#1"} <= set(tree.names), "a model's names have one suffix"
+    assert tree[tree.handle("Cuboid0#0")].alias == "Cuboid"
     simulation.close()
 
 

@@ -30,6 +30,7 @@ KEYS = {
     "pybullet": "python3-pybullet-pip",
     "pydantic": "python3-pydantic-pip",
     "tkinter": "python3-tk",
+    "ruckig": "python3-ruckig-pip",
     "trimesh": "python3-trimesh-pip",
     "viser": "python3-viser-pip",
     "websockets": "python3-websockets-pip",

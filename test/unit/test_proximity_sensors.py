@@ -52,6 +52,32 @@ def test_a_ray_is_exact(simulation, sim):
     assert normal == pytest.approx([0, 0, -1], abs=1e-3)
 
 
+def test_a_collection_is_looked_for_as_one(sim):
+    ray, boxes = sim.getObject("/Ray"), sim.createCollection(0)
+    assert sim.checkProximitySensor(ray, boxes)[0] == 0, "nothing is in it"
+    sim.addItemToCollection(boxes, sim.handle_all, -1, 0)
+    assert sim.checkProximitySensor(ray, boxes) == sim.readProximitySensor(ray)
+    sim.addItemToCollection(boxes, sim.handle_single, sim.getObject("/RayBox"), 1)
+    state, distance, _, met, _ = sim.checkProximitySensor(ray, boxes)
+    assert (state, met) == (1, sim.getObject("/Floor")) and distance == pytest.approx(3, abs=1e-3)
+
+
+def test_a_sensor_looks_for_the_entity_that_is_set(simulation, sim):
+    ray, obstacles = sim.getObject("/Ray"), sim.createCollection(0)
+    assert sim.getObjectInt32Param(ray, sim.proxintparam_entity_to_detect) == sim.handle_all
+    sim.addItemToCollection(obstacles, sim.handle_all, -1, 0)
+    sim.addItemToCollection(obstacles, sim.handle_tree, sim.getObject("/RayBox"), 1)
+    before = simulation.snapshot()
+    sim.setObjectInt32Param(ray, sim.proxintparam_entity_to_detect, obstacles)
+    assert sim.getObjectInt32Param(ray, sim.proxintparam_entity_to_detect) == obstacles
+    assert sim.readProximitySensor(ray)[3] == sim.handleProximitySensor(ray)[3] == sim.getObject("/Floor")
+    assert sim.checkProximitySensor(ray, sim.handle_all)[3] == sim.getObject("/RayBox"), "what is asked for counts"
+    with pytest.raises(ValueError, match="no object has the handle 4711"):
+        sim.setObjectInt32Param(ray, sim.proxintparam_entity_to_detect, 4711)
+    simulation.restore(before)
+    assert sim.readProximitySensor(ray)[3] == sim.getObject("/RayBox")
+
+
 def nearest(x, y, z):
     """Return how near a ball of 0.2 m radius is to a sensor, and which of its points."""
     length = math.hypot(x, y, z)

@@ -74,3 +74,47 @@ def test_reset_ends_it(floating):
     step(floating, 5)
     assert floating.drone.body.state.linear_velocity == ZERO
     assert floating.drone.body.state.angular_velocity == ZERO
+
+
+SCENE = """
+objects:
+  - {name: Ball, shape: sphere, size: [0.2], position: [5, 0, 2], mass: 2}
+  - {name: Post, shape: box, size: [0.2, 0.2, 2], position: [3, 0, 1]}
+  - {name: Hinge, kind: joint, type: revolute, parent: Post, mode: passive}
+  - {name: Rod, shape: box, size: [1, 0.1, 0.1], parent: Hinge, position: [0, 0, 0], mass: 0.6}
+"""
+INERTIA = 0.6 * (1 + 0.01) / 12  # kg m², of the rod about z
+PUSHES = """
+def sysCall_actuation():
+    ball, post, rod = (sim.getObjectHandle(name) for name in ("Ball", "Post", "Rod"))
+    sim.addForceAndTorque(ball, [9, 9, 9], [9, 9, 9])
+    sim.addForce(ball + sim.handleflag_resetforcetorque, [0, 0.1, 0], [1, 0, 0])
+    sim.addForceAndTorque(ball, [1, 0, 0], [0, 0, 0.1])
+    sim.addForceAndTorque(post, [1, 0, 0], [0, 0, 1])
+    sim.addForceAndTorque(rod, [9, 0, 0], [0, 0, 0.3])
+    sim.addForceAndTorque(rod + sim.handleflag_resettorque, [0, 0, 0], [0, 0, 0.1])
+    sim.addForceAndTorque(sim.getObject("/Quadcopter"), [9, 9, 9], [0, 0, 0.001])
+    sim.addForceAndTorque(sim.getObject("/Quadcopter") + sim.handleflag_resetforce, [0.52, 0, 0])
+"""
+
+
+def test_scripts_push_shapes_of_the_scene_and_take_it_back(tmp_path):
+    """A sphere of 2 kg and 0.1 m has 0.008 kg m²; what is pushed in one step is not pushed in the next."""
+    script, scene = tmp_path / "pushes.py", tmp_path / "scene.yaml"
+    script.write_text(PUSHES)
+    scene.write_text(SCENE)
+    simulation = Simulation(parameters.load({"gravity": 0.0, "scene_file": str(scene)}), script=str(script))
+    things, drone = simulation.scene.things(), simulation.drone
+    try:
+        for count in (1, 2):
+            simulation.step()
+            ball, rod = things["Ball"].velocity(), things["Rod"].velocity()
+            assert ball[0] == pytest.approx((count * 2 / 2 * 0.05, 0, 0), abs=1e-9)
+            assert ball[1] == pytest.approx((0, 0, 0), abs=1e-9), "0.1 N m from the force, -0.1 as a torque"
+            assert rod[1] == pytest.approx((0, 0, count * 0.1 / INERTIA * 0.05), rel=1e-3)
+            assert drone.body.state.linear_velocity[0] == pytest.approx(count * 0.52 / drone.body.mass * 0.05, rel=0.05)
+            assert drone.body.state.angular_velocity[2] > 0
+        assert not any(map(any, things["Post"].velocity()))
+        assert not simulation.world.shape_forces.sums
+    finally:
+        simulation.close()

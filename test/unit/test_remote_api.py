@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import zmq
 from remote_client import Client, Refusal, official_client
+from vrep_encoder import chunk, file, integers, mesh, numbers, scene_object, shape
 
 from drone_sim.remote.conversation import RemoteApi
 from drone_sim.remote.remote_api import start_server
@@ -126,6 +127,33 @@ def test_functions_return_nothing_one_or_several_values(stage):
     assert client.sim("getObjectPosition", drone, None) == [0, 0, 1]
 
 
+def test_relative_paths_begin_at_the_root_as_nobody_asks(stage):
+    client = stage.client()
+    floor, other = client.sim("getObject", "/Floor"), client.sim("getObject", "Quadricopter#0")
+    assert client.sim("getObject", ":/Floor") == client.sim("getObject", "./Floor") == floor
+    assert client.sim("getObject", ":/Quadcopter[1]") == other
+    assert client.sim("getObject", "./base/target", {"index": 1}) == client.sim("getObject", "DronePosition#0")
+    assert client.sim("getObject", "./base", {"proxy": other}) == client.sim("getObject", "/Quadcopter[1]/base")
+
+
+def test_a_script_is_an_object_below_its_vehicle(stage):
+    client = stage.client()
+    stage.player.start()
+    script = client.sim("getObject", "/Quadcopter/Script")
+    assert client.sim("callScriptFunction", "turned", script, "abc", 1, 2) == ("cba", [2, 1])
+    assert client.sim("getObjectParent", script) == client.sim("getObject", "/Quadcopter")
+
+
+def test_collections(stage):
+    client = stage.client()
+    drone, whole, tree = client.sim("getObject", "/Quadcopter"), client.sim("createCollection", 0), -6
+    client.sim("addItemToCollection", whole, tree, drone, 0)
+    assert drone in client.sim("getCollectionObjects", whole)
+    other = client.sim("getObject", "/Quadcopter[1]")
+    assert client.sim("checkDistance", whole, other)[2] == [drone, other]
+    client.sim("destroyCollection", whole)
+
+
 def test_the_objects_of_every_vehicle_are_there(stage):
     client = stage.client()
     other = client.sim("getObject", "Quadricopter#0")
@@ -152,7 +180,7 @@ def test_the_objects_of_every_vehicle_are_there(stage):
         ("sim.handle_world", [], "handle_world is no function"),
         ("os.system", ["ls"], "no function 'os.system'"),
         ("__import__", ["os"], "no function '__import__'"),
-        ("zmqRemoteApi.require", ["simIK"], "no module 'simIK'; near names are sim"),
+        ("zmqRemoteApi.require", ["simIK"], "there is no plugin simIK here: there is no inverse kinematics"),
         ("zmqRemoteApi.info", [[1]], "expected (module: Name)"),
         ("sim.getObjectPosition", [10**400], "no object has the handle"),
         ("sim.wait", ["long"], "sim.wait: a number is expected"),
@@ -427,6 +455,41 @@ def test_a_function_of_the_client_is_called_and_may_call(stage):
     assert client.ask("_*executed*_", 1, 2)["ret"] == [1, 2]
 
 
+def test_a_motion_calls_a_function_of_the_client_in_every_step(stage):
+    client = stage.client()
+    client.sim("startSimulation")
+    most = {"maxVel": [1.0], "maxAccel": [2.0], "maxJerk": [10.0]}
+    reply = client.ask("sim.moveToConfig", {"pos": [0.0], "targetPos": [1.0], **most, "callback": "moved@func"})
+    seen, waiting = [], stage.server._waiting
+    while "func" in reply:
+        assert reply["func"] == "moved"
+        seen.append((stage.simulation.time, reply["args"][0]["pos"][0]))
+        client.send("_*executed*_", False)
+        assert stage.settled(lambda: waiting)
+        stage.go()
+        reply = client.reply()
+    assert [time for time, _ in seen] == pytest.approx([0.05 * step for step in range(34)])
+    assert seen[-1][1] == reply["ret"][0]["pos"][0] == 1.0
+
+
+def test_a_motion_while_the_simulation_is_stopped_is_made_at_once(stage):
+    client = stage.client()
+    most = [[1.0], [2.0], [10.0]]
+    reply = client.ask("sim.moveToConfig", -1, [0.0], None, None, *most, [1.0], None, "moved@func")
+    calls = 0
+    while "func" in reply:
+        calls, (position, _, _, _) = calls + 1, reply["args"]
+        reply = client.ask("_*executed*_")
+    assert calls == 34
+    assert reply["ret"][0] == position == [1.0]
+
+
+def test_an_endless_motion_while_the_simulation_is_stopped_is_refused(stage):
+    slow = {"pos": [0.0], "targetPos": [1.0], "maxVel": [1e-6], "maxAccel": [1.0], "maxJerk": [1.0]}
+    reply = stage.client().ask("sim.moveToConfig", slow)
+    assert "sim.moveToConfig: more than 10000 steps: start the simulation first" in reply["err"]
+
+
 def test_a_function_of_the_client_that_fails_leaves_it_as_it_was(stage):
     client = stage.client()
     for _ in range(40):
@@ -560,3 +623,58 @@ def test_the_official_client_flies_by_its_own_calls():
     finally:
         over.set()
         thread.join()
+
+
+# ---- CoppeliaSim's own scenes
+
+
+def test_a_scene_of_coppeliasim_is_loaded_from_the_folder_of_scenes(tmp_path):
+    """As CoppeliaSim's example pController does; nobody flies there."""
+    (tmp_path / "messaging").mkdir()
+    motor = integers("Jtt", 10) + numbers("_mp", "Dmp", 0, 100) + chunk("Va9", b"\x11") + integers("Jmd", 5)
+    arm = shape(2, "Arm", mesh(size=(1, 0.1, 0.1)), parent=1, at=(0.5, 0, 0.2), dynamic=True)
+    posts = (
+        shape(number, name, mesh(), at=(0, 3.0 * number, 1), alias="Post") for number, name in ((0, "A"), (3, "B"))
+    )
+    scene = file(*posts, scene_object("JNT", 1, "joint", 0, own=motor), arm)
+    (tmp_path / "messaging" / "arm.ttt").write_bytes(scene)
+    loaded = parameters.load({"remote_api": {"scenes": str(tmp_path)}})
+    simulation = Simulation(loaded, started=False)
+    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    server = RemoteApiServer(player, "127.0.0.1", 0)
+    client = Client(server)
+    try:
+        constants = client.call("zmqRemoteApi.info", "sim")
+        folder = client.sim("getStringParam", constants["stringparam_scenedefaultdir"]["const"])
+        with pytest.raises(Refusal, match=r"'../arm.ttt': the name of a .yaml or .ttt file beside the scene file"):
+            client.sim("loadScene", "../arm.ttt")
+        assert client.sim("loadScene", f"{folder}/messaging/arm.ttt") == 1
+        assert not simulation.vehicles
+        joint = client.sim("getObject", "/Post[0]/joint")
+        client.sim("setJointTargetVelocity", joint, 1.0)
+        client.sim("setStepping", True)
+        client.sim("startSimulation")
+        for _ in range(20):
+            player.step()
+        assert client.sim("getJointPosition", joint) == pytest.approx(1.0, abs=0.1)
+        client.sim("stopSimulation")
+        assert client.sim("getJointPosition", joint) == 0
+        with pytest.raises(Refusal, match="no script is attached to 'Drone'"):
+            client.sim("getScriptHandle")
+        assert client.sim("loadScene", "") == 1 and list(simulation.vehicles) == ["drone"]
+    finally:
+        client.vanish()
+        server.close()
+        simulation.close()
+
+
+def test_what_is_made_while_stopped_stays_through_start_and_stop(stage):
+    client = stage.client()
+    made = client.sim("createDummy", 0.01)
+    client.sim("setObjectPosition", made, -1, [0.1, 0.2, 0.3])
+    client.sim("startSimulation")
+    stage.go(2)
+    client.sim("setObjectPosition", made, -1, [5, 5, 5])
+    client.sim("stopSimulation")
+    assert client.sim("getObjectPosition", made, -1) == pytest.approx([0.1, 0.2, 0.3])
+    client.sim("removeObject", made)

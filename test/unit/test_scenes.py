@@ -13,7 +13,9 @@ from drone_sim.shapes.box import Box
 from drone_sim.shapes.sphere import Sphere
 from drone_sim.world import World
 
-KEYS = "datum, drone, floor, gravity, magnetic_field, objects, scripts, sub_step, time_step, vehicles, weather"
+KEYS = "collections, datum, drone, floor, gravity, magnetic_field, objects, physics, scripts, " + (
+    "sub_step, time_step, vehicles, weather"
+)
 
 URDF = """<robot name="barrel"><link name="barrel">
   <inertial><mass value="2"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -190,7 +192,8 @@ objects:
 """
     )
     shapes = "'box', 'cylinder', 'sphere', 'mesh', 'urdf', 'capsule', 'compound'"
-    kinds = "; or `kind`: one of 'dummy', 'joint', 'proximity_sensor', 'vision_sensor', 'path', 'force_sensor'"
+    kinds = "; or `kind`: one of 'dummy', 'joint', 'proximity_sensor', 'vision_sensor', 'path', 'force_sensor', "
+    kinds += "'script'"
     with pytest.raises(ParameterError) as refused:
         parameters.load({"scene_file": file, "gravity": "down"})
     first, *others = str(refused.value).split("; line ")

@@ -17,7 +17,7 @@ sim = require 'sim'
 function sysCall_init() states = {sim.getSimulationState()} end
 function sysCall_sensing()
   states[#states + 1] = sim.getSimulationState()
-  if sim.getSimulationTime() > 0.12 then sim.%s() end
+  if sim.getSimulationTime() > 0.07 then sim.%s() end
   stopping = sim.getSimulationStopping()
 end
 function sysCall_cleanup()

@@ -92,7 +92,13 @@ def _fails(tmp_path):
         ),
         ("sim.getObjectPosition(nil,-1)", "load", 1, ["wrong kind of value: got (nothing, -1)"]),
         ("local h = 1\nsim.setObjectPosition(h,-1,{0,0,0/0})", "load", 2, ["finite numbers are expected"]),
-        ("sim.setScriptSimulationParameter(1,'particleVelocity',{})", "load", 1, ["a number is expected"]),
+        (
+            "sim.setScriptSimulationParameter(sim.getScriptHandle('Quadricopter_propeller_respondable1'),"
+            "'particleVelocity',{})",
+            "load",
+            1,
+            ["a number is expected"],
+        ),
         (
             "function on_twist(m)\n error('x')\nend\nsimROS.subscribe('cmd_vel','geometry_msgs/Twist','on_twist')",
             "on_twist",

@@ -18,8 +18,8 @@ def _run(tmp_path, caplog):
 
     def run(text, **files):
         """Run a script beside files; return what it printed."""
-        (tmp_path / "parts").mkdir(exist_ok=True)
         for name, contents in files.items():
+            (tmp_path / name.replace("__", "/")).parent.mkdir(exist_ok=True)
             (tmp_path / name.replace("__", "/")).with_suffix(".lua").write_text(contents, encoding="utf-8")
         path = tmp_path / "main.lua"
         path.write_text(text, encoding="utf-8")
@@ -53,10 +53,13 @@ def test_what_is_written_goes_nowhere_and_the_script_goes_on(run, dialect, tmp_p
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        ("io.open('best.dat', 'r')", "io.open: a Lua script reads no files: use script_parameters"),
-        ("io.open('best.dat')", "io.open: a Lua script reads no files"),
-        ("for line in io.lines('best.dat') do end", "io.lines: a Lua script reads no files"),
-        ("io.open('a', 'w'):read()", "read: a Lua script reads no files"),
+        ("assert(io.open('best.dat', 'r'))", "best.dat: No such file or directory"),
+        ("for line in io.lines('best.dat') do end", "io.lines: best.dat: No such file or directory"),
+        ("for line in io.lines() do end", "io.lines: a Lua script reads files beside it, by io.open or io.lines"),
+        ("io.read()", "io.read: a Lua script reads files beside it, by io.open or io.lines"),
+        ("io.open('main.lua'):write('x')", "write: a Lua script writes no files: print it"),
+        ("io.open('main.lua'):read('x')", "read: a number of bytes, 'a', 'l', 'L' or 'n' is expected"),
+        ("io.open('a', 'w'):read()", "read: this file is open for writing"),
         ("io.popen('ls')", "io.popen: a child script starts no programs: use a launch file"),
         ("os.execute('clear')", "os.execute: a child script starts no programs"),
         ("os.getenv('HOME')", "os.getenv: a Lua script sees no environment: use script_parameters"),
@@ -67,6 +70,53 @@ def test_what_is_written_goes_nowhere_and_the_script_goes_on(run, dialect, tmp_p
 def test_what_is_refused_says_so_in_one_line(run, dialect, call, words):
     said = refused(run, dialect + "\n" + call)
     assert f"main.lua:{2 + bool(dialect)}: {words}" in said and "\n" not in said
+
+
+@DIALECTS
+def test_a_file_beside_the_script_is_read(run, dialect, tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "way points.csv").write_bytes(b"1.5 -2.5,x\n\nlast \xff")
+    main = """
+local f = assert(io.open('./data/way points.csv', 'r'))
+print(io.type(f), f:read('*n', 'n'))
+print(f:read(2), f:read('*l'), f:read(), f:read('*a') == 'last \\255', f:read('*l'), f:read('a'))
+print(f:seek('set', 1), f:read(2), f:seek('end'), f:read(1), f:seek('cur', -3), f:read(9))
+f:close()
+for line in io.lines('data/way points.csv') do print(#line) end
+for line in io.open('data/way points.csv'):lines() do printf('%d %s %s', #line, true, nil) end
+"""
+    assert run(dialect + main) == [
+        "file\t1.5\t-2.5",
+        ",x\t\t\ttrue\tnil\t",
+        "1\t.5\t18\tnil\t15\tt \N{REPLACEMENT CHARACTER}",
+        *["10", "0", "6"],
+        *["10 true nil", "0 true nil", "6 true nil"],
+    ]
+
+
+@DIALECTS
+@pytest.mark.parametrize(
+    "name", ["../main.lua", "/etc/passwd", "data/../../main.lua", ".hidden", "a\\0b", "", "x" * 300]
+)
+def test_no_data_elsewhere_are_read(run, dialect, name):
+    said = refused(run, dialect + f"print(io.open('{name}'))")
+    assert "main.lua:" in said.partition("io.open: ")[0]
+    assert "a file beside the script, or in a folder there, is expected" in said
+
+
+@DIALECTS
+def test_data_are_neither_links_out_of_the_folder_nor_endless(run, dialect, tmp_path):
+    (tmp_path / "out.txt").symlink_to("/etc/hostname")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    (tmp_path / "large").write_bytes(b"x" * 2**21)
+    for name in ("out.txt", "zero"):
+        assert "leads out of the script's folder" in refused(run, dialect + f"io.open('{name}')")
+    assert all(line.startswith("nil\t") for line in run(dialect + "print(io.open('large')) print(io.open('parts'))"))
+
+
+@DIALECTS
+def test_a_plugin_that_is_required_says_why_it_is_not_there(run, dialect):
+    assert "there is no plugin simIK here: there is no inverse kinematics" in refused(run, dialect + "require 'simIK'")
 
 
 @DIALECTS
@@ -103,6 +153,19 @@ def test_a_helper_may_be_a_module_of_lua_5_1(run):
     main = FLAT + "local q = require 'quad'\nprint(q.new(0.5).height, quad == q, new)"
     assert run(main, quad=helper) == ["1\ttrue\tnil"]
     assert "module is of Lua 5.1: let the file return a table instead" in refused(run, "require 'quad'", quad=helper)
+
+
+@DIALECTS
+def test_a_script_is_no_helper_of_its_own(run, dialect):
+    said = refused(run, dialect + "require 'main'")
+    assert "no module 'main': main.lua is this script itself; a helper needs another name" in said and "\n" not in said
+    assert run(dialect + "print(require 'main')", main__init="return 7") == ["7"]
+
+
+def test_flat_names_and_operators_of_newer_luas_may_stand_in_one_script(run):
+    assert run(FLAT + "print(5 | 2, 1 << 3)") == ["7\t8"]
+    assert run(FLAT + "print('5 | 2', table.getn({1, 2}))") == ["5 | 2\t2"], "in 5.1, where nothing else is asked for"
+    assert "main.lua:2: unexpected symbol near '='" in refused(run, FLAT + "= 1")
 
 
 @DIALECTS

@@ -6,7 +6,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
-from drone_sim.scripting.api import names
+from drone_sim.scripting.api.names import NameFunctions
 
 
 @pytest.fixture(name="simulation", scope="module")
@@ -22,6 +22,18 @@ def _objects(simulation):
     return simulation.context.objects
 
 
+@pytest.fixture(name="find")
+def _find(simulation, objects):
+    """What sim.getObject does in the drone's own script; the name in the place of the handle."""
+    functions = NameFunctions(simulation.child_scripts["drone"])
+
+    def found(path, **options):
+        handle = functions.getObject(path, options)
+        return handle if handle == -1 else objects[handle].name
+
+    return found
+
+
 @pytest.mark.parametrize(
     "path, name",
     [
@@ -34,6 +46,8 @@ def _objects(simulation):
         ("Quadricopter_target", "DronePosition"),
         ("/Quadcopter", "Drone"),
         ("/Quadcopter/base", "Quadricopter_base"),
+        ("/Quadcopter/base/target", "DronePosition"),
+        ("/propeller[0]/respondable/body/joint", "Quadricopter_propeller_joint1"),
         ("/Drone/base", "Quadricopter_base"),
         ("/Quadricopter/Quadricopter_base", "Quadricopter_base"),
         ("/base", "Quadricopter_base"),
@@ -51,7 +65,14 @@ def _objects(simulation):
         ("/Quadcopter/propeller[3]/joint", "Quadricopter_propeller_joint4"),
         ("/Quadcopter/propeller/joint", "Quadricopter_propeller_joint1"),
         ("/propeller[1]", "Quadricopter_propeller2"),
-        ("/Quadcopter/respondable[1]", "Quadricopter_propeller_respondable2"),
+        ("/Quadcopter/respondable", "Quadricopter_propeller_respondable1"),
+        ("/Quadcopter/body/../../joint", "Quadricopter_propeller_joint1"),
+        ("/*/base", "Quadricopter_base"),
+        ("/Quad*/prop*[2]/j?int", "Quadricopter_propeller_joint3"),
+        ("./pro*[1]/*[0]", "Quadricopter_propeller_respondable2"),
+        ("/Quadcopter/Script", "Drone_script"),
+        ("./Script", "Drone_script"),
+        ("../Script/..", "Drone"),
         ("/TrackCam", "TrackCam"),
         ("./Track_base/TrackCam", "TrackCam"),
         ("/FrontVision", "FrontVision"),
@@ -59,8 +80,8 @@ def _objects(simulation):
         ("ResizableFloor_5_25", "Floor"),
     ],
 )
-def test_paths(objects, path, name):
-    assert objects[names.find(objects, path, "Drone", -1)].name == name
+def test_paths(find, path, name):
+    assert find(path) == name
 
 
 @pytest.mark.parametrize(
@@ -69,22 +90,45 @@ def test_paths(objects, path, name):
         ("Quadricopter_bas", "near names are Quadricopter_base"),
         ("/Quadcopter/propeller[4]", "/Quadcopter/propeller[3]"),
         ("/Quadcopter/bases", "/Quadcopter/base"),
-        ("/", "names none"),
+        ("/", "no object '/';"),
         ("/Floor/base", "near names"),
         ("/Quadcopter/propeller[x]", "near names"),
+        ("/Quadcopter/respondable[1]", "near names"),  # the first of each propeller, none is the second
+        ("/Quadcopter/zzz*", "no object '/Quadcopter/zzz*'"),
+        ("/Quadcopter" + "/*" * 99, "no object"),
+        ("/*" * 5000, "no object"),
         ("../..", "known are"),
         ("zzzzzzzz", "known are"),
     ],
 )
-def test_unknown_names_list_the_near_ones(objects, path, near):
+def test_unknown_names_list_the_near_ones(find, path, near):
     with pytest.raises(ValueError, match="no object") as raised:
-        names.find(objects, path, "Drone", -1)
+        find(path)
     assert near in str(raised.value)
 
 
-def test_paths_are_found_again(objects):
+def test_paths_are_found_again(find, objects):
     for handle in objects:
-        assert names.find(objects, objects.path(handle), "Drone", -1) == handle
+        assert find(objects.path(handle)) == objects[handle].name
+
+
+def test_the_index_of_a_path_counts_all_that_it_means(find):
+    found = [find("/Quadcopter/respondable", index=index, noError=True) for index in range(5)]
+    assert found == [f"Quadricopter_propeller_respondable{number}" for number in (1, 2, 3, 4)] + [-1]
+    assert find("/Quadcopter/propeller[2]/*", index=2) == "Quadricopter_propeller_joint3"
+    assert find("/*/*/respondable", index=3) == "Quadricopter_propeller_respondable4", "each counts once"
+    with pytest.raises(ValueError, match=r"no object '/Quadcopter/base' with the index 1, from 0"):
+        find("/Quadcopter/base", index=1)
+
+
+def test_a_proxy_is_where_relative_paths_begin(find, objects):
+    propeller = objects.handle("Quadricopter_propeller3")
+    assert find("./joint", proxy=propeller) == "Quadricopter_propeller_joint3"
+    assert find("..", proxy=propeller) == "Drone" and find(".", proxy=propeller) == "Quadricopter_propeller3"
+    assert find(":/base", proxy=propeller) == "Quadricopter_base", "from the model that it is part of"
+    assert find("/base", proxy=propeller) == "Quadricopter_base", "that from the root stays"
+    with pytest.raises(ValueError, match="no object has the handle 4711"):
+        find("./joint", proxy=4711)
 
 
 def test_parents(objects):
@@ -94,7 +138,7 @@ def test_parents(objects):
     assert parent("Drone") is None
     assert parent("TrackCam").name == "Track_base"
     assert parent("Quadricopter_propeller_respondable2").name == "Quadricopter_propeller2"
-    assert parent("DronePosition").name == "Drone"
+    assert parent("DronePosition").name == "Quadricopter_base"
 
 
 def test_a_target_without_parent_stays(simulation, objects):

@@ -151,7 +151,7 @@ def test_it_is_not_where_that_is_forbidden(fly, busy):
 def test_it_waits_for_a_signal(fly):
     text = """
     function sysCall_thread() sim.setFloatSignal('n', sim.waitForSignal('go')) end
-    function sysCall_sensing() if sim.getSimulationTime() > 0.12 then sim.setFloatSignal('go', 7) end end
+    function sysCall_sensing() if sim.getSimulationTime() > 0.07 then sim.setFloatSignal('go', 7) end end
     """
     assert fly(text, 5) == [None, None, None, 7, 7]
 

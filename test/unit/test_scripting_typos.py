@@ -66,11 +66,11 @@ def test_a_name_of_the_scripts_own_is_its_own(load, caplog, ending, name):
 
 @ENDINGS
 def test_what_coppeliasim_calls_and_nobody_here_is_said_once(load, caplog, ending):
-    said, path = load(ending, "".join(define(ending, f"sysCall_{name}") for name in ("init", "vision", "joint")))
+    said, path = load(ending, "".join(define(ending, f"sysCall_{name}") for name in ("init", "msg", "joint")))
     assert said == ""
     phases = "sysCall_init, sysCall_actuation, sysCall_sensing, sysCall_cleanup are"
     assert [record.getMessage() for record in caplog.records] == [
-        f"{path}: sysCall_{name} is not called here; {phases}" for name in ("joint", "vision")
+        f"{path}: sysCall_{name} is not called here; {phases}" for name in ("joint", "msg")
     ]
 
 

@@ -44,15 +44,15 @@ def test_hover_holds_the_height_for_a_minute(simulation):
         assert simulation.drone.body.state.position == pytest.approx((0, 0, 0.8), abs=1e-3)
 
 
-@pytest.mark.parametrize("name, reached", [("vx", 0.943), ("vy", 0.943), ("vz", 0.998), ("wz", 1.0)])
-def test_a_command_reaches_its_velocity_in_5_s_and_ends_at_rest_in_6_s(simulation, name, reached):
+@pytest.mark.parametrize("name, reached", [("vx", 0.911), ("vy", 0.923), ("vz", 0.998), ("wz", 1.0)])
+def test_a_command_reaches_its_velocity_in_5_s_and_ends_at_rest_in_8_s(simulation, name, reached):
     command, index = COMMANDS[name]
     fly(simulation, 1)
     simulation.drone.commands.receive(command)
     fly(simulation, 5)
     assert velocity(simulation)[index] == pytest.approx(reached, rel=0.02)
     simulation.drone.commands.receive(Twist())
-    fly(simulation, 6)
+    fly(simulation, 8)
     assert velocity(simulation) == pytest.approx([0.0] * 6, abs=0.02)
 
 
@@ -64,7 +64,7 @@ BARE = {"thrust_limits": "none", "recovery_margin": "none"}
     [
         ({}, {}, 180, 180),
         ({"recovery_margin": "none"}, {"velocity_limits": "none"}, 176, 180),
-        (BARE, {"velocity_limits": "none"}, 133, 143),
+        (BARE, {"velocity_limits": "none"}, 129, 139),
     ],
 )
 def test_displaced_starts_return_to_rest(control, propellers, lowest, highest):

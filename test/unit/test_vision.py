@@ -7,9 +7,13 @@ import sys
 import numpy as np
 import pytest
 
+from drone_sim.hosting.child_scripts import surroundings
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.control import Turns
+from drone_sim.scripting.api.modules import make_sim
+from drone_sim.scripting.time_limit import TimeLimit
 
 SCENE = {
     "scene": {"objects": [{"shape": "box", "size": [0.5, 0.5, 0.5], "position": [2, 0, 0.8], "color": [1, 0, 0, 1]}]}
@@ -173,3 +177,63 @@ def test_what_has_not_changed_is_not_drawn_again(simulation):
     here = camera.matrix()
     camera.put((*here[:3], here[3] + 0.5, *here[4:]))  # a script moves the camera
     assert not np.array_equal(front.look(), again)
+
+
+def depths_and_colours(sim, handle):
+    image, size = sim.getVisionSensorImg(handle)
+    depth, _ = sim.getVisionSensorDepth(handle, 1)
+    return np.frombuffer(image, np.uint8).reshape(*size[::-1], 3), np.frombuffer(depth, "<f4").reshape(size[::-1])
+
+
+def test_every_sensor_gives_colours_and_depths():
+    eye = {
+        "name": "Eye",
+        "kind": "vision_sensor",
+        "position": [0.3, 0, 0.8],
+        "rpy": [np.pi / 2, 0, np.pi / 2],
+        "width": 64,
+    }
+    scene = {"scene": {"objects": [*SCENE["scene"]["objects"], {**eye, "height": 48}]}}
+    simulation = Simulation(parameters.load(scene))
+    try:
+        script = simulation.child_scripts["drone"]
+        around = surroundings([simulation.drone], simulation.context, simulation.operations, TimeLimit(0.0), Turns())
+        sim = make_sim(script, around)
+        for name in ("FrontVision", "DepthVision", "Eye"):
+            handle = sim.getObjectHandle(name)
+            colours, depths = depths_and_colours(sim, handle)
+            box = red(colours)
+            assert box.sum() > 20 and box[box.shape[0] // 2, box.shape[1] // 2]
+            near = depths[box].min()
+            assert 1.4 < near < 1.8 and depths[box].max() < near + 0.01
+            assert np.isinf(depths[-1]).all(), "the sky"
+            _, values = sim.readVisionSensor(handle)
+            assert values[4] == pytest.approx(sim.getVisionSensorDepthBuffer(handle)[depths.argmin()])
+            assert values[6] > 0.5, "the reddest"
+    finally:
+        simulation.close()
+
+
+LARGE = """
+function sysCall_init()
+    local eye = sim.getObject('/Eye')
+    local image = sim.getVisionSensorImage(eye)
+    local depth = sim.getVisionSensorDepthBuffer(eye)
+    sim.setInt32Signal('numbers', #image)
+    sim.setInt32Signal('depths', #depth)
+    sim.setInt32Signal('bytes', #sim.getVisionSensorImg(eye))
+    sim.setInt32Signal('packed', #sim.packTable({image = image}))
+end
+"""
+
+
+def test_an_image_of_a_large_sensor_comes_as_numbers(tmp_path):
+    (tmp_path / "large.lua").write_text(LARGE)
+    eye = {"name": "Eye", "kind": "vision_sensor", "width": 1280, "height": 720}
+    loaded = parameters.load({"scene": {"objects": [eye]}, "script_time_limit": 0.0})
+    simulation = Simulation(loaded, script=str(tmp_path / "large.lua"))
+    try:
+        numbers = [simulation.context.signals.get(int, name) for name in ("numbers", "depths", "bytes")]
+        assert numbers == [3 * 1280 * 720, 1280 * 720, 3 * 1280 * 720]
+    finally:
+        simulation.close()

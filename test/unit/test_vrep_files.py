@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from vrep_encoder import (
     chunk,
+    collection_item,
     container,
     file,
     integers,
@@ -21,7 +22,7 @@ from vrep_encoder import (
     weight,
 )
 
-from drone_sim.vrep_files.model import VrepFileError
+from drone_sim.vrep_files.model import VrepCollection, VrepCollectionItem, VrepFileError
 from drone_sim.vrep_files.reading import read, read_file
 from drone_sim.vrep_files.shapes import _packed
 
@@ -174,6 +175,18 @@ def test_a_script_object_acts_on_its_parent():
 def test_the_switches_of_a_script(switches, enabled):
     (found,) = read(file(scene_object("DMY", 0, "D"), script(0, "x = 1", switches=switches))).scripts
     assert found.is_enabled == enabled
+
+
+def test_a_collection():
+    items = collection_item(7, 1) + collection_item(8, 3, removes=True)
+    (found,) = read(
+        file(chunk("GRP", chunk("Grn", text("arm")) + integers("Gix", 2000000) + items + b"EOO"))
+    ).collections
+    assert found == VrepCollection(
+        "arm", (VrepCollectionItem("tree", 7, False, False), VrepCollectionItem("chain", 8, True, False))
+    )
+    with pytest.raises(VrepFileError, match="collection 1: Gty: an item of type 9"):
+        read(file(chunk("GRP", collection_item(7, 9) + b"EOO")))
 
 
 # ---- what is no such file

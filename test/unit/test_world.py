@@ -9,6 +9,7 @@ from drone_sim.files.resources import package_path
 from drone_sim.mechanics import frames, urdf
 from drone_sim.mechanics.state import Pose
 from drone_sim.mechanics.wrench import Wrench
+from drone_sim.shapes.box import Box
 from drone_sim.world import World
 
 SUB_STEP = 0.005
@@ -100,3 +101,27 @@ def test_two_worlds_do_not_know_each_other(space):
     other.close()
     other.close()
     assert space.state(here).position == pytest.approx((0, 0, 1), abs=1e-12)
+
+
+@pytest.mark.parametrize("speed", [2, 10, 20, 40, 150])
+@pytest.mark.parametrize("gap", [0.0, 0.03, 0.07, 0.11])
+@pytest.mark.parametrize("thrown", ["drone", "box"])
+@pytest.mark.parametrize("onto", ["wall", "floor"])
+def test_what_is_fast_is_held_and_does_not_rebound(space, thrown, onto, gap, speed):
+    way = np.array((1.0, 0.0, 0.0) if onto == "wall" else (0.0, 0.0, -1.0))
+    end = np.array((2.0, 0.0, 2.0) if onto == "wall" else (0.0, 0.0, 0.0))
+    if onto == "wall":
+        space.add_object(Box((0.1, 4.0, 4.0)), Pose(tuple(end + 0.05 * way)))
+    else:
+        space.add_floor(10.0, "")
+    start = Pose(tuple(end - (2.0 - gap) * way))
+    body = (
+        space.add_rigid_body(BODY, start) if thrown == "drone" else space.add_object(Box((0.2,) * 3), start, mass=1.0)
+    )
+    space.set_velocity(body, tuple(speed * way), (0.0, 0.0, 0.0))
+    states = []
+    for _ in range(300):
+        space.advance({body: Wrench()}, 1)
+        states.append(space.state(body))
+    assert max((np.array(one.position) - end) @ way for one in states) < 0.01, "its centre is in front of the face"
+    assert min(np.array(one.linear_velocity) @ way for one in states) > -0.01 * speed

@@ -132,5 +132,11 @@ def script(handle, code, kind=1, switches=8, parameters=(), tag="LST", more=b"")
     )
 
 
+def collection_item(handle, kind, removes=False):
+    """A part of a collection: 0 the object, 1 and 2 what hangs on it, 3 and 4 what it hangs on, 5 all."""
+    switches = chunk("Gty", bytes([kind])) + chunk("Var", bytes([not removes]))
+    return chunk("Asg", integers("Obj", handle, -1) + switches + b"EOO")
+
+
 def file(*objects, version=22, compressed=False):
     return container(b"".join(objects) + b"EOF", version, compressed)

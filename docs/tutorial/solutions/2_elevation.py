@@ -1,6 +1,6 @@
 """Stage 2 with half the damping.
 
-The damping ratio is halved, too: 0.45. After the pull the drone overshoots by 16 cm, where it did not before.
+The damping ratio is halved, too: 0.45. After the pull the drone overshoots by 15 cm, where it did not before.
 """
 
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs

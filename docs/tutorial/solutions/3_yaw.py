@@ -1,7 +1,7 @@
 """Stage 3 that holds its heading.
 
 3.1 and -3.1 rad are 0.08 rad apart, not 6.2: math.remainder takes the short way round. The heading held is that at the
-end of the command; 1.38 rad, since the drone, too, needs its time to follow 0.5 rad/s.
+end of the command; 1.40 rad, since the drone, too, needs its time to follow 0.5 rad/s.
 """
 
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
@@ -55,7 +55,7 @@ def sysCall_sensing():
     sim.setObjectOrientation(self.trackBase, -1, [0, 0, ori[2]])
 
     twist = flight_plan(sim.getSimulationTime())
-    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # world frame: linear and angular velocity
+    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # linear in the world frame, angular in its own
 
     if twist[2] == 0:
         self.thrust = self.thrust_gravity + self.Kzref * (self.zref - pos[2]) - self.Dzref * d_global_pos[2]

@@ -56,7 +56,7 @@ def sysCall_sensing():
     sim.setObjectOrientation(self.trackBase, -1, [0, 0, ori[2]])
 
     twist = flight_plan(sim.getSimulationTime())
-    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # world frame: linear and angular velocity
+    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # linear in the world frame, angular in its own
     local_ori = sim.getObjectOrientation(self.d, self.trackBase)
     track_mat_inv = sim.getInvertedMatrix(sim.getObjectMatrix(self.trackBase, -1))
     track_mat_inv[3] = track_mat_inv[7] = track_mat_inv[11] = 0  # a velocity is turned, not moved

@@ -6,7 +6,7 @@ Without a law for the place, the times have to be found by trying.
 # ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
 
 # vx, vy (m/s), for how long (s): flying backward or to the right, the drone brakes harder, and stops sooner
-SIDES = ((1, 0, 3.55), (0, 1, 3.55), (-1, 0, 4), (0, -1, 4))
+SIDES = ((1, 0, 3.4), (0, 1, 3.4), (-1, 0, 4.05), (0, -1, 4))
 
 
 def sysCall_init():
@@ -67,7 +67,7 @@ def sysCall_sensing():
     sim.setObjectOrientation(self.trackBase, -1, [0, 0, ori[2]])
 
     twist = flight_plan(sim.getSimulationTime())
-    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # world frame: linear and angular velocity
+    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # linear in the world frame, angular in its own
     local_ori = sim.getObjectOrientation(self.d, self.trackBase)
     track_mat_inv = sim.getInvertedMatrix(sim.getObjectMatrix(self.trackBase, -1))
     track_mat_inv[3] = track_mat_inv[7] = track_mat_inv[11] = 0  # a velocity is turned, not moved

@@ -42,7 +42,7 @@ def sysCall_actuation():
 def vertical_control():
     """Return the collective thrust (m/s)."""
     error = sim.getObjectPosition(self.target, -1)[2] - sim.getObjectPosition(self.d, -1)[2]
-    velocity, _ = sim.getObjectVelocity(self.heli)
+    velocity, _ = sim.getVelocity(self.heli)
     return self.thrust_gravity + 2 * error - 2 * velocity[2]
 
 

@@ -85,7 +85,7 @@ def sysCall_sensing():
     sim.setObjectOrientation(self.trackBase, -1, [0, 0, ori[2]])
 
     local_ori = sim.getObjectOrientation(self.d, self.trackBase)  # orientation in the track frame
-    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # global linear and angular speeds
+    d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # linear in the world, angular in its own frame
     track_mat_inv = sim.getInvertedMatrix(sim.getObjectMatrix(self.trackBase, -1))
     track_mat_inv[3] = track_mat_inv[7] = track_mat_inv[11] = 0
     d_local_pos = sim.multiplyVector(track_mat_inv, d_global_pos)  # linear speed in the track frame
@@ -106,7 +106,7 @@ def sysCall_sensing():
     self.roll_corr = self.Pangle * (roll_target - roll) - self.Dangle * droll
 
     if max(abs(pitch), abs(roll)) > self.most_lean:
-        recover(d_global_ori)
+        recover(sim.getObjectVelocity(self.d + sim.handleflag_axis)[1])
 
 
 def control_elevation(z, vz):

@@ -37,6 +37,13 @@ def check(content: bytes) -> None:
         raise ValueError(f"{width} x {height} px: at most {MAX_SIDE} x {MAX_SIDE} px are allowed")
 
 
+def png(image: np.ndarray) -> bytes:
+    """Return an 8-bit picture (h, w, 3 or 4), top row first, as a PNG file."""
+    content = io.BytesIO()
+    Image.fromarray(image).save(content, "PNG")
+    return content.getvalue()
+
+
 def _read(path: str) -> ReadFile:
     try:
         content = read_bytes(path, MAX_SIZE)

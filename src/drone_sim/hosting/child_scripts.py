@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from drone_sim.context import SimulationContext
+from drone_sim.hosting.picture_filters import filter_picture, filters_pictures
 from drone_sim.hosting.tuning import Tuning
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.saved_state import Restore, in_turn
@@ -19,7 +20,7 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.host import Operations, Surroundings
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.guarded import GuardedScript, tell_failure
 from drone_sim.scripting.time_limit import TimeLimit
@@ -44,6 +45,7 @@ class HostedScript(ABC):
         bus.backend = context.backend
         self.context = context
         self.script: load.Script = load.no_script()
+        self._filters = False  # whether its script is to see every picture of the vision sensor that it is on
 
     @abstractmethod
     def seen(self) -> Sequence[Vehicle]:
@@ -63,6 +65,13 @@ class HostedScript(ABC):
         Raises ValueError for what is no dynamic shape of a vehicle that it may push.
         """
         self._owner(shape, lambda one: shape in one.shapes).add_force(shape, force, torque, offset)
+
+    def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
+        """Forget the forces on a shape, or the torques, or both, that were added since the last step.
+
+        Raises ValueError for what is no dynamic shape of a vehicle that it may push.
+        """
+        self._owner(shape, lambda one: shape in one.shapes).drop_forces(shape, forces, torques)
 
     def turn_joint(self, joint: str, angle: float | None = None) -> float:
         """Turn a propeller's blades to an angle (rad), unless None; return it. Raises ValueError for what is none."""
@@ -90,9 +99,16 @@ class HostedScript(ABC):
         self.close()
         context = self.context
         limit, turns = TimeLimit(context.script_time_limit), Turns()
-        sim = make_sim(self, surroundings(self.seen(), context, operations, limit, turns))
-        modules = {"sim": sim, "simROS": make_sim_ros(self.bus, context.clock), **make_plugins(self)}
-        self.script = guarded(load.load(path, modules, limit, turns))
+        around = surroundings(self.seen(), context, operations, limit, turns)
+        modules = {
+            "sim": make_sim(self, around),
+            "simROS": make_sim_ros(self.bus, context.clock),
+            "simVision": make_sim_vision(self, around),
+            **make_plugins(self),
+        }
+        script = load.load(path, modules, limit, turns)
+        self._filters = filters_pictures(context, self.own_script, script)
+        self.script = guarded(script)
         context.scripts.attached_to(self.own_script).loaded(self.script, context.clock.time)
 
     def _call_init(self) -> None:
@@ -111,8 +127,15 @@ class HostedScript(ABC):
         self.bus.deliver(self.script)
         self.script.call("actuation")
 
+    def sensing(self) -> None:
+        """Let the script sense; one of a vision sensor filters its picture first."""
+        if self._filters:
+            filter_picture(self.context, self.own_script, self.script)
+        self.script.call("sensing")
+
     def close(self) -> None:
         """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
+        self._filters = False
         self.script.close()
         self.script = load.no_script()
         self.bus.close()
@@ -221,7 +244,7 @@ class AttachedScript(HostedScript):
         self.parameters: dict[str, Any] = {} if law is None else law
         self.parameters.update({} if law is None else {**_PROPELLER_SCRIPT, **law})
         self.parameters.update(copy.deepcopy(parameters.parameters))
-        context.scripts.add(self.own_script, self.parameters)
+        context.scripts.add(self.own_script, self.parameters).is_embedded = parameters.embedded
 
     def seen(self) -> Sequence[Vehicle]:
         """Return its vehicle, or all."""

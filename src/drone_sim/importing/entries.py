@@ -15,6 +15,7 @@ from drone_sim.vrep_files.model import VrepCamera, VrepDummy, VrepInertia, VrepJ
 _LARGEST_PICTURE = 4096  # px, of a side
 _NEAREST, _FARTHEST = 1e-4, 1e5  # m
 _LARGEST_FORCE = 1e9  # N m or N
+_WITHOUT_LOSS = {"force sensor": "force_sensor", "script": "script"}
 _LEAST_MASS, _LEAST_MOMENT = 1e-6, 1e-12
 
 
@@ -39,6 +40,8 @@ class Entries:
         keys: dict[str, Any] = {"name": one.name}
         if one.alias:
             keys["alias"] = one.alias
+        if one.object.is_model:
+            keys["model"] = True
         if parent:
             keys["parent"] = parent
         place = pose_keys(local)
@@ -146,9 +149,9 @@ class Entries:
 
     def _other(self, one: Placed) -> dict[str, Any]:
         kind = getattr(one.object.of, "kind", "object")
-        if kind not in ("force sensor", "light", "script"):
+        if kind not in (*_WITHOUT_LOSS, "light"):
             self._report.add(one.name, f"a {kind}: only its place is brought")
-        return {"kind": "force_sensor" if kind == "force sensor" else "dummy"}
+        return {"kind": _WITHOUT_LOSS.get(kind, "dummy")}
 
 
 def _is_only_carried(one: Placed) -> bool:

@@ -65,11 +65,16 @@ class Folder:
         self._taken.add(name.lower())
         return name
 
-    def write(self, name: str, content: str) -> None:
-        """Write a text file. Raises OSError."""
+    def keep_free(self, names: Iterable[str]) -> None:
+        """Give no file one of these names."""
+        self._taken.update(name.lower() for name in names)
+
+    def write(self, name: str, content: str | bytes) -> None:
+        """Write a file, text in UTF-8. Raises OSError."""
         path = self.path / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        writing.write(path, content)
+        with writing.replacing(path, binary=isinstance(content, bytes)) as file:
+            file.write(content)
 
 
 class Report:

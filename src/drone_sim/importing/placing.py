@@ -42,6 +42,16 @@ class Placed:
     children: list[Placed] = field(default_factory=list)
 
     @property
+    def wanted_name(self) -> str:
+        """Its name in the file."""
+        return self.object.name or self.object.alias or f"object_{self.object.handle}"
+
+    @property
+    def top(self) -> Placed:
+        """What it hangs on, by way of others, too, and that hangs on nothing; itself perhaps."""
+        return self if self.above is None else self.above.top
+
+    @property
     def alias(self) -> str:
         """Its alias where that says more than its name, '' otherwise."""
         alias = label(self.object.alias)

@@ -10,21 +10,22 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from drone_sim.importing import object_collections
 from drone_sim.importing.entries import Entries
 from drone_sim.importing.folder import Folder, Report, label, number, pose_keys
 from drone_sim.importing.placing import Placed, floor_parts, floor_size, placed
 from drone_sim.importing.quadricopters import find, plain_name
-from drone_sim.importing.scripts import ScriptFiles, bring, values
+from drone_sim.importing.scripts import ScriptFiles, asked_for, bring, values
 from drone_sim.importing.shapes import MeshWriter
 from drone_sim.importing.vehicles import ImportedVehicle, suffixes, vehicle_names
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import IDENTITY
-from drone_sim.mechanics.object_names import suffixed
+from drone_sim.mechanics.object_names import shifted, suffixed
 from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.message_text import MAX_NAME
 from drone_sim.scene.scene_parameters import MAX_OBJECTS
 from drone_sim.vehicles.quadricopter_objects import QuadricopterObjects
-from drone_sim.vrep_files.model import Other, VrepCamera, VrepDummy, VrepFile, VrepScript
+from drone_sim.vrep_files.model import BULLET, Other, VrepCamera, VrepDummy, VrepFile, VrepScript
 from drone_sim.vrep_files.reading import read_file
 
 _CAMERAS = ("FrontVision", "DepthVision", "TrackCam", "FloorVision")
@@ -51,10 +52,21 @@ class UniqueNames:
     def give(self, objects: Iterable[Placed], report: Report) -> None:
         """Name every object as in the file, where that can be."""
         for one in objects:
-            wanted = one.object.name or one.object.alias or f"object_{one.object.handle}"
-            one.name = self.free(wanted)
-            if one.name != wanted:
-                report.add(wanted, f"is called {one.name} here")
+            one.name = self.free(one.wanted_name)
+            if one.name != one.wanted_name:
+                report.add(one.wanted_name, f"is called {one.name} here")
+
+    def give_in_trees(self, objects: Iterable[Placed], report: Report) -> None:
+        """Name the objects of each tree as in the file, or, where one of these names is taken, all as a copy's."""
+        trees: dict[int, list[Placed]] = defaultdict(list)
+        for placed_one in objects:
+            trees[id(placed_one.top)].append(placed_one)
+        for tree in trees.values():
+            wanted = [label(one.wanted_name) or "object" for one in tree]
+            for one, name in zip(tree, shifted(wanted, self._taken)):
+                one.name = self.free(name)
+                if one.name != one.wanted_name:
+                    report.add(one.wanted_name, f"is called {one.name} here")
 
     def free(self, wanted: str) -> str:
         """Return a name like the one wanted, and take it."""
@@ -97,6 +109,7 @@ class _Import:
         self._name = name
         self._folder = folder
         self._report = Report()
+        folder.keep_free(one for script in file.scripts for files in asked_for(script.text) for one in files)
         self._writer = MeshWriter(folder)
         self.script_files = ScriptFiles(folder)
         self._objects = placed(file)
@@ -110,12 +123,17 @@ class _Import:
         self._of_vehicles = {id(one) for vehicle in self._vehicles for one in vehicle.objects.values()}
         taken: set[str] = set()
         for vehicle in self._vehicles:  # whose objects have our names, too, which no other vehicle's may have
-            others = [one.suffix for one in self._vehicles if one is not vehicle]
-            UniqueNames(taken | reserved_names(others) if others else ()).give(vehicle.objects.values(), self._report)
+            suffixes_of_others = [one.suffix for one in self._vehicles if one is not vehicle]
+            taken_by_others = taken | reserved_names(suffixes_of_others) if suffixes_of_others else set()
+            UniqueNames(taken_by_others).give(vehicle.objects.values(), self._report)
             taken |= {one.name for one in vehicle.objects.values()}
         taken |= reserved_names([vehicle.suffix for vehicle in self._vehicles])
         ours = self._of_vehicles | {id(one) for one in self._floor}
-        UniqueNames(taken).give((one for one in self._objects if id(one) not in ours), self._report)
+        others = [one for one in self._objects if id(one) not in ours]
+        flown = {id(vehicle.root.top) for vehicle in self._vehicles}
+        names = UniqueNames(taken)
+        names.give((one for one in others if id(one.top) in flown), self._report)
+        names.give_in_trees((one for one in others if id(one.top) not in flown), self._report)
 
     def run(self) -> Imported:
         content: dict[str, Any] = {**self._world()}
@@ -129,6 +147,11 @@ class _Import:
         scripts = list(self._attached())
         if scripts:
             content["scripts"] = scripts
+        there = self._kept | self._of_vehicles
+        brought = {one.object.handle: one.name for one in self._objects if id(one) in there}
+        collections = list(object_collections.entries(self._file.collections, brought, self._report))
+        if collections:
+            content["collections"] = collections
         self._write(content)
         return Imported(self._folder.path / SCENE, len(entries), len(vehicles), len(scripts), self._report)
 
@@ -145,6 +168,8 @@ class _Import:
         sub_step = step / max(1, round(step / min(max(wanted, 1e-4), step)))
         if abs(sub_step - _SUB_STEP) > 1e-9:
             world["sub_step"] = number(sub_step, 12)
+        if settings.engine != BULLET:
+            world["physics"] = {"gyroscopic": True}  # CoppeliaSim's Bullet alone leaves that term out
         if settings.gravity is not None and abs(settings.gravity[2] - _GRAVITY) > 1e-6:
             world["gravity"] = number(settings.gravity[2])
         if settings.gravity is not None and any(settings.gravity[:2]):
@@ -198,10 +223,12 @@ class _Import:
                 if on is None:
                     self._report.add(one.name, "has a second child script: not brought")
                 elif index > 0 or id(one) not in roots:
-                    yield self._entry_of(script, on)
+                    yield self._entry_of(script, on, index > 0 or script.is_embedded)
 
-    def _entry_of(self, script: VrepScript, on: Placed) -> dict[str, Any]:
-        entry = {"object": on.name, "script": self.script_files.write(on.name, script)}
+    def _entry_of(self, script: VrepScript, on: Placed, embedded: bool) -> dict[str, Any]:
+        entry: dict[str, Any] = {"object": on.name, "script": self.script_files.write(on.name, script)}
+        if embedded:
+            entry["embedded"] = True
         parameters = values(script.parameters or on.object.parameters)
         return {**entry, "parameters": parameters} if parameters else entry
 
@@ -255,7 +282,7 @@ class _Import:
         if isinstance(of, VrepDummy):
             return bool(one.children) and not of.path  # it held nothing but what is left out
         return (isinstance(of, VrepCamera) and of.resolution is None) or (
-            isinstance(of, Other) and of.kind in (*_ONLY_LOOKED_THROUGH, "script", "force sensor")
+            isinstance(of, Other) and of.kind in (*_ONLY_LOOKED_THROUGH, "force sensor")
         )
 
     def _is_mentioned(self, one: Placed) -> bool:
@@ -264,8 +291,6 @@ class _Import:
 
     def _hangs_on(self, one: Placed) -> tuple[str, frames.Matrix]:
         """Return the nearest object above that is there, '' for the world, and the pose in its frame."""
-        if one.is_dynamic and one.above is not None and one.above.object.shape is not None:
-            return "", one.matrix  # the tree alone does not hold it
         here = one.above
         while here is not None and id(here) not in self._kept and id(here) not in self._of_vehicles:
             here = here.above

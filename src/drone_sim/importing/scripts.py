@@ -15,7 +15,6 @@ from drone_sim.vrep_files.model import VrepScript
 
 _NUMBER = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*")
 _MOST_PARAMETERS = 256
-_IDLE = "-- The file's own scripts push this drone: nothing else is to.\nfunction sysCall_init()\nend\n"
 
 
 class ScriptFiles:
@@ -34,13 +33,7 @@ class ScriptFiles:
     def write(self, name: str, script: VrepScript) -> str:
         """Return the name of the file with a script of the object `name`."""
         suffix = ".py" if script.language == "python" else ".lua"
-        return self._file(name, script.text if script.text.endswith("\n") else f"{script.text}\n", suffix)
-
-    def idle(self) -> str:
-        """Return the name of a script that does nothing."""
-        return self._file("idle", _IDLE, ".lua")
-
-    def _file(self, name: str, text: str, suffix: str) -> str:
+        text = script.text if script.text.endswith("\n") else f"{script.text}\n"
         if (text, suffix) not in self._written:
             file = self._folder.free_name(name, suffix)
             self._folder.write(file, text)
@@ -96,14 +89,19 @@ def bring(beside: Path, folder: Path, own: Collection[str]) -> None:
         writing.write(folder / LIST, "".join(f"{name}\n" for name in brought))
 
 
-def _asked(text: str, beside: Path) -> list[str]:
-    """Return the names of the files that a script asks for."""
+def asked_for(text: str) -> list[list[str]]:
+    """Return the files of Lua that a script asks for, the names that each may have."""
     found = []
     for how, name in _ASKED.findall(text):
         inner = name.replace(".", "/")
         files = [f"{inner}.lua", f"{inner}/init.lua"] if how == "require" else [name]
-        found += [file for file in files if file.endswith(".lua") and (beside / file).is_file()][:1]
+        found.append([file for file in files if file.endswith(".lua")])
     return found
+
+
+def _asked(text: str, beside: Path) -> list[str]:
+    """Return the names of the files beside it that a script asks for."""
+    return [file for files in asked_for(text) for file in [one for one in files if (beside / one).is_file()][:1]]
 
 
 def _text(beside: Path, name: str) -> str | None:

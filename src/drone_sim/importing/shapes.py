@@ -1,26 +1,37 @@
 """What a shape of a file is in a scene: a simple form where it is made of such, a mesh file where not.
 
-Mesh files are OBJ, with a list of materials where there are several colours.
+Mesh files are OBJ, with a list of materials where there are several colours, or textures.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, cast
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from drone_sim.files import images
 from drone_sim.files.mesh_files import MAX_PARTS, MAX_TRIANGLES
 from drone_sim.importing.folder import Folder, numbers, pose_keys, shade
 from drone_sim.mechanics.frames import IDENTITY, Matrix
-from drone_sim.vrep_files.model import Rgba, VrepMesh, VrepPrimitive, VrepShape
+from drone_sim.vrep_files.model import Rgba, VrepMesh, VrepPrimitive, VrepShape, VrepTexture
 
 MAX_SCENE_TRIANGLES = 450_000  # of all files that are written: a scene may have 500 000
 Surface = tuple[VrepMesh, Matrix]  # and where it stands
+_WHITE = (1.0, 1.0, 1.0)
 
 
 class TooLarge(ValueError):
     """A mesh has more triangles than a file may have, or than a scene has left."""
+
+
+class Look(NamedTuple):
+    """How a surface looks: its colour, and the texture on it."""
+
+    color: Rgba
+    texture: VrepTexture | None
 
 
 class MeshWriter:
@@ -30,10 +41,11 @@ class MeshWriter:
         """Take where they go."""
         self._folder = folder
         self._written: dict[int, str] = {}
+        self._images: dict[VrepTexture, str] = {}
         self._left = MAX_SCENE_TRIANGLES
 
     def write(self, name: str, surfaces: Sequence[Surface]) -> str:
-        """Return the name of a file with these surfaces; their colours are in it where there are several.
+        """Return the name of a file with these surfaces; it has their textures, and their colours if several.
 
         Raises TooLarge.
         """
@@ -46,19 +58,27 @@ class MeshWriter:
         self._left -= triangles
         if key not in self._written:
             file = self._folder.free_name(name, ".obj", "meshes/")
-            if len(materials) > 1:
+            if _are_listed(materials):
                 listed = file.removesuffix(".obj") + ".mtl"
-                self._folder.write(listed, _mtl(materials))
+                self._folder.write(listed, _mtl(materials, self._image))
                 content = f"mtllib {listed.rpartition('/')[2]}\n{content}"
             self._folder.write(file, content)
             self._written[key] = file
         return self._written[key]
 
+    def _image(self, texture: VrepTexture) -> str:
+        """Return the name of a texture's file, beside the mesh files."""
+        if texture not in self._images:
+            name = self._folder.free_name(Path(texture.name).stem or "texture", ".png", "meshes/")
+            self._folder.write(name, images.png(texture.image))
+            self._images[texture] = name.rpartition("/")[2]
+        return self._images[texture]
+
 
 def color(surfaces: Sequence[Surface]) -> Rgba | None:
-    """Return the one colour of some surfaces; None where they have several, which their file says."""
-    colors = {mesh.color for mesh, _ in surfaces}
-    return colors.pop() if len(colors) == 1 else None
+    """Return the one colour of some surfaces; None where they have several, or textures, which their file says."""
+    looks = _materials(surfaces)
+    return None if _are_listed(looks) else next(iter(looks)).color
 
 
 def has_triangles(mesh: VrepMesh) -> bool:
@@ -66,22 +86,43 @@ def has_triangles(mesh: VrepMesh) -> bool:
     return len(mesh.faces) > 0
 
 
-def _materials(surfaces: Sequence[Surface]) -> dict[Rgba, str]:
-    colors = dict.fromkeys(mesh.color for mesh, _ in surfaces)
-    return {one: f"color_{number}" for number, one in enumerate(colors)}
+def _look(mesh: VrepMesh) -> Look:
+    if mesh.cover is None:
+        return Look(mesh.color, None)
+    return Look((*_WHITE, mesh.color[3]) if mesh.cover.is_decal else mesh.color, mesh.cover.texture)
 
 
-def _obj(surfaces: Sequence[Surface], materials: dict[Rgba, str]) -> str:
-    lines, first = [], 1
-    for number, (rgba, material) in enumerate(materials.items()):
-        if len(materials) > 1 and number < MAX_PARTS:  # what comes after the last one that may be is of its colour
+def _materials(surfaces: Sequence[Surface]) -> dict[Look, str]:
+    looks = dict.fromkeys(_look(mesh) for mesh, _ in surfaces)
+    return {one: f"color_{number}" for number, one in enumerate(looks)}
+
+
+def _are_listed(materials: Mapping[Look, str]) -> bool:
+    return len(materials) > 1 or any(one.texture is not None for one in materials)
+
+
+def _obj(surfaces: Sequence[Surface], materials: dict[Look, str]) -> str:
+    lines, first, first_corner = [], 1, 1
+    for number, (look, material) in enumerate(materials.items()):
+        if _are_listed(materials) and number < MAX_PARTS:  # what comes after the last one that may be looks like it
             lines.append(f"usemtl {material}")
-        for mesh, matrix in (one for one in surfaces if one[0].color == rgba):
+        for mesh, matrix in (one for one in surfaces if _look(one[0]) == look):
             vertices = moved(mesh.vertices, matrix)
             lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in cast("list[list[float]]", vertices.tolist())]
-            lines += [f"f {a} {b} {c}" for a, b, c in cast("list[list[int]]", (mesh.faces + first).tolist())]
+            lines += _faces(mesh, first, first_corner)
             first += len(vertices)
+            first_corner += 3 * len(mesh.faces) if mesh.cover else 0
     return "\n".join([*lines, ""])
+
+
+def _faces(mesh: VrepMesh, first: int, first_corner: int) -> list[str]:
+    """Return the lines of a mesh's faces, with where their corners lie on its texture."""
+    faces = cast("list[list[int]]", (mesh.faces + first).tolist())
+    if mesh.cover is None:
+        return [f"f {a} {b} {c}" for a, b, c in faces]
+    on_texture = cast("list[list[float]]", mesh.cover.corners.reshape(-1, 2).tolist())
+    covered = (f"f {a}/{n} {b}/{n + 1} {c}/{n + 2}" for n, (a, b, c) in zip(itertools.count(first_corner, 3), faces))
+    return [*(f"vt {u:.6g} {v:.6g}" for u, v in on_texture), *covered]
 
 
 def moved(vertices: np.ndarray, matrix: Matrix) -> np.ndarray:
@@ -92,10 +133,11 @@ def moved(vertices: np.ndarray, matrix: Matrix) -> np.ndarray:
     return vertices @ turn[:, :3].T + turn[:, 3]
 
 
-def _mtl(materials: dict[Rgba, str]) -> str:
+def _mtl(materials: dict[Look, str], file_of: Callable[[VrepTexture], str]) -> str:
     lines = []
-    for (red, green, blue, opacity), name in materials.items():
+    for ((red, green, blue, opacity), texture), name in materials.items():
         lines += [f"newmtl {name}", f"Kd {red:.4g} {green:.4g} {blue:.4g}", f"d {opacity:.4g}"]
+        lines += [f"map_Kd {file_of(texture)}"] if texture is not None else []
     return "\n".join([*lines, ""])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from drone_sim.importing.folder import Folder, Report, label, number, numbers, pose_keys, word
 from drone_sim.importing.placing import Placed
-from drone_sim.importing.quadricopters import VrepQuadricopter, built_in_law, plain_name, swings_on
+from drone_sim.importing.quadricopters import Propeller, VrepQuadricopter, built_in_law, plain_name, swings_on
 from drone_sim.importing.scripts import ScriptFiles, values
 from drone_sim.importing.shapes import MeshWriter
 from drone_sim.importing.vehicle_urdf import VehicleUrdf
@@ -17,7 +17,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_names import split
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS
-from drone_sim.vehicles.quadricopter_objects import DRONE, TARGET, TRACK_BASE, joint, respondable
+from drone_sim.vehicles.quadricopter_objects import BASE, DRONE, SCRIPT, TARGET, TRACK_BASE, joint, respondable, seen
 from drone_sim.vrep_files.model import VrepCamera, VrepJoint, VrepScript
 
 _OWN_CAMERAS = {"FrontVision": "front", "DepthVision": "depth", "TrackCam": "track", "FloorVision": "floor"}
@@ -51,14 +51,15 @@ class ImportedVehicle:
         quadricopter = self.quadricopter
         found = {DRONE: quadricopter.root}
         for index, propeller in enumerate(quadricopter.propellers, start=1):
-            found[f"Quadricopter_propeller{index}"] = propeller.link
-            found[respondable(index)] = propeller.body
-            if propeller.joint is not None:
-                found[joint(index)] = propeller.joint
+            found.update(_known_parts(index, propeller))
         if quadricopter.base is not None:
             found["Quadricopter_base"] = quadricopter.base
         if quadricopter.target is not None:
             found[TARGET] = quadricopter.target
+        own = [script.own_object for script in self._scripts.get(quadricopter.root.object.handle, ())[:1]]
+        script = next((one for one in quadricopter.root.children if one.object.handle in own), None)
+        if script is not None:
+            found[SCRIPT] = script
         for one in quadricopter.inside():
             ours = next((name for end, name in _BY_NAME.items() if plain_name(one).lower().endswith(end)), None)
             if ours is not None and ours not in found and one.object.shape is None:
@@ -125,7 +126,6 @@ class ImportedVehicle:
                 f"{self.root.name}: its propellers' scripts are V-REP's own; the built-in law is the same"
             )
         entry["objects"] = {ours: self._object(ours, one) for ours, one in self.objects.items()}
-        entry["objects"].update(self._missing_target())
         cameras = {self._camera_key(one): self._camera(one) for one in self.cameras}
         return {**entry, "cameras": cameras} if cameras else entry
 
@@ -144,10 +144,8 @@ class ImportedVehicle:
             parameters = values(own[0].parameters or self.root.object.parameters)
             script = {"script": files.write(self.root.name, own[0])}
             return {**script, "script_parameters": parameters} if parameters else script
-        if any("ddForce" in script.text for several in self._scripts.values() for script in several):
-            return {"script": files.idle()}
-        report.add(self.root.name, "has no child script: the built-in one flies it, or the one that is given")
-        return {}
+        report.add(self.root.name, "has no child script: only one that is given, as in script:=pilot, flies it")
+        return {"script": "none"}
 
     def _object(self, ours: str, one: Placed) -> dict[str, Any]:
         """Return how one of its objects is called, and where it is on what it hangs on in ours."""
@@ -160,19 +158,17 @@ class ImportedVehicle:
             keys.update({"position": [0.0, 0.0, 0.0], **pose_keys(frames.relative(self._above(ours), one.matrix))})
         return keys
 
-    def _missing_target(self) -> dict[str, Any]:
-        """Return the place of the target that the file has not: in the frame that its scripts read, as V-REP's are."""
-        base = self.quadricopter.base
-        if TARGET in self.objects or base is None:
-            return {}
-        matrix = frames.relative(self.root.matrix, base.matrix)
-        return {TARGET: {"position": [0.0, 0.0, 0.0], **pose_keys(matrix)}}
-
     def _above(self, ours: str) -> Matrix:
         """Return the world from what one of our objects hangs on."""
+        if ours == TARGET:
+            base = self.quadricopter.base
+            return frames.multiply(self.root.matrix, BASE) if base is None else base.matrix
         for index, propeller in enumerate(self.quadricopter.propellers, start=1):
-            if ours in (respondable(index), joint(index)):
+            if ours == respondable(index):
                 return propeller.link.matrix
+            if ours in (seen(index), joint(index)):
+                above = self.objects.get(seen(index), propeller.body)
+                return above.matrix if ours == joint(index) else propeller.body.matrix
         return self.root.matrix
 
     # ---- cameras
@@ -201,6 +197,16 @@ class ImportedVehicle:
             "far": number(min(max(camera.far, 2 * near, 1e-3), 1e5)),
             "every": 1,
         }
+
+
+def _known_parts(index: int, propeller: Propeller) -> dict[str, Placed]:
+    """Return the file's objects that a propeller has of itself, by their names there."""
+    found = {f"Quadricopter_propeller{index}": propeller.link, respondable(index): propeller.body}
+    if propeller.joint is not None:
+        if propeller.joint.above in propeller.body.children:
+            found[seen(index)] = propeller.joint.above
+        found[joint(index)] = propeller.joint
+    return found
 
 
 def suffixes(found: Sequence[VrepQuadricopter]) -> list[int]:

@@ -10,8 +10,14 @@ class Clock:
         """Begin at time 0; `time_step` in s."""
         self.time_step = time_step
         self.steps = 0
+        self.is_sensing = False
 
     @property
     def time(self) -> float:
         """Simulated time in s."""
         return self.steps * self.time_step
+
+    @property
+    def script_time(self) -> float:
+        """What scripts are told (s): V-REP's time goes on at the end of a step, after the sensing phase."""
+        return (self.steps - self.is_sensing) * self.time_step

@@ -8,7 +8,7 @@ step handles a dozen of them and one numpy call costs more than all the arithmet
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import asin, atan2, copysign, cos, sin, sqrt
+from math import asin, atan2, copysign, cos, hypot, sin, sqrt
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -178,6 +178,14 @@ def rotate_back(m: Sequence[float], vector: Sequence[float]) -> Vector:
         m[1] * x + m[5] * y + m[9] * z,
         m[2] * x + m[6] * y + m[10] * z,
     )
+
+
+def rotation_vector(m: Sequence[float]) -> Vector:
+    """Return the rotation of a transform as its axis times its angle (rad, 0 to pi)."""
+    x, y, z, w = to_quaternion(m)
+    sine = hypot(x, y, z)
+    scale = 2.0 * atan2(sine, w) / sine if sine else 2.0
+    return x * scale, y * scale, z * scale
 
 
 def turned(quaternion: Sequence[float], vector: Sequence[float]) -> Vector:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Sequence
 
 NO_SUFFIX = -1  # what has no suffix
 _SUFFIXED = re.compile(r"(.+)#(\d+)", re.DOTALL)
@@ -19,6 +19,12 @@ def split(name: str) -> tuple[str, int]:
     """Return a name without its suffix, and the suffix; NO_SUFFIX where it has none."""
     match = _SUFFIXED.fullmatch(name)
     return (match.group(1), int(match.group(2))) if match else (name, NO_SUFFIX)
+
+
+def shifted(names: Sequence[str], taken: Container[str]) -> list[str]:
+    """Return the names of a model's copy, as V-REP gives them: suffixes higher by the least that leaves none taken."""
+    copies = ([suffixed(bare, end + more) for bare, end in map(split, names)] for more in itertools.count())
+    return next(copy for copy in copies if not any(name in taken for name in copy))
 
 
 def numbered(name: str) -> Iterator[str]:

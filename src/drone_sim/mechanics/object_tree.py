@@ -151,7 +151,7 @@ class ObjectTree:
         return ((handle, child) for handle, child in self._objects.items() if child.parent is parent)
 
     def path(self, handle: int) -> str:
-        """Return the 4.x path of an object from the root, such as /Quadcopter/propeller[0]/joint."""
+        """Return the 4.x path of an object from the root, such as /Quadcopter/propeller[0]/respondable."""
         parts = []
         here: SceneObject | None = self[handle]
         while here is not None:
@@ -167,6 +167,10 @@ class ObjectTree:
     def __contains__(self, name: str) -> bool:
         """Tell whether an object has that name."""
         return name in self._handles
+
+    def get(self, handle: int) -> SceneObject | None:
+        """Return the object of a handle, None where there is none."""
+        return self._objects.get(handle)
 
     def handle_of(self, sought: SceneObject | None) -> int:
         """Return the handle of an object, WORLD for None."""
@@ -197,32 +201,42 @@ class ObjectTree:
 
         return restore
 
-    def matrix(self, handle: int, relative_to: int = WORLD) -> Matrix:
-        """Return the transform of an object relative to another, to its PARENT, or to the WORLD."""
+    def matrix(self, handle: int, relative_to: int = WORLD, base: bool = False) -> Matrix:
+        """Return the transform of an object relative to another, to its PARENT, or to the WORLD.
+
+        Relative to a joint is relative to what has moved with it; `base`: to the frame that stands still.
+        """
         try:
             moved = self._objects[handle]
         except (KeyError, TypeError):
             moved = self[handle]  # which says what is wrong; this runs a dozen times a step
         if relative_to == WORLD:
             return moved.matrix()
-        reference = moved.parent if relative_to == PARENT else self[relative_to]
-        return moved.matrix() if reference is None else frames.relative(reference.below(), moved.matrix())
+        frame = self._frame(moved, relative_to, base)
+        return moved.matrix() if frame is None else frames.relative(frame, moved.matrix())
 
-    def turn(self, handle: int, relative_to: int = WORLD) -> Matrix:
+    def _frame(self, moved: SceneObject, relative_to: int, base: bool) -> Matrix | None:
+        """Return the transform world from the frame relative to which an object is meant, None for the world's."""
+        reference = None if relative_to == WORLD else moved.parent if relative_to == PARENT else self[relative_to]
+        if reference is None:
+            return None
+        return reference.matrix() if base else reference.below()
+
+    def turn(self, handle: int, relative_to: int = WORLD, base: bool = False) -> Matrix:
         """Return what `matrix` does, of which only the rotation counts."""
         if relative_to in (WORLD, PARENT):
-            return self.matrix(handle, relative_to)
-        return frames.relative_turn(self[relative_to].below(), self[handle].matrix())
+            return self.matrix(handle, relative_to, base)
+        reference = self[relative_to]
+        return frames.relative_turn(reference.matrix() if base else reference.below(), self[handle].matrix())
 
-    def set_matrix(self, handle: int, relative_to: int, matrix: Matrix) -> None:
+    def set_matrix(self, handle: int, relative_to: int, matrix: Matrix, base: bool = False) -> None:
         """Put an object at a transform relative to another, to its PARENT, or to the WORLD, with all that is below it.
 
-        Raises ValueError for what cannot be put anywhere.
+        `base` is as for `matrix`. Raises ValueError for what cannot be put anywhere.
         """
         moved = self[handle]
-        if relative_to != WORLD:
-            reference = moved.parent if relative_to == PARENT else self[relative_to]
-            matrix = matrix if reference is None else frames.multiply(reference.below(), matrix)
+        frame = self._frame(moved, relative_to, base)
+        matrix = matrix if frame is None else frames.multiply(frame, matrix)
         if not self._loose:
             moved.put(matrix)
             return
@@ -232,15 +246,15 @@ class ObjectTree:
         for one, local in below:
             one.put(frames.multiply(matrix, local))
 
-    def set_position(self, handle: int, relative_to: int, position: Sequence[float]) -> None:
+    def set_position(self, handle: int, relative_to: int, position: Sequence[float], base: bool = False) -> None:
         """Put an object at a place (m) relative to another, to its PARENT, or to the WORLD, turned as it is.
 
         Its rotation is not taken into that frame and back: relative to itself, again and again, its errors would grow
         threefold each time.
         """
         moved = self[handle]
-        reference = None if relative_to == WORLD else moved.parent if relative_to == PARENT else self[relative_to]
-        x, y, z = position if reference is None else frames.transform(reference.below(), position)
+        frame = self._frame(moved, relative_to, base)
+        x, y, z = position if frame is None else frames.transform(frame, position)
         m0, m1, m2, _, m4, m5, m6, _, m8, m9, m10, _ = moved.matrix()
         self.set_matrix(handle, WORLD, (m0, m1, m2, x, m4, m5, m6, y, m8, m9, m10, z))
 

@@ -66,6 +66,16 @@ class Path(SceneObject):
         ahead = tuple(b - a for a, b in zip(one, other))
         return looking_along((x, y, z), (ahead[0], ahead[1], ahead[2]))
 
+    def nearest(self, place: Vector) -> float:
+        """Return how far (m) from its beginning it comes nearest to a place."""
+        found = []
+        for begin, (one, other) in zip(self._ends, itertools.pairwise(self.points)):
+            piece = math.dist(one, other)
+            ahead = sum((b - a) * (c - a) for a, b, c in zip(one, other, place)) / piece**2 if piece else 0.0
+            share = min(max(ahead, 0.0), 1.0)
+            found.append((math.dist([a + share * (b - a) for a, b in zip(one, other)], place), begin + share * piece))
+        return min(found)[1]
+
 
 def looking_along(position: Vector, ahead: Vector) -> Matrix:
     """Return the frame at a position with x in a direction, y level and z upwards; upright where there is none."""

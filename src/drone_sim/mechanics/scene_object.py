@@ -10,7 +10,7 @@ from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.mechanics.state import Pose, State
 
-KINDS = ("shape", "joint", "dummy", "proximity_sensor", "vision_sensor", "path", "camera", "force_sensor")
+KINDS = ("shape", "joint", "dummy", "proximity_sensor", "vision_sensor", "path", "camera", "force_sensor", "script")
 
 
 class DynamicBody(Protocol):
@@ -52,6 +52,7 @@ class SceneObject:
         self._added_below = parent
         self.local = local
         self.body = body
+        self.is_model = False  # whether it is the base of a model
         self.kind = kind or ("dummy" if body is None else "shape")
         self._above: Matrix | None = None
         self._below: Matrix | None = None
@@ -77,6 +78,13 @@ class SceneObject:
         while part is not None and part is not whole:
             part = part._added_below
         return part is whole
+
+    def model(self) -> SceneObject | None:
+        """Return the base of the model that it is part of, itself perhaps; None where it is part of none."""
+        here: SceneObject | None = self
+        while here is not None and not here.is_model:
+            here = here.parent
+        return here
 
     def hangs_on(self, other: SceneObject) -> bool:
         """Tell whether that object is its parent, or its parent's, and so on."""
@@ -113,14 +121,20 @@ class SceneObject:
         """Return a function that puts it back where it is now, under its present parent."""
         return saved(self, "parent", "local")
 
+    @property
+    def carrier(self) -> DynamicBody | None:
+        """The body that takes it along: its own, or that of what it hangs on; None where the dynamics moves none."""
+        one: SceneObject | None = self
+        while one is not None and one.body is None:
+            one = one.parent
+        return None if one is None else one.body
+
     def velocity(self) -> tuple[Vector, Vector]:
         """Return linear (m/s) and angular (rad/s) velocity in the world; zero where no body carries it."""
-        carrier = self
-        while carrier.body is None:
-            if carrier.parent is None:
-                return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-            carrier = carrier.parent
-        (x, y, z), _, linear, angular = carrier.body.state
+        carrier = self.carrier
+        if carrier is None:
+            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        (x, y, z), _, linear, angular = carrier.state
         m, (wx, wy, wz) = self.matrix(), angular
         x, y, z = m[3] - x, m[7] - y, m[11] - z  # from the body's frame to this one
         return (linear[0] + wy * z - wz * y, linear[1] + wz * x - wx * z, linear[2] + wx * y - wy * x), angular

@@ -8,7 +8,7 @@ from typing import Any
 
 from drone_sim.message_text import near_names
 from drone_sim.remote.control import ClientControl, MovedObjects
-from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task
+from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, name_of
 from drone_sim.remote.host import ClientHost
 from drone_sim.remote.messages import ClientRequest
 from drone_sim.run.player import Player
@@ -21,7 +21,7 @@ from drone_sim.scripting.api.messages import MessageBus
 from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros
 from drone_sim.scripting.api.service_servers import ServiceRequest
 from drone_sim.scripting.api.types import Name
-from drone_sim.scripting.api.unknown import not_there
+from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError
 
 _IS_FUNCTION = "@func"  # what the name of a client's own function ends in, among the arguments
@@ -143,6 +143,8 @@ class Client:
 
     def require(self, module: Name) -> None:
         """Raise ValueError for a module that there is not."""
+        if module in PLUGINS:
+            raise ValueError(not_there("", module, ()))
         if module not in self._modules:
             raise ValueError(f"no module '{module}'; {near_names(str(module), self._modules)}")
 
@@ -157,7 +159,7 @@ class Client:
         """Let the client's functions have the messages and requests that wait for it."""
         self._bus.new_callbacks()
         for callback, message in self._bus.take():
-            name = callback.name if isinstance(callback, ClientFunction) else str(callback)
+            name = name_of(callback)
             if not isinstance(message, ServiceRequest):
                 yield Call(name, [message])
             elif not message.is_abandoned:
@@ -165,6 +167,8 @@ class Client:
 
 
 def _argument(value: Any) -> Any:
+    if isinstance(value, dict):  # of parameters, one of which may be a function
+        return {key: _argument(one) for key, one in value.items()}
     is_function = isinstance(value, str) and value.endswith(_IS_FUNCTION)
     return ClientFunction(value.removesuffix(_IS_FUNCTION)) if is_function else value
 

@@ -3,33 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from drone_sim.files.resources import resolve
+from drone_sim.files.resources import locate, resolve
 from drone_sim.mechanics.frames import Matrix
-from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Until
+from drone_sim.mechanics.joint import Joint, JointControl
+from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Until, name_of
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.models import inside
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
-from drone_sim.scripting.api.control import Wait, has_passed
+from drone_sim.scripting.api.control import Action, Wait, has_passed
 from drone_sim.scripting.api.types import Name, Number, WrongValue, numbers
 
 _STOPPED, _PAUSED, _RUNNING = (CONSTANTS[f"simulation_{one}"] for one in ("stopped", "paused", "advancing_running"))
 _MOST_CALLS = 10_000
-Places = dict[str, Matrix]  # by the names of objects
+
+
+class Arrangement(NamedTuple):
+    """Where an object is (in the world what the dynamics moves, else in its parent), and how a joint stands."""
+
+    place: Matrix
+    value: float = 0.0  # rad or m
+    control: JointControl | None = None
+
+
+Arrangements = dict[str, Arrangement]  # by the names of objects
 
 
 class MovedObjects:
-    """Where objects are put while the simulation is stopped: V-REP begins there; here `start` reads the scene anew."""
+    """What objects are told while the simulation is stopped, where to be and how joints are to move.
+
+    V-REP begins with that; here `start` reads the scene anew.
+    """
 
     def __init__(self, simulation: Simulation):
         """Take the simulation."""
         self._simulation = simulation
         self._era = -1
-        self._initial: Places = {}
+        self._initial: Arrangements = {}
 
     def watch(self) -> None:
         """Remember how an era begins; call it before anything is done to the simulation."""
@@ -37,27 +53,36 @@ class MovedObjects:
             self._era = self._simulation.era
             self._initial = {} if self._simulation.running else self._all()
 
-    def places(self) -> Places:
-        """Return where in the world what is that has been put somewhere else since the simulation stopped.
+    def changed(self) -> Arrangements:
+        """Return what is otherwise than when the simulation stopped; places are in the world.
 
         Carried by an object that was moved is not moved.
         """
         objects = self._simulation.context.objects
-        changed = (name for name, place in self._all().items() if self._initial.get(name, place) != place)
-        return {name: objects[objects.handle(name)].matrix() for name in changed}
+        changed = {name: one for name, one in self._all().items() if self._initial.get(name, one) != one}
+        return {name: one._replace(place=objects[objects.handle(name)].matrix()) for name, one in changed.items()}
 
-    def put(self, places: Places) -> None:
-        """Put objects there again, as far as there still are some of these names."""
+    def arrange(self, arrangements: Arrangements) -> None:
+        """Let objects be so again, as far as there still are some of these names."""
         objects = self._simulation.context.objects
-        for name, place in places.items():
-            if name in objects:
-                objects[objects.handle(name)].put(place)
+        for name, (place, value, control) in arrangements.items():
+            one = objects[objects.handle(name)] if name in objects else None
+            if one is not None:
+                one.put(place)
+            if isinstance(one, Joint) and control is not None:
+                one.place(value)
+                one.command(control)
 
-    def _all(self) -> Places:
-        """Return where every object is: in the world what the dynamics moves, else in its parent."""
+    def _all(self) -> Arrangements:
+        """Return how every object is; what a joint holds is where that says."""
         objects = self._simulation.context.objects
         found = (objects[handle] for handle in objects)
-        return {one.name: one.local if one.body is None else one.matrix() for one in found}
+        return {one.name: _arrangement(one) for one in found if not getattr(one, "is_held", False)}
+
+
+def _arrangement(one: SceneObject) -> Arrangement:
+    place = one.local if one.body is None else one.matrix()
+    return Arrangement(place, one.value, one.control) if isinstance(one, Joint) else Arrangement(place)
 
 
 class ClientControl:
@@ -92,9 +117,9 @@ class ClientControl:
         if self._simulation.running:
             self._player.pause(False)
             return
-        moved = self._moved.places()
+        changed = self._moved.changed()
         self._player.start()
-        self._moved.put(moved)
+        self._moved.arrange(changed)
 
     @sim("345")
     def pauseSimulation(self) -> None:
@@ -118,21 +143,33 @@ class ClientControl:
 
     @sim("345")
     def loadScene(self, filename: Name) -> int:
-        """Let another scene file, beside the last one, take its place while the simulation is stopped; return 1."""
+        """Let another scene file take the last one's place while the simulation is stopped; return 1.
+
+        It may be one of V-REP's (.ttt), and lies in sim.stringparam_scenedefaultdir: beside the last one, or in
+        `remote_api: {scenes: ...}`. '' is the scene that there is without a file.
+        """
         if self._simulation.running:
             raise ValueError("a scene is loaded while the simulation is stopped: call stopSimulation first")
-        self._simulation.load_scene(str(self._beside(filename)))
+        self._simulation.load_scene(str(inside(self._folder(), filename, ".ttt")) if filename != "" else "")
         return 1
 
     @sim("345")
     def saveScene(self, filename: Name) -> int:
         """Write the scene as it stands into a file (.yaml) beside the scene file; return 1."""
-        self._simulation.save_scene(self._beside(filename))
+        self._simulation.save_scene(inside(self._folder(), filename))
         return 1
 
-    def _beside(self, filename: str) -> Path:
-        file = self._simulation.parameters.scene_file
-        return inside(resolve(file).parent if file else None, filename)
+    @sim("5", getStringParameter="345")
+    def getStringParam(self, parameter: int) -> str:
+        """Return sim.stringparam_scenedefaultdir, the folder of which loadScene takes files; '' for any other."""
+        return str(self._folder() or "") if parameter == CONSTANTS["stringparam_scenedefaultdir"] else ""
+
+    def _folder(self) -> Path | None:
+        """Return the folder where scene files lie, None for none."""
+        known = self._simulation.parameters
+        if known.remote_api.scenes:
+            return locate(known.remote_api.scenes)
+        return resolve(known.scene_file).parent if known.scene_file else None
 
     # ---- steps
 
@@ -188,6 +225,9 @@ class ClientControl:
         script fails in such a step.
         """
         simulation, run = self._simulation, self._simulation.run
+        if isinstance(wait, Action):
+            yield from self._carry_out(wait)
+            return wait.value()
         if wait.by_steps and not self._player.playing:
             return wait.value()
         if not wait.over():
@@ -195,3 +235,29 @@ class ClientControl:
         if wait.by_steps and simulation.run != run and self._player.failure:
             raise RequestRefused(str(self._player.failure))
         return wait.value()
+
+    def _carry_out(self, action: Action) -> Task:
+        """Let an action be done, and the simulation go on in between, if it is playing, until it is stopped.
+
+        Raises ValueError for one that takes too many steps, where it is not.
+        """
+        simulation, run, answer = self._simulation, self._simulation.run, None
+        steps, at_once = iter(action), 0
+        while simulation.run == run:
+            try:
+                asked = steps.send(answer)
+            except StopIteration:
+                return
+            answer, now = None, simulation.context.clock.steps
+            if asked:
+                answer = yield Call(name_of(asked.callback), asked.arguments)
+            elif not self._player.playing:
+                at_once += 1
+                if at_once > _MOST_CALLS:
+                    raise ValueError(f"more than {_MOST_CALLS} steps: start the simulation first")
+            else:
+                yield self._stepping.wait(Until(partial(self._has_left, run, now)))
+
+    def _has_left(self, run: int, steps: int) -> bool:
+        """Tell whether the simulation is in another step, or another run."""
+        return self._simulation.run != run or self._simulation.context.clock.steps != steps

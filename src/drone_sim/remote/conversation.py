@@ -47,6 +47,11 @@ class ClientFunction:
         raise ValueError("a function of a client outside cannot be called from here")
 
 
+def name_of(function: Any) -> str:
+    """Return what the client knows its function by, which it has said either way."""
+    return function.name if isinstance(function, ClientFunction) else str(function)
+
+
 def returned(values: list[Any]) -> Any:
     """Return what a client's function has returned: nothing, one value, or several."""
     return None if not values else values[0] if len(values) == 1 else tuple(values)

@@ -44,6 +44,10 @@ class ClientHost:
         """Let a force (N, world) act in the next step at a point (m) in a shape's frame, and a torque (N m)."""
         self._of(shape).propulsion.add_force(shape, force, torque, offset)
 
+    def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
+        """Forget the forces on a shape, or the torques, or both, that were added since the last step."""
+        self._of(shape).propulsion.drop_forces(shape, forces, torques)
+
     def turn_joint(self, joint: str, angle: float | None) -> float:
         """Turn a propeller's blades to an angle (rad), unless None; return the angle."""
         return self._of(joint).propulsion.blades.turn(joint, angle)
@@ -61,10 +65,15 @@ class ClientHost:
 class _FromOutside(Scripts):
     """The scripts of a simulation, called by somebody who is none of them."""
 
+    are_own = False
+
     _NOBODY = Attachment(-1, "", {}, is_law=False)
 
     def __init__(self, scripts: Scripts):
         self.__dict__ = scripts.__dict__
+
+    def is_own(self, _caller: Attachment, _callee: Attachment) -> bool:
+        return False
 
     def call(self, _caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
         return super().call(self._NOBODY, callee, call)

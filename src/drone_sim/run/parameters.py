@@ -53,12 +53,19 @@ class RemoteApiParameters(Checked):
     serve: Switch
     address: Annotated[str, Field(pattern=ADDRESS, max_length=MAX_NAME)]
     port: Annotated[int, Within(0, 65535)]
+    scenes: FileName
 
 
 class PaceParameters(Checked):
     """How fast the simulation goes."""
 
     real_time_factor: Annotated[Finite, Within(1e-3, 1e3, or_zero=True)]
+
+
+class PhysicsParameters(Checked):
+    """What of the textbook's dynamics V-REP leaves out."""
+
+    gyroscopic: Switch
 
 
 class Parameters(PaceParameters, EquipmentParameters):
@@ -71,6 +78,7 @@ class Parameters(PaceParameters, EquipmentParameters):
     time_step: Annotated[Finite, Within(1e-4, 1)]
     sub_step: Annotated[Finite, Within(1e-5, 1)]
     gravity: Annotated[Finite, Within(-100, 100)]
+    physics: PhysicsParameters
     scene_file: FileName
     scene: SceneParameters
     drone: DroneParameters

@@ -46,6 +46,8 @@ def save(
     content["objects"] = _objects(scene, path.parent)
     if scene.scripts:
         content["scripts"] = [models.plain(one, path.parent) for one in scene.scripts.values()]
+    if own.collections:
+        content["collections"] = [one.model_dump(mode="json", exclude_defaults=True) for one in own.collections]
     text = _HEAD + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
     try:
         parameters.check_scene(yaml_files.parse(text), path)

@@ -89,7 +89,7 @@ class Simulation:
         flown = [script_of(one, parameters, script) for one in parameters.fleet]
         for path in (*flown, *(one.script for one in parameters.scene.scripts)):  # one that is not there needs no world
             load.script_path(path)
-        self._take(self._set_up(parameters, World(parameters.sub_step, parameters.gravity, gui)))
+        self._take(self._set_up(parameters, _world(parameters, gui)))
         try:
             if started:
                 self.load_scripts()
@@ -102,7 +102,7 @@ class Simulation:
 
     def _rebuild(self, parameters: Parameters, handles: Handles) -> None:
         """Put scene and vehicles without scripts into a new world, which then takes the last one's place."""
-        built = self._set_up(parameters, World(parameters.sub_step, parameters.gravity), handles)
+        built = self._set_up(parameters, _world(parameters), handles)
         if self._gui:  # a process has one window: what can be built is built there once more
             built.context.world.close()
             self.world.clear()
@@ -297,3 +297,7 @@ class Simulation:
     def save_scene(self, path: Path) -> None:
         """Write floor, objects, vehicles and weather as they are now: a scene file. Raises ParameterError, OSError."""
         saving.save(path, self.parameters, self.scene, self.vehicles.values(), self.context.weather.now)
+
+
+def _world(parameters: Parameters, gui: bool = False) -> World:
+    return World(parameters.sub_step, parameters.gravity, gui, gyroscopic=parameters.physics.gyroscopic)

@@ -18,9 +18,12 @@ from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.object_names import suffixed
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles, ObjectTree
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
+from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.run.parameters import Parameters
+from drone_sim.scene import object_collections
 from drone_sim.scene.operations import SceneOperations
 from drone_sim.scene.scene import Scene
+from drone_sim.scripting.load import NO_SCRIPT
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.world import World
@@ -46,6 +49,7 @@ class SimulationSetup:
         Raises ParameterError and UrdfError.
         """
         self.parameters, self._world = parameters, world
+        objects = ObjectTree(handles)
         self.context = context = SimulationContext(
             world=world,
             clock=clock,
@@ -54,7 +58,8 @@ class SimulationSetup:
             datum=parameters.scene.datum,
             magnetic_field=parameters.scene.magnetic_field,
             script_time_limit=parameters.script_time_limit,
-            objects=ObjectTree(handles),
+            objects=objects,
+            velocities=VelocityMeter(objects, clock),
             weather=Weather(parameters.weather, clock),
             **lasting,
         )
@@ -88,9 +93,10 @@ class SimulationSetup:
     def save_state(self) -> Restore:
         """Return a function that brings back all but what the world itself does."""
         own, scripts = self.context, self.scripts
-        kept = (own.objects, own.signals, own.data, own.tubes, own.drawings, own.windows)
+        left = (own.signals, own.data, own.tubes, own.collections, own.broadcasts, own.drawings, own.windows)
         hosted = (*scripts.child_scripts.values(), *scripts.attached)
-        parts: list[Any] = [*kept, *hosted, *self.vehicles.values(), self.scene, own.weather]
+        carried = (*self.vehicles.values(), self.scene, own.weather)
+        parts: list[Any] = [own.objects, own.velocities, *left, *hosted, *carried]
         return in_turn(saved(own.clock, "steps"), *(one.save_state() for one in parts))
 
     def tune_as(self, before: SimulationSetup) -> None:
@@ -173,6 +179,7 @@ class SimulationSetup:
             self.scene.name_objects()
         except ParameterError as error:
             raise ParameterError(f"{self.parameters.scene_place(error.location)}: {error.problems[0].reason}") from None
+        object_collections.begin(self.parameters.scene.collections, self.context)
 
     def _check(self) -> None:
         if not self._world.is_finite():
@@ -184,9 +191,10 @@ class SimulationSetup:
 
 
 def script_of(vehicle: VehicleParameters, parameters: Parameters, script: str) -> str:
-    """Return the script that flies a vehicle: its own, where it names one, else `script`, if any."""
-    has_own = vehicle.script != parameters.script
-    return vehicle.script if has_own or not script else script
+    """Return the script that flies a vehicle: its own, where it names one, else `script`, or the parameters' one."""
+    if vehicle.script not in (parameters.script, NO_SCRIPT):
+        return vehicle.script
+    return script or parameters.script or vehicle.script
 
 
 def give_back_memory() -> None:

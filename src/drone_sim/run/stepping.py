@@ -57,6 +57,7 @@ class Stepper:
         """Begin a run at time 0."""
         self._scripts, self._context, self._clock = setup.scripts, setup.context, setup.context.clock
         self._world, self._operations = setup.context.world, setup.operations
+        self._velocities = setup.context.velocities
         self._sub_steps = setup.parameters.sub_steps
         self._vehicles = setup.vehicles
         self._divergence_check = DivergenceCheck(setup.parameters.scene.floor, self._clock)
@@ -91,6 +92,7 @@ class Stepper:
             self._begin_step()
         for script in self._alone or self._scripts.all():
             script.actuation()
+        self._velocities.begin_step()
         wrenches = dict(zip(self._bodies, map(Vehicle.wrench, vehicles)))
         carries = carried.shapes or carried.bases
         if carries:
@@ -101,13 +103,21 @@ class Stepper:
             vehicle.body.refresh()
         if carries:
             carried.follow()
+        self._velocities.end_step()
         self._clock.steps += 1
         self._divergence_check.check(vehicles)
         for vehicle in vehicles:
             vehicle.take_pictures(self._clock.steps)
         self._follow_scripts()
-        for script in self._alone or self._scripts.all():
-            script.script.call("sensing")
+        self._sense()
+
+    def _sense(self) -> None:
+        self._clock.is_sensing = True
+        try:
+            for script in self._alone or self._scripts.all():
+                script.sensing()
+        finally:
+            self._clock.is_sensing = False
 
     def _follow_scripts(self) -> None:
         """Begin and end the scripts of objects that have come and gone."""

@@ -7,17 +7,21 @@ from typing import Annotated, Protocol
 
 from pydantic import Field
 
-from drone_sim.config.types import Checked, FileName, Label, ParameterError, ScriptValue
+from drone_sim.config.types import Checked, FileName, Label, ParameterError, ScriptValue, Switch
 
 MAX_SCRIPTS = 256
 MAX_PARAMETERS = 256  # of one script
 
 
 class AttachedScriptParameters(Checked):
-    """A child script on an object of the scene or of a vehicle, which has the name `object` there."""
+    """A child script on an object of the scene or of a vehicle, which has the name `object` there.
+
+    `embedded`: `..` in its paths is the parent of that object, as up to CoppeliaSim 4.8, and not the object itself.
+    """
 
     object: Label
     script: FileName
+    embedded: Switch = False
     parameters: Annotated[dict[Label, ScriptValue], Field(default_factory=dict, max_length=MAX_PARAMETERS)]
 
 

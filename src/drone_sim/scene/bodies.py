@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import IDENTITY, Matrix, cross
+from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector, cross
 from drone_sim.mechanics.inertia import Inertia
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose, State
@@ -204,6 +204,18 @@ class ShapeObject(SceneObject):
         if self.is_static:
             self.carried.follow()
             self._follow()
+
+    def push(self, force: Vector, torque: Vector) -> None:
+        """Let a force (N) at its centre of mass and a torque (N m) act in the next step, both in the world frame.
+
+        What the dynamics leaves alone feels nothing.
+        """
+        if not self.is_static:
+            self._world.shape_forces.add(self.number, self.link, force, torque)
+
+    def drop_pushes(self, forces: bool, torques: bool) -> None:
+        """Forget the forces, or the torques, or both, that have pushed it since the last step."""
+        self._world.shape_forces.drop(self.number, self.link, forces, torques)
 
     def release(self) -> None:
         """Be in the world as at the beginning, before another object takes its place."""

@@ -11,12 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from drone_sim.config.types import ParameterError
 from drone_sim.mechanics.frames import IDENTITY, Matrix, multiply
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.kinds.force_sensor import ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.object_parameters import ObjectParameters
 
+MOST_HELD = 127  # of one body: PyBullet counts 128 links, and knows no state of a larger one
 _Holding = JointParameters | ForceSensorParameters
 
 
@@ -58,7 +60,10 @@ class Chains(NamedTuple):
 
 
 def found(entries: Mapping[int, EntryParameters]) -> Chains:
-    """Return the chains among the entries of a scene, whose parents come in any order, but not in a circle."""
+    """Return the chains among the entries of a scene, whose parents come in any order, but not in a circle.
+
+    Raises ParameterError for one of more than MOST_HELD joints.
+    """
     return _Search(entries).run()
 
 
@@ -87,7 +92,16 @@ class _Search:
         chains: list[Chain] = []
         for joint in self._held:
             self._put(joint, chains)
+        for chain in chains:
+            self._check(chain)
         return Chains(chains, reasons)
+
+    def _check(self, chain: Chain) -> None:
+        if len(chain.hung) > MOST_HELD:
+            name = self._entries[chain.hung[0].joint if chain.root is None else chain.root].name
+            raise ParameterError(
+                f"{len(chain.hung)} joints and force sensors hang together, from '{name}' on: at most {MOST_HELD} may"
+            )
 
     def _shapes_below(self, joints: Mapping[int, _Holding]) -> dict[int, list[int]]:
         """Return the shapes with a mass right below each joint."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point
+from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point, Switch
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, from_rpy, to_quaternion
 from drone_sim.mechanics.joint import FORCE, POSITION, SPHERICAL, VELOCITY, Joint
@@ -26,11 +26,12 @@ class EntryParameters(Checked):
     """An entry; `position` (m) and `rpy` (rad) are in the frame of the object named `parent`, '' the world.
 
     No other object has its `name` (V-REP 3.x); siblings may share the `alias` (4.x), which is the name where none is
-    given.
+    given. `model`: it is the base of a model, from which paths with a colon begin (`:/`).
     """
 
     name: Label = ""
     alias: Label = ""
+    model: Switch = False
     parent: Label = ""
     position: Point
     rpy: Angles = (0.0, 0.0, 0.0)

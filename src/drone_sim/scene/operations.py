@@ -15,7 +15,7 @@ from typing import Any
 from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.object_names import numbered, plain, suffixed
+from drone_sim.mechanics.object_names import numbered, plain, shifted, suffixed
 from drone_sim.mechanics.object_tree import PARENT, WORLD, levels
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scene import models
@@ -150,10 +150,10 @@ class SceneOperations:
     def _add_named_anew(
         self, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters] = ()
     ) -> list[int]:
-        """Add entries, and scripts on them, under their names, or, where these are taken, such with a suffix."""
+        """Add entries, and scripts on them, under their names, or, where one is taken, all of them as copies."""
         tree, new, names = self._scene.tree, {"": ""}, []
-        for one in entries:
-            free = itertools.chain([one.name], (suffixed(plain(one.name), number) for number in itertools.count()))
+        for one, wanted in zip(entries, shifted([one.name for one in entries], {*tree.names})):
+            free = itertools.chain([wanted], (suffixed(plain(wanted), number) for number in itertools.count()))
             names.append(next(name for name in free if name not in tree and name not in names))
             new.setdefault(one.name, names[-1])
         made = [

@@ -30,14 +30,16 @@ from drone_sim.files.resources import resolve
 from drone_sim.mechanics.object_names import numbered
 from drone_sim.mechanics.object_tree import DEEPEST
 from drone_sim.message_text import shown
-from drone_sim.scene import attached_scripts
+from drone_sim.scene import attached_scripts, object_collections
 from drone_sim.scene.attached_scripts import AttachedScriptParameters, AttachedScripts
 from drone_sim.scene.entry import EntryParameters
 from drone_sim.scene.kinds import KINDS
+from drone_sim.scene.object_collections import CollectionList
 from drone_sim.scene.object_parameters import SHAPES, ObjectParameters
 
 MAX_OBJECTS = 1000
-WORLD = ("time_step", "sub_step", "gravity")  # what a scene file may say of these comes before the parameters
+# What a scene file may say of these comes before the parameters.
+WORLD = ("time_step", "sub_step", "gravity", "physics")
 BESIDE = ("drone", "vehicles", "weather", *WORLD)  # what a scene file holds besides the scene
 MAX_TRIANGLES = 500_000  # of all meshes of a scene, each counted as often as it stands there
 MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all its textures
@@ -89,6 +91,7 @@ class SceneParameters(Checked):
     floor: FloorParameters
     objects: Annotated[list[EntryChoice], Field(max_length=MAX_OBJECTS)]
     scripts: AttachedScripts
+    collections: CollectionList
 
     def model_post_init(self, _context: Any) -> None:
         """Give a name to objects without one; check what concerns several objects at once."""
@@ -105,6 +108,7 @@ class SceneParameters(Checked):
             if len(above) > DEEPEST:
                 raise _refused(index, "parent", one.parent, f"more than {DEEPEST} objects above '{one.name}'")
         attached_scripts.check(self.scripts)
+        object_collections.check(self.collections)
 
 
 def name_shapes(objects: list[EntryChoice]) -> None:

@@ -46,6 +46,10 @@ class GuardedScript:
             raise ScriptError(name, self.failure.path, 0, "the script has failed, and is not called any more")
         return self._called(self._script.call_function, name, arguments)
 
+    def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Call a global function for the script itself. Raises ScriptError."""
+        return self._script.call_own(name, arguments)
+
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message."""
         self._attempt(self._script.callback, callback, message)

@@ -18,6 +18,7 @@ from drone_sim.scripting.python.script import PythonScript
 from drone_sim.scripting.time_limit import TimeLimit
 
 DEFAULT = "pilot"
+NO_SCRIPT = "none"  # what a vehicle says that has none, for others to fly it: the one that is given, or a client
 
 
 class Script(Protocol):
@@ -38,6 +39,9 @@ class Script(Protocol):
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
+
+    def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message. Raises ScriptError."""

@@ -11,6 +11,7 @@ from drone_sim.scripting.api.constants import PHASES
 _LOG = logging.getLogger(__name__)  # not the script's own words
 _PREFIX = "sysCall_"
 FUNCTIONS = {phase: f"{_PREFIX}{phase}" for phase in PHASES}
+VISION = f"{_PREFIX}vision"  # of the script of a vision sensor, before its sensing
 THREADS = (f"{_PREFIX}thread", f"{_PREFIX}threadmain")  # of 4.3 and newer; of 4.0 to 4.2
 _PLAIN = {name.replace("_", "").lower(): name for name in (*FUNCTIONS.values(), *THREADS)}
 _NEAR, _NEAR_WITHOUT_SYS = 0.75, 0.9  # of difflib's ratio
@@ -21,7 +22,7 @@ _OTHER_KINDS = """
     nonSimulation realTimeIdle info msg event data ext moduleEntry beforeMainScript beforeSimulation afterSimulation
     suspend suspended resume beforeInstanceSwitch afterInstanceSwitch beforeSave afterSave beforeCopy afterCopy
     beforeDelete afterDelete afterCreate selChange userConfig addOnScriptRun addOnScriptSuspend addOnScriptSuspended
-    addOnScriptResume dyn dynCallback joint jointCallback contact contactCallback vision visionCallback trigger
+    addOnScriptResume dyn dynCallback joint jointCallback contact contactCallback visionCallback trigger
 """
 _ELSEWHERE = frozenset(_PREFIX + name for name in _OTHER_KINDS.split())
 
@@ -50,7 +51,7 @@ def warn(path: str, functions: Collection[str]) -> None:
 
 def idle(functions: Collection[str]) -> str:
     """Return what to say of a script none of whose functions is called, '' for any other."""
-    if any(name in functions for name in (*FUNCTIONS.values(), *THREADS)):
+    if any(name in functions for name in (*FUNCTIONS.values(), *THREADS, VISION)):
         return ""
     bare = [f"{name} would have to be {FUNCTIONS[name]}" for name in PHASES if name in functions]
     return "; ".join([f"has none of {_listed()}, {THREADS[0]}: nothing flies the drone", *bare])
@@ -58,7 +59,7 @@ def idle(functions: Collection[str]) -> str:
 
 def _meant(name: str) -> str | None:
     """Return the phase function that a name comes near to, None for one that is known or is none of ours."""
-    if name in FUNCTIONS.values() or name in THREADS or name in _ELSEWHERE or len(name) > _LONGEST:
+    if name in (*FUNCTIONS.values(), *THREADS, VISION) or name in _ELSEWHERE or len(name) > _LONGEST:
         return None
     plain = name.replace("_", "").lower()
     cutoff = 0.0 if plain.startswith("syscall") else _NEAR if plain.startswith("sys") else _NEAR_WITHOUT_SYS

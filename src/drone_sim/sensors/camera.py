@@ -161,26 +161,26 @@ class Camera(Sensor):
         own = parameters
         self.period = own.every
         self.intrinsics = Intrinsics(own.width, own.height, own.horizontal_fov, own.near, own.far)
-        self._last: tuple[int, Matrix, np.ndarray] | None = None  # the scene's changes, the pose, the picture
+        self._last: dict[str, tuple[int, Matrix, np.ndarray]] = {}  # by kind: the scene's changes, pose, picture
 
-    def take(self) -> np.ndarray:
-        """Return a picture of the scene as it stands; shape and type as Vision.picture says."""
-        return self._vision.picture(self.kind, self.intrinsics, np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4)))
+    def take(self, kind: str = "") -> np.ndarray:
+        """Return a picture of the scene as it stands, of its own kind or another; as Vision.picture says."""
+        return self._vision.picture(kind or self.kind, self.intrinsics, np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4)))
 
-    def look(self) -> np.ndarray:
-        """Return what it sees now: the last picture where nothing has changed since, else a new one.
+    def look(self, kind: str = "") -> np.ndarray:
+        """Return what it sees now: the last picture of a kind where nothing has changed since, else a new one.
 
         Frozen, it sees what it saw; silent, it is dark.
         """
+        kind = kind or self.kind
         changes, pose = self._vision.changes, self.pose()
         if self.failure == "silent":
             shape = self.intrinsics.height, self.intrinsics.width
-            return np.zeros((*shape, 3), np.uint8) if self.kind == "color" else np.zeros(shape, np.float32)
-        if self.failure == "frozen" and self._last is not None:
-            return self._last[2]
-        if self._last is None or self._last[:2] != (changes, pose):
-            self._last = changes, pose, self.take()
-        return self._last[2]
+            return np.zeros((*shape, 3), np.uint8) if kind == "color" else np.zeros(shape, np.float32)
+        last = self._last.get(kind)
+        if last is None or (self.failure != "frozen" and last[:2] != (changes, pose)):
+            last = self._last[kind] = changes, pose, self.take(kind)
+        return last[2]
 
     def show(self, steps: int, image: np.ndarray | None, age: float = 0.0) -> None:
         """Let those who look see a picture, which has come after so many steps, of some age (s); None is none."""
@@ -191,7 +191,8 @@ class Camera(Sensor):
 
     def reset(self) -> None:
         """Forget the pictures that were taken."""
-        self.image = self.latest = self._last = None
+        self.image = self.latest = None
+        self._last.clear()
         self.age = 0.0
 
     def save_state(self) -> Restore:

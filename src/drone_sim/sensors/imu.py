@@ -26,7 +26,9 @@ from drone_sim.mechanics.frames import (
     cross,
     multiply_quaternions,
     position,
+    relative_turn,
     rotate_back,
+    rotation_vector,
     to_quaternion,
 )
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
@@ -101,12 +103,13 @@ class Imu(Instrument):
         """Integrate over the sub-step that has just been, then sample if it is time."""
         axes, step = self.fitting.pose(), self.fitting.sub_step
         velocity, last, fallen = self._point_velocity(axes), self._velocity, self.carrier.gravity * step
-        if self._jumps != self.carrier.jumps:  # put there at rest: that was no acceleration
-            self._jumps, last = self.carrier.jumps, _ZERO
+        before = self._axes
+        if self._jumps != self.carrier.jumps:  # put there at rest: that was neither acceleration nor turn
+            self._jumps, last, before = self.carrier.jumps, _ZERO, axes
         change = velocity[0] - last[0], velocity[1] - last[1], velocity[2] - last[2] - fallen
         self._gained = _sum(self._gained, rotate_back(axes, change), 1.0)
-        # Bullet turns the body by the new angular velocity, and about it: its components are the same before and after.
-        self._turned = _sum(self._turned, rotate_back(axes, self.carrier.state.angular_velocity), step)
+        # The axis of a turn has the same components before and after.
+        self._turned = _sum(self._turned, rotation_vector(relative_turn(before, axes)), 1.0)
         self._axes, self._velocity = axes, velocity
         self._passed += step
         super().look(count)

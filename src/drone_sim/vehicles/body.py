@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from drone_sim.context import NOBODY, SimulationContext
 from drone_sim.forces.force import Force
@@ -13,6 +14,21 @@ from drone_sim.mechanics.state import Pose, State
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.sensors.sensor import Contact, Hit
+
+_NONE: Vector = (0.0, 0.0, 0.0)
+
+
+class Pushed(NamedTuple):
+    """A force (N, world) at a point (m, inertial frame) and a torque (N m, world), on the shape of a name."""
+
+    shape: str
+    force: Vector
+    torque: Vector
+    point: Vector
+
+    def without(self, forces: bool, torques: bool) -> Pushed:
+        """Return what is left without its force, its torque, or both."""
+        return self._replace(force=_NONE if forces else self.force, torque=_NONE if torques else self.torque)
 
 
 class Body:
@@ -48,7 +64,7 @@ class Body:
     def reset(self) -> None:
         """Return to the start, at rest, with nothing that pushes."""
         self._world.set_pose(self.number, self._start)
-        self.wrench = Wrench()  # of the next step
+        self._pushed: list[Pushed] = []  # in the next step
         self.refresh()
 
     def begin_on_floor(self) -> None:
@@ -79,7 +95,7 @@ class Body:
     def restored(self) -> None:
         """Follow the world, which was put back to what it had been."""
         self.jumps += 1
-        self.wrench = Wrench()
+        self._pushed = []
         self.refresh()
 
     def place_visuals(self, places: Mapping[int, Matrix]) -> None:
@@ -98,10 +114,21 @@ class Body:
         """Thrust of each propeller in N, in the last step."""
         return self.propellers.thrusts
 
-    def add_force(self, force: Vector, torque: Vector, point: Vector) -> None:
-        """Let a force (N, world) act in the next step at a point (m, inertial frame), and a torque (N m, world)."""
+    def add_force(self, push: Pushed) -> None:
+        """Let a force and a torque act in the next step."""
         self.pushes += 1
-        self.wrench.add(force, torque, point)
+        self._pushed.append(push)
+
+    def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
+        """Forget the forces on a shape, or the torques, or both, that were added since the last step."""
+        self._pushed = [one.without(forces, torques) if one.shape == shape else one for one in self._pushed]
+
+    def take_pushes(self) -> Wrench:
+        """Return what scripts push it with in the step that begins, and forget it."""
+        wrench, pushed, self._pushed = Wrench(), self._pushed, []
+        for _, force, torque, point in pushed:
+            wrench.add(force, torque, point)
+        return wrench
 
     def apply(self, force: Force) -> None:
         """Let a force act in the sub-step that comes, as it is at this moment."""

@@ -13,7 +13,7 @@ from drone_sim.mechanics.inertia import Inertia, Inertial, combined
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.message_text import near_names
-from drone_sim.vehicles.body import Body
+from drone_sim.vehicles.body import Body, Pushed
 from drone_sim.vehicles.quadricopter_objects import DRONE, joint, respondable
 from drone_sim.vehicles.types.vehicle_type import VehicleType
 
@@ -171,9 +171,20 @@ class Propulsion:
 
         Both keep their direction through the sub-steps. Raises ValueError for an object that is no dynamic shape.
         """
+        self._body.add_force(Pushed(shape, force, torque, frames.transform(self._place(shape), offset)))
+
+    def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
+        """Forget the forces on a shape, or the torques, or both, that were added since the last step.
+
+        Raises ValueError for an object that is no dynamic shape.
+        """
+        self._place(shape)
+        self._body.drop_forces(shape, forces, torques)
+
+    def _place(self, shape: str) -> Matrix:
         if shape not in self.shapes:
             raise ValueError(f"'{shape}' is not a dynamic shape; there are: {', '.join(self.shapes)}")
-        self._body.add_force(force, torque, frames.transform(self.shapes[shape], offset))
+        return self.shapes[shape]
 
     def masses(self) -> dict[str, float]:
         """Return the mass (kg) of each shape, by object name."""

@@ -2,14 +2,16 @@
 
     Drone                                        /Quadcopter             carried by the dynamics
       Quadricopter_base                          /Quadcopter/base        the pose that scripts read
+        DronePosition                            .../target              the green sphere
       Track_base                                 /Quadcopter/Track_base
       Quadricopter_propeller<i>                  /Quadcopter/propeller[i-1]
         Quadricopter_propeller_respondable<i>    .../respondable
-        Quadricopter_propeller_joint<i>          .../joint
+          Quadricopter_propeller_body<i>         .../respondable/body
+            Quadricopter_propeller_joint<i>      .../respondable/body/joint
       FrontVision, TrackCam, one for every camera  /FrontVision
       one for every sensor                       /range and so on
       Quadricopter_floorCamera, _frontCamera     /floorCamera, /frontCamera
-      DronePosition                              /target                 the green sphere
+      Drone_script                               /Quadcopter/Script      its child script, as an object of 4.9
 
 Each name that begins with Quadricopter_ stands there with Quadcopter_, too, as in CoppeliaSim 4.0.
 The names of the second vehicle end in #0, those of the third in #1, and so on, as those of V-REP's copies do.
@@ -52,6 +54,7 @@ NOWHERE_ELSE = ObjectPlace()
 DRONE = "Drone"
 TARGET = "DronePosition"  # the green sphere
 TRACK_BASE = "Track_base"
+SCRIPT = "Drone_script"
 FLOOR_CAMERA, FRONT_CAMERA = "Quadricopter_floorCamera", "Quadricopter_frontCamera"
 BASE = frames.from_rpy((0.0, 0.0, -0.01), (0.0, 0.0, 0.0))  # Quadricopter_base in the root's frame
 _ALONG_X = (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)  # z forward, y up, x left
@@ -63,12 +66,17 @@ def respondable(number: int) -> str:
     return f"Quadricopter_propeller_respondable{number}"
 
 
+def seen(number: int) -> str:
+    """Return the name of what is seen of propeller 1 to 4 beside its blades."""
+    return f"Quadricopter_propeller_body{number}"
+
+
 def joint(number: int) -> str:
     """Return the name of the joint that turns the blades of propeller 1 to 4."""
     return f"Quadricopter_propeller_joint{number}"
 
 
-_PROPELLERS = [name(n) for n in (1, 2, 3, 4) for name in ("Quadricopter_propeller{}".format, respondable, joint)]
+_PROPELLERS = [name(n) for n in (1, 2, 3, 4) for name in ("Quadricopter_propeller{}".format, respondable, seen, joint)]
 OWN_NAMES = (
     DRONE,
     "Quadricopter_base",
@@ -76,6 +84,7 @@ OWN_NAMES = (
     TARGET,
     FLOOR_CAMERA,
     FRONT_CAMERA,
+    SCRIPT,
     *_PROPELLERS,
 )  # of every vehicle
 
@@ -114,12 +123,14 @@ class QuadricopterObjects:
             name = f"Quadricopter_propeller{number}"
             self._add(name, DRONE, link, alias="propeller", kind="force_sensor")
             self._add(respondable(number), name, alias="respondable", kind="shape")
-            self._add(joint(number), name, alias="joint", kind="joint")
+            self._add(seen(number), respondable(number), alias="body", kind="shape")
+            self._add(joint(number), seen(number), alias="joint", kind="joint")
         down = frames.from_rpy((0.0, 0.0, -0.01), (0.0, math.pi / 2, 0.0))
         self._add(FLOOR_CAMERA, DRONE, frames.multiply(down, _ALONG_X), alias="floorCamera", kind="camera")
         front = frames.from_rpy((0.13, 0.0, 0.0), (0.0, 0.0, 0.0))
         self._add(FRONT_CAMERA, DRONE, frames.multiply(front, _ALONG_X), alias="frontCamera", kind="camera")
-        self._add(TARGET, DRONE, BASE, alias="target", also=("Quadricopter_target", "target"), kind="shape")
+        self._add(TARGET, "Quadricopter_base", alias="target", also=("Quadricopter_target", "target"), kind="shape")
+        self._add(SCRIPT, DRONE, alias="Script", kind="script")
         for camera in cameras.values():
             self._add_camera(links, camera)
         for name, sensor in sensors.items():
@@ -152,6 +163,7 @@ class QuadricopterObjects:
             )
         except ValueError as error:  # one of the scene has that name
             raise ParameterError(str(error)) from None
+        self._objects[handle].is_model = name == DRONE
         self._handles.append(handle)
 
     def _add_sensor(self, links: Mapping[str, Matrix], name: str, sensor: SensorParameters) -> None:

@@ -84,6 +84,9 @@ class Vehicle:
         objects.add(self.body, rigid.links, self.propulsion.rotors.links, own.cameras, own.sensors)
         names = (one + self.suffix for one in (DRONE, TRACK_BASE, TARGET))
         self.object, self.track, self.target = (tree[tree.handle(name)] for name in names)
+        for handle in self.handles:
+            if tree[handle].body is not None:
+                self.context.velocities.follow(handle)
         self.propulsion.attach(own.propellers)
         self.commands.listening = []
         for camera in self.cameras.values():
@@ -172,7 +175,7 @@ class Vehicle:
     def wrench(self) -> Wrench:
         """Return what pushes the body through this step, the forces of single sub-steps aside."""
         body = self.body
-        wrench, body.wrench = body.wrench, Wrench()
+        wrench = body.take_pushes()
         for force in self._forces:
             force.add_to(wrench, body)
         if self.pushes.lasting:

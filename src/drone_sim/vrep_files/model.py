@@ -39,6 +39,26 @@ class VrepPrimitive:
     pose: Pose
 
 
+@dataclass(frozen=True, eq=False)
+class VrepTexture:
+    """An image (h, w, 3 or 4), 0..255, top row first."""
+
+    name: str
+    image: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class VrepCover:
+    """A texture on a mesh: where each corner of its faces lies on it, (m, 3, 2), 0..1, v upwards.
+
+    `is_decal`: the mesh's own colour does not show.
+    """
+
+    texture: VrepTexture
+    corners: np.ndarray
+    is_decal: bool
+
+
 @dataclass(frozen=True)
 class VrepMesh:
     """One surface of a shape: vertices (n, 3), m, in the shape's frame; faces (m, 3); colour 0..1."""
@@ -47,6 +67,7 @@ class VrepMesh:
     faces: np.ndarray
     color: Rgba
     primitive: VrepPrimitive | None = None
+    cover: VrepCover | None = None
 
 
 @dataclass(frozen=True)
@@ -130,7 +151,10 @@ Kind = VrepShape | VrepJoint | VrepDummy | VrepCamera | VrepProximitySensor | Ot
 
 @dataclass(frozen=True)
 class VrepScript:
-    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own."""
+    """A script on an object (its handle; -1 for the main script); since 4.9 it is an object of its own.
+
+    `parent_is_proxy`: of that, whether its paths begin from its parent, as of one that came from an older file.
+    """
 
     object: int
     kind: str  # main, child or customization, or another's number
@@ -140,6 +164,30 @@ class VrepScript:
     parameters: tuple[tuple[str, str], ...] = ()
     is_stock_main: bool = False
     own_object: int = -1  # handle of the script as an object, -1 where it is none
+    parent_is_proxy: bool = False
+
+    @property
+    def is_embedded(self) -> bool:
+        """Whether it is, for its paths, no object of its own."""
+        return self.own_object == -1 or self.parent_is_proxy
+
+
+@dataclass(frozen=True)
+class VrepCollectionItem:
+    """What belongs to a collection: an object by its handle, what hangs on it, what it hangs on, or all there are."""
+
+    what: str  # single, tree, chain or all
+    object: int
+    removes: bool  # from what the items before it say
+    without: bool  # of a tree or chain: whether it leaves out the object itself
+
+
+@dataclass(frozen=True)
+class VrepCollection:
+    """Objects under a name."""
+
+    name: str
+    items: tuple[VrepCollectionItem, ...]
 
 
 @dataclass(frozen=True)
@@ -165,6 +213,9 @@ class VrepObject:
         return self.of if isinstance(self.of, VrepShape) else None
 
 
+BULLET = 0  # the number of that physics engine; 1 is ODE, others Vortex, Newton, MuJoCo
+
+
 @dataclass(frozen=True)
 class VrepSettings:
     """What a file says of the world: steps (s), gravity (m/s²); None where it says nothing, as models do."""
@@ -172,6 +223,7 @@ class VrepSettings:
     time_step: float | None = None
     dynamics_step: float | None = None
     gravity: tuple[float, float, float] | None = None
+    engine: int = BULLET
     visible_layers: int = 0x00FF
 
 
@@ -184,3 +236,4 @@ class VrepFile:
     objects: tuple[VrepObject, ...]  # a parent before its children
     scripts: tuple[VrepScript, ...]
     settings: VrepSettings
+    collections: tuple[VrepCollection, ...] = ()

@@ -11,7 +11,16 @@ import numpy as np
 from drone_sim.files.resources import read_bytes
 from drone_sim.vrep_files.chunks import finite, level, singles, top, unpack
 from drone_sim.vrep_files.container import MAX_SIZE, open_container
-from drone_sim.vrep_files.model import VrepFile, VrepFileError, VrepObject, VrepScript, VrepSettings, within
+from drone_sim.vrep_files.model import (
+    VrepCollection,
+    VrepFile,
+    VrepFileError,
+    VrepObject,
+    VrepScript,
+    VrepSettings,
+    within,
+)
+from drone_sim.vrep_files.object_collections import read_collection
 from drone_sim.vrep_files.objects import SCRIPT, is_object, read_object, script_of
 from drone_sim.vrep_files.scripts import read_script
 from drone_sim.vrep_files.shapes import Pools
@@ -46,13 +55,13 @@ def with_dynamics(settings: VrepSettings, data: bytes) -> VrepSettings:
     found = own.find("_n3", "En3", "En2", "Eng")
     if found is None:
         return settings
-    _engine, x, y, z, mode = unpack(f"<i3{width}i", found, "_n3")
+    engine, x, y, z, mode = unpack(f"<i3{width}i", found, "_n3")
     if own.find("_n3", "En3") is None:
         mode += 1
     gravity = finite((x, y, z) if width == "d" else tuple(float(str(np.float32(one))) for one in (x, y, z)), "_n3")
     step = own.numbers("_tp", "Stp", 1)
     seconds = step[0] if step is not None else _PRESET_DYNAMICS_STEP if mode < _PRESETS else None
-    return replace(settings, gravity=(gravity[0], gravity[1], gravity[2]), dynamics_step=seconds)
+    return replace(settings, engine=engine, gravity=(gravity[0], gravity[1], gravity[2]), dynamics_step=seconds)
 
 
 SUFFIXES = (".ttt", ".ttm")
@@ -79,23 +88,27 @@ def read(content: bytes) -> VrepFile:
     pools, settings = Pools(), VrepSettings()
     objects: list[VrepObject] = []
     scripts: list[VrepScript] = []
+    collections: list[VrepCollection] = []
     for tag, data in top(container.payload):
         if is_object(tag):
             objects.append(read_object(tag, data, pools))
             scripts += _script_in(tag, data, objects[-1])
-        elif tag == "VIN":
-            with within("VIN"):
-                pools.add(data)
+        elif tag in ("VIN", "TEX"):
+            with within(tag):
+                pools.add(data, tag)
         elif tag == "LST":
             with within(f"script {len(scripts) + 1}"):
                 scripts.append(read_script(data))
+        elif tag == "GRP":
+            with within(f"collection {len(collections) + 1}"):
+                collections.append(read_collection(data))
         elif tag in _SETTINGS:
             with within(tag):
                 settings = _SETTINGS[tag](settings, data)
         if len(objects) > MAX_OBJECTS:
             raise VrepFileError(f"holds more than {MAX_OBJECTS} objects")
     program = f"{container.program // 10000}.{container.program // 100 % 100}.{container.program % 100}"
-    return VrepFile(container.version, program, _tree(objects), tuple(scripts), settings)
+    return VrepFile(container.version, program, _tree(objects), tuple(scripts), settings, tuple(collections))
 
 
 def _script_in(tag: str, data: bytes, one: VrepObject) -> list[VrepScript]:

@@ -6,7 +6,7 @@ from drone_sim.vrep_files.chunks import Texts, decoded, level
 from drone_sim.vrep_files.model import VrepFileError, VrepScript
 
 _KINDS = {0: "main", 1: "child", 6: "customization"}
-_DISABLED, _OWN_MAIN = 2, 8
+_DISABLED, _PARENT_IS_PROXY, _OWN_MAIN = 2, 4, 8
 _MOST_PARAMETERS = 10_000
 
 
@@ -30,6 +30,7 @@ def read_script(data: bytes, owner: int | None = None) -> VrepScript:
         is_enabled=not switches & _DISABLED,
         language="python" if "python" in language or text.startswith("#python") else "lua",
         parameters=read_parameters(own.find("Prm")),
+        parent_is_proxy=bool(switches & _PARENT_IS_PROXY),
         is_stock_main=kind == "main" and (not switches & _OWN_MAIN or "defaultMainScript" in text),
     )
 

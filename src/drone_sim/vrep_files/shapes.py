@@ -12,7 +12,16 @@ import numpy as np
 
 from drone_sim.mechanics.state import Pose
 from drone_sim.vrep_files.chunks import Level, finite, level, levels, position_first, unpack
-from drone_sim.vrep_files.model import Rgba, VrepFileError, VrepInertia, VrepMesh, VrepPrimitive, VrepShape
+from drone_sim.vrep_files.model import (
+    Rgba,
+    VrepFileError,
+    VrepInertia,
+    VrepMesh,
+    VrepPrimitive,
+    VrepShape,
+    VrepTexture,
+)
+from drone_sim.vrep_files.textures import read_cover, read_texture
 
 MAX_TRIANGLES = 3_000_000  # of a file
 _WORDS = ("", "plane", "disc", "cuboid", "spheroid", "cylinder", "cone", "heightfield", "capsule")
@@ -23,14 +32,18 @@ _REST = (31, 8191, 2097151, 536870911)  # taken from a packed index with 0 to 3 
 
 @dataclass
 class Pools:
-    """Vertices and faces that stand once in a file, for all shapes that use them."""
+    """Vertices, faces and textures that stand once in a file, for all shapes that use them."""
 
     vertices: list[np.ndarray] = field(default_factory=list)
     faces: list[np.ndarray] = field(default_factory=list)
+    textures: dict[int, VrepTexture] = field(default_factory=dict)
     triangles: int = 0  # read so far, each mesh counted
 
-    def add(self, data: bytes) -> None:
-        """Take the pools of a `VIN`. Raises VrepFileError."""
+    def add(self, data: bytes, tag: str) -> None:
+        """Take the pools of a `VIN`, or the texture of a `TEX`. Raises VrepFileError."""
+        if tag == "TEX":
+            self.textures.update([read_texture(data)])
+            return
         for one in level(data).chunks:
             if one.tag == "Ver":
                 self.vertices.append(_vertices(one.data))
@@ -51,7 +64,9 @@ def read_mesh(outside: Level, inside: Level, pools: Pools) -> VrepMesh:
         raise VrepFileError(f"holds more than {MAX_TRIANGLES} triangles")
     if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
         raise VrepFileError("a face names a vertex that there is not")
-    return VrepMesh(vertices @ turn[:, :3].T + turn[:, 3], faces, _color(inside), _primitive(inside, pose))
+    cover = read_cover(inside, vertices, faces, pools.textures)
+    placed = vertices @ turn[:, :3].T + turn[:, 3]
+    return VrepMesh(placed, faces, _color(inside), _primitive(inside, pose), cover)
 
 
 def _picked(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import dist
 from typing import Any, NamedTuple
 
@@ -62,6 +62,7 @@ class Queries:
         """Take the client, and what knows which links nothing meets."""
         self._client = client
         self._filter = collision_filter
+        self._met_in_parts: dict[int, dict[int, Touch]] = {}  # by body, and by what it met
         self._probe: int | None = None  # a collision shape as good as a point
 
     def ray(self, start: Vector, end: Vector, ignoring: int = -1) -> RayHit | None:
@@ -142,7 +143,24 @@ class Queries:
         return found
 
     def contacts(self, body: int) -> list[Touch]:
-        """Return where a body was pushed by others in the last sub-step."""
+        """Return where a body was pushed by others in the last sub-step; once for each body, if that went in parts."""
+        if body in self._met_in_parts:
+            return list(self._met_in_parts[body].values())
+        return self._touches(body)
+
+    def begin_sub_step(self, bodies: Iterable[int] = ()) -> None:
+        """Forget the last sub-step; of these bodies the contacts of its parts will be told, by `end_part`."""
+        self._met_in_parts = {body: {} for body in bodies}
+
+    def end_part(self, share: float) -> None:
+        """Add up what pushed those bodies through a part that is such a share of its sub-step."""
+        for body, met in self._met_in_parts.items():
+            for one in self._touches(body):
+                x, y, z = met[one.body].force if one.body in met else (0.0, 0.0, 0.0)
+                force = x + one.force[0] * share, y + one.force[1] * share, z + one.force[2] * share
+                met[one.body] = one._replace(force=force)
+
+    def _touches(self, body: int) -> list[Touch]:
         found = pybullet.getContactPoints(bodyA=body, physicsClientId=self._client)
         if not found:
             return []

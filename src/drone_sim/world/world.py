@@ -27,10 +27,13 @@ from drone_sim.world import assemblies, bodies
 from drone_sim.world.assemblies import Link
 from drone_sim.world.bullet_files import BulletFiles
 from drone_sim.world.collision_filter import CollisionFilter
+from drone_sim.world.gyroscopic_term import GyroscopicTerm, NoGyroscopicTerm
+from drone_sim.world.impacts import Impacts
 from drone_sim.world.initial_poses import InitialPoses
 from drone_sim.world.joints import Joints
 from drone_sim.world.pictures import Pictures, Textures
 from drone_sim.world.queries import Queries
+from drone_sim.world.shape_forces import ShapeForces
 
 _changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 _NO_TURN = (0.0, 0.0, 0.0, 1.0)
@@ -38,6 +41,9 @@ _NO_TURN = (0.0, 0.0, 0.0, 1.0)
 # 1e-7 what lies still rattles at some 1e-3 m/s², which only an accelerometer feels; this is less than 1e-6 m/s².
 _SOLVED = 1e-18
 _FAR_UP = 1e6  # m
+_Load = tuple[int, Vector, Vector, Sequence[tuple[float, ...]]]  # a body, and what Wrench has
+_where, _pull, _turn = pybullet.getBasePositionAndOrientation, pybullet.applyExternalForce, pybullet.applyExternalTorque
+_step, _IN_WORLD = pybullet.stepSimulation, pybullet.WORLD_FRAME
 _ahead: list[int] = []  # clients that nobody has used yet
 
 
@@ -50,8 +56,10 @@ def connect_ahead() -> None:
 class World:
     """A floor, objects and rigid bodies under gravity."""
 
-    def __init__(self, sub_step: float, gravity: float, gui: bool = False):
+    def __init__(self, sub_step: float, gravity: float, gui: bool = False, *, gyroscopic: bool = False):
         """Make an empty world that steps by `sub_step` (s); `gui` opens PyBullet's window.
+
+        `gyroscopic`: bodies turn as Euler's equations say, and not as in V-REP, which leaves out their term ω × Iω.
 
         Raises RuntimeError where `gui` finds no display.
         """
@@ -63,7 +71,7 @@ class World:
             raise RuntimeError("PyBullet's window needs a display: set DISPLAY, or leave out gui:=true")
         # Of each file it reads PyBullet would keep the content for good, and none of ours is read twice.
         pybullet.setPhysicsEngineParameter(enableFileCaching=0, physicsClientId=self._client)
-        self._sub_step, self._gravity = sub_step, gravity
+        self._sub_step, self._gravity, self._gyroscopic = sub_step, gravity, gyroscopic
         self._snapshots: set[int] = set()
         self._gui = gui
         if gui:
@@ -85,8 +93,13 @@ class World:
         self.pictures = Pictures(self._client, self._files.origin)
         self._textures = Textures(self._client, self._files)
         self.joints = Joints(self._client, self._look_anew)
+        self._gyroscopic_term = GyroscopicTerm(self._client) if self._gyroscopic else NoGyroscopicTerm(self._client)
+        self._impacts = Impacts(self._client, self._sub_step)
+        self._turns: dict[int, Quaternion] = {}  # before the last (part of a) sub-step, of what wrenches act on
+        self._speeds: dict[int, Vector] = {}  # the same of velocities
         self.collision_filter = CollisionFilter(self._client, self.pictures.moved)
         self.queries = Queries(self._client, self.collision_filter)
+        self.shape_forces = ShapeForces(self._client)
 
     def _look_anew(self) -> None:
         self.changes = next(_changes)
@@ -185,9 +198,14 @@ class World:
         del self._inertial_frames[body]
         self._initial_poses.forget(body)
         self.joints.forget(body)
+        self._gyroscopic_term.forget(body)
+        self._turns.pop(body, None)
+        self._impacts.forget(body)
         self.collision_filter.forget(body)
+        self.shape_forces.forget(body)
         self._textures.forget(body)
         self._centres.pop(body, None)
+        self._speeds.pop(body, None)
         self.pictures.remove(body)
         self._files.drop_old()
 
@@ -219,6 +237,8 @@ class World:
             backwards = Pose(backwards.position, _NO_TURN)  # the very same one: `state` looks in every step
         self.changes = next(_changes)
         self._inertial_frames[number] = (inertial, backwards)
+        self._gyroscopic_term.add(number)
+        self._impacts.add(number)
 
     # ---- dynamics
 
@@ -242,6 +262,7 @@ class World:
         """Return pose and velocity of a body's root link."""
         centre, turn = self._centres[body] = pybullet.getBasePositionAndOrientation(body, self._client)
         (vx, vy, vz), angular = pybullet.getBaseVelocity(body, self._client)
+        self._speeds[body] = vx, vy, vz
         inertial, backwards = self._inertial_frames[body]
         orientation = turn if backwards.orientation is _NO_TURN else multiply_quaternions(turn, backwards.orientation)
         arm = turned(orientation, inertial.position)  # from the root link to the centre of mass
@@ -260,6 +281,7 @@ class World:
         centre, turn = compose(pose, inertial)
         self.changes = next(_changes)
         self._centres.pop(body, None)
+        self._speeds.pop(body, None)
         self.pictures.moved(body)
         pybullet.resetBasePositionAndOrientation(body, centre, turn, self._client)
         pybullet.resetBaseVelocity(body, [0, 0, 0], [0, 0, 0], self._client)
@@ -269,6 +291,7 @@ class World:
         arm = turned(self.state(body).orientation, self._inertial_frames[body][0].position)
         velocity = [one + more for one, more in zip(linear, cross(angular, arm))]
         pybullet.resetBaseVelocity(body, velocity, angular, self._client)
+        self._speeds.pop(body, None)
 
     def part(self, body: int) -> None:
         """Take a body out of every contact, which Bullet would remember wherever it goes; it is far up then."""
@@ -282,35 +305,60 @@ class World:
 
         `between` is called with 0 before the first of these sub-steps, and after each with how many there have been.
         """
-        # Local names and positional arguments: this loop is most of a step.
-        client, in_world = self._client, pybullet.WORLD_FRAME
-        where, pull, turn, step = (
-            pybullet.getBasePositionAndOrientation,
-            pybullet.applyExternalForce,
-            pybullet.applyExternalTorque,
-            pybullet.stepSimulation,
-        )
-        known = self._centres  # in the first sub-step
         loads = [(body, wrench.force, *wrench.terms) for body, wrench in wrenches.items()]
+        any_fast = self._impacts.begin_step(sub_steps, self._speeds)
+        if not any_fast:
+            self.queries.begin_sub_step()
+        self._gyroscopic_term.begin_step()
         if between is not None:
             between(0)
         for count in range(1, sub_steps + 1):
-            for body, force, (torque_x, torque_y, torque_z), levers in loads:
-                centre, (x, y, z, w) = (known and known.get(body)) or where(body, client)
-                pull(body, -1, force, centre, in_world, client)
-                for lx, ly, lz, ax, ay, az in levers:  # Wrench.torque_under, without a call
-                    tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
-                    ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
-                    torque_x += uy * az - uz * ay
-                    torque_y += uz * ax - ux * az
-                    torque_z += ux * ay - uy * ax
-                turn(body, -1, (torque_x, torque_y, torque_z), in_world, client)
-            step(client)
-            known = {}
+            if any_fast:
+                self._step(loads, self._impacts.parts())
+            else:
+                self._step_once(loads, self._sub_step)
             if between is not None:
                 between(count)
+        self.shape_forces.sums.clear()
         self._centres.clear()
+        self._speeds.clear()
         self.changes = next(_changes)
+
+    def _step(self, loads: Sequence[_Load], parts: int) -> None:
+        """Do a sub-step, in equal parts."""
+        self._gyroscopic_term.begin_step()  # the last one's parts may have been others
+        if parts == 1:
+            self.queries.begin_sub_step()
+            self._step_once(loads, self._sub_step)
+            return
+        self.queries.begin_sub_step(body for body, *_ in loads)
+        part = self._sub_step / parts
+        with self._impacts.divided(part):
+            for _ in range(parts):
+                self._step_once(loads, part)
+                self.queries.end_part(1 / parts)
+
+    def _step_once(self, loads: Sequence[_Load], duration: float) -> None:
+        # Positional arguments: this is most of a step.
+        client, known, turns = self._client, self._centres, self._turns
+        for body, force, (torque_x, torque_y, torque_z), levers in loads:
+            centre, orientation = (known and known.get(body)) or _where(body, client)
+            x, y, z, w = turns[body] = orientation
+            _pull(body, -1, force, centre, _IN_WORLD, client)
+            for lx, ly, lz, ax, ay, az in levers:  # Wrench.torque_under, without a call
+                tx, ty, tz = y * lz - z * ly, z * lx - x * lz, x * ly - y * lx
+                ux, uy, uz = w * tx + y * tz - z * ty, w * ty + z * tx - x * tz, w * tz + x * ty - y * tx
+                torque_x += uy * az - uz * ay
+                torque_y += uz * ax - ux * az
+                torque_z += ux * ay - uy * ax
+            _turn(body, -1, (torque_x, torque_y, torque_z), _IN_WORLD, client)
+        if self.shape_forces.sums:
+            self.shape_forces.apply()
+        self._gyroscopic_term.begin_sub_step(turns, duration)
+        _step(client)
+        self._gyroscopic_term.end_sub_step(duration)
+        if known:
+            known.clear()
 
     def apply(self, body: int, wrench: Wrench) -> None:
         """Let a wrench act on a body in the next sub-step, beside what `advance` applies."""
@@ -333,6 +381,8 @@ class World:
         """Put everything where it stood, at rest."""
         self.changes = next(_changes)
         self._centres.clear()
+        self._speeds.clear()
+        self.shape_forces.sums.clear()
         self.pictures.all_moved()
         self._initial_poses.bring_back()
 
@@ -345,6 +395,8 @@ class World:
     def restore(self, number: int) -> None:
         """Bring back what `snapshot` remembered, to the last bit."""
         self._centres.clear()
+        self._speeds.clear()
+        self.shape_forces.sums.clear()
         self.changes = next(_changes)
         self.pictures.all_moved()
         pybullet.restoreState(number, physicsClientId=self._client)

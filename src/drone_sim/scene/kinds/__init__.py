@@ -7,6 +7,7 @@ from drone_sim.scene.kinds.force_sensor import ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.kinds.path import PathParameters
 from drone_sim.scene.kinds.proximity_sensor import ProximitySensorParameters
+from drone_sim.scene.kinds.script import ScriptParameters
 from drone_sim.scene.kinds.vision_sensor import VisionSensorParameters
 
 KINDS = (
@@ -16,4 +17,5 @@ KINDS = (
     VisionSensorParameters,
     PathParameters,
     ForceSensorParameters,
+    ScriptParameters,
 )

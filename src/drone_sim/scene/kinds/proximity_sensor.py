@@ -15,10 +15,12 @@ from drone_sim.config.types import Finite, Length, ParameterError, Within
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.volume import Spot, Volume
 from drone_sim.scene.bodies import bodies_above
 from drone_sim.scene.kinds.kind import KindParameters, Place
+from drone_sim.scripting.api.sensors import EVERYTHING
 from drone_sim.world import World
 from drone_sim.world.queries import Met
 
@@ -69,7 +71,12 @@ class ProximitySensor(SceneObject):
         """Take where it is, what it looks through, and what the simulation shares."""
         super().__init__(*place, kind="proximity_sensor")
         self.volume = volume
+        self.entity = EVERYTHING
         self._context = context
+
+    def save_state(self) -> Restore:
+        """Return a function that puts it back where it is now, looking for what it looks for now."""
+        return in_turn(super().save_state(), saved(self, "entity"))
 
     def detect(self, wanted: Callable[[str], bool] = lambda _: True) -> Detection | None:
         """Return the nearest point of an object whose name is wanted; None where there is none."""

@@ -10,9 +10,11 @@ import numpy as np
 from drone_sim.config.types import Finite, Length, ParameterError, Within
 from drone_sim.context import SimulationContext
 from drone_sim.mechanics import frames
+from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
 from drone_sim.scene.kinds.kind import KindParameters, Place
+from drone_sim.scripting.api.vision import Detected
 
 MAX_SIDE = 2048  # px
 _OPTICAL = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, math.pi))  # from V-REP's axes: y down, x right
@@ -53,9 +55,14 @@ class VisionSensor(SceneObject):
         self.near, self.far = parameters.near, parameters.far
         self.angle = parameters.fov  # rad, of the larger side
         self.orthographic_size = parameters.size  # m, of the larger side; None where it is perspective
+        self.detected = Detected()
         self._context = context
 
-    def picture(self, kind: str) -> np.ndarray:
+    def save_state(self) -> Restore:
+        """Return a function that brings back where it is, and what its script has found."""
+        return in_turn(super().save_state(), saved(self, "detected"))
+
+    def picture(self, kind: str = "color") -> np.ndarray:
         """Return what it sees: "color" or "depth", as sensors.camera.Vision has it. Raises ValueError."""
         self._context.carried.follow()
         pose = np.reshape((*frames.multiply(self.matrix(), _OPTICAL), 0, 0, 0, 1), (4, 4))

@@ -26,7 +26,12 @@ from drone_sim.scripting.api.unknown import not_there
 
 Function = Callable[..., Any]
 _Method = TypeVar("_Method", bound=Function)
-_FLAT = {"sim": "sim", "simROS": "simExtRosInterface_", "simUI": "simExtCustomUI_"}  # what names of 3.x begin with
+_FLAT = {
+    "sim": "sim",
+    "simROS": "simExtRosInterface_",
+    "simUI": "simExtCustomUI_",
+    "simVision": "simExtVision_",
+}  # what names of 3.x begin with
 _MISTAKES = (TypeError, ValueError, KeyError, IndexError, AttributeError, OverflowError)
 _SHOWN = 60  # characters of a value
 _MOST = 13  # values

@@ -22,7 +22,7 @@ handleflag assembly=0x400000 togglevisibility=0x400000 extended=0x400000 greysca
 handle chain=-7 app=-13
 # what getObjectType returns
 object shape_type joint_type graph_type camera_type dummy_type proximitysensor_type path_type=8 visionsensor_type
-    mill_type=11 forcesensor_type light_type mirror_type octree_type pointcloud_type
+    mill_type=11 forcesensor_type light_type mirror_type octree_type pointcloud_type script_type
 sceneobject shape joint graph camera dummy proximitysensor visionsensor=9 forcesensor=12 light octree=15 pointcloud
     script
 object no_subtype=200
@@ -126,8 +126,13 @@ boolparam hierarchy_visible console_visible collision_handling_enabled distance_
 stringparam application_path video_filename app_arg1 app_arg2 app_arg3 app_arg4 app_arg5 app_arg6 app_arg7 app_arg8
     app_arg9 additional_addonscript_firstscene additional_addonscript scene_path_and_name scene_path scene_name
     scene_unique_id=118 additional_addonscript1=11 additional_addonscript2 verbosity=121 statusbarverbosity
-    dlgverbosity consolelogfilter startupscriptstring uniqueid
+    dlgverbosity consolelogfilter startupscriptstring uniqueid tempdir tempscenedir datadir importexportdir addonpath
+    scenedefaultdir modeldefaultdir
 arrayparam gravity fog fog_color background_color1 background_color2 ambient_light random_euler
+# how degrees of freedom of a trajectory go together, and what 3.x calls the distance of two poses
+ruckig phasesync timesync nosync=3 minvel=0x100 minaccel=0x200
+rml phase_sync_if_possible only_time_sync only_phase_sync no_sync
+distcalcmethod dl dac max_dl_dac dl_and_dac sqrt_dl2_and_dac2 dl_if_nonzero dac_if_nonzero
 # what a buffer holds
 buffer uint8 int8 uint16 int16 uint32 int32 float double uint8rgb uint8bgr uint8rgba uint8argb base64 split
     clamp=0x100
@@ -178,15 +183,17 @@ PHASES = ("init", "actuation", "sensing", "cleanup")
 CALL_TYPES = {phase: CONSTANTS[f"syscb_{phase}"] for phase in PHASES} | {"thread": CONSTANTS["syscb_threadmain"]}
 
 AXIS = GREYSCALE = CODED = CONSTANTS["handleflag_axis"]  # the same bit, which each function understands in its own way
-METRES = CONSTANTS["handleflag_depthbuffermeters"]
-_FIRST_FLAG = 1 << 20
+BASE, WXYZ = CONSTANTS["handleflag_reljointbaseframe"], CONSTANTS["handleflag_wxyzquat"]
+METRES = ABSOLUTE = CONSTANTS["handleflag_depthbuffermeters"]  # ABSOLUTE: handleflag_abscoords
+RESET_FORCE, RESET_TORQUE = CONSTANTS["handleflag_resetforce"], CONSTANTS["handleflag_resettorque"]
+_FIRST_FLAG, _BEYOND_FLAGS = 1 << 20, 1 << 31
 
 
 def bare(handle: int) -> int:
     """Return a handle without its flags."""
-    return int(handle) % _FIRST_FLAG if handle >= _FIRST_FLAG else handle
+    return int(handle) % _FIRST_FLAG if _FIRST_FLAG <= handle < _BEYOND_FLAGS else handle
 
 
 def has(handle: int, flag: int) -> bool:
     """Tell whether a flag was added to a handle."""
-    return handle >= _FIRST_FLAG and bool(int(handle) & flag)
+    return _FIRST_FLAG <= handle < _BEYOND_FLAGS and bool(int(handle) & flag)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Generator
+from typing import Any, NamedTuple
 
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.types import WrongValue
@@ -49,6 +49,16 @@ class Control:
         return asked
 
 
+class Call(NamedTuple):
+    """A call of one of the script's own functions: by name, itself, or in Lua its number."""
+
+    callback: Any
+    arguments: list[Any]
+
+
+Steps = Generator[Call | None, Any, None]  # yields None once a step, and what is to be called, whose answer is sent in
+
+
 class Wait:
     """What a function of the API waits for, the same for threads of either language and for clients outside."""
 
@@ -69,12 +79,25 @@ class Wait:
         self.by_steps = by_steps
         self._given_up = given_up
 
-    def __iter__(self) -> Iterator[None]:
+    def __iter__(self) -> Steps:
         """Yield once a step as long as a thread has to wait."""
         while not self.over():
-            yield
+            yield None
             if self._given_up():
                 return
+
+
+class Action(Wait):
+    """What a function of the API does step by step, while a thread waits for its end."""
+
+    def __init__(self, steps: Steps, value: Callable[[], Any]):
+        """`steps` are what it does; `value` returns what the function returns then."""
+        super().__init__(lambda: False, value)
+        self._steps = steps
+
+    def __iter__(self) -> Steps:
+        """Return its steps, which are there once."""
+        return self._steps
 
 
 def has_passed(clock: Callable[[], float], seconds: float) -> Callable[[], bool]:
@@ -106,12 +129,20 @@ class Turns:
         """Begin a turn."""
         self._called = 0
 
-    def wait_for(self, wait: Wait, function: str) -> Any:
-        """Leave the thread as long as a function has to wait; return what it brings. Raises NoThread."""
-        for _ in wait:
-            if not self.leave():
+    def wait_for(self, wait: Wait, function: str, call: Callable[[Call], Any]) -> Any:
+        """Leave the thread as long as a function has to wait; return what it brings. Raises NoThread.
+
+        `call` calls what the script is to be asked meanwhile.
+        """
+        steps, answer = iter(wait), None
+        while True:
+            try:
+                asked = steps.send(answer)
+            except StopIteration:
+                return wait.value()
+            answer = call(asked) if asked else None
+            if not asked and not self.leave():
                 raise NoThread(f"{function}: {NO_THREAD}")
-        return wait.value()
 
     def count(self) -> None:
         """Count a call of the API in a thread; leave it where it has had its turn."""

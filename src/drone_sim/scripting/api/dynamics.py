@@ -7,17 +7,20 @@ V-REP 3.x has it.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Mapping
 from typing import Protocol, runtime_checkable
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.inertia import Inertia, turned
 from drone_sim.mechanics.joint import KINEMATIC, PASSIVE, POSITION, VELOCITY, Joint
+from drone_sim.mechanics.object_collections import members
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Functions
+from drone_sim.scripting.api.sensors import EVERYTHING, Detector
 from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers, WrongValue, numbers
 from drone_sim.scripting.api.vision import Eye
 
@@ -59,6 +62,8 @@ def readable(found: SceneObject) -> Getters:
             "visionfloatparam_far_clipping": lambda: found.far,
             "visionfloatparam_perspective_angle": lambda: found.angle,
         }
+    if isinstance(found, Detector):
+        return {"proxintparam_entity_to_detect": lambda: found.entity}
     return {"shapeintparam_static": lambda: found.is_static} if isinstance(found, Freezable) else {}
 
 
@@ -181,13 +186,13 @@ class Dynamics(Functions):
     @sim("345")
     def getObjectFloatParameter(self, handle: Handle, parameter: int) -> tuple[int, float]:
         """Return 1 and what getObjectFloatParam does; 0 and 0 for a parameter that is not known here."""
-        found = self._objects[handle]
+        found, velocities = self._objects[handle], self._context.velocities
         known: dict[str, Callable[[], float]] = {
             "shapefloatparam_mass": lambda: self.getShapeMass(handle),
-            "objfloatparam_abs_x_velocity": lambda: found.velocity()[0][0],
-            "objfloatparam_abs_y_velocity": lambda: found.velocity()[0][1],
-            "objfloatparam_abs_z_velocity": lambda: found.velocity()[0][2],
-            "objfloatparam_abs_rot_velocity": lambda: sum(one * one for one in found.velocity()[1]) ** 0.5,
+            "objfloatparam_abs_x_velocity": lambda: velocities.velocity(handle)[0][0],
+            "objfloatparam_abs_y_velocity": lambda: velocities.velocity(handle)[0][1],
+            "objfloatparam_abs_z_velocity": lambda: velocities.velocity(handle)[0][2],
+            "objfloatparam_abs_rot_velocity": lambda: math.hypot(*velocities.rotation(handle)),
             "objfloatparam_size_factor": lambda: self._factor(handle),
             **(self._corners(handle) if isinstance(found, Freezable) else {}),
             **readable(found),
@@ -229,16 +234,24 @@ class Dynamics(Functions):
         return self._surroundings.operations.factors(handle)[0] if self._surroundings.operations is not None else 1.0
 
     def _set(self, function: str, handle: int, kinds: tuple[str, ...], parameter: int, value: float) -> int:
-        known, names = dict(settable(self._objects[handle])), _names(kinds, parameter)
+        found, names = self._objects[handle], _names(kinds, parameter)
+        known = dict(settable(found))
         operations = self._surroundings.operations
-        if operations is not None and isinstance(self._objects[handle], Freezable):  # a shape of the scene
+        if operations is not None and isinstance(found, Freezable):  # a shape of the scene
             known["shapeintparam_respondable"] = lambda on: operations.change(handle, respondable=bool(on))
+        if isinstance(found, Detector):
+            known["proxintparam_entity_to_detect"] = lambda entity: self._look_for(found, int(entity))
         for name in names:
             if name in known:
                 known[name](*numbers((value,), 1))
                 return 1
         self._ignored.say(function, f"{names[0]} is accepted and ignored")
         return 1
+
+    def _look_for(self, sensor: Detector, entity: int) -> None:
+        if entity != EVERYTHING:
+            members(entity, self._objects, self._context.collections)  # or there is none
+        sensor.entity = entity
 
 
 def _carrier(found: SceneObject | None) -> SceneObject | None:

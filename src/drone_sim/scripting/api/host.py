@@ -11,7 +11,10 @@ import numpy as np
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.inertia import Inertia
+from drone_sim.mechanics.object_collections import Collections
 from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.velocity_meter import VelocityMeter
+from drone_sim.scripting.api.broadcasts import Broadcasts
 from drone_sim.scripting.api.control import Control, Turns
 from drone_sim.scripting.api.custom_data import CustomData
 from drone_sim.scripting.api.distances import MeasureWay
@@ -42,16 +45,20 @@ class ScriptContext:
     gravity: float
     drawings: Drawings
     windows: Windows
-    objects: ObjectTree = field(default_factory=ObjectTree)
+    objects: ObjectTree
+    velocities: VelocityMeter  # of the objects
     scripts: Scripts = field(default_factory=Scripts)
     signals: Signals = field(default_factory=Signals)
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
+    collections: Collections = field(default_factory=Collections)
+    broadcasts: Broadcasts = field(default_factory=Broadcasts)
 
     def clear(self) -> None:
         """Leave nothing there, as before a run; whoever holds one of them may go on to do so."""
-        for one in (self.objects, self.scripts, self.signals, self.control, self.data, self.tubes):
+        parts = self.objects, self.velocities, self.scripts, self.signals, self.control, self.data, self.tubes
+        for one in (*parts, self.collections, self.broadcasts):
             one.clear()
 
 
@@ -72,6 +79,12 @@ class Host(Protocol):
 
     def add_force(self, shape: str, force: Vector, torque: Vector, offset: Vector) -> None:
         """Let a force (N, world) act in the next step at a point (m) in the frame of a shape, and a torque (N m).
+
+        Raises ValueError for what is none of the drone's.
+        """
+
+    def drop_forces(self, shape: str, forces: bool, torques: bool) -> None:
+        """Forget the forces on a shape, or the torques, or both, that were added since the last step.
 
         Raises ValueError for what is none of the drone's.
         """
@@ -148,7 +161,7 @@ class Operations(Protocol):
 class Surroundings:
     """What the API needs besides the drone: how a script is run, and what it sees, by object name."""
 
-    pictures: Mapping[str, Callable[[], np.ndarray]] = field(default_factory=dict)
+    pictures: Mapping[str, Callable[..., np.ndarray]] = field(default_factory=dict)  # of a kind, or without one its own
     outside: Caller = lambda function: function()  # calls a function where OpenGL is, on nobody's time limit
     inside: Caller = lambda function: function()  # the same, on this script's time limit
     operations: Operations | None = None  # on the objects of the scene, where there is one

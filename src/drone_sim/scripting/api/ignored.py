@@ -60,7 +60,7 @@ _TABLE = {
                 handleDynamics=0 getRealTimeSimulation=1 getScriptAttribute=0 handleCustomizationScripts=0
                 handleAddOnScripts=0 handleSandboxScript=0 openModule=0 handleModule=0 closeModule=0
             3 handleVarious handleJoint handlePath handleChildScript=0 handleSensingChildScripts=0
-            - adjustRealTimeTimer setSimulationTimeStep handleIkGroup isRealTimeSimulationStepNeeded=1
+            - adjustRealTimeTimer handleIkGroup isRealTimeSimulationStepNeeded=1
         """,
         "propellers are rigidly attached, and nothing breaks": """
             345 breakForceSensor

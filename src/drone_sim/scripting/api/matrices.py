@@ -29,9 +29,12 @@ class Matrices:
     """Matrices, 12 numbers each, and rotations."""
 
     @sim("345")
-    def multiplyVector(self, matrix: TwelveNumbers, vector: Numbers) -> list[float]:
-        """Return matrix · vector, of one vector or of several, one after the other."""
-        m = numbers(matrix, 12)
+    def multiplyVector(self, matrix: Numbers, vector: Numbers) -> list[float]:
+        """Return matrix · vector, of one vector or of several, one after the other.
+
+        `matrix` may be a pose (7 numbers), or a quaternion (x, y, z, w).
+        """
+        m = _transform(matrix)
         if len(vector) == 3:
             return list(frames.transform(m, numbers(vector, 3)))
         values = numbers(vector, len(vector))
@@ -101,9 +104,11 @@ class Matrices:
 
     @sim("345")
     def rotateAroundAxis(
-        self, matrix: TwelveNumbers, axis: ThreeNumbers, position: ThreeNumbers, angle: Number
+        self, matrix: Numbers, axis: ThreeNumbers, position: ThreeNumbers, angle: Number
     ) -> list[float]:
-        """Return a transform turned by an angle (rad) about an axis through a position, both in the world."""
+        """Return a transform, or a pose, turned by an angle (rad) about an axis through a position, in the world."""
+        if len(matrix) == 7:
+            return to_pose(self.rotateAroundAxis(from_pose(matrix), axis, position, angle))
         there = numbers(position, 3)
         turn = frames.from_quaternion((0.0, 0.0, 0.0), about(numbers(axis, 3), numbers((angle,), 1)[0]))
         x, y, z = frames.rotate(turn, there)
@@ -121,6 +126,13 @@ class Matrices:
     def yawPitchRollToAlphaBetaGamma(self, yaw: Number, pitch: Number, roll: Number) -> tuple[float, float, float]:
         """Return V-REP's Euler angles of yaw, pitch and roll (R = Rz Ry Rx), in rad."""
         return frames.to_euler(frames.from_rpy((0.0, 0.0, 0.0), numbers((roll, pitch, yaw), 3)))
+
+
+def _transform(values: Numbers) -> Matrix:
+    """Return the transform of 12 numbers, of a pose (7), or of a quaternion (4)."""
+    if len(values) == 4:
+        return built((0.0, 0.0, 0.0), values)
+    return built(values[:3], values[3:]) if len(values) == 7 else numbers(values, 12)
 
 
 def built(position: Sequence[float], turn: Sequence[float]) -> Matrix:
@@ -172,38 +184,40 @@ class Poses:
     @sim("5")
     def buildPose(self, position: ThreeNumbers, angles: Numbers) -> list[float]:
         """Return the pose of a position and Euler angles, or a quaternion (x, y, z, w)."""
-        return _pose(built(position, angles))
+        return to_pose(built(position, angles))
 
     @sim("5")
     def multiplyPoses(self, first: SevenNumbers, second: SevenNumbers) -> list[float]:
         """Return the pose first · second."""
-        return _pose(frames.multiply(_matrix(first), _matrix(second)))
+        return to_pose(frames.multiply(from_pose(first), from_pose(second)))
 
     @sim("5", getPoseInverse="5")
     def invertPose(self, pose: SevenNumbers) -> list[float]:
         """Return the pose that undoes another."""
-        return _pose(frames.invert(_matrix(pose)))
+        return to_pose(frames.invert(from_pose(pose)))
 
     @sim("5")
     def interpolatePoses(self, first: SevenNumbers, second: SevenNumbers, part: Number) -> list[float]:
         """Return the pose so far (0 to 1) between two, the rotation on the shortest way."""
-        return _pose(between(_matrix(first), _matrix(second), numbers((part,), 1)[0]))
+        return to_pose(between(from_pose(first), from_pose(second), numbers((part,), 1)[0]))
 
     @sim("5")
     def poseToMatrix(self, pose: SevenNumbers) -> list[float]:
         """Return the 12 numbers of a pose's transform."""
-        return list(_matrix(pose))
+        return list(from_pose(pose))
 
     @sim("5")
     def matrixToPose(self, matrix: TwelveNumbers) -> list[float]:
         """Return the pose of a transform's 12 numbers."""
-        return _pose(numbers(matrix, 12))
+        return to_pose(numbers(matrix, 12))
 
 
-def _matrix(pose: SevenNumbers) -> Matrix:
+def from_pose(pose: SevenNumbers) -> Matrix:
+    """Return the transform of a pose."""
     values = numbers(pose, 7)
     return frames.from_quaternion(values[:3], unit(values[3:]))
 
 
-def _pose(matrix: Matrix) -> list[float]:
+def to_pose(matrix: Sequence[float]) -> list[float]:
+    """Return the pose of a transform."""
     return [*frames.position(matrix), *frames.to_quaternion(matrix)]

@@ -9,6 +9,7 @@ log names the function, what it got, and what it takes.
 from __future__ import annotations
 
 from drone_sim.mechanics.clock import Clock
+from drone_sim.mechanics.saved_state import Restore, in_turn
 from drone_sim.scripting.api.calls import Api, functions_of
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.custom_data import CustomDataFunctions
@@ -17,12 +18,16 @@ from drone_sim.scripting.api.drawings import DrawingFunctions
 from drone_sim.scripting.api.dynamics import Dynamics
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import PLUGINS, Ignored
+from drone_sim.scripting.api.image_filters import ImageFilters
 from drone_sim.scripting.api.joints import JointFunctions
 from drone_sim.scripting.api.matrices import Matrices, Poses
 from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.motions import MotionFunctions
 from drone_sim.scripting.api.names import NameFunctions
+from drone_sim.scripting.api.object_collections import CollectionFunctions
 from drone_sim.scripting.api.objects import ObjectKinds, Objects
-from drone_sim.scripting.api.packing import Bits, Packing
+from drone_sim.scripting.api.older_motions import OlderMotions
+from drone_sim.scripting.api.packing import Bits, Packing, Tables
 from drone_sim.scripting.api.paths import Paths
 from drone_sim.scripting.api.ros_functions import RosFunctions, ServiceFunctions, TopicFunctions
 from drone_sim.scripting.api.scene_objects import SceneObjects, Shapes
@@ -31,21 +36,25 @@ from drone_sim.scripting.api.sensors import ProximitySensors, Sensors
 from drone_sim.scripting.api.signals import SignalFunctions, TubeFunctions
 from drone_sim.scripting.api.simulation import SimulationFunctions
 from drone_sim.scripting.api.threads import Threads
+from drone_sim.scripting.api.trajectories import TrajectoryFunctions
 from drone_sim.scripting.api.vision import VisionSensors
 from drone_sim.scripting.api.windows import Dialogs, Views
+from drone_sim.scripting.api.wireless import Wireless
 
 
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
     """Return `sim` for a script, on what it is attached to."""
     context = host.context
-    names, ignored = NameFunctions(host), _ignored(host)
+    names, ignored, trajectories = NameFunctions(host), _ignored(host), TrajectoryFunctions()
     seen = host, surroundings, ignored
+    motions = MotionFunctions(*seen)
     parts = (
         Sensors(*seen),
         Objects(*seen),
         JointFunctions(*seen),
         ProximitySensors(*seen),
-        DistanceFunctions(context.objects, surroundings.nearest),
+        DistanceFunctions(context.objects, context.collections, surroundings.nearest),
+        CollectionFunctions(names, context.objects, context.collections),
         Paths(*seen),
         ObjectKinds(*seen),
         SceneObjects(surroundings),
@@ -63,17 +72,35 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         names,
         SignalFunctions(context.signals),
         TubeFunctions(context.tubes),
+        Wireless(*seen),
         CustomDataFunctions(context.objects, context.data),
         Packing(),
+        Tables(),
         Threads(*seen),
+        trajectories,
+        motions,
+        OlderMotions(motions, *seen),
         DrawingFunctions(context.drawings, context.objects, ignored),
     )
-    return Api("sim", {**ignored.functions("sim"), **functions_of(*parts)}, CONSTANTS, names.save_state)
+    return Api(
+        "sim", {**ignored.functions("sim"), **functions_of(*parts)}, CONSTANTS, lambda: _both(names, trajectories)
+    )
+
+
+def _both(names: NameFunctions, trajectories: TrajectoryFunctions) -> Restore:
+    """Return a function that brings back what a script has set in both."""
+    return in_turn(names.save_state(), trajectories.save_state())
 
 
 def make_sim_ros(bus: MessageBus, clock: Clock) -> Api:
     """Return `simROS` for the script that flies a drone, by the simulation's clock."""
     return Api("simROS", functions_of(TopicFunctions(bus), ServiceFunctions(bus), RosFunctions(bus, clock)), {})
+
+
+def make_sim_vision(host: Host, surroundings: Surroundings) -> Api:
+    """Return `simVision` for a script, on what it is attached to."""
+    filters = ImageFilters(host, surroundings, _ignored(host))
+    return Api("simVision", functions_of(filters), {}, filters.save_state)
 
 
 def make_plugins(host: Host) -> dict[str, Api]:

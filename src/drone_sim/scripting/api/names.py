@@ -1,16 +1,13 @@
-"""`sim`: objects by their names: V-REP 3.x names, and CoppeliaSim 4.x paths.
+"""`sim`: objects by their names: V-REP 3.x names, and CoppeliaSim 4.x paths (object_paths.py).
 
     Quadricopter_base  Quadricopter_base#  Quadricopter_base#0     3.x; the suffix tells copies of a model apart
-    /Quadcopter/base   /Quadcopter[1]/base   /target               4.x, from the root of the scene
-    .  ./base  :/base  ..  ../propeller[0]/respondable             4.x, from the model that the script belongs to
-
-In newer 4.x models the script is an object of its own below the model (`..` is the model), in older
-ones it belongs to the model itself (`.` is): both mean the drone here. An element of a path names any
-descendant, the nearest first; [i] takes the i-th of several.
 
 A name without a suffix means the object of the script's own model, as in V-REP: in the script of Drone#0,
 Quadricopter_base is Quadricopter_base#0. Where there is none, it is an object of the scene, such as Floor, but not one
 of the model that Drone#0 is a copy of. `name#` is always the one without a suffix.
+
+Since CoppeliaSim 4.9 a script is an object of its own below the model (`..` is the model), before it was a part of the
+object itself (`.` is): both mean the drone in its script.
 """
 
 from __future__ import annotations
@@ -20,9 +17,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from drone_sim.mechanics.object_names import NO_SUFFIX, plain, split, suffixed
-from drone_sim.mechanics.object_tree import ObjectTree
-from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.mechanics.object_tree import WORLD, ObjectTree
 from drone_sim.message_text import near_names
+from drone_sim.scripting.api import object_paths
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS, bare
 from drone_sim.scripting.api.host import Host
@@ -30,8 +27,6 @@ from drone_sim.scripting.api.types import Handle, Name, numbers
 
 _SELF = CONSTANTS["handle_self"]
 _SUFFIXED = re.compile(r"(.+)#(\d*)", re.DOTALL)
-_ELEMENT = re.compile(r"^([^\[\]]+)(?:\[(\d+)\])?$")
-_OWN = (".", "..", ":")
 
 
 class NameFunctions:
@@ -43,29 +38,42 @@ class NameFunctions:
         """`host` is the drone that the script flies, or what else it is on."""
         self._objects = host.context.objects
         self._host = host  # its object may get another name
-        self._suffix = split(host.own_script)[1]
+        self.suffix = split(host.own_script)[1]  # that names without one have
 
     @sim("5")
     def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
         """Return the handle of an object by path or name; -1 for none with the option noError, or name@silentError.
 
-        The option `index` takes the i-th of several of a path; sim.handle_self is what the script is on.
+        The option `index` takes the i-th of several of a path, from 0; `proxy` is the object from which relative paths
+        begin, in the place of the script's own. sim.handle_self is what the script is on.
         """
         if path == _SELF:
             return self._objects.handle(self._host.own_script)
-        name, options = path, options or {}
-        if isinstance(path, str):
-            name, _, flag = path.partition("@")  # @alt is for names of 4.x, which are found anyhow
-            if options.get("index"):
-                name += f"[{int(options['index'])}]"
-            if flag == "silentError":
-                options = {"noError": True}
+        options = options or {}
+        name, _, flag = path.partition("@") if isinstance(path, str) else (path, "", "")  # @alt: of 4.x, found anyhow
         try:
-            return find(self._objects, name, self._host.own_script, self._suffix)
+            return self._find(name, int(options.get("index", 0)), options.get("proxy", WORLD))
         except ValueError:
-            if options.get("noError"):
+            if options.get("noError") or flag == "silentError":
                 return -1
             raise
+
+    def _find(self, name: str, index: int, proxy: int) -> int:
+        objects, own_name = self._objects, self._host.own_script
+        if not (isinstance(name, str) and object_paths.is_path(name)):
+            return find(objects, name, own_name, self.suffix)
+        scripts = self._host.context.scripts
+        own = objects[objects.handle(own_name)] if scripts.are_own else None
+        is_embedded = own is not None and scripts.attached_to(own_name).is_embedded
+        if proxy != WORLD:
+            own, is_embedded = objects[proxy], True
+        above = own.parent if own is not None and is_embedded else own
+        found = object_paths.find(objects, name, own, above, max(0, index))
+        if found is None:
+            known = [*objects.names, *(objects.path(handle) for handle in objects)]
+            shown = f"{name}' with the index {index}, from 0" if index > 0 else f"{name}'"
+            raise ValueError(f"no object '{shown}; {near_names(name, known)}")
+        return objects.handle_of(found)
 
     @sim("345")
     def getObjectHandle(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
@@ -100,48 +108,33 @@ class NameFunctions:
         Without a name, return the suffix of the script's own objects.
         """
         if name is None:
-            return self._suffix
+            return self.suffix
         bare, suffix = split(name)
         return suffix, bare.removesuffix("#")
 
     @sim("345")
     def setNameSuffix(self, suffix: int) -> None:
         """Let names without a suffix mean those with this one, -1 for none."""
-        self._suffix = max(NO_SUFFIX, int(numbers((suffix,), 1)[0]))
+        self.suffix = max(NO_SUFFIX, int(numbers((suffix,), 1)[0]))
 
     def save_state(self) -> Callable[[], None]:
         """Return a function that brings back the suffix that setNameSuffix has set."""
-        kept = self._suffix
+        kept = self.suffix
 
         def restore() -> None:
-            self._suffix = kept
+            self.suffix = kept
 
         return restore
 
 
-def find(objects: ObjectTree, path: str, own: str, suffix: int) -> int:
-    """Return the handle that a name or path means in a script of the object `own`, whose names have that suffix.
+def find(objects: ObjectTree, name: str, own: str, suffix: int) -> int:
+    """Return the handle that a name means in a script of the object `own`, whose names have that suffix.
 
     Raises ValueError with the near names.
     """
-    if not isinstance(path, str):
+    if not isinstance(name, str):
         raise TypeError("a name is a string")
-    first, slash, rest = path.partition("/")
-    if not slash and first not in _OWN:
-        return objects.handle(_full_name(objects, path, own, suffix))
-    here: SceneObject | None = None
-    if first in _OWN:
-        here = objects[objects.handle(own)]
-    elif first:
-        rest = path
-    for element in filter(None, rest.split("/")):
-        here = _step(objects, here, element)
-        if here is None:
-            known = [*objects.names, *(objects.path(handle) for handle in objects)]
-            raise ValueError(f"no object '{path}'; {near_names(path, known)}")
-    if here is None:
-        raise ValueError(f"no object '{path}': it names none")
-    return objects.handle_of(here)
+    return objects.handle(_full_name(objects, name, own, suffix))
 
 
 def _full_name(objects: ObjectTree, name: str, own: str, suffix: int) -> str:
@@ -154,7 +147,9 @@ def _full_name(objects: ObjectTree, name: str, own: str, suffix: int) -> str:
         is_its_own = suffix == split(own)[1]  # and not one that setNameSuffix has set
         by_its_names = (suffixed(name, split(one)[1]) for one in _names(objects, own) if is_its_own)
         found = next((one for one in by_its_names if one in objects and one != name), None)
-        return found or (full if not _is_of_the_scene(objects, name, own) else name)
+        if found or not _is_of_the_scene(objects, name, own):
+            return found or full
+        return name if name in objects else _only_copy(objects, name, own)
     # A script that is copied out of a scene with several models names its own with a suffix.
     is_meant = name in objects or (match.group(2) and objects.is_copied(match.group(1)))
     return name if is_meant else match.group(1)
@@ -170,28 +165,14 @@ def _is_of_the_scene(objects: ObjectTree, name: str, own: str) -> bool:
     original = plain(own)
     if name not in objects or original not in objects or not objects.is_copied(original):
         return True
-    return not objects[objects.handle(name)].is_part_of(objects[objects.handle(original)])
+    twin = objects[objects.handle(original)]
+    return not objects[objects.handle(name)].is_part_of(twin.model() or twin)
 
 
-def _step(objects: ObjectTree, here: SceneObject | None, element: str) -> SceneObject | None:
-    if element == ".":
-        return here
-    if element == "..":
-        return here.parent if here is not None else None
-    match = _ELEMENT.match(element)
-    if match is None:
-        return None
-    name, index = match.group(1), int(match.group(2) or 0)
-    found = [candidate for candidate in _descendants(objects, here) if candidate.is_called(name)]
-    return found[index] if index < len(found) else None
+def _only_copy(objects: ObjectTree, name: str, own: str) -> str:
+    """Return the first of the objects of which an import has made copies, but none of a copy of `own`; else the name.
 
-
-def _descendants(objects: ObjectTree, root: SceneObject | None) -> list[SceneObject]:
-    """Return everything below an object, the nearest first."""
-    level: list[SceneObject | None] = [root]
-    everything: list[SceneObject] = []
-    while level:
-        below = [child for parent in level for _, child in objects.children(parent)]
-        everything += below
-        level = [*below]
-    return everything
+    Where a file's names are ours, all of that tree have a suffix (importing/scene_folder.py).
+    """
+    copies = sorted(split(one)[1] for one in objects.names if plain(one) == name) if objects.is_copied(name) else []
+    return next((suffixed(name, end) for end in copies if suffixed(own, end) not in objects), name)

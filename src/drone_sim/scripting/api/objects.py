@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -9,7 +10,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.scripting.api.calls import sim
-from drone_sim.scripting.api.constants import AXIS, CONSTANTS, bare
+from drone_sim.scripting.api.constants import AXIS, BASE, CONSTANTS, RESET_FORCE, RESET_TORQUE, WXYZ, bare, has
 from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.matrices import unit
 from drone_sim.scripting.api.types import (
@@ -27,7 +28,11 @@ _WITHOUT_ROOT, _CHILDREN_ALONE = 1, 2  # options of getObjectsInTree
 
 
 class Objects(Functions):
-    """The objects of the scene, where they are, how they move, the forces on them."""
+    """The objects of the scene, where they are, how they move, the forces on them.
+
+    Relative to a joint is relative to what hangs on it; sim.handleflag_reljointbaseframe, added to the handle of the
+    object, makes it relative to the joint's own frame, which does not turn.
+    """
 
     @sim("345")
     def getObjectParent(self, handle: Handle) -> int:
@@ -48,80 +53,89 @@ class Objects(Functions):
     @sim("345")
     def getObjectPosition(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the position of an object."""
-        m = self._objects.matrix(handle, relativeTo)
+        m = self._matrix(handle, relativeTo)
         return [m[3], m[7], m[11]]
 
     @sim("345")
     def setObjectPosition(self, handle: Handle, relativeTo: Handle, position: ThreeNumbers = ()) -> None:
         """Move an object: (handle, relativeTo, position), or (handle, position, relativeTo) as in 4.x."""
         frame, place = _frame_and_values(relativeTo, position, 3)
-        self._objects.set_position(handle, frame, place)
+        self._objects.set_position(bare(handle), frame, place, has(handle, BASE))
 
     @sim("345")
     def getObjectOrientation(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the Euler angles of an object."""
-        return list(frames.to_euler(self._objects.turn(handle, relativeTo)))
+        return list(frames.to_euler(self._objects.turn(bare(handle), relativeTo, has(handle, BASE))))
 
     @sim("345")
     def setObjectOrientation(self, handle: Handle, relativeTo: Handle, angles: ThreeNumbers = ()) -> None:
         """Turn an object: (handle, relativeTo, angles), or (handle, angles, relativeTo) as in 4.x."""
         frame, turn = _frame_and_values(relativeTo, angles, 3)
-        m = self._objects.matrix(handle, frame)
-        self._objects.set_matrix(handle, frame, frames.from_euler((m[3], m[7], m[11]), turn))
+        m = self._matrix(handle, frame)
+        self._put(handle, frame, frames.from_euler((m[3], m[7], m[11]), turn))
 
     @sim("345")
     def getObjectQuaternion(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
-        """Return the quaternion (x, y, z, w) of an object."""
-        return list(frames.to_quaternion(self._objects.matrix(handle, relativeTo)))
+        """Return the quaternion of an object: (x, y, z, w), and (w, x, y, z) with sim.handleflag_wxyzquat."""
+        return _to_script(handle, frames.to_quaternion(self._matrix(handle, relativeTo)))
 
     @sim("345")
     def setObjectQuaternion(self, handle: Handle, relativeTo: Handle, quaternion: FourNumbers = ()) -> None:
-        """Turn an object to a quaternion (x, y, z, w); the arguments in either order."""
+        """Turn an object to a quaternion, as getObjectQuaternion returns it; the arguments in either order."""
         frame, turn = _frame_and_values(relativeTo, quaternion, 4)
-        m = self._objects.matrix(handle, frame)
-        self._objects.set_matrix(handle, frame, frames.from_quaternion((m[3], m[7], m[11]), unit(turn)))
+        m = self._matrix(handle, frame)
+        self._put(handle, frame, frames.from_quaternion((m[3], m[7], m[11]), _from_script(handle, turn)))
 
     @sim("45")
     def getObjectPose(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
-        """Return position and quaternion of an object, 7 numbers."""
-        m = self._objects.matrix(handle, relativeTo)
-        return [*frames.position(m), *frames.to_quaternion(m)]
+        """Return position and quaternion of an object, 7 numbers; the latter is as getObjectQuaternion returns it."""
+        m = self._matrix(handle, relativeTo)
+        return [*frames.position(m), *_to_script(handle, frames.to_quaternion(m))]
 
     @sim("45")
     def setObjectPose(self, handle: Handle, relativeTo: Handle, pose: SevenNumbers = ()) -> None:
         """Move and turn an object to a position and a quaternion; the arguments in either order."""
         frame, place = _frame_and_values(relativeTo, pose, 7)
-        self._objects.set_matrix(handle, frame, frames.from_quaternion(place[:3], unit(place[3:])))
+        self._put(handle, frame, frames.from_quaternion(place[:3], _from_script(handle, place[3:])))
 
     @sim("345")
     def getObjectMatrix(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
         """Return the 12 numbers of an object's transform."""
-        return list(self._objects.matrix(handle, relativeTo))
+        return list(self._matrix(handle, relativeTo))
 
     @sim("345")
     def setObjectMatrix(self, handle: Handle, relativeTo: Handle, matrix: TwelveNumbers = ()) -> None:
         """Move and turn an object to a transform; the arguments in either order."""
         frame, place = _frame_and_values(relativeTo, matrix, 12)
-        self._objects.set_matrix(handle, frame, place)
+        self._put(handle, frame, place)
+
+    def _matrix(self, handle: int, frame: int) -> frames.Matrix:
+        if handle < BASE:  # most often, and often in a step
+            return self._objects.matrix(handle, frame)
+        return self._objects.matrix(bare(handle), frame, has(handle, BASE))
+
+    def _put(self, handle: int, frame: int, matrix: frames.Matrix) -> None:
+        self._objects.set_matrix(bare(handle), frame, matrix, has(handle, BASE))
 
     # ---- how they move
 
     @sim("345")
     def getObjectVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame.
+        """Return an object's velocity (m/s, world) and angular velocity (rad/s): the means over the last step.
 
-        sim.handleflag_axis may be added to the handle, and changes nothing. V-REP takes the means over the last step,
-        and without the flag the Euler angles of the turn in the frame that the object had before it, over the step.
-        Here both are the angular velocity at the end of the step: see "Where this differs" in docs/scripts.md.
+        The latter has the Euler angles of the step's turn, in the frame that the object had before it, over the step.
+        With sim.handleflag_axis added to the handle it is that turn as a rotation vector, in the world frame.
         """
-        if handle >= AXIS:
-            handle = bare(handle)
-        linear, angular = self._objects[handle].velocity()
+        meter = self._context.velocities
+        if handle < AXIS:
+            linear, angular = meter.velocity(handle)
+        else:
+            linear, angular = meter.velocity(bare(handle))[0], meter.rotation(bare(handle))
         return list(linear), list(angular)
 
     @sim("345")
     def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return linear (m/s) and angular velocity (rad/s) of an object, in the world frame."""
+        """Return what linear (m/s) and angular velocity (rad/s) an object has reached by now, in the world frame."""
         linear, angular = self._objects[handle].velocity()
         return list(linear), list(angular)
 
@@ -132,16 +146,39 @@ class Objects(Functions):
         """Let a force (N) at a body's centre of mass and a torque (N m) act in the next step.
 
         Both are in the world frame, and keep their direction through the sub-steps of the step, whatever the body does.
+        sim.handleflag_resetforce and _resettorque, or both, _resetforcetorque, added to the handle, forget what was
+        added before.
         """
-        shape = self._objects[handle].name
-        self._host.add_force(shape, _vector(force), _vector(torque), (0.0, 0.0, 0.0))
+        found = self._pushed(handle, RESET_FORCE, RESET_TORQUE)
+        push = getattr(found, "push", None)  # a shape of the scene
+        if push is None:
+            self._host.add_force(found.name, _vector(force), _vector(torque), (0.0, 0.0, 0.0))
+        else:
+            push(_vector(force), _vector(torque))
 
     @sim("345")
     def addForce(self, handle: Handle, position: ThreeNumbers, force: ThreeNumbers) -> None:
-        """Let a force (N) act in the next step at a position (m); both in the frame of the body."""
-        shape = self._objects[handle]
-        x, y, z = frames.rotate(shape.matrix(), _vector(force))
-        self._host.add_force(shape.name, (x, y, z), (0.0, 0.0, 0.0), _vector(position))
+        """Let a force (N) act in the next step at a position (m); both in the frame of the body.
+
+        For a shape of the scene the position is from its centre of mass. sim.handleflag_resetforcetorque, added to the
+        handle, forgets what was added before.
+        """
+        found = self._pushed(handle, RESET_FORCE | RESET_TORQUE, RESET_FORCE | RESET_TORQUE)
+        push = getattr(found, "push", None)  # a shape of the scene
+        place, lever, pull = found.matrix(), _vector(position), _vector(force)
+        if push is None:
+            self._host.add_force(found.name, frames.rotate(place, pull), (0.0, 0.0, 0.0), lever)
+        else:
+            push(frames.rotate(place, pull), frames.rotate(place, frames.cross(lever, pull)))
+
+    def _pushed(self, handle: int, forces: int, torques: int) -> SceneObject:
+        """Return what is pushed, without what was added before where one of these flags says so."""
+        if handle < RESET_FORCE:
+            return self._objects[handle]
+        found = self._objects[bare(handle)]
+        drop = getattr(found, "drop_pushes", functools.partial(self._host.drop_forces, found.name))
+        drop(has(handle, forces), has(handle, torques))
+        return found
 
 
 def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[float, ...]]:
@@ -153,6 +190,15 @@ def _frame_and_values(first: Any, second: Any, count: int) -> tuple[int, tuple[f
     if second != ():
         raise WrongValue(f"a handle and {count} numbers are expected")
     return WORLD, numbers(first, count)
+
+
+def _to_script(handle: int, quaternion: frames.Quaternion) -> list[float]:
+    x, y, z, w = quaternion
+    return [w, x, y, z] if has(handle, WXYZ) else [x, y, z, w]
+
+
+def _from_script(handle: int, quaternion: Sequence[float]) -> frames.Quaternion:
+    return unit((*quaternion[1:], quaternion[0]) if has(handle, WXYZ) else quaternion)
 
 
 def _vector(values: Sequence[float]) -> frames.Vector:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import struct
 from collections.abc import Mapping, Sequence
@@ -37,7 +38,7 @@ class Packing:
     def unpackTable(self, data: Text) -> Any:
         """Return the table in a string of packTable's."""
         try:
-            return _table(json.loads(_bytes(data)))
+            return _table(json.loads(as_bytes(data)))
         except (ValueError, TypeError, LookupError, RecursionError):
             raise ValueError("this string was not made by sim.packTable") from None
 
@@ -46,7 +47,7 @@ class Packing:
         """Return values of one sim.buffer_... as values of another, each times `factor` plus `offset`."""
         if from_kind not in _FORMATS or to_kind not in _FORMATS:
             raise ValueError("known are sim.buffer_uint8, _int8, _uint16, _int16, _uint32, _int32, _float and _double")
-        values = [factor * one + offset for one in _unpacked(_FORMATS[from_kind], _bytes(data))]
+        values = [factor * one + offset for one in _unpacked(_FORMATS[from_kind], as_bytes(data))]
         return _packed(_FORMATS[to_kind], values)
 
 
@@ -59,7 +60,7 @@ def _add_kind(code: str, new: str, old: str) -> None:
     def unpack(_self: Packing, data: Text, start: int = 0, count: int = 0, offset: int = 0) -> list[float]:
         if not offset >= 0:
             raise WrongValue("an offset of 0 bytes or more is expected")
-        return _part(_unpacked(code, _bytes(data)[int(offset) :]), start, count)
+        return _part(_unpacked(code, as_bytes(data)[int(offset) :]), start, count)
 
     part = f"a string of {struct.calcsize(code)} bytes each, `count` (0: all) from `start`."
     sim.add(Packing, pack, f"pack{new}", f"Return numbers as {part}", **{f"pack{old}": "3"})
@@ -94,7 +95,7 @@ def _unpacked(kind: str, data: bytes) -> list[Any]:
     return list(struct.unpack_from(f"<{count}{kind}", data))
 
 
-def _bytes(data: Text | bytes) -> bytes:
+def as_bytes(data: Text | bytes) -> bytes:
     """Return a string as it was packed; raises WrongValue for anything else."""
     if isinstance(data, str):
         return data.encode("utf-8", "surrogateescape")
@@ -124,6 +125,15 @@ def _table(value: Any) -> Any:
             return value["bytes"].encode("latin-1")
         return {_table(key): _table(one) for key, one in value["table"]}
     return value
+
+
+class Tables:
+    """Tables of a script's own."""
+
+    @sim("45")
+    def copyTable(self, table: Any) -> Any:
+        """Return a copy of a table and of all tables in it; of anything else the value itself."""
+        return copy.deepcopy(table)
 
 
 class Bits:

@@ -16,6 +16,8 @@ from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.types import Handle, Number, Numbers, WrongValue, numbers
 
 _MOST = 1_000_000  # numbers of a table
+_MOST_POINTS = 10_000  # of a path that is made
+_CLOSED, _LOOKS_ALONG = 2, 16  # options of createPath
 
 
 class Paths(Functions):
@@ -37,6 +39,44 @@ class Paths(Functions):
     def getOrientationOnPath(self, handle: Handle, relativeDistance: Number) -> list[float]:
         """Return the Euler angles, in the world, of the frame at a share of a path: x ahead, z up."""
         return list(frames.to_euler(self._on_path(handle, relativeDistance)))
+
+    @sim("34")
+    def getDataOnPath(self, handle: Handle, relativeDistance: Number) -> tuple[int, list[float]]:
+        """Return flags and four numbers that a path may carry along: all 0 here, where paths carry none."""
+        self._on_path(handle, relativeDistance)
+        return 0, [0.0] * 4
+
+    @sim("34")
+    def getClosestPositionOnPath(self, handle: Handle, position: Sequence[float]) -> float:
+        """Return the share of a path, from 0 to 1, at which it comes nearest to a place in the world."""
+        path = self._path(handle)
+        place = frames.transform(frames.invert(path.matrix()), numbers(position, 3))
+        return path.nearest(place) / path.length if path.length else 0.0
+
+    @sim("345")
+    def createPath(
+        self, ctrlPts: Numbers, options: int = 0, subdiv: int = 100, smoothness: Number = 1.0, *_: Any
+    ) -> int:
+        """Make a path through poses of 7 numbers each, one after the other; return its handle.
+
+        `options`: 2 closed, 16 it looks along itself, not as the poses do. It has `subdiv` points, and its corners are
+        rounded off over `smoothness` (0 to 1) of each piece.
+        """
+        operations = self._surroundings.operations
+        if not isinstance(ctrlPts, Sequence):
+            raise WrongValue("poses of control points are expected: paths without points are not made here")
+        if operations is None:
+            raise ValueError("there is no scene here")
+        (smooth,), count = numbers((smoothness,), 1), int(subdiv)
+        if not 2 <= count <= _MOST_POINTS:
+            raise WrongValue(f"a subdiv of 2 to {_MOST_POINTS} points is expected, not {count}")
+        closed = bool(int(options) & _CLOSED)
+        poses = smoothed(_points(ctrlPts, 7), closed, min(max(smooth, 0.0), 1.0), count)
+        said: dict[str, Any] = {"points": [pose[:3] for pose in poses], "closed": closed}
+        if not int(options) & _LOOKS_ALONG:
+            said["turns"] = [pose[3:] for pose in poses]
+        entry = {"name": operations.free_name("Path"), "alias": "Path", "kind": "path", **said}
+        return self._surroundings.outside(lambda: operations.add([entry])[0])
 
     @sim("345")
     def getPathPosition(self, handle: Handle) -> float:
@@ -87,6 +127,33 @@ def _points(path: Sequence[float], dof: int) -> list[tuple[float, ...]]:
         raise WrongValue(f"a table with {count} numbers for each point is expected, not {len(path)} in all")
     flat = numbers(path, len(path))
     return [flat[first : first + count] for first in range(0, len(flat), count)]
+
+
+def smoothed(points: Sequence[Sequence[float]], closed: bool, smoothness: float, count: int) -> list[list[float]]:
+    """Return so many points along a line through points, whose corners are parabolas over a share of each piece."""
+    corners = [*points, points[0]] if closed and points[0] != points[-1] else [*points]
+    if len(corners) < 2:
+        raise WrongValue("two control points or more are expected")
+    pieces = len(corners) - 1
+    return [_rounded(corners, closed, smoothness, pieces * index / (count - 1)) for index in range(count)]
+
+
+def _rounded(corners: Sequence[Sequence[float]], closed: bool, smoothness: float, along: float) -> list[float]:
+    """Return the point so many pieces along, which is rounded off where a corner is nearer than half its share."""
+    pieces = len(corners) - 1
+    corner = round(along)
+    index, share = min(int(along), pieces - 1), along - corner
+    if abs(share) >= smoothness / 2 or (corner in (0, pieces) and not closed):
+        return _between(corners[index], corners[index + 1], along - index)
+    before, here, after = corners[corner - 1 if corner else -2], corners[corner], corners[corner % pieces + 1]
+    reach = share / smoothness + 0.5  # from 0 to 1 through the corner
+    way = smoothness / 2
+    one, other = _between(before, here, 1 - way * (1 - reach)), _between(here, after, way * reach)
+    return _between(one, other, reach)
+
+
+def _between(one: Sequence[float], other: Sequence[float], share: float) -> list[float]:
+    return _with_unit_quaternion([a + share * (b - a) for a, b in zip(one, other)], one, other, share)
 
 
 def _with_unit_quaternion(

@@ -14,6 +14,7 @@ from drone_sim.message_text import near_names
 
 ScriptParameters = dict[str, Any]  # what getScriptSimulationParameter reads
 
+FIRST = 500_000  # the first handle: no object has one that large
 DEEPEST = 8  # scripts that wait for each other
 
 
@@ -22,6 +23,9 @@ class Callee(Protocol):
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Return what a global function returns: None, a value, or a tuple of several. Raises ScriptError."""
+
+    def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
 
 
 class Attachment:
@@ -37,6 +41,7 @@ class Attachment:
         self.parameters = parameters
         self.read: frozenset[str] = frozenset(parameters)
         self.is_law = is_law
+        self.is_embedded = False  # whether `..` in its paths is the parent of its object, as up to CoppeliaSim 4.8
         self.began = 0.0  # s, simulated, when it was loaded
         self.script: Callee | None = None
 
@@ -46,7 +51,12 @@ class Attachment:
 
 
 class Scripts:
-    """Attachments by handle (a small number that no other one of the run has had) and by object."""
+    """Attachments by handle (a number that nothing else of the run has had) and by object.
+
+    `are_own`: whether who asks is one of them; the paths of a client outside begin at no object.
+    """
+
+    are_own = True
 
     def __init__(self) -> None:
         """Start with none."""
@@ -56,7 +66,7 @@ class Scripts:
         """Forget all; handles are given out anew."""
         self._by_handle: dict[int, Attachment] = {}
         self._by_name: dict[str, Attachment] = {}
-        self._numbers = itertools.count()
+        self._numbers = itertools.count(FIRST)
         self._waiting: list[Attachment] = []  # callers, and what they called
 
     def add(self, name: str, parameters: ScriptParameters, *, is_law: bool = False) -> Attachment:
@@ -106,12 +116,16 @@ class Scripts:
         """Return the parameters that built-in laws read, by name."""
         return {name: None for one in self if one.is_law for name in one.read}
 
+    def is_own(self, caller: Attachment, callee: Attachment) -> bool:
+        """Tell whether a script calls itself."""
+        return caller is callee
+
     def call(self, caller: Attachment, callee: Attachment, call: Callable[[Callee], Any]) -> Any:
-        """Let one script call another. Raises ValueError for one that waits for this call itself, or is too deep."""
+        """Let a script call another, or itself. Raises ValueError for one that waits for this call, or is too deep."""
         if callee.script is None:
             why = "is a built-in law, and has no functions" if callee.is_law else "is loaded after this one"
             raise ValueError(f"the script of '{callee.name}' {why}")
-        if callee is caller or callee in self._waiting:
+        if callee is not caller and callee in self._waiting:
             raise ValueError(f"the script of '{callee.name}' is being called already: it waits for this call to end")
         if len(self._waiting) >= DEEPEST:
             raise ValueError(f"scripts call each other more than {DEEPEST} deep")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 DEEPEST = 16  # levels of nested tables, lists and mappings
-MOST_VALUES = 1_000_000  # in one call or message
+MOST_VALUES = 3 * 2048 * 2048  # in one call or message: the largest picture of a vision sensor, as numbers
 MOST_BYTES = 64 * 1024 * 1024  # of all its strings
 
 _PLAIN = frozenset((float, int, bool, type(None)))
@@ -40,7 +40,12 @@ def refuse_if_too_large(
         count += len(inner)
         if count > MOST_VALUES:
             raise ValueError(f"more than {MOST_VALUES} values are too many")
-        waiting.extend((one, depth + 1) for one in inner if type(one) not in _PLAIN)
+        waiting.extend((one, depth + 1) for one in _not_plain(inner))
+
+
+def _not_plain(values: list[Any]) -> list[Any]:
+    """Return those that are to be looked into; whether there are any is asked at once, for images have millions."""
+    return [] if _PLAIN.issuperset(map(type, values)) else [one for one in values if type(one) not in _PLAIN]
 
 
 def _inner(value: Any, fields: Fields) -> list[Any] | None:

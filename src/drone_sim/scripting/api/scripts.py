@@ -7,13 +7,15 @@ one's answer cannot be called meanwhile.
 from __future__ import annotations
 
 import difflib
+import functools
 import logging
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
+from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
@@ -35,8 +37,10 @@ _LEVELS = {
     **{CONSTANTS[name]: logging.WARNING for name in ("verbosity_warnings", "verbosity_scriptwarnings")},
     **{CONSTANTS[name]: logging.ERROR for name in ("verbosity_errors", "verbosity_scripterrors")},
 }
-_SELF, _TREE = CONSTANTS["handle_self"], CONSTANTS["handle_tree"]
-_CHILD, _NONE = CONSTANTS["scripttype_childscript"], -1
+_SELF, _TREE, _CHAIN, _ALL, _MAIN = (
+    CONSTANTS[f"handle_{one}"] for one in ("self", "tree", "chain", "all", "main_script")
+)
+_CHILD, _CUSTOMIZATION, _NONE = CONSTANTS["scripttype_childscript"], CONSTANTS["scripttype_customizationscript"], -1
 
 
 class _OnScripts(Functions):
@@ -47,14 +51,36 @@ class _OnScripts(Functions):
         super().__init__(host, surroundings, ignored)
         self._find = names.getObject
         self._scripts = host.context.scripts
-        self._own = self._scripts.attached_to(host.own_script)
+
+    @functools.cached_property
+    def _own(self) -> Attachment:
+        """This script; a client outside has none where nobody flies. Raises ValueError."""
+        return self._scripts.attached_to(self._host.own_script)
 
     def _script(self, handle: int) -> Attachment:
         if handle == _SELF:
             return self._own
+        if handle == _MAIN:
+            raise ValueError("the main script is the simulation itself: it has neither parameters nor functions")
         if not isinstance(handle, (int, float)):
             raise WrongValue("the handle of a script is expected")
-        return self._scripts[int(handle)]
+        number = int(handle)
+        found = self._scripts.get(number)
+        if found is None and number in {*self._objects} and self._objects[number].kind == "script":
+            found = self._script_of(number)
+        return self._scripts[number] if found is None else found
+
+    def _script_of(self, handle: int) -> Attachment:
+        """Return the script of an object. Raises ValueError where it has none."""
+        if handle == _SELF:
+            return self._own
+        return self._on_object(handle) or self._scripts.attached_to(self._objects[handle].name)
+
+    def _on_object(self, handle: int) -> Attachment | None:
+        """Return the script that is on an object, or that a script object is; None for none."""
+        one = self._objects[handle]
+        there = (each for each in (one, one.parent if one.kind == "script" else None) if each is not None)
+        return next((self._scripts.attached_to(each.name) for each in there if each.name in self._scripts), None)
 
 
 class ScriptFunctions(_OnScripts):
@@ -68,10 +94,10 @@ class ScriptFunctions(_OnScripts):
         if name is None or name == _SELF:
             return self._own.handle
         try:
-            found = self._objects[self._find(name)].name
+            handle = self._find(name)
         except ValueError:
-            found = name
-        return self._scripts.attached_to(found).handle
+            return self._scripts.attached_to(name).handle
+        return self._script_of(handle).handle
 
     @sim("345")
     def getObjectAssociatedWithScript(self, script: Handle) -> int:
@@ -80,8 +106,10 @@ class ScriptFunctions(_OnScripts):
 
     @sim("345")
     def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
-        """Return a simulation parameter of a script."""
-        parameters = self._script(script).parameters
+        """Return a simulation parameter of a script; for sim.handle_tree, _chain or _all, of the first that has it."""
+        several = self._several(script)
+        parameters = next((one.parameters for one in several if name in one.parameters), None)
+        parameters = parameters or (several or [self._script(script)])[0].parameters
         if name not in parameters:
             raise ValueError(f"no script parameter '{name}'; {near_names(name, parameters)}")
         value = parameters[name]
@@ -91,15 +119,17 @@ class ScriptFunctions(_OnScripts):
     def setScriptSimulationParameter(self, script: Handle, name: Name, value: Any) -> None:
         """Set a simulation parameter of a script: `particleVelocity` (m/s) drives a propeller.
 
-        With sim.handle_tree it is set in this script and those below. A name that a propeller's law does not have is
-        refused where it comes near to one that it has; of any other the log says once that nothing reads it.
+        With sim.handle_tree it is set in this script and those below, with sim.handle_chain in this one and those
+        above, with sim.handle_all in every one. A name that a propeller's law does not have is refused where it comes
+        near to one that it has; of any other the log says once that nothing reads it.
         """
         found = self._scripts.get(script)
         if found and name in found.parameters and type(value) is float and isfinite(value):  # often, so at once
             found.parameters[name] = value
             return
-        scripts = self._tree() if script == _TREE else [self._script(script)]
-        if script == _TREE or name not in scripts[0].parameters:
+        several = self._several(script)
+        scripts = several or [self._script(script)]
+        if several or name not in scripts[0].parameters:
             self._check_name(scripts, name)
         for one in scripts:
             _set(one.parameters, name, value)
@@ -114,13 +144,20 @@ class ScriptFunctions(_OnScripts):
         """Set a simulation parameter of the script that is attached to an object (4.x)."""
         self.setScriptSimulationParameter(self._script_of(handle).handle, name, value)
 
-    def _script_of(self, handle: int) -> Attachment:
-        return self._own if handle == _SELF else self._scripts.attached_to(self._objects[handle].name)
+    def _several(self, handle: int) -> list[Attachment]:
+        """Return the scripts that a special handle stands for, this one first, as there are; none for any other."""
+        own = self._object(self._own)
+        belongs: dict[int, Callable[[SceneObject], bool]] = {
+            _TREE: lambda one: one.is_part_of(own),
+            _CHAIN: own.is_part_of,
+            _ALL: lambda _: True,
+        }
+        meant = belongs.get(handle)
+        found = [one for one in self._scripts if meant is not None and meant(self._object(one))]
+        return sorted(found, key=lambda one: one is not self._own)
 
-    def _tree(self) -> list[Attachment]:
-        """Return this script and those below it."""
-        whole = self._objects[self._objects.handle(self._own.name)]
-        return [one for one in self._scripts if self._objects[self._objects.handle(one.name)].is_part_of(whole)]
+    def _object(self, script: Attachment) -> SceneObject:
+        return self._objects[self._objects.handle(script.name)]
 
     def _check_name(self, scripts: Collection[Attachment], name: Any) -> None:
         """Raise ValueError for a misspelt parameter of a propeller; say of one that nothing reads that it is so."""
@@ -217,7 +254,7 @@ class ScriptCalls(_OnScripts):
     @sim("345")
     def getScriptExecutionCount(self) -> int:
         """Return in how many steps this script has been called before: 0 in the first one (3.0)."""
-        return round((self._context.clock.time - self._own.began) / self._context.clock.time_step)
+        return round((self._context.clock.script_time - self._own.began) / self._context.clock.time_step)
 
     @sim("345")
     def callScriptFunction(self, function: Name, script: Handle, *arguments: Any) -> Any:
@@ -228,15 +265,24 @@ class ScriptCalls(_OnScripts):
         if not isinstance(function, str):
             raise WrongValue("the name of a function is expected")
         name, at, of = function.partition("@")
-        callee = self._script(script) if not at else self._scripts.attached_to(self._objects[self._find(of)].name)
+        callee = self._of_type(self._find(of), script) if at else self._script(script)
         values = list(arguments)
         refuse_if_too_large(values)
         try:
+            if self._scripts.is_own(self._own, callee):
+                return self._scripts.call(self._own, callee, lambda one: one.call_own(name, values))
             return self._surroundings.inside(
                 lambda: self._scripts.call(self._own, callee, lambda one: one.call_function(name, values))
             )
         except ScriptError as error:
             raise ValueError(str(error)) from None
+
+    def _of_type(self, handle: int, kind: int) -> Attachment:
+        """Return the script of a type on an object. Raises ValueError."""
+        if kind == _CUSTOMIZATION:
+            name = self._objects[handle].name
+            raise ValueError(f"no customization script is attached to '{name}': those of V-REP's files are not brought")
+        return self._script_of(handle)
 
     @sim("5")
     def getScriptFunctions(self, script: Handle) -> Any:
@@ -246,8 +292,7 @@ class ScriptCalls(_OnScripts):
     def _attached(self, object: Handle | Name) -> Attachment | None:
         if object == _SELF:
             return self._own
-        name = self._objects[self._find(object) if isinstance(object, str) else object].name
-        return self._scripts.attached_to(name) if name in self._scripts else None
+        return self._on_object(self._find(object) if isinstance(object, str) else object)
 
 
 class _Functions:

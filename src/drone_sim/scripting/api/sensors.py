@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.object_collections import members
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
@@ -19,7 +20,7 @@ from drone_sim.scripting.api.types import Handle, Number, WrongValue
 
 _NOT_YET, _NOTHING, _DETECTED = -1, 0, 1  # detection states of CoppeliaSim
 _EVERY_SENSOR = (CONSTANTS["handle_all"], CONSTANTS["handle_all_except_explicit"])
-_EVERYTHING = CONSTANTS["handle_all"]
+EVERYTHING = CONSTANTS["handle_all"]
 _Detection = tuple[int, float, list[float], int, list[float]]
 
 
@@ -71,6 +72,8 @@ class FoundObject(Protocol):
 class Detector(Protocol):
     """A proximity sensor of the scene."""
 
+    entity: int  # handle of the object or collection that it looks for, or EVERYTHING
+
     def detect(self, wanted: Callable[[str], bool] = ...) -> Any:
         """Return what is nearest (FoundObject) of the objects whose names are wanted, or None."""
 
@@ -86,7 +89,7 @@ class ProximitySensors(Functions):
         normal are in the sensor's frame, which looks along z; the object is -1 where it has gone.
         """
         found = self._objects[handle]
-        return self._seen(found.detect()) if isinstance(found, Detector) else self._last(found.name)
+        return self._seen(self._detected(found)) if isinstance(found, Detector) else self._last(found.name)
 
     @sim("345")
     def handleProximitySensor(self, handle: Handle) -> _Detection:
@@ -94,19 +97,16 @@ class ProximitySensors(Functions):
         if handle not in _EVERY_SENSOR:
             return self.readProximitySensor(handle)
         every = [self._objects[one] for one in self._objects]
-        seen = [one.detect() for one in every if isinstance(one, Detector)]
+        seen = [self._detected(one) for one in every if isinstance(one, Detector)]
         return self._seen(min((one for one in seen if one is not None), key=lambda one: one.distance, default=None))
 
     @sim("345")
     def checkProximitySensor(self, handle: Handle, entity: Handle) -> _Detection:
-        """Return what readProximitySensor does of one object alone, or of sim.handle_all."""
+        """Return what readProximitySensor does of one object or collection alone, or of sim.handle_all."""
         sensor = self._objects[handle]
         if not isinstance(sensor, Detector):
             raise WrongValue(f"'{sensor.name}' is no proximity sensor of the scene: {self._known()}")
-        if entity == _EVERYTHING:
-            return self._seen(sensor.detect())
-        names = self._objects[entity].names
-        return self._seen(sensor.detect(names.__contains__))
+        return self._seen(self._detected(sensor, entity))
 
     @sim("345")
     def checkProximitySensorEx(
@@ -121,6 +121,17 @@ class ProximitySensors(Functions):
         """Forget what a sensor has read: there is nothing to forget, it looks when it is read."""
         if handle not in _EVERY_SENSOR:
             self._objects[handle]
+
+    def _detected(self, sensor: Detector, entity: int | None = None) -> FoundObject | None:
+        """Return what a sensor finds of an entity, of that which it looks for unless another is given."""
+        of = sensor.entity if entity is None else entity
+        if of == EVERYTHING:
+            found: FoundObject | None = sensor.detect()
+            return found
+        detectable = members(of, self._objects, self._context.collections)
+        names = {name for one in detectable for name in self._objects[one].names}
+        found = sensor.detect(names.__contains__)
+        return found
 
     def _seen(self, found: FoundObject | None) -> _Detection:
         if found is None:

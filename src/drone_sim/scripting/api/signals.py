@@ -90,7 +90,9 @@ class SignalFunctions:
 
     @sim("345")
     def setStringSignal(self, name: Name, value: Text) -> None:
-        """Set a string."""
+        """Set a string; a number is written out, with up to 14 digits."""
+        if type(value) in (int, float):
+            value = str(value) if type(value) is int else f"{value:.14g}"
         if not isinstance(value, (str, bytes)):
             raise WrongValue("a string is expected")
         self._signals.set(str, name, value)

@@ -12,10 +12,11 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.control import PAUSE, STOP
 from drone_sim.scripting.api.host import Functions, Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
-from drone_sim.scripting.api.types import Number
+from drone_sim.scripting.api.types import Number, numbers
 
 VERSION, REVISION = 40600, 0  # the CoppeliaSim whose API this is nearest to
 _LINUX = 2
+_ROUNDED = 1e-6  # s, of single precision
 _PLUGINS = ("RosInterface", "ROSInterface", "ROS", "simROS", "CustomUI", "simUI")  # by every name that they had
 
 
@@ -76,8 +77,8 @@ class SimulationFunctions(Functions):
 
     @sim("345")
     def getSimulationTime(self) -> float:
-        """Return the simulated time in seconds."""
-        return self._context.clock.time
+        """Return the simulated time in seconds; in the sensing phase that at which the step began."""
+        return self._context.clock.script_time
 
     @sim("345")
     def getSimulationTimeStep(self) -> float:
@@ -136,6 +137,21 @@ class SimulationFunctions(Functions):
         """Return sim.arrayparam_gravity in m/s²; there is no other."""
         return list(self._read("arrayparam", parameter, [0.0, 0.0, 0.0]))
 
+    @sim("5", setFloatParameter="345", setFloatingParameter="3")
+    def setFloatParam(self, parameter: int, value: Any) -> None:
+        """Accept any sim.floatparam_... and ignore it; sim.floatparam_simulation_time_step is what it is."""
+        if parameter == CONSTANTS["floatparam_simulation_time_step"]:
+            self.setSimulationTimeStep(value)
+        else:
+            self._ignored.say("setFloatParam", f"{_name('floatparam', parameter)} is accepted and ignored")
+
+    @sim("")
+    def setSimulationTimeStep(self, step: Number) -> None:
+        """Raise an error where another time step (s) is wanted than the one there is (3.x)."""
+        (wanted,), there = numbers((step,), 1), self._context.clock.time_step
+        if abs(wanted - there) > _ROUNDED:
+            raise ValueError(f"the time step stays {there:g} s, not {wanted:g}: `time_step` of the scene file says it")
+
     def _read(self, kind: str, parameter: int, otherwise: Any) -> Any:
         """Return a parameter; raises ValueError for a number that is none of that kind."""
         values = self._values[kind]
@@ -158,7 +174,6 @@ def _add_setter(word: str, kind: str, old: str, so: str = "") -> None:
 
 
 _add_setter("Int32", "intparam", "Integer")
-_add_setter("Float", "floatparam", "Floating")
 _add_setter("Bool", "boolparam", "Boolean")
 _add_setter("String", "stringparam", "")
 _add_setter("Array", "arrayparam", "", ": gravity is a parameter of the node")

@@ -15,7 +15,6 @@ PLUGINS = {
     "simB0": "the ZeroMQ remote API does what B0 did",
     "simIK": "there is no inverse kinematics: a drone has no arm to bend",
     "simOMPL": "there is no path planner: plan outside, and send the way points",
-    "simVision": "there are no image filters: read the picture, or publish it to a node that uses OpenCV",
     "simGeom": "there is no geometry plugin",
     "simOctomap": "there are no octrees",
     "simIM": "there are no image filters: publish the picture to a node that uses OpenCV",
@@ -37,7 +36,7 @@ ABSENT: dict[str, str] = {
     r"simExtROS_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
     r"simros_\w+": "the plugin of V-REP 3.0 to 3.2; use simROS.advertise, simROS.publish and simROS.subscribe",
     r"simExtOMPL_\w+": PLUGINS["simOMPL"],
-    r"simExtVision_\w+": PLUGINS["simVision"],
+    r"simExtVision_\w+|simVision\.\w+": "that filter is not here: read the picture, or let a node do it",
     r"simExtOctomap_\w+": PLUGINS["simOctomap"],
     r"simExt(?!RosInterface_)\w+": "a plugin of V-REP's that is not here",
     r"sim_ext_\w+": "a constant of a plugin that is not here",
@@ -53,13 +52,12 @@ ABSENT: dict[str, str] = {
     r"sim\.\w*(?:Collision|Distance)\w*": (
         "there are no collision and distance objects; checkCollision and checkDistance measure between two objects"
     ),
-    r"sim\.\w*(?:Mill|Mechanism|Collection)\w*": "there are no collections and no mills",
-    r"sim\.(?:rml|ruckig|moveTo)\w*": "there is no trajectory generator: set the target a little further in every step",
+    r"sim\.\w*(?:Mill|Mechanism)\w*": "there are no mills",
     r"sim\.\w*(?:WorkThread|Plugin)\w*": "plugins are not loaded from scripts",
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
-    r"sim\.followPath|sim\.\w*PathTarget\w*": "there is no trajectory generator: set the target in every step",
-    r"sim\.(?:sendData|receiveData)": "there is no wireless transmission: use signals or tubes",
+    r"sim\.\w*PathTarget\w*": "a path has no target of its own: followPath moves an object along it",
     r"sim\.\w+ObjectCustomData": "use writeCustomDataBlock and readCustomDataBlock",
+    r"sim\.execute(?:ScriptString|LuaCode)": "text is not run as code: callScriptFunction calls a script's function",
     r"sim\.launchExecutable": "a child script starts no programs: use a launch file",
 }
 _FLAT = re.compile(r"sim([A-Z]\w*)")

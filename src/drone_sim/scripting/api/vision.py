@@ -3,13 +3,13 @@
 An image is a string of width · height · 3 bytes, red, green, blue, **the bottom row first**, as V-REP
 gives it (OpenGL's order); simROS.imageTransportPublish turns it over. It shows the scene as of the last
 step, or as of now where nobody has looked since. Depth is in m along the sensor's z, and infinite beyond the far plane.
+Every sensor has both, whichever of them it publishes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -19,7 +19,15 @@ from drone_sim.scripting.api.host import Functions
 from drone_sim.scripting.api.types import Handle, Number, WrongValue, numbers
 
 _GREY, _DEPTH_IN_METRES = 1, 1  # options of 4.x
+_ALL = (0, 0)  # the corner and size of a whole picture
 _LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601
+
+
+class Detected(NamedTuple):
+    """What a sensor's own script has found in its picture: whether it triggers, and packets of floats, as strings."""
+
+    trigger: bool = False
+    packets: tuple[bytes, ...] = ()
 
 
 @runtime_checkable
@@ -31,8 +39,10 @@ class Eye(Protocol):
     near: float
     far: float
     angle: float
+    orthographic_size: float | None  # m, of its larger side, where it is orthographic
+    detected: Detected
 
-    def picture(self, kind: str) -> np.ndarray:
+    def picture(self, kind: str = "color") -> np.ndarray:
         """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane."""
 
 
@@ -55,7 +65,7 @@ class VisionSensors(Functions):
 
     @sim("5")
     def getVisionSensorImg(
-        self, handle: Handle, options: int = 0, _cutoff: Number = 0.0, pos: Any = (0, 0), size: Any = (0, 0)
+        self, handle: Handle, options: int = 0, _cutoff: Number = 0.0, pos: Any = _ALL, size: Any = _ALL
     ) -> tuple[bytes, list[int]]:
         """Return image and [width, height] of a part of a picture; `options` 1: grey."""
         flag = GREYSCALE if int(options) & _GREY else 0
@@ -72,7 +82,7 @@ class VisionSensors(Functions):
 
     @sim("5")
     def getVisionSensorDepth(
-        self, handle: Handle, options: int = 0, pos: Any = (0, 0), size: Any = (0, 0)
+        self, handle: Handle, options: int = 0, pos: Any = _ALL, size: Any = _ALL
     ) -> tuple[bytes, list[int]]:
         """Return depths as a string of floats, the bottom row first, and [width, height].
 
@@ -100,54 +110,52 @@ class VisionSensors(Functions):
         return [width, height]
 
     @sim("345")
-    def handleVisionSensor(self, handle: Handle) -> int:
-        """Take the picture; return the number of detections: 0, there are no filters."""
+    def handleVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
+        """Take the picture; return whether the sensor's own script triggers, 1 or 0, and what it found: its packets."""
         self._picture(handle)
-        return 0
+        detected = self._detected(handle)
+        return int(detected.trigger), *(np.frombuffer(one, "<f4").tolist() for one in detected.packets)
 
     @sim("345")
-    def readVisionSensor(self, handle: Handle) -> tuple[int, list[float]]:
-        """Return 0, as there are no filters that detect anything, and 15 numbers.
+    def readVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
+        """Return whether the sensor's own script triggers, 1 or 0, 15 numbers, and what that script found: its packets.
 
-        They are intensity, red, green, blue (0 to 1) and depth: the least, the largest, and the mean of each. The depth
-        of a sensor of colours is 0.
+        They are intensity, red, green, blue and depth (0 to 1): the least, the largest, and the mean of each. Depth is
+        0 at the near plane, and 1 at the far one.
         """
-        picture = self._picture(handle)
-        if picture.ndim == 3:
-            colors = picture.reshape(-1, 3) / np.float32(255)
-            channels = np.column_stack([colors @ _LUMINANCE, colors, np.zeros(len(colors))])
-        else:
-            depths = np.nan_to_num(picture.ravel(), nan=0.0, posinf=0.0)
-            channels = np.column_stack([np.zeros((len(depths), 4)), depths])
-        return 0, [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()]
+        colors = self._colors(handle).reshape(-1, 3) / np.float32(255)
+        depths = self._depths(bare(handle))[::-1].ravel()
+        channels = np.column_stack([colors @ _LUMINANCE, colors, depths])
+        trigger, *packets = self.handleVisionSensor(handle)
+        return trigger, [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()], *packets
 
-    def _colors(self, handle: int, pos: Sequence[float], size: Sequence[float]) -> np.ndarray:
-        picture = self._picture(handle)
-        if picture.ndim != 3 or picture.dtype != np.uint8:
-            raise WrongValue(f"'{self._objects[bare(handle)].name}' sees no colours")
-        return _part(picture, pos, size)
+    def _detected(self, handle: int) -> Detected:
+        found = self._objects[bare(handle)]
+        return found.detected if isinstance(found, Eye) else Detected()
 
-    def _depths(self, handle: int, pos: Sequence[float], size: Sequence[float]) -> np.ndarray:
-        """Return depths (height, width), the bottom row first; raises WrongValue for a sensor of colours."""
+    def _colors(self, handle: int, pos: Sequence[float] = _ALL, size: Sequence[float] = _ALL) -> np.ndarray:
+        """Return colours (height, width, 3)."""
+        return _part(self._picture(handle, "color"), pos, size)
+
+    def _depths(self, handle: int, pos: Sequence[float] = _ALL, size: Sequence[float] = _ALL) -> np.ndarray:
+        """Return depths (height, width), the bottom row first."""
         picture, found = self._picture(handle, "depth"), self._objects[bare(handle)]
-        name = found.name
-        if picture.ndim != 2:
-            raise WrongValue(f"'{name}' sees colours, and no depth: a camera of the kind depth does")
         depths = np.nan_to_num(_part(picture, pos, size)[::-1].astype("<f4"), nan=np.inf)
         if has(handle, METRES):
             return depths
-        near, far = (found.near, found.far) if isinstance(found, Eye) else self._surroundings.planes[name]
+        near, far = (found.near, found.far) if isinstance(found, Eye) else self._surroundings.planes[found.name]
         return np.clip((depths - near) / max(far - near, 1e-9), 0.0, 1.0).astype("<f4")
 
-    def _picture(self, handle: int, kind: str = "color") -> np.ndarray:
-        """Return what a sensor sees; one of the scene sees what `kind` says, a drone's camera what it is made for."""
+    def _picture(self, handle: int, *kind: str) -> np.ndarray:
+        """Return what a sensor sees: "color" or "depth", and without a kind what it is made for."""
         found, pictures = self._objects[bare(handle)], self._surroundings.pictures
-        take = partial(found.picture, kind) if isinstance(found, Eye) else pictures.get(found.name)
+        take = found.picture if isinstance(found, Eye) else pictures.get(found.name)
         if take is None:
             eyes = [one.name for one in map(self._objects.__getitem__, self._objects) if isinstance(one, Eye)]
             known = ", ".join([*pictures, *eyes]) or "none"
             raise WrongValue(f"'{found.name}' is not a vision sensor; there are: {known}")
-        return self._surroundings.outside(take)  # not the script's time; the first picture compiles shaders
+        # Not the script's time: the first picture compiles shaders.
+        return self._surroundings.outside(lambda: take(*kind))
 
 
 def _two(values: Any) -> tuple[float, ...]:

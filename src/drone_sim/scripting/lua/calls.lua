@@ -5,7 +5,7 @@ local bridge, sandbox = ...
 local error, type, next, rawget, rawset = error, type, next, rawget, rawset
 local match, concat = string.match, table.concat
 local getinfo = sandbox.debug.getinfo
-local within_limits, take_snapshot = sandbox.within_limits, sandbox.take_snapshot
+local within_limits, protected, take_snapshot = sandbox.within_limits, sandbox.protected, sandbox.take_snapshot
 local take_turn, thread_has_ended, hand_back = sandbox.take_turn, sandbox.thread_has_ended, sandbox.hand_back
 local env, callbacks, sources = sandbox.globals, sandbox.callbacks, sandbox.sources
 
@@ -74,6 +74,13 @@ function sandbox.called(name, ...)
   local f = rawget(env, name)
   if type(f) ~= 'function' then return phases(), MISSING, 0 end
   return run(function(...) return hand_back(name, f(...)) end, ...)
+end
+
+-- Call a function of the script for the script itself, which runs now: within its limits.
+function sandbox.called_own(name, ...)
+  local f = rawget(env, name)
+  if type(f) ~= 'function' then return MISSING end
+  return protected(function(...) return hand_back(name, f(...)) end, ...)
 end
 
 -- Call a function back with a message; `answered`: what it returns is handed over.

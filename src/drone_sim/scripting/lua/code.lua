@@ -2,6 +2,7 @@
 local bridge, sandbox = ...
 
 local error, type, tostring, select, setmetatable = error, type, tostring, select, setmetatable
+local next, rawset, getmetatable = next, rawset, sandbox.debug.getmetatable
 local byte = string.byte
 local load, loadstring, setfenv = load, loadstring, setfenv
 local newer = _VERSION ~= 'Lua 5.1'
@@ -9,10 +10,12 @@ local sources, protected = sandbox.sources, sandbox.protected
 
 local env = {} -- the script's globals
 local modules, loaded = {}, {} -- the API's and Lua's own; what the script required, by name
+local own_modules = {} -- CoppeliaSim's
 local texts = {} -- of the script and what it requires
 local chunk -- the file that is being required
 local seen, made, LOADING = {}, {}, {}
 sandbox.globals, sandbox.modules, sandbox.loaded, sandbox.texts = env, modules, loaded, texts
+sandbox.own_modules = own_modules
 
 local function compile(text, name)
   if byte(text) == 27 then return nil, 'precompiled code' end
@@ -30,6 +33,7 @@ sandbox.compile = compile
 local function load_module(name)
   if type(name) ~= 'string' then error("no module '" .. tostring(name) .. "'", 3) end
   local found, text, chunk_name = bridge.module(name)
+  if not found and own_modules[name] then return own_modules[name] end
   if not found then error(text, 3) end
   if byte(text) == 27 then error('precompiled code: ' .. chunk_name, 3) end
   local f, message = compile(text, '=' .. chunk_name)
@@ -62,6 +66,24 @@ function env.require(name)
   if module == nil then module = load_module(name) end
   return module
 end
+
+---- copies of tables, which cannot be made in Python: functions stay what they are, and what is one table stays one
+
+local function copied(value, copies)
+  if type(value) ~= 'table' then return value end
+  local copy = copies[value]
+  if not copy then
+    copy = {}
+    copies[value] = copy
+    for key, one in next, value do rawset(copy, copied(key, copies), copied(one, copies)) end
+    setmetatable(copy, getmetatable(value))
+  end
+  return copy
+end
+
+local function copy_table(value) return copied(value, {}) end
+
+sandbox.own['sim.copyTable'], sandbox.own.simCopyTable = copy_table, copy_table
 
 ---- other scripts' functions, as if they were a table's
 

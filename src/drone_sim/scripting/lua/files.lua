@@ -1,4 +1,4 @@
--- Files and programs: a Lua script reads the code that lies beside it, writes none, and starts nothing.
+-- Files and programs: a Lua script reads what lies beside it, writes nothing, and starts nothing.
 --
 -- What it would write goes nowhere, which is said once: a script that keeps a record of its flight flies. Whatever else
 -- it asks of io or os is refused in one line, with what to use instead.
@@ -6,10 +6,12 @@ local bridge, sandbox = ...
 
 local error, type, tostring, select, pairs = error, type, tostring, select, pairs
 local concat, sub, setmetatable = table.concat, string.sub, setmetatable
+local find, match = sandbox.find, sandbox.match
+local tonumber, floor, unpack = tonumber, math.floor, table.unpack or unpack
 local env, modules, sources = sandbox.globals, sandbox.modules, sandbox.sources
 local log, compile, protected = bridge.log, sandbox.compile, sandbox.protected
 
-local READING = 'a Lua script reads no files: use script_parameters, simROS.getParamDouble, or a file of Lua beside it'
+local READING = 'a Lua script reads files beside it, by io.open or io.lines with a name'
 local WRITING = 'a Lua script writes no files: print it, or simROS.publish it'
 local STARTING = 'a child script starts no programs: use a launch file'
 local ENVIRONMENT = 'a Lua script sees no environment: use script_parameters'
@@ -39,7 +41,7 @@ local function methods_of(write)
   methods.close = function() return true end
   methods.flush = function(file) return file end
   methods.setvbuf, methods.seek = methods.close, function() return 0 end
-  methods.read = function() error('read: ' .. READING, 2) end
+  methods.read = function() error('read: this file is open for writing', 2) end
   methods.lines = methods.read
   return methods
 end
@@ -52,7 +54,7 @@ local nowhere, words = methods_of(function() end), methods_of(line_of)
 local has_said = false
 
 env.io = {stdout = a_file(words), stderr = a_file(words), write = line_of}
-refuse('io', {'input', 'lines', 'read'}, READING)
+refuse('io', {'input', 'read'}, READING)
 refuse('io', {'output', 'tmpfile'}, WRITING)
 refuse('io', {'popen'}, STARTING)
 refuse('os', {'execute'}, STARTING)
@@ -60,15 +62,91 @@ refuse('os', {'exit'}, 'sim.stopSimulation() ends a flight')
 refuse('os', {'getenv', 'setlocale'}, ENVIRONMENT)
 refuse('os', {'remove', 'rename', 'tmpname'}, WRITING)
 
+-- Return the methods of a file with that text: one place in it, from which is read.
+local function methods_of_text(text)
+  local methods, here = {}, 1
+
+  local function line(with_end)
+    if here > #text then return nil end
+    local last = find(text, '\n', here, true) or #text + 1
+    local found = sub(text, here, with_end and last or last - 1)
+    here = last + 1
+    return found
+  end
+
+  local function one(format)
+    if type(format) == 'number' then
+      if here > #text and format > 0 then return nil end
+      here = here + floor(format)
+      return sub(text, here - floor(format), here - 1)
+    end
+    local letter = match(tostring(format), '^%*?([aAlLnN])')
+    if letter == 'a' or letter == 'A' then
+      local rest = sub(text, here)
+      here = #text + 1
+      return rest
+    elseif letter == 'n' or letter == 'N' then
+      local _, last, number = find(text, '^%s*([%w%.+-]+)', here)
+      if tonumber(number) then here = last + 1 end
+      return tonumber(number)
+    elseif letter then
+      return line(letter == 'L')
+    end
+    error("read: a number of bytes, 'a', 'l', 'L' or 'n' is expected", 3)
+  end
+
+  function methods.read(_, ...)
+    local found, count = {}, select('#', ...)
+    if count == 0 then return line() end
+    for i = 1, count do
+      found[i] = one((select(i, ...)))
+      if found[i] == nil then return unpack(found, 1, i) end
+    end
+    return unpack(found, 1, count)
+  end
+
+  function methods.lines(_, format) return function() return one(format or 'l') end end
+
+  function methods.seek(_, whence, offset)
+    local from = {set = 0, ['end'] = #text, cur = here - 1}
+    local place = (from[whence or 'cur'] or 0) + (offset or 0)
+    if place < 0 then return nil, 'Invalid argument' end
+    here = floor(place) + 1
+    return here - 1
+  end
+
+  function methods.close() return true end
+  function methods.write() error('write: ' .. WRITING, 2) end
+  methods.flush, methods.setvbuf = methods.close, methods.close
+  return methods
+end
+
+local function read_file(asked_by, name)
+  local found, text, why = bridge.data(name)
+  if found then return a_file(methods_of_text(text)) end
+  if why == 'refused' then error(asked_by .. ': ' .. text, 3) end
+  return nil, text
+end
+
 function env.io.open(name, mode)
   if type(name) ~= 'string' then error('io.open: the name of a file is expected', 2) end
   local first = type(mode) == 'string' and sub(mode, 1, 1)
-  if first ~= 'w' and first ~= 'a' then error('io.open: ' .. READING, 2) end
+  if first ~= 'w' and first ~= 'a' then
+    local file, message = read_file('io.open', name) -- no tail call, or the error would not know the script's line
+    return file, message
+  end
   if not has_said then
     has_said = true
     log("io.open: '" .. sub(name, 1, LONGEST) .. "' is not written: " .. WRITING .. ' (accepted and ignored)')
   end
   return a_file(nowhere)
+end
+
+function env.io.lines(name, format)
+  if type(name) ~= 'string' then error('io.lines: ' .. READING, 2) end
+  local file, message = read_file('io.lines', name)
+  if not file then error('io.lines: ' .. message, 2) end
+  return file:lines(format)
 end
 
 function env.io.close() return true end

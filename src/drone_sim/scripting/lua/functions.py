@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Generator, Mapping, Set
 from typing import Any
 
 from drone_sim.scripting.api.calls import Api, Function, contents, explain, flat_name, most_values
@@ -95,24 +95,34 @@ def _failed(
 
 
 def _asked_in_steps(name: str, state: LuaState, wait: Wait) -> tuple[Any, ...]:
-    """Answer with a function that Lua calls once a step: it returns whether to wait, and what the wait has brought."""
+    """Answer with a function that Lua calls once a step: it returns whether to wait, and what the wait has brought.
+
+    Where one of the script's own functions is to be called first, it and its arguments stand behind that it waits, and
+    the next call tells whether it has returned true.
+    """
     if state.waits >= _MOST_WAITS:
         state.runtime.gccollect()  # those of coroutines that are no more
     if state.waits >= _MOST_WAITS:
         raise ValueError(f"at most {_MOST_WAITS} coroutines of a script wait at once")
     steps = _steps(wait, state)
 
-    def waited() -> tuple[bool, Any]:
-        return next(steps)
+    def waited(answer: Any = None) -> tuple[Any, ...]:
+        return steps.send(answer)
 
     return PLAIN, lua_function(name, waited, state)
 
 
-def _steps(wait: Wait, state: LuaState) -> Iterator[tuple[bool, Any]]:
+def _steps(wait: Wait, state: LuaState) -> Generator[tuple[Any, ...], Any, None]:
     state.waits += 1
+    steps, answer = iter(wait), None
     try:
-        for _ in wait:
-            yield True, None
+        while True:
+            try:
+                asked = steps.send(answer)
+            except StopIteration:
+                break
+            answer = yield (True, asked.callback, *asked.arguments) if asked else (True,)
     finally:
         state.waits -= 1
-    yield False, wait.value()
+    value = wait.value()
+    yield (False, *value) if isinstance(value, tuple) else (False, value)

@@ -9,7 +9,7 @@ local error, type, tostring, select, pairs = error, type, tostring, select, pair
 local rawget, setmetatable = rawget, setmetatable
 local unpack = table.unpack or unpack
 local concat, byte, sub = table.concat, string.byte, string.sub
-local find, gmatch = string.find, string.gmatch
+local find, format, gmatch = string.find, string.format, string.gmatch
 local load, loadstring, setfenv = load, loadstring, setfenv
 local create, resume, close = coroutine.create, sandbox.resume, coroutine.close
 local getmeta = sandbox.debug.getmetatable
@@ -18,6 +18,7 @@ local check, checked, tonumber = sandbox.check, sandbox.checked, tonumber
 local env, modules = sandbox.globals, sandbox.modules
 local texts, place_in_script = sandbox.texts, sandbox.place_in_script
 local newer = _VERSION ~= 'Lua 5.1'
+sandbox.find, sandbox.match = find, string.match -- for patterns that end: a script may have neither
 
 local function pack(...)
   return {n = select('#', ...), ...}
@@ -48,6 +49,15 @@ function env.print(...)
   for i = 1, select('#', ...) do words[i] = tostring((select(i, ...))) end
   local line = sub(concat(words, '\t'), 1, bridge.longest_line)
   log(line)
+end
+
+function env.printf(text, ...)
+  local values = pack(...)
+  for i = 1, values.n do
+    local kind = type(values[i])
+    if kind ~= 'number' and kind ~= 'string' then values[i] = tostring(values[i]) end
+  end
+  env.print(format(text, unpack(values, 1, values.n)))
 end
 
 env.pcall = protected

@@ -1,4 +1,4 @@
-"""Helper files beside a Lua child script, which it requires by name or loads as files."""
+"""Files beside a Lua child script: helpers that it requires by name or loads as files, and data that it reads."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from drone_sim.message_text import near_names
+from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import read_source
 from drone_sim.scripting.lua.source import LuaSource
 
 _CHUNK_LENGTH = 50  # Lua cuts longer chunk names
 _NAME = re.compile(r"[\w-]+(?:[./][\w-]+)*")
 _FILE = re.compile(r"[\w-]+(?:[./][\w-]+)*\.lua")
+_DATA = re.compile(r"\w[\w .+-]*(?:/\w[\w .+-]*)*")
 _LONGEST, _MOST = 200, 1000  # characters of a name; helpers
 
 
@@ -45,12 +47,29 @@ class LuaHelpers:
         """Return true, text and chunk name of a .lua file; or false and a message."""
         return self._read("cannot load", name, self._file)
 
+    def read_data(self, name: bytes) -> tuple[bool, bytes, bytes]:
+        """Return true and the contents of a file; or false, a message, and 'refused' for one that is out of bounds."""
+        shown = name.decode("utf-8", "replace")
+        file, why = shown.removeprefix("./"), b"refused"
+        try:
+            if len(file) > _LONGEST or not _DATA.fullmatch(file):
+                raise ValueError("a file beside the script, or in a folder there, is expected, such as data/path.csv")
+            path, why = str(self._inside(file)), b""
+            return True, read_source(path), b""
+        except ValueError as error:
+            return False, f"{shown[:80]}: {error}".encode("utf-8", "replace"), why
+
+    def _inside(self, file: str) -> Path:
+        """Return the path of a file; raises ValueError for one that a link leads to elsewhere."""
+        path = self._folder / file
+        if not path.resolve().is_relative_to(self._folder.resolve()):
+            raise ValueError("leads out of the script's folder")
+        return path
+
     def _read(self, failed: str, name: bytes, found: Callable[[str], str]) -> tuple[bool, bytes, bytes]:
         try:
             file = found(name.decode("utf-8"))
-            path, chunk = self._folder / file, self._chunk(file)
-            if not path.resolve().is_relative_to(self._folder.resolve()):
-                raise ValueError("leads out of the script's folder")
+            path, chunk = self._inside(file), self._chunk(file)
             text = LuaSource(read_source(path)).text
             if len(self._paths) > _MOST:
                 raise ValueError(f"a script has at most {_MOST} modules")
@@ -76,11 +95,21 @@ class LuaHelpers:
             raise ValueError("a module's name is made of letters, digits, _ and -; dots stand for folders")
         inner = name.replace(".", "/")
         for file in (f"{inner}.lua", f"{inner}/init.lua"):
-            if (self._folder / file).exists():
+            if (self._folder / file).exists() and not self._is_script(file):
                 return file
+        if name in PLUGINS:
+            raise ValueError(not_there("", name, ()))
         beside = [path.stem for path in self._folder.glob("*.lua") if str(path) not in self._paths.values()]
         near = near_names(name, beside)
+        if self._is_script(f"{inner}.lua"):
+            raise ValueError(
+                f"{inner}.lua is this script itself; a helper needs another name, or lies in {inner}/init.lua"
+            )
         raise ValueError(f"no file {inner}.lua beside the script{f'; {near}' if beside else ''}")
+
+    def _is_script(self, file: str) -> bool:
+        """Tell whether a file in the folder is the script, which is no helper of its own."""
+        return (self._folder / file) == Path(self._paths[self.chunk])
 
     @staticmethod
     def _chunk(file: str) -> str:

@@ -33,7 +33,8 @@ _NIL = re.compile(r"(?:field|global|method) '(\w+)'")
 _NUMBERS = {phase: number for number, phase in enumerate((*PHASES, "thread"), start=1)}
 _NEAR = 0.8  # of difflib's ratio
 _THREAD = 1 << _NUMBERS["thread"] - 1
-_CALLS = ("open", "phase", "called", "called_back", "has", "functions", "save_state", "restore")  # in calls.lua
+# In calls.lua.
+_CALLS = ("open", "phase", "called", "called_own", "called_back", "has", "functions", "save_state", "restore")
 _ABOUT_MEMORY = f"not enough memory: the script uses more than {state.MEMORY // state.MIB} MiB"
 
 
@@ -59,7 +60,7 @@ class LuaScript:
             raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
         self._thread: Executor = LuaThread(limit) if text.loops_in_c else SameThread(limit)
         try:
-            dialect = state.OLDEST if text.flat or "phases" in text.form else state.newest()
+            dialect = state.dialect_for(text.text, text.flat or "phases" in text.form)
             self._has_coroutines = text.coroutines
             self._lua = self._thread.run(self._build, dialect, text.threads)
             self._run("load", self._lua["open"], text.text, text.form.encode())
@@ -129,6 +130,14 @@ class LuaScript:
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function with values; return None, a value or a tuple of several. Raises ScriptError."""
         self._run(name, self._call_function, name, arguments)
+        return self._state.values.handed_back()
+
+    def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Do what `call_function` does, for the script itself, which runs now: on its time. Raises ScriptError."""
+        outcome = self._lua["called_own"](name.encode(), *self._state.values.to_lua(arguments, unpacked=True))
+        how, *found = outcome if isinstance(outcome, tuple) else (outcome,)
+        if how is not True:
+            raise self._failure(name, how, found)
         return self._state.values.handed_back()
 
     def _call_function(self, name: str, arguments: list[Any]) -> Any:

@@ -10,12 +10,15 @@ _PER_PHASE = re.compile(rb"\bsim_call_type\b")
 # Functions that can loop in C for good, where no hook ends them. Whoever names none of them gets none of them.
 _LOOPS_IN_C = re.compile(rb"\b(?:find|g?match|gfind|gsub|sort|move|load|loadstring|collectgarbage|date|utf8)\b")
 _REQUIRE = re.compile(rb"\b(?:require|loadfile|dofile)\b")  # a helper may name what it likes; these cannot
-_REQUIRE_OWN = re.compile(rb"\brequire[ \t]{0,9}\(?[ \t]{0,9}['\"](?:sim|simROS|math|string|table|coroutine|os)['\"]")
-_PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|thread|threadmain)\b")
+_REQUIRE_OWN = re.compile(
+    rb"\brequire[ \t]{0,9}\(?[ \t]{0,9}['\"](?:sim|simROS|simVision|math|string|table|coroutine|os)['\"]"
+)
+_PHASE_FUNCTION = re.compile(rb"\bsysCall_(?:init|actuation|sensing|cleanup|vision|thread|threadmain)\b")
 _THREAD_TYPE = re.compile(rb"\b(?:syscb_thread(?:main)?|childscriptcall_threaded)\b")
 _IN_THREAD = re.compile(
     rb"\bsim\.?(?:[sS]etThread(?:SwitchTiming|AutomaticSwitch|IsFree|ResumeLocation)|[sS]witchThread|"
-    rb"[gG]etThread(?:Id|Exis?tRequest)|[wW]ait(?:ForSignal)?|[dD]elegateChildScriptExecution)\b"
+    rb"[gG]etThread(?:Id|Exis?tRequest)|[wW]ait(?:ForSignal)?|[dD]elegateChildScriptExecution|"
+    rb"(?:[mM]oveTo|RMLMoveTo|rmlMoveTo)\w+|[fF]ollowPath)\b"
     rb"|\bsim[._]simulation_advancing_abouttostop\b|\bthreadFunction\b"
 )
 _COROUTINES = re.compile(rb"\bcoroutine\b")

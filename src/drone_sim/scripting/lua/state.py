@@ -54,6 +54,27 @@ def newest() -> str:
     raise ImportError("lupa has no Lua")
 
 
+def dialect_for(text: bytes, flat: bool) -> str:
+    """Return the Lua that a script is for: V-REP 3.x's for `flat` names, unless it is written in a newer one.
+
+    Raises ImportError.
+    """
+    if not flat or (not _parses(OLDEST, text) and _parses(newest(), text)):  # such as with | and &, as of Lua 5.3
+        return newest()
+    return OLDEST
+
+
+def _parses(dialect: str, text: bytes) -> bool:
+    lupa = importlib.import_module(f"lupa.{dialect}")
+    try:
+        lupa.LuaRuntime(encoding=None, register_eval=False, register_builtins=False, max_memory=_CAP).compile(text)
+    except lupa.LuaSyntaxError:
+        return False
+    except lupa.LuaError:  # out of memory: whoever runs it will say so
+        return True
+    return True
+
+
 class LuaState:
     """Lua for one script. `close` lets go of it: Python cannot see a cycle that leads through Lua.
 
@@ -96,6 +117,7 @@ class LuaState:
             "longest_ms": LONGEST_MS,
             "module": self._reader(helpers.read),
             "file": self._reader(helpers.read_file),
+            "data": self._reader(helpers.read_data),
         }
         table = self.runtime.table_from({key.encode(): value for key, value in bridge.items()})
         self.sandbox: Any = self.runtime.table()

@@ -2,7 +2,8 @@
 -- the API once it has made many of them in its turn: never at a moment that depends on how fast the computer is.
 local bridge, sandbox = ...
 
-local error, type, next = error, type, next
+local error, type, next, select = error, type, next, select
+local unpack = table.unpack or unpack
 local create, resume, yield, status = coroutine.create, sandbox.resume, coroutine.yield, coroutine.status
 local running, isyieldable = coroutine.running, coroutine.isyieldable
 local upper = string.upper
@@ -78,18 +79,26 @@ end
 
 ---- what a thread calls
 
+local function pack(...)
+  return {n = select('#', ...), ...}
+end
+
 -- Return a function of the API that waits: `begun` returns what tells, once a step, whether to wait for longer, and what
--- it has brought; `results` reads that.
+-- it has brought, or what to call first; `results` reads that.
 function sandbox.waiting(name, begun, results)
   return function(...)
     local ask = begun(...)
-    local waits, value = results(ask(0))
-    while waits do
+    local function told(waits, f, ...)
+      if not waits or f == nil then return waits, f, ... end
+      return told(results(ask(0, sandbox.own_function(name, f)(...) and true or false)))
+    end
+    local answer = pack(told(results(ask(0))))
+    while answer[1] do
       if not in_thread() then error(name .. ': ' .. bridge.no_thread, 2) end
       yield()
-      waits, value = results(ask(0))
+      answer = pack(told(results(ask(0))))
     end
-    return value
+    return unpack(answer, 2, answer.n)
   end
 end
 

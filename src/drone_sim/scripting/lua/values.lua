@@ -6,6 +6,7 @@
 local bridge, sandbox = ...
 
 local error, type, select, next, rawget, rawset = error, type, select, next, rawget, rawset
+local tostring = tostring
 local rawlen = rawlen or function(t) return #t end -- which knows no __len in 5.1
 local unpack = table.unpack or unpack
 local place_in_script, stop = sandbox.place_in_script, sandbox.stop
@@ -33,6 +34,13 @@ end
 local function fail(message)
   local line, name = place_in_script()
   error(name .. ':' .. line .. ': ' .. message, 0)
+end
+
+-- Return a function of the script's, by that number or the name of a global, which a function of the API asks for.
+function sandbox.own_function(asks, number)
+  local f = callbacks[number] or rawget(sandbox.globals, number)
+  if type(f) ~= 'function' then fail(asks .. ": the script has no function '" .. tostring(number) .. "'") end
+  return f
 end
 
 -- What Python gave: how to read it, and values.

@@ -14,6 +14,7 @@ from drone_sim.scripting.api.script_values import DEEPEST, MOST_BYTES, MOST_VALU
 
 _NUMBERS = frozenset((float, int, bool))
 _ALL_NUMBERS = _NUMBERS.issuperset
+_ALL_FLOATS = frozenset((float,)).issuperset
 _LARGEST = 2**63  # whole numbers beyond are floats in Lua
 
 # How the values of an answer to Lua are read there (values.lua).
@@ -126,7 +127,8 @@ class Values:
             return bytes(value)
         named = fields(value)
         if named is None:
-            return self._table_from([self._to_lua(item) for item in value])
+            floats = type(value) is list and _ALL_FLOATS(map(type, value))  # as in images, which are long
+            return self._table_from(value if floats else [self._to_lua(item) for item in value])
         return self._table_from({self._key(key): self._to_lua(item) for key, item in named.items()})
 
     def _key(self, key: Any) -> Any:

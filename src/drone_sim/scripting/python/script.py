@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 from drone_sim.message_text import near_names
 from drone_sim.scripting import phase_names, script_log
 from drone_sim.scripting.api.calls import Api, Function, UnknownName, contents, mistake, save_state
-from drone_sim.scripting.api.control import NoThread, Turns, waits
+from drone_sim.scripting.api.control import Call, NoThread, Turns, waits
 from drone_sim.scripting.api.types import Callback
+from drone_sim.scripting.api.unknown import PLUGINS, not_there
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS, THREADS
 from drone_sim.scripting.python.helpers import Helpers
@@ -60,7 +61,7 @@ class PythonScript:
         self.is_empty = not source.strip()
         self._modules = modules
         self._thread = self._new_thread(turns) if _NAMES_THREAD in source else None
-        self._found = {name: _waiting(one, turns) for name, one in modules.items()}
+        self._found = {name: _waiting(one, turns, self._called) for name, one in modules.items()}
         if self._thread:
             self._found = {name: self._thread.counted(one) for name, one in self._found.items()}
         found = {"self": Variables(), "require": self._require, "print": _print, _STOPPED: ScriptStopped, **self._found}
@@ -137,6 +138,11 @@ class PythonScript:
         self.check(name)
         return self._run(name, self._globals[name], *arguments)
 
+    def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Do what `call_function` does, for the script itself, which runs now: on its time."""
+        self.check(name)
+        return self._globals[name](*arguments)
+
     def callback(self, callback: Callback, message: Any) -> Any:
         """Call the script's function (or that of this name) with a message, or a request; return its value.
 
@@ -148,6 +154,12 @@ class PythonScript:
         return self._run(callback, self._globals[callback], message)
 
     answer = callback
+
+    def _called(self, call: Call) -> Any:
+        """Return what one of its functions returns, in the midst of its thread."""
+        self.check(call.callback)
+        function = call.callback if callable(call.callback) else self._globals[call.callback]
+        return function(*call.arguments)
 
     def check(self, callback: Callback) -> None:
         """Raise ScriptError where there is no function to call back."""
@@ -218,6 +230,8 @@ class PythonScript:
         return result
 
     def _require(self, name: str) -> Api:
+        if name in PLUGINS:
+            raise UnknownName(not_there("", name, ()))
         if name not in self._found:
             raise UnknownName(f"no module '{name}'; {near_names(str(name), self._found)}")
         return self._found[name]
@@ -280,14 +294,17 @@ def _copy(value: Any, memo: dict[int, Any]) -> Any:
         return value
 
 
-def _waiting(api: Api, turns: Turns) -> Api:
-    """Return a module whose functions leave the script's thread as long as they have to wait."""
+def _waiting(api: Api, turns: Turns, called: Callable[[Call], Any]) -> Api:
+    """Return a module whose functions leave the script's thread as long as they have to wait.
+
+    `called` calls what they ask of the script meanwhile.
+    """
     name, functions, constants = contents(api)
 
-    def waiting(function: Function, called: str) -> Function:
+    def waiting(function: Function, shown: str) -> Function:
         @functools.wraps(function)
         def call(*arguments: Any, **named: Any) -> Any:
-            return turns.wait_for(function(*arguments, **named), called)
+            return turns.wait_for(function(*arguments, **named), shown, called)
 
         return call
 

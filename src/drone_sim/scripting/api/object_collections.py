@@ -1,0 +1,94 @@
+"""`sim`: collections of objects, which distances, collisions and proximity sensors take in the place of one object."""
+
+from __future__ import annotations
+
+from drone_sim.mechanics.object_collections import ITEMS, Collections, Item
+from drone_sim.mechanics.object_names import suffixed
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.names import NameFunctions
+from drone_sim.scripting.api.types import Handle, Name, WrongValue
+
+_ALL = CONSTANTS["handle_all"]
+_ITEMS = {CONSTANTS[f"handle_{word}"]: word for word in ITEMS}
+_REMOVES, _WITHOUT_OBJECT = 1, 2  # options of an item
+
+
+class CollectionFunctions:
+    """Collections of objects, which distances, collisions and proximity sensors take in the place of one object."""
+
+    def __init__(self, names: NameFunctions, objects: ObjectTree, collections: Collections):
+        """`names` understands names; `collections` are those of the run, of some `objects`."""
+        self._names = names
+        self._objects = objects
+        self._collections = collections
+
+    @sim("345", createCollectionEx="45")
+    def createCollection(self, name: Name | int = "", _options: int = 0) -> int:
+        """Make an empty collection: (options), or (name, options) as up to 4.1; return its handle.
+
+        The option 1, that it counts whatever its objects are, changes nothing: here they all count.
+        """
+        return self._collections.add(name if isinstance(name, str) else "")
+
+    @sim("45")
+    def addItemToCollection(self, collection: Handle, what: int, object: Handle = -1, options: int = 0) -> None:
+        """Add an object (sim.handle_single), what hangs on it (_tree), what it hangs on (_chain), or all (_all).
+
+        `options`: 1 removes them from what was added before, 2 leaves out the object itself. A tree is that of the
+        moment at which the collection is asked for.
+        """
+        word = _ITEMS.get(what)
+        if word is None:
+            raise WrongValue("sim.handle_single, _tree, _chain or _all is expected")
+        if word != "all":
+            self._objects[object]
+        removes, without = bool(int(options) & _REMOVES), bool(int(options) & _WITHOUT_OBJECT)
+        item = Item("all", -1) if word == "all" else Item(word, int(object), removes, without)
+        self._collections.extend(collection, item)
+
+    @sim("34")
+    def addObjectToCollection(self, collection: Handle, object: Handle, what: int, options: int = 0) -> int:
+        """Do what addItemToCollection does; return 1 (3.x)."""
+        self.addItemToCollection(collection, what, object, options)
+        return 1
+
+    @sim("345")
+    def getCollectionHandle(self, name: Name) -> int:
+        """Return the handle of a collection by its name (3.x); -1 for none with name@silentError."""
+        if not isinstance(name, str):
+            raise WrongValue("the name of a collection is expected")
+        name, _, flag = name.partition("@")
+        own = suffixed(name, self._names.suffix)
+        try:
+            return self._collections.handle(own if own in self._collections.names else name.removesuffix("#"))
+        except ValueError:
+            if flag == "silentError":
+                return -1
+            raise
+
+    @sim("345")
+    def getCollectionName(self, collection: Handle) -> str:
+        """Return the name of a collection, '' for none (3.x)."""
+        return self._collections.name(collection)
+
+    @sim("345")
+    def getCollectionObjects(self, collection: Handle) -> list[int]:
+        """Return the handles of the objects that are in a collection now."""
+        return self._collections.objects(collection, self._objects)
+
+    @sim("345")
+    def emptyCollection(self, collection: Handle) -> None:
+        """Take all objects out of a collection, of sim.handle_all out of all."""
+        for one in self._these(collection):
+            self._collections.empty(one)
+
+    @sim("5", removeCollection="345")
+    def destroyCollection(self, collection: Handle) -> None:
+        """Forget a collection, of sim.handle_all all of them; its objects stay."""
+        for one in self._these(collection):
+            self._collections.remove(one)
+
+    def _these(self, collection: int) -> list[int]:
+        return [*self._collections] if collection == _ALL else [collection]

@@ -1,0 +1,164 @@
+"""The term ω × Iω of Euler's equations, of every link of every body: left out as in CoppeliaSim, or the textbook's.
+
+PyBullet gives it to every multibody, and has no switch for it. It takes I⁻¹ (ω × Iω) h from the angular velocity in a
+sub-step of length h, without a look at what comes after: a tumble gains energy. A torque ω × Iω takes that out again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import pybullet
+
+from drone_sim.mechanics.frames import Quaternion, Vector, cross, turned
+
+_SLOW = 1e-8  # (rad/s)²; slower, the term is below the noise of what moves
+_STILL: Vector = (0.0, 0.0, 0.0)
+_ROUND = 1e-9  # of its largest moment of inertia by which others may differ: a cube or a sphere has no such term
+_ITERATIONS = 6  # each leaves h |ω| / 2 of the error: 1e-10 of it at 9 rad/s and 5 ms
+
+
+class NoGyroscopicTerm:
+    """Takes the term out of what PyBullet does in a sub-step."""
+
+    def __init__(self, client: int):
+        """Take PyBullet's client."""
+        self._client = client
+        self._roots: dict[int, Vector] = {}  # moments of inertia (kg m², along the principal axes), by body
+        self._links: dict[int, dict[int, Vector]] = {}  # the same of all other links, by PyBullet's number
+        self._before: dict[int, Quaternion] = {}  # attitudes of roots a step of PyBullet's ago, in the same `advance`
+
+    def add(self, body: int) -> None:
+        """Know a body."""
+        links = {}
+        for number in range(-1, pybullet.getNumJoints(body, self._client)):
+            mass, _, moments, *_ = pybullet.getDynamicsInfo(body, number, self._client)
+            if mass and max(moments) - min(moments) > _ROUND * max(moments):
+                links[number] = moments
+        if -1 in links:
+            self._roots[body] = links.pop(-1)
+        if links:
+            self._links[body] = links
+
+    def forget(self, body: int) -> None:
+        """Know nothing of a body any more."""
+        self._roots.pop(body, None)
+        self._links.pop(body, None)
+
+    def begin_step(self) -> None:
+        """Ask for velocities in the next step of PyBullet's: attitudes of before do not tell them."""
+        self._before.clear()
+
+    def begin_sub_step(self, known: Mapping[int, Quaternion], duration: float) -> None:
+        """Let torques act in the step of PyBullet's that comes, of that duration (s), as the last one.
+
+        `known` are attitudes of roots that need not be asked for.
+        """
+        client, attitudes = self._client, self._before
+        for body, moments in self._roots.items():
+            now, before = known.get(body), attitudes.get(body)
+            velocity = self._velocity(body, now) if now is None or before is None else _rate(before, now, duration)
+            if now is not None:
+                attitudes[body] = now
+            if velocity is not _STILL:
+                torque = self._torque(moments, velocity, duration)
+                pybullet.applyExternalTorque(body, -1, torque, pybullet.LINK_FRAME, client)
+        for body, links in self._links.items():
+            states = pybullet.getLinkStates(body, list(links), 1, 1, client)  # with velocities, and attitudes of now
+            for (number, moments), state in zip(links.items(), states):
+                if _turns(state[7]):
+                    torque = self._torque(moments, _seen_from(state[1], state[7]), duration)
+                    pybullet.applyExternalTorque(body, number, torque, pybullet.LINK_FRAME, client)
+
+    def _velocity(self, body: int, turn: Quaternion | None) -> Vector:
+        """Return the angular velocity of a root along its principal axes (rad/s), _STILL where it hardly turns."""
+        velocity = pybullet.getBaseVelocity(body, self._client)[1]
+        if not _turns(velocity):
+            return _STILL
+        return _seen_from(turn or pybullet.getBasePositionAndOrientation(body, self._client)[1], velocity)
+
+    def end_sub_step(self, duration: float) -> None:
+        """Do what is to be done once PyBullet has stepped."""
+
+    def _torque(self, moments: Vector, velocity: Vector, _duration: float) -> Vector:
+        """Return ω × Iω (N m), everything along the principal axes."""
+        (a, b, c), (p, q, r) = moments, velocity
+        return (c - b) * q * r, (a - c) * r * p, (b - a) * p * q
+
+
+class GyroscopicTerm(NoGyroscopicTerm):
+    """Half of the term before PyBullet turns a body, half of it after: the angular momentum L stays as it is.
+
+    With the velocities u before and v between, I v = exp(-v h/2) I u, and after that I w = exp(-v h/2) I v, all along
+    the principal axes, while Bullet turns the body by v h. Being symmetric in time it neither gains nor loses energy.
+    Joints are PyBullet's own: a link below one has the first half twice.
+    """
+
+    def end_sub_step(self, duration: float) -> None:
+        """Turn every root's velocity by the second half of the term."""
+        client = self._client
+        self._before.clear()  # attitudes do not tell of this half
+        for body, moments in self._roots.items():
+            linear, velocity = pybullet.getBaseVelocity(body, client)
+            if _turns(velocity):
+                turn = pybullet.getBasePositionAndOrientation(body, client)[1]
+                between = _seen_from(turn, velocity)
+                after = _velocity(moments, _turned_back(between, duration / 2, _momentum(moments, between)))
+                pybullet.resetBaseVelocity(body, linear, turned(turn, after), client)
+
+    def _torque(self, moments: Vector, velocity: Vector, duration: float) -> Vector:
+        momentum, between = _momentum(moments, velocity), velocity
+        for _ in range(_ITERATIONS):
+            half = _turned_back(between, duration / 2, momentum)
+            between = _velocity(moments, half)
+        changes = zip(super()._torque(moments, velocity, duration), half, momentum)
+        x, y, z = (torque + (new - old) / duration for torque, new, old in changes)
+        return x, y, z
+
+
+def _turns(velocity: Vector) -> bool:
+    x, y, z = velocity
+    return x * x + y * y + z * z > _SLOW
+
+
+def _seen_from(turn: Quaternion, vector: Vector) -> Vector:
+    """Return a vector of the world in a frame that is turned so."""
+    x, y, z, w = turn
+    return turned((-x, -y, -z, w), vector)
+
+
+def _rate(before: Quaternion, now: Quaternion, duration: float) -> Vector:
+    """Return with which angular velocity a body has turned, in its own frame: quicker than to ask for it.
+
+    Bullet turns it by the whole of that in one go; the axis is the same before and after.
+    """
+    (x0, y0, z0, w0), (x1, y1, z1, w1) = before, now
+    x = w0 * x1 - w1 * x0 - y0 * z1 + z0 * y1
+    y = w0 * y1 - w1 * y0 - z0 * x1 + x0 * z1
+    z = w0 * z1 - w1 * z0 - x0 * y1 + y0 * x1
+    square = x * x + y * y + z * z
+    if square < _SLOW * duration * duration / 4 or square >= 1.0:
+        return _STILL
+    sine = math.sqrt(square)
+    scale = 2.0 * math.asin(sine) / (sine * duration)
+    return x * scale, y * scale, z * scale
+
+
+def _momentum(moments: Vector, velocity: Vector) -> Vector:
+    return moments[0] * velocity[0], moments[1] * velocity[1], moments[2] * velocity[2]
+
+
+def _velocity(moments: Vector, momentum: Vector) -> Vector:
+    return momentum[0] / moments[0], momentum[1] / moments[1], momentum[2] / moments[2]
+
+
+def _turned_back(velocity: Vector, duration: float, vector: Vector) -> Vector:
+    """Return exp(-v t) of a vector (Rodrigues' formula)."""
+    speed = math.hypot(*velocity)
+    axis = _velocity((speed, speed, speed), velocity)
+    sine, versine = math.sin(-speed * duration), 1 - math.cos(speed * duration)
+    once = cross(axis, vector)
+    twice = cross(axis, once)
+    x, y, z = (one + sine * first + versine * second for one, first, second in zip(vector, once, twice))
+    return x, y, z

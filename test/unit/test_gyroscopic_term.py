@@ -1,0 +1,91 @@
+"""Bodies turn as in V-REP, without the term ω × Iω, or as Euler's equations say."""
+
+import contextlib
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.frames import IDENTITY
+from drone_sim.mechanics.state import Pose
+from drone_sim.mechanics.wrench import Wrench
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.compound import Part
+from drone_sim.shapes.mass import inertia_of
+from drone_sim.shapes.shape import WHITE
+from drone_sim.world import World
+from drone_sim.world.assemblies import Hinge, Link
+
+SUB_STEP = 0.005  # s
+TUMBLE = (4.0, 7.0, 4.0)  # rad/s, 9 in all
+MASS = 1.0  # kg
+BOX = Box((0.1, 0.3, 0.5))  # m
+MOMENTS = np.array([0.34, 0.26, 0.10]) * MASS / 12  # kg m²
+
+
+@contextlib.contextmanager
+def tumbling(gyroscopic, add, sub_step=SUB_STEP):
+    """Give a world without gravity, and a body of it that tumbles."""
+    world = World(sub_step, gravity=0.0, gyroscopic=gyroscopic)
+    try:
+        body = add(world)
+        world.set_velocity(body, (0.0, 0.0, 0.0), TUMBLE)
+        yield world, body
+    finally:
+        world.close()
+
+
+def add_box(world):
+    return world.add_object(BOX, Pose((0.0, 0.0, 1.0)), mass=MASS)
+
+
+def add_box_on_a_hinge(world):
+    """Add a small ball's mass with the box as its second link, about the same centre."""
+    parts = [Part(BOX, IDENTITY, WHITE)]
+    small = [Part(Box((0.01, 0.01, 0.01)), IDENTITY, WHITE)]
+    hinge = Hinge(0, IDENTITY, "fixed", None, 0.0)
+    links = [
+        Link(small, mass=0.01, inertia=inertia_of(small, 0.01)),
+        Link(parts, mass=MASS, inertia=inertia_of(parts, MASS), hinge=hinge),
+    ]
+    return world.add_assembly(links, Pose((0.0, 0.0, 1.0)), ["", ""])[0]
+
+
+def turning(world, body):
+    """Return angular velocity (rad/s), angular momentum (N m s, world) and energy (J) of the box."""
+    _, orientation, _, velocity = world.state(body)
+    turn = np.reshape(frames.from_quaternion((0, 0, 0), orientation), (3, 4))[:, :3]
+    momentum = turn @ (MOMENTS * (turn.T @ velocity))
+    return np.array(velocity), momentum, momentum @ velocity / 2
+
+
+@pytest.mark.parametrize("pushed", [False, True])
+@pytest.mark.parametrize("add", [add_box, add_box_on_a_hinge])
+def test_what_tumbles_keeps_its_angular_velocity_as_in_vrep(add, pushed):
+    with tumbling(False, add) as (world, body):
+        world.advance({body: Wrench()} if pushed else {}, 2000)
+        assert turning(world, body)[0] == pytest.approx(TUMBLE, abs=1e-8)
+
+
+@pytest.mark.parametrize("pushed", [False, True])
+def test_the_textbooks_tumble_keeps_momentum_and_energy_over_10_s(pushed):
+    with tumbling(True, add_box) as (world, body):
+        _, momentum, energy = turning(world, body)
+        for _ in range(20):
+            world.advance({body: Wrench()} if pushed else {}, 100)
+            _, momentum_now, energy_now = turning(world, body)
+            assert momentum_now == pytest.approx(momentum, abs=1e-5 * np.linalg.norm(momentum))
+            assert energy_now == pytest.approx(energy, rel=0.01)
+
+
+def test_the_textbooks_tumble_is_what_eulers_equations_say():
+    def euler(_, rate):
+        return -np.cross(rate, MOMENTS * rate) / MOMENTS
+
+    with tumbling(True, add_box, sub_step=SUB_STEP / 20) as (world, body):
+        world.advance({}, 2000)
+        velocity, *_ = turning(world, body)
+        turn = np.reshape(frames.from_quaternion((0, 0, 0), world.state(body).orientation), (3, 4))[:, :3]
+        expected = solve_ivp(euler, (0, 100 * SUB_STEP), TUMBLE, rtol=1e-9, atol=1e-12).y[:, -1]
+        assert turn.T @ velocity == pytest.approx(expected, abs=0.02 * np.linalg.norm(expected))
