@@ -18,6 +18,7 @@ DISPLAY = "needs a display, and a package that setup does not install"
 WORKSPACE = "needs a catkin workspace and the network"
 INSTALLS = "installs packages"
 ANOTHER = "needs another package, or another machine"
+RECORDED = "needs the network, and nothing of that repository is kept here"
 EXTENDING = "test/unit/test_docs_extending.py follows the page"
 
 NOT_RUN = {  # with the reason
@@ -35,6 +36,8 @@ NOT_RUN = {  # with the reason
     "sudo apt install ./build/deb/ros-drone-sim_*.deb": INSTALLS,
     "pip install coppeliasim-zmqremoteapi-client": INSTALLS,
     "python3": "test/unit/test_docs_remote.py types what comes after it",
+    "git clone https://github.com/OBulun/Coppelia-Quad": RECORDED,
+    "./dev.sh recordings Coppelia-Quad": RECORDED,
     "ssh -L 8080:localhost:8080 you@the-machine": ANOTHER,
     "rosrun my_package flyer.py": ANOTHER,
     "rosrun drone_sim grade_live course.yaml --node flyer": "test/ros/grade_live.test grades that node",
