@@ -27,7 +27,7 @@ timeline:
   - {at: 3, faults: {propellers: [0.9, 1, 1, 1]}}
   - {at: 4, land: {}}
 criteria:
-  - {kind: rise_time, of: vx, after: 1, from: 0, to: 1, at_most: 0.6}
+  - {kind: rise_time, of: vx, after: 1, from: 0, to: 1, at_most: 1}
   - {kind: stays, of: z, until: 4, at_least: 0.9}
   - {kind: steady_error, of: vy, to: 0, at_most: 1}
   - {kind: attitude, at_most: 1}

@@ -32,7 +32,7 @@ from drone_sim.run.guardian import Guardian
 guardian = Guardian("drone_sim")
 from drone_sim.ros.node import node
 from drone_sim.world import World
-def stuck(*_arguments):
+def stuck(*_arguments, **_options):
     print("flying into it", flush=True)
     {call}
 World.{function} = stuck
