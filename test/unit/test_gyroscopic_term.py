@@ -79,11 +79,12 @@ def test_the_textbooks_tumble_keeps_momentum_and_energy_over_10_s(pushed):
             assert energy_now == pytest.approx(energy, rel=0.01)
 
 
-def test_the_textbooks_tumble_is_what_eulers_equations_say():
+@pytest.mark.parametrize("add", [add_box, add_box_on_a_hinge])
+def test_the_textbooks_tumble_is_what_eulers_equations_say(add):
     def euler(_, rate):
         return -np.cross(rate, MOMENTS * rate) / MOMENTS
 
-    with tumbling(True, add_box, sub_step=SUB_STEP / 20) as (world, body):
+    with tumbling(True, add, sub_step=SUB_STEP / 20) as (world, body):
         world.advance({}, 2000)
         velocity, *_ = turning(world, body)
         turn = np.reshape(frames.from_quaternion((0, 0, 0), world.state(body).orientation), (3, 4))[:, :3]

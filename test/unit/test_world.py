@@ -125,3 +125,17 @@ def test_what_is_fast_is_held_and_does_not_rebound(space, thrown, onto, gap, spe
         states.append(space.state(body))
     assert max((np.array(one.position) - end) @ way for one in states) < 0.01, "its centre is in front of the face"
     assert min(np.array(one.linear_velocity) @ way for one in states) > -0.01 * speed
+
+
+def test_what_acts_in_a_sub_step_acts_through_all_of_its_parts(space):
+    """A body that slides along a wall is fast and near something: its sub-steps are divided."""
+    space.add_object(Box((0.1, 100.0, 4.0)), Pose((0.2, 0.0, 2.0)))
+    gained = []
+    for x in (0.0, -50.0):  # beside the wall, 5 cm off, and far from it
+        body = space.add_object(Box((0.2,) * 3), Pose((x, 0.0, 2.0)), mass=1.0)
+        space.set_velocity(body, (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+        push = wrench(force=(-1.0, 0.0, 2.0))
+        space.advance({}, 20, between=lambda _count, body=body, push=push: space.apply(body, push))
+        gained.append(space.state(body).linear_velocity)
+    assert gained[0] == pytest.approx((-0.1, 1.0, 0.2), abs=1e-9)
+    assert gained[0] == pytest.approx(gained[1], abs=1e-9)

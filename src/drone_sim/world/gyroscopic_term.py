@@ -51,7 +51,7 @@ class NoGyroscopicTerm:
         self._before.clear()
 
     def begin_sub_step(self, known: Mapping[int, Quaternion], duration: float) -> None:
-        """Let torques act in the step of PyBullet's that comes, of that duration (s), as the last one.
+        """Let torques act in the step of PyBullet's that comes, as long (s) as the last one since `begin_step`.
 
         `known` are attitudes of roots that need not be asked for.
         """
@@ -92,8 +92,13 @@ class GyroscopicTerm(NoGyroscopicTerm):
 
     With the velocities u before and v between, I v = exp(-v h/2) I u, and after that I w = exp(-v h/2) I v, all along
     the principal axes, while Bullet turns the body by v h. Being symmetric in time it neither gains nor loses energy.
-    Joints are PyBullet's own: a link below one has the first half twice.
+    Links below a joint have PyBullet's own term: nobody can set their velocities after a step.
     """
+
+    def add(self, body: int) -> None:
+        """Know a body's root."""
+        super().add(body)
+        self._links.pop(body, None)
 
     def end_sub_step(self, duration: float) -> None:
         """Turn every root's velocity by the second half of the term."""

@@ -11,7 +11,6 @@ import pybullet
 from drone_sim.mechanics.frames import Vector
 
 _REACH = 0.001  # m that a body goes in a part of a sub-step
-_SLOW = _REACH / 0.005  # m/s, of what needs no parts
 _GAIN = 2.0  # m/s that a body may win in a step without being looked after
 _MOST_PARTS = 1000
 # Of how deep two bodies are in each other Bullet takes back this share in each of its steps: a velocity, with which
@@ -28,6 +27,7 @@ class Impacts:
     def __init__(self, client: int, sub_step: float):
         """Take PyBullet's client, and the sub-step (s)."""
         self._client, self._sub_step = client, sub_step
+        self._slow = _REACH / sub_step  # m/s, of what needs no parts
         self._bodies: set[int] = set()
         self._jointed: set[int] = set()
         self._fast: list[int] = []
@@ -53,7 +53,8 @@ class Impacts:
         self._fast = [
             body
             for body in (() if self._jointed else self._bodies)
-            if self._speed(body, known.get(body)) > _SLOW and self._may_meet_something(body, duration, _GAIN * duration)
+            if self._speed(body, known.get(body)) > self._slow
+            and self._may_meet_something(body, duration, _GAIN * duration)
         ]
         return bool(self._fast)
 
@@ -68,8 +69,10 @@ class Impacts:
         """Let Bullet's steps last that long (s), and what is fast not rebound."""
         client = self._client
         pybullet.setPhysicsEngineParameter(part, contactERP=_RECOVERY_OF_FAST, physicsClientId=client)
-        yield
-        pybullet.setPhysicsEngineParameter(self._sub_step, contactERP=_RECOVERY, physicsClientId=client)
+        try:
+            yield
+        finally:
+            pybullet.setPhysicsEngineParameter(self._sub_step, contactERP=_RECOVERY, physicsClientId=client)
 
     def _speed(self, body: int, velocity: Vector | None = None) -> float:
         return math.hypot(*(velocity or pybullet.getBaseVelocity(body, self._client)[0]))

@@ -60,7 +60,6 @@ class World:
         """Make an empty world that steps by `sub_step` (s); `gui` opens PyBullet's window.
 
         `gyroscopic`: bodies turn as Euler's equations say, and not as in V-REP, which leaves out their term ω × Iω.
-
         Raises RuntimeError where `gui` finds no display.
         """
         self._files = BulletFiles()
@@ -95,11 +94,14 @@ class World:
         self.joints = Joints(self._client, self._look_anew)
         self._gyroscopic_term = GyroscopicTerm(self._client) if self._gyroscopic else NoGyroscopicTerm(self._client)
         self._impacts = Impacts(self._client, self._sub_step)
-        self._turns: dict[int, Quaternion] = {}  # before the last (part of a) sub-step, of what wrenches act on
-        self._speeds: dict[int, Vector] = {}  # the same of velocities
+        self._turns: dict[
+            int, Quaternion
+        ] = {}  # attitudes before the last (part of a) sub-step, of what wrenches act on
+        self._speeds: dict[int, Vector] = {}  # m/s, of centres of mass, read since the last step
         self.collision_filter = CollisionFilter(self._client, self.pictures.moved)
         self.queries = Queries(self._client, self.collision_filter)
         self.shape_forces = ShapeForces(self._client)
+        self._applied: list[tuple[int, Wrench]] = []  # through the next sub-step
 
     def _look_anew(self) -> None:
         self.changes = next(_changes)
@@ -317,6 +319,7 @@ class World:
                 self._step(loads, self._impacts.parts())
             else:
                 self._step_once(loads, self._sub_step)
+            self._applied.clear()
             if between is not None:
                 between(count)
         self.shape_forces.sums.clear()
@@ -341,6 +344,8 @@ class World:
     def _step_once(self, loads: Sequence[_Load], duration: float) -> None:
         # Positional arguments: this is most of a step.
         client, known, turns = self._client, self._centres, self._turns
+        for applied in self._applied:
+            self._act(*applied)
         for body, force, (torque_x, torque_y, torque_z), levers in loads:
             centre, orientation = (known and known.get(body)) or _where(body, client)
             x, y, z, w = turns[body] = orientation
@@ -361,11 +366,13 @@ class World:
             known.clear()
 
     def apply(self, body: int, wrench: Wrench) -> None:
-        """Let a wrench act on a body in the next sub-step, beside what `advance` applies."""
-        centre, orientation = self._centres.get(body) or pybullet.getBasePositionAndOrientation(body, self._client)
-        pybullet.applyExternalForce(body, -1, wrench.force, centre, pybullet.WORLD_FRAME, self._client)
-        torque = wrench.torque_under(orientation)
-        pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, self._client)
+        """Let a wrench act on a body through the next sub-step, beside what `advance` applies."""
+        self._applied.append((body, wrench))
+
+    def _act(self, body: int, wrench: Wrench) -> None:
+        centre, orientation = self._centres.get(body) or _where(body, self._client)
+        _pull(body, -1, wrench.force, centre, _IN_WORLD, self._client)
+        _turn(body, -1, wrench.torque_under(orientation), _IN_WORLD, self._client)
 
     def keep_initial_poses(self) -> None:
         """Remember where everything stands, at rest, for `begin_anew`."""

@@ -19,27 +19,9 @@ from drone_sim.scripting.api.motions import Motion, MotionFunctions, move_joints
 from drone_sim.scripting.api.types import Handle, Number, Numbers, WrongValue, numbers
 
 _POSITION, _ORIENTATION = 1, 2  # what of an object is moved, added up
-_JOINTS = (
-    "flags",
-    "vel",
-    "accel",
-    "maxVel",
-    "maxAccel",
-    "maxJerk",
-    "targetPos",
-    "targetVel",
-    "direction",
-)
-_PLACES = (
-    "flags",
-    "vel",
-    "accel",
-    "maxVel",
-    "maxAccel",
-    "maxJerk",
-    "position",
-    "quaternion",
-)
+_LIMITS = ("flags", "vel", "accel", "maxVel", "maxAccel", "maxJerk")
+_JOINTS = (*_LIMITS, "targetPos", "targetVel", "direction")
+_PLACES = (*_LIMITS, "position", "quaternion")
 _M_PER_RAD = 0.1 / math.radians(90)  # what V-REP counts a turn for, where nothing else is said
 _NEAR_M, _NEAR_RAD = 5e-5, math.radians(0.01)  # below which V-REP takes a way for none
 _WAYS: tuple[Callable[[float, float], float], ...] = (  # by sim.distcalcmethod_..., of m and of rad in m

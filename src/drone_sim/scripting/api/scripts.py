@@ -65,10 +65,8 @@ class _OnScripts(Functions):
         if not isinstance(handle, (int, float)):
             raise WrongValue("the handle of a script is expected")
         number = int(handle)
-        found = self._scripts.get(number)
-        if found is None and number in {*self._objects} and self._objects[number].kind == "script":
-            found = self._script_of(number)
-        return self._scripts[number] if found is None else found
+        one = self._objects.get(number)
+        return self._script_of(number) if one is not None and one.kind == "script" else self._scripts[number]
 
     def _script_of(self, handle: int) -> Attachment:
         """Return the script of an object. Raises ValueError where it has none."""
