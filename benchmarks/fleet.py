@@ -65,6 +65,8 @@ def in_the_node(seconds: float = 20.0) -> list[Row]:
             for subscriber in heard:
                 subscriber.unregister()
         rospy.signal_shutdown("done")
+    if not came:
+        raise RuntimeError("no picture came")
     flew = node.flew(lines)
     return [
         {

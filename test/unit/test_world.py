@@ -129,9 +129,9 @@ def test_what_is_fast_is_held_and_does_not_rebound(space, thrown, onto, gap, spe
 
 def test_what_acts_in_a_sub_step_acts_through_all_of_its_parts(space):
     """A body that slides along a wall is fast and near something: its sub-steps are divided."""
-    space.add_object(Box((0.1, 100.0, 4.0)), Pose((0.2, 0.0, 2.0)))
+    space.add_object(Box((0.1, 100.0, 4.0)), Pose((0.16, 0.0, 2.0)))
     gained = []
-    for x in (0.0, -50.0):  # beside the wall, 5 cm off, and far from it
+    for x in (0.0, -50.0):  # beside the wall, 1 cm off, and far from it
         body = space.add_object(Box((0.2,) * 3), Pose((x, 0.0, 2.0)), mass=1.0)
         space.set_velocity(body, (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
         push = wrench(force=(-1.0, 0.0, 2.0))
