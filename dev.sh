@@ -67,7 +67,7 @@ install_packages() { # install_packages NAME...
     say "using the ROS in $ros"
     return
   fi
-  command -v dpkg-query >/dev/null || fail "neither Debian nor a ROS 1 that has been sourced: see README.md"
+  command -v dpkg-query >/dev/null || fail "neither Debian nor a ROS 1 that has been sourced: see docs/install.md"
   for package in "$@"; do
     dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
   done
@@ -133,6 +133,7 @@ fill_venv() { # fill_venv REQUIREMENTS...
     if [ "$list" = requirements.txt ]; then make_pybullet; fi
     say "installing the python packages of $list (a minute, once)"
     pip install -q --find-links "$wheels" -r "$list" >&2
+    if [ "$list" = requirements.txt ]; then slim_pybullet; fi
     sed -i "/ $list\$/d" "$before"
     cksum "$list" >>"$before"
   done
@@ -148,6 +149,17 @@ make_pybullet() {
   if have_pybullet || pip install -q --dry-run --no-deps --only-binary :all: "$version" >/dev/null 2>&1; then return; fi
   pip install -q setuptools numpy >&2 # where they are not the system's
   locked "$wheels" compile_pybullet
+}
+
+# Of the wheel's 290 MB nothing here reads its robots and learning environments, nor the symbols for its debugger.
+slim_pybullet() {
+  local folder library
+  for folder in "$venv"/lib/python*/site-packages; do
+    rm -rf "$folder"/pybullet_{data,envs,examples,robots,utils}
+  done
+  for library in "$venv"/lib/python*/site-packages/pybullet.*.so; do
+    if [ -f "$library" ] && command -v strip >/dev/null; then strip --strip-unneeded "$library"; fi
+  done
 }
 
 have_pybullet() { compgen -G "$wheels/${version/==/-}-$tag-*.whl" >/dev/null; }

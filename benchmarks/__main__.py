@@ -17,7 +17,7 @@ from drone_sim.files import writing
 from drone_sim.render.renderer import Renderer
 
 Row = dict[str, Any]
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[1] / "docs/benchmarks.md"
 RESULTS = Path(__file__).parent / "results.json"
 
 
@@ -68,19 +68,19 @@ def _text(value: Any) -> str:
     return f"{value:.3g}" if value < 1000 else str(round(value))
 
 
-def _fill_readme(results: dict[str, Any]) -> None:
+def _fill_page(results: dict[str, Any]) -> None:
     begin, end = "<!-- benchmarks: begin -->\n", "<!-- benchmarks: end -->"
     tables = [f"{name}\n{table(results[name])}" for name in BENCHMARKS if name in results]
     block = "```text\n" + "\n\n".join([f"on {results['machine']}", *tables]) + "\n```\n"
-    before, _, rest = README.read_text().partition(begin)
-    writing.write(README, before + begin + block + end + rest.partition(end)[2])
+    before, _, rest = PAGE.read_text().partition(begin)
+    writing.write(PAGE, before + begin + block + end + rest.partition(end)[2])
 
 
 def main() -> int:
     """Run the benchmarks named, or all."""
     parser = argparse.ArgumentParser(prog="./dev.sh bench", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"one of {', '.join(BENCHMARKS)}; all without")
-    parser.add_argument("--readme", action="store_true", help="put the tables into README.md")
+    parser.add_argument("--docs", action="store_true", help="put the tables into docs/benchmarks.md")
     parser.add_argument("--plot", metavar="FILE", help="draw the results to a picture")
     arguments = parser.parse_args()
     unknown = set(arguments.names) - set(BENCHMARKS)
@@ -97,8 +97,8 @@ def main() -> int:
         writing.write(RESULTS, json.dumps(results, indent=1) + "\n")
     if arguments.plot:
         plot.draw(results, arguments.plot)
-    if arguments.readme:
-        _fill_readme(results)
+    if arguments.docs:
+        _fill_page(results)
     return 0
 
 

@@ -1,6 +1,7 @@
 """The cockpit with one browser on the same machine, the front camera on: what comes, what is late, what it costs."""
 
 import contextlib
+import gzip
 import importlib.util
 import os
 import re
@@ -13,7 +14,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from urllib.request import urlopen
+from urllib.request import Request, urlopen
 from xmlrpc.client import ServerProxy
 
 from benchmarks import node
@@ -25,27 +26,16 @@ SETTLED = 10.0  # s, after which the browser has compiled what it needs
 NODES = {"cockpit": "/cockpit", "simulation": "/drone_sim"}
 TICK = os.sysconf("SC_CLK_TCK")
 
-# Counts what viser's worker hands to the page, and the animation frames in which something is drawn.
+# Counts messages in which a frame moves, and the pictures that are painted. The page has its scene when it is loaded.
 SPY = """
-if (location.pathname.startsWith("/scene/")) {
+() => {
   const seen = (window.seen = { moves: 0, drawn: 0 });
-  const moves = (message) => message.type.startsWith("Set") && message.name?.startsWith("/frames/");
-  const Plain = Worker;
-  window.Worker = class extends Plain {
-    constructor(...given) {
-      super(...given);
-      this.addEventListener("message", ({ data }) => { seen.moves += data.messages?.some(moves) ? 1 : 0; });
-    }
-  };
-  let drew = false;
-  for (const name of ["drawElements", "drawArrays", "drawElementsInstanced"]) {
-    const draw = WebGL2RenderingContext.prototype[name];
-    WebGL2RenderingContext.prototype[name] = function (...given) { drew = true; draw.apply(this, given); };
-  }
-  const tick = () => { seen.drawn += drew ? 1 : 0; drew = false; requestAnimationFrame(tick); };
-  tick();
+  const take = scene.take.bind(scene), paint = scene.canvas.paint;
+  scene.take = (said, bytes) => { seen.moves += said.moved.length ? 1 : 0; take(said, bytes); };
+  scene.canvas.paint = (...given) => { seen.drawn += 1; paint(...given); };
 }
 """
+PAGE = ("", "cockpit.css", "cockpit.js")
 
 
 def measure(seconds: float = 30.0) -> list[Row]:
@@ -62,11 +52,10 @@ def measure(seconds: float = 30.0) -> list[Row]:
             with _launched() as (address, served):
                 page = browser.new_context(viewport=SIZE).new_page()
                 page.set_default_timeout(1e3 * PATIENCE)
-                page.add_init_script(SPY)
                 rows.append({"name": f"launch -> page served, {name} time", "s": served})
                 rows.append({"name": f"address opened -> page drawn, {name} time", "s": _opened(page, address)})
                 if name == "second":
-                    rows += _watched(page, seconds)
+                    rows += _sizes(page, address) + _watched(page, seconds)
                 page.context.close()
         browser.close()
     return rows
@@ -97,14 +86,25 @@ def _opened(page: Any, address: str) -> float:
     began = time.monotonic()
     page.goto(address)
     ready(page)
-    wait_for(_scene(page), "window.seen.moves > 0")
-    drawn = _scene(page).evaluate("window.seen.drawn")
-    wait_for(_scene(page), "before => window.seen.drawn > before", drawn)
-    return time.monotonic() - began
+    wait_for(page, "window.scene?.bodies?.has('drone')")
+    drawn = page.evaluate("scene.canvas.frames")
+    wait_for(page, "before => scene.canvas.frames > before", drawn)
+    took = time.monotonic() - began
+    page.evaluate(SPY)
+    return took
 
 
-def _scene(page: Any) -> Any:
-    return next(frame for frame in page.frames if "/scene/" in frame.url)
+def _sizes(page: Any, address: str) -> list[Row]:
+    """Return how large the page's files are, as they are and as they are sent."""
+    raw, sent = 0, 0
+    headers = {"Cookie": "; ".join(f"{one['name']}={one['value']}" for one in page.context.cookies())}
+    for name in PAGE:
+        request = Request(address.partition("?")[0] + name, headers={**headers, "Accept-Encoding": "gzip"})
+        with urlopen(request) as answer:
+            packed = answer.read()
+        sent += len(packed)
+        raw += len(gzip.decompress(packed))
+    return [{"name": "the page's files", "kB": raw / 1e3}, {"name": "the page's files, compressed", "kB": sent / 1e3}]
 
 
 def _watched(page: Any, seconds: float) -> list[Row]:
@@ -134,7 +134,7 @@ def _state(page: Any) -> dict[str, float]:
     master = ServerProxy(os.environ["ROS_MASTER_URI"])
     pids = {name: _pid(master, node_name) for name, node_name in NODES.items()}
     used = {name: _processor([pid]) for name, pid in pids.items()}
-    seen = _scene(page).evaluate("window.seen")
+    seen = page.evaluate("window.seen")
     return {"at": time.monotonic(), **seen, **used, "browser": _processor(_named("chromium"))}
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import pybullet
 import trimesh
 
+from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Renderer
 from drone_sim.shapes.box import Box
@@ -29,6 +30,8 @@ Row = dict[str, Any]
 Drawn = tuple[list[Visual], np.ndarray]  # and their poses, world from visual (N, 4, 4)
 
 CAMERA = Intrinsics(640, 480, np.radians(60.0), 0.02, 100.0)
+LENS = Distorted(640, 480, np.radians(60.0), 0.02, 100.0, "plumb_bob", (-0.28, 0.07))
+FISHEYE = Distorted(640, 480, np.radians(170.0), 0.02, 100.0, "equidistant")
 AHEAD = np.array([[0.0, 0.0, 1.0, 0.2], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.8], [0.0, 0.0, 0.0, 1.0]])
 DOWNWARD = np.array(  # 1 m above the floor, 30 degrees down: floor to the last pixel, and the quadrotor's shadow
     [[0.0, -0.5, np.sqrt(0.75), -4.5], [-1.0, 0.0, 0.0, 0.0], [0.0, -np.sqrt(0.75), -0.5, 1.0], [0.0, 0.0, 0.0, 1.0]]
@@ -140,6 +143,9 @@ def compare(folder: Path, seconds: float = 2.0) -> list[Row]:
         ours("drone_sim", scene, seconds),
         ours("drone_sim, 4 samples", scene, seconds, samples=4),
         ours("drone_sim, nothing but floor", build(folder, things=0), seconds, view=DOWNWARD),
+        ours("drone_sim, through a lens (plumb_bob)", scene, seconds, camera=LENS),
+        ours("drone_sim, through a fisheye of 170 degrees", scene, seconds, camera=FISHEYE),
+        with_truth("drone_sim, with depth and instances", scene, seconds),
     ]
     bare = {"shadow": 0, "flags": pybullet.ER_NO_SEGMENTATION_MASK}
     for name, plugin in (("TinyRenderer", False), ("EGL plugin", True)):
@@ -180,6 +186,23 @@ def ours(
         out = np.empty((camera.height, camera.width, 3), np.uint8)
         draw = lambda: renderer.render(camera, view, poses, out)  # noqa: E731 - it is only timed
         return measure(name, draw, seconds, renderer=renderer.description, **facts)
+    finally:
+        renderer.close()
+
+
+def with_truth(name: str, scene: Drawn, seconds: float) -> Row:
+    """Our renderer, with two of its other outputs beside the picture."""
+    renderer = Renderer()
+    try:
+        visuals, poses = scene
+        renderer.set_visuals(visuals)
+        numbers = np.arange(1, len(visuals) + 1)
+
+        def draw() -> None:
+            renderer.render(CAMERA, AHEAD, poses)
+            renderer.render_outputs(("depth", "instance"), CAMERA, AHEAD, poses, instances=numbers)
+
+        return measure(name, draw, seconds)
     finally:
         renderer.close()
 

@@ -3,7 +3,6 @@
 The simulation goes slower than real time, so that a browser without a GPU draws every step of it. Three minutes.
 """
 
-import math
 import shutil
 import sys
 import time
@@ -17,7 +16,7 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import Error, sync_playwright
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test" / "web"))
-from cockpit_page import ready, wait_for
+from cockpit_page import PROJECT, STARTED, TIP, ready, wait_for
 from launched import launched
 
 SIZE = {"width": 960, "height": 560}  # px of the page
@@ -29,8 +28,7 @@ PATIENCE = 60_000  # ms
 STANDS = 1500  # ms, the last picture
 QUALITY = 55  # of WebP
 SCRIPT, OLD, NEW = "tutorial/6_ros.py", "sim.getObjectPosition(self.d, -1)[2]", "1.4"  # m: climb to that
-EYE, AIM, TIP = (-1.6, 0.0, 0.7), (0.4, 0.0, 0.0), (0.0, 0.0, 0.2)  # m, from the drone: who looks, at what; its arrow
-HALF_ANGLE = math.radians(75 / 2)  # of the picture's height
+UP, ARROW = 2, (0.0, 0.0, 0.95)  # a part of the handle, and the tip of its arrow
 PULL = 0.35  # m
 POINTER = [(0, 0), (0, 17), (4, 13), (7, 20), (10, 19), (7, 12), (12, 12)]  # px
 LEFT = "document.querySelector('.cm-scroller').scrollLeft = 0"  # a long line moves it
@@ -46,6 +44,7 @@ def main(path: str) -> None:
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"))
         page = browser.new_page(viewport=SIZE)
         page.set_default_timeout(PATIENCE)
+        page.add_init_script(STARTED)
         page.goto(cockpit.address)
         ready(page)
         film = Film(page)
@@ -61,14 +60,15 @@ class Film:
     def __init__(self, page):
         """Film from the next picture on."""
         self.page, self.pictures = page, []
-        self.scene = page.frame_locator("#scene")
         self.at = np.array([SIZE["width"] * 0.3, SIZE["height"] * 0.6])
-        self.steps = 0
+        self.steps, self.place = 0, (0.0, 0.0, 0.0)
         rospy.init_node("film", anonymous=True, disable_signals=True)
         rospy.Subscriber("/drone/odom", Odometry, self._on_step, queue_size=1)
 
-    def _on_step(self, _message):
+    def _on_step(self, message):
         self.steps += 1
+        at = message.pose.pose.position
+        self.place = at.x, at.y, at.z
 
     def look(self):
         """Return what the page looks like now."""
@@ -125,8 +125,6 @@ def open_script(film):
     page.wait_for_timeout(2000)
     if page.locator("#lesson-body").is_visible():
         page.locator("#fold").click()
-    for note in film.scene.locator("[class*=Notification-closeButton]").all():
-        note.click()
     while not film.steps:
         page.wait_for_timeout(100)
 
@@ -168,32 +166,27 @@ def widen(film):
 
 
 def drag(film):
-    """Pull the drone up by the arrow of its handle."""
-    film.move(seen(film, TIP), 12, fly=True)
-    film.page.mouse.move(*(film.at + 1))  # the arrow takes notice
+    """Pull the drone up by the arrow of its handle, which is there while the pointer is on the drone."""
+    film.move(seen(film, film.place), 12, fly=True)
     film.take(2, fly=True)
+    tip = np.array(film.page.evaluate(TIP, [UP, ARROW]))
+    film.move(seen(film, tip), 8, fly=True)
     film.page.mouse.down()
-    film.move(seen(film, np.add(TIP, (0, 0, PULL))), 16, fly=True)
+    film.move(seen(film, np.add(tip, (0, 0, PULL))), 16, fly=True)
     film.page.mouse.up()
     film.take(12, fly=True)
 
 
 def seen(film, point):
-    """Return where a point (m, from the drone) is in the page, for who looks from behind."""
-    box = film.scene.locator("canvas").first.bounding_box()
-    ahead = np.subtract(AIM, EYE) / np.linalg.norm(np.subtract(AIM, EYE))
-    right = np.cross(ahead, (0, 0, 1)) / np.linalg.norm(np.cross(ahead, (0, 0, 1)))
-    ray = np.subtract(point, EYE)
-    place = np.array((ray @ right, ray @ np.cross(ahead, right))) / (ray @ ahead)
-    middle = np.array((box["x"] + box["width"] / 2, box["y"] + box["height"] / 2))
-    return middle + place * box["height"] / 2 / math.tan(HALF_ANGLE)
+    """Return where a point of the world is in the page."""
+    return np.array(film.page.evaluate(PROJECT, list(map(float, point))))
 
 
 def switch_camera(film):
     """Look through the front camera."""
     try:
-        film.click(film.scene.get_by_role("tab", name="Cameras"))
-        film.click(film.scene.get_by_label("drone/front"))
+        film.click(film.page.locator("#rail").get_by_role("button", name="Cameras"))
+        film.click(film.page.get_by_label("front", exact=True))
     except Error as error:
         print(f"the camera is not switched on: {str(error).splitlines()[0]}")
     film.take(6, fly=True)

@@ -10,20 +10,11 @@ import inspect
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-from drone_sim.mechanics.clock import Clock
-from drone_sim.mechanics.object_tree import ObjectTree
-from drone_sim.mechanics.velocity_meter import VelocityMeter
 from drone_sim.scripting.api import ignored, unknown
-from drone_sim.scripting.api.calls import Api, Declaration, contents, declaration_of, flat_name
-from drone_sim.scripting.api.drawings import Drawings
-from drone_sim.scripting.api.host import ScriptContext, Surroundings
-from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
-from drone_sim.scripting.api.registry import Scripts
-from drone_sim.scripting.api.windows import Windows
+from drone_sim.scripting.api.calls import Declaration, contents, flat_name
+from drone_sim.scripting.api.listing import apis, declared, first_paragraph, is_ignored
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "api.md"
@@ -49,44 +40,6 @@ _HEAD = "| 3.x | 4.0 to 4.2 | 4.3 and later | what it does |\n|---|---|---|---|\
 _IGNORED_HEAD = "| 3.x | 4.0 to 4.2 | 4.3 and later | returns |\n|---|---|---|---|\n"
 
 
-def apis() -> dict[str, Api]:
-    """Return every module of the script API, of a drone that is not there."""
-    scripts = Scripts()
-    scripts.add("Drone", {})
-    clock, objects = Clock(0.05), ObjectTree()
-    host: Any = SimpleNamespace(
-        context=ScriptContext(
-            clock=clock,
-            gravity=-9.81,
-            drawings=Drawings(shown=False),
-            windows=Windows(),
-            objects=objects,
-            velocities=VelocityMeter(objects, clock),
-            scripts=scripts,
-        ),
-        sensors={},
-        own_script="Drone",
-    )
-    ros = make_sim_ros(MessageBus("drone"), host.context.clock)
-    vision = make_sim_vision(host, Surroundings())
-    return {"sim": make_sim(host, Surroundings()), "simROS": ros, "simVision": vision, **make_plugins(host)}
-
-
-def declared(api: Api) -> Iterator[tuple[Declaration, Any]]:
-    """Yield each function of a module once, with its declaration."""
-    seen: set[int] = set()
-    for function in contents(api)[1].values():
-        declaration = declaration_of(function)
-        if declaration is not None and id(declaration) not in seen:
-            seen.add(id(declaration))
-            yield declaration, function
-
-
-def is_ignored(function: Any) -> bool:
-    """Tell whether a function of the API does nothing."""
-    return bool(function.__module__ == ignored.__name__)
-
-
 def text() -> str:
     """Return the page."""
     return "\n".join([_INTRODUCTION, *_implemented(), *_ignored(), *_absent()])
@@ -98,7 +51,7 @@ def _implemented() -> Iterator[str]:
         sections: dict[str, list[str]] = {}
         for declaration, function in declared(api):
             if not is_ignored(function):
-                what = _first_sentences(inspect.getdoc(function) or "")
+                what = first_paragraph(inspect.getdoc(function) or "").replace("|", "\\|")
                 sections.setdefault(_section(function), []).append(_row(declaration, what))
         for title, rows in sections.items():
             yield f"## {module}: {title}\n\n{_HEAD}{''.join(sorted(rows, key=str.lower))}"
@@ -109,11 +62,6 @@ def _section(function: Any) -> str:
     of = getattr(sys.modules[function.__module__], function.__qualname__.partition(".")[0])
     title = (inspect.getdoc(of) or "").split("\n")[0].rstrip(".")
     return title[:1].lower() + title[1:]
-
-
-def _first_sentences(doc: str) -> str:
-    """Return the first paragraph of a docstring, on one line."""
-    return " ".join(doc.split("\n\n")[0].split()).replace("|", "\\|")
 
 
 def _row(declaration: Declaration, what: str) -> str:

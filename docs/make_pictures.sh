@@ -46,8 +46,8 @@ report() {
 # The textures of tasks/, and a picture of each task in its folder.
 tasks() { "$python" docs/make_textures.py && "$python" docs/take_task_pictures.py; }
 
-# The cockpit of docs/cockpit.md; needs what ./dev.sh test-web installs.
-cockpit() { "$python" docs/take_cockpit_picture.py "$pictures/cockpit.png"; }
+# The cockpit of docs/cockpit.md and README.md; needs what ./dev.sh test-web installs.
+cockpit() { "$python" docs/take_cockpit_pictures.py "$pictures"; }
 
 # The same in motion, for README.md; three minutes, on a machine that does nothing else.
 cockpit-film() { "$python" docs/film_cockpit.py "$pictures/cockpit.webp"; }

@@ -1,6 +1,8 @@
 """Stage 1 of docs/tutorial.md: constant thrust, no control yet; the track frame follows the drone."""
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
+PARAMETERS = {
+    "thrust_gravity": 5.33,  # m/s, compensation for gravity
+}
 
 
 def sysCall_init():
@@ -10,9 +12,15 @@ def sysCall_init():
     sim.setObjectParent(self.trackBase, -1, True)  # from here on it moves only when this script moves it
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
 
-    self.thrust_gravity = 5.33  # m/s, compensation for gravity
-    self.thrust = self.thrust_gravity
+    for name, value in PARAMETERS.items():
+        sim.setScriptSimulationParameter(sim.handle_self, name, value)
+    self.thrust = gain("thrust_gravity")
     self.pitch_corr = self.yaw_corr = self.roll_corr = 0
+
+
+def gain(name):
+    """Return one of PARAMETERS as it is now: it may be tuned while the drone flies."""
+    return sim.getScriptSimulationParameter(sim.handle_self, name)
 
 
 def sysCall_actuation():
@@ -27,8 +35,10 @@ def sysCall_actuation():
 
 
 def sysCall_sensing():
-    """Keep the track frame on the drone, level, turned by its yaw."""
+    """Keep the track frame on the drone, level, turned by its yaw; set the thrust for the next actuation."""
     pos = sim.getObjectPosition(self.d, -1)
     ori = sim.getObjectOrientation(self.d, -1)
     sim.setObjectPosition(self.trackBase, -1, pos)
     sim.setObjectOrientation(self.trackBase, -1, [0, 0, ori[2]])
+
+    self.thrust = gain("thrust_gravity")

@@ -1,6 +1,11 @@
 """Stage 2 of docs/tutorial.md: the thrust holds an elevation, or follows a vertical speed."""
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
+PARAMETERS = {
+    "thrust_gravity": 5.33,  # m/s, compensation for gravity
+    "Dthrust": 1,  # (m/s) per (m/s)
+    "Kzref": 5,  # (m/s) per m
+    "Dzref": 3,  # (m/s) per (m/s)
+}
 
 
 def sysCall_init():
@@ -10,14 +15,16 @@ def sysCall_init():
     sim.setObjectParent(self.trackBase, -1, True)  # from here on it moves only when this script moves it
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
 
-    self.thrust_gravity = 5.33  # m/s, compensation for gravity
-    self.thrust = self.thrust_gravity
+    for name, value in PARAMETERS.items():
+        sim.setScriptSimulationParameter(sim.handle_self, name, value)
+    self.thrust = gain("thrust_gravity")
     self.pitch_corr = self.yaw_corr = self.roll_corr = 0
-
-    self.Dthrust = 1  # (m/s) per (m/s)
-    self.Kzref = 5  # (m/s) per m
-    self.Dzref = 3  # (m/s) per (m/s)
     self.zref = sim.getObjectPosition(self.d, -1)[2]  # m, used if the z-speed command is null
+
+
+def gain(name):
+    """Return one of PARAMETERS as it is now: it may be tuned while the drone flies."""
+    return sim.getScriptSimulationParameter(sim.handle_self, name)
 
 
 def flight_plan(t):
@@ -48,7 +55,7 @@ def sysCall_sensing():
     d_global_pos, _ = sim.getObjectVelocity(self.d)  # world frame: linear velocity
 
     if twist[2] == 0:
-        self.thrust = self.thrust_gravity + self.Kzref * (self.zref - pos[2]) - self.Dzref * d_global_pos[2]
+        self.thrust = gain("thrust_gravity") + gain("Kzref") * (self.zref - pos[2]) - gain("Dzref") * d_global_pos[2]
     else:
-        self.thrust = self.thrust_gravity + self.Dthrust * (twist[2] - d_global_pos[2])
+        self.thrust = gain("thrust_gravity") + gain("Dthrust") * (twist[2] - d_global_pos[2])
         self.zref = pos[2]  # to be held when the z-speed command is null again

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from drone_sim.config.types import DatumParameters
 from drone_sim.forces.weather import Weather
 from drone_sim.mechanics.frames import Vector
+from drone_sim.scripting import load
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.host import ScriptContext
 from drone_sim.sensors.camera import TurningBlades, Vision
@@ -53,6 +54,7 @@ class SimulationContext(ScriptContext):
     magnetic_field: Vector
     script_time_limit: float
     backend: Backend | None = None
+    load_script: load.Loader = load.load
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
     link_names: dict[tuple[int, int], str] = field(default_factory=dict)
     carried: CarriedBodies = field(default_factory=CarriedBodies)
@@ -68,6 +70,10 @@ class SimulationContext(ScriptContext):
         """Return what scripts call a body's link (-1: its root), '' for what they do not know."""
         name = self.link_names.get((body, link))
         return self.names.get(body, NOBODY)[1] if name is None else name
+
+    def person_name_of(self, place: tuple[int, int]) -> str:
+        """Return what a person calls a body's link, '' for what has no name."""
+        return self.link_names.get(place) or self.names.get(place[0], NOBODY)[0]
 
     def body_of(self, name: str) -> int:
         """Return the body that scripts call so. Raises LookupError."""

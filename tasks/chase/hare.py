@@ -5,8 +5,6 @@ import math
 import tutorial
 from tutorial import on_twist, sysCall_actuation, sysCall_cleanup, sysCall_init  # noqa: F401 -- called as they are
 
-# ruff: noqa: F821 -- `sim` and `self` are there when a child script runs
-
 REST, SPEED, RADIUS = 2.0, 0.5, 3.0  # s, m/s, m
 SWING, PERIOD = 0.1, 15.0  # m/s, s: up and down
 

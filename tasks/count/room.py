@@ -3,8 +3,6 @@
 import math
 import random
 
-# ruff: noqa: F821 -- `sim` and `self` are there when a child script runs
-
 PLACES = [(2 * math.pi * number / 11, 2.3 + 0.4 * (number % 2)) for number in range(11)]  # rad, m from the middle
 RADIUS, AWAY = 0.15, (40, 40, -5)  # m: of a ball; where those are that are not there
 RED, OTHERS = [f"Red{number}" for number in range(1, 8)], ["Blue", "Green", "Yellow", "Violet"]

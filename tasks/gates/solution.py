@@ -5,8 +5,6 @@ import math
 import tutorial
 from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 GATES = ("Red", "Orange", "Yellow", "Green", "Blue", "Violet")
 BEFORE, BEHIND = -1.0, 0.6  # m from the gate's middle, along the way through it
 NEAR = 0.25  # m: so near, a place is reached

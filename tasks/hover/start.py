@@ -5,8 +5,6 @@ import math
 import tutorial
 from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 
 def sysCall_init():
     """Begin as the tutorial's script does; remember the place."""

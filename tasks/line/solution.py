@@ -7,8 +7,6 @@ import numpy as np
 import tutorial
 from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 EVERY = 2  # steps from one picture to the next
 SPEED = 0.5  # m/s, along the line
 DARK = 100  # of 255: the line's pixels are darker

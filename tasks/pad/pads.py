@@ -3,8 +3,6 @@
 import math
 import random
 
-# ruff: noqa: F821 -- `sim` is there when a child script runs
-
 FAR, APART = (0.7, 1.0), (1.2, math.pi)  # m from the origin; rad between the two
 
 

@@ -7,8 +7,6 @@ import numpy as np
 import tutorial
 from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 TAG = 7
 EVERY = 4  # steps from one picture to the next
 FOV = math.radians(60)

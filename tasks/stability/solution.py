@@ -1,7 +1,5 @@
 """The tutorial's stage 6 with a guard: the collective thrust stays positive, whatever the height."""
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 
 def sysCall_init():
     """Find the objects, set the variables for control, subscribe to the commands."""

@@ -2,8 +2,6 @@
 
 from tutorial import sysCall_actuation, sysCall_cleanup, sysCall_init, sysCall_sensing  # noqa: F401 -- as they are
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 
 def on_twist(msg):
     """Keep the command that has come: `linear` in m/s, `angular` in rad/s, ahead, to the left and up."""

@@ -34,8 +34,8 @@ NOT_RUN = {  # with the reason
     "catkin_make": WORKSPACE,
     "./dev.sh deb": "takes minutes: packaging is tried in bare chroots",
     "sudo apt install ./build/deb/ros-drone-sim_*.deb": INSTALLS,
-    "pip install coppeliasim-zmqremoteapi-client": INSTALLS,
-    "python3": "test/unit/test_docs_remote.py types what comes after it",
+    "client/bin/pip install coppeliasim-zmqremoteapi-client": INSTALLS,
+    "client/bin/python": "test/unit/test_docs_remote.py types what comes after it",
     "git clone https://github.com/OBulun/Coppelia-Quad": RECORDED,
     "./dev.sh recordings Coppelia-Quad": RECORDED,
     "ssh -L 8080:localhost:8080 you@the-machine": ANOTHER,
@@ -50,7 +50,6 @@ NOT_RUN = {  # with the reason
 }
 SLOW = {  # run with --all only
     "rosrun drone_sim doctor",
-    "rosrun drone_sim sweep steps --param Kzref=1:10:10 --param Dzref=1:5:5 --plot map.png",
     "rosrun drone_sim sweep steps.yaml --param Kzref=1:10:10 --param Dyaw=0.1,0.5,1 --smallest rise_time"
     " --plot heat.png --csv all.csv",
     "rosrun drone_sim sweep steps.yaml --param Kzref=1:10:2 --param Dyaw=0.1:2:2 --smallest rise_time --optimize",

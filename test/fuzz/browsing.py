@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import logging
 import os
@@ -14,40 +12,34 @@ from pathlib import Path
 from typing import Any
 
 import commands  # noqa: F401 - rospy's publishers and subscribers do nothing then
-import viser
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "unit"))
 from cockpit_asked import Asked
 
+from drone_sim.ros.cockpit.editor.scene_files import SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
-from drone_sim.ros.cockpit.panel.cameras import ScriptWindows
-from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
-from drone_sim.ros.cockpit.server.page_server import page_files
+from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows
+from drone_sim.ros.cockpit.panel.panel import Panel
+from drone_sim.ros.cockpit.scene.meshes import MeshStore
+from drone_sim.ros.cockpit.scene.scene_state import SceneState
+from drone_sim.ros.cockpit.scene.scene_view import SceneView
+from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL
+from drone_sim.ros.cockpit.server.page_server import PageServer
 from drone_sim.ros.cockpit.server.page_socket import PageSocket
-from drone_sim.ros.cockpit.teleop import HeldCommands
+from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
+from drone_sim.ros.cockpit.topics import FoundTopics, ImageTopic
 
-_TOKEN = "fuzz-token"
 _PATIENCE = 10.0  # s
 _LEFT_OUT = "grade"  # which is a process of its own
 _LAST = 424242  # the number of a question that is asked after all others
 
-Data = tuple[list[bytes], list[bytes], list[bytes]]
+Data = tuple[list[bytes], list[bytes]]
 
 
 class Wrong(Exception):
     """A browser got what it must not get, or nothing."""
-
-
-class _Cameras:
-    shown: tuple[str, ...] = ()
-
-    def follow_views(self, _topics: Any) -> None:
-        pass
-
-    def turn(self, _name: str, _on: bool) -> None:
-        pass
 
 
 class Cockpit:
@@ -56,14 +48,13 @@ class Cockpit:
     def __init__(self) -> None:
         """Serve."""
         self._answers: dict[str, Any] = {}
-        self.socket = PageSocket(HeldCommands(lambda _: None), self._answers)
-        with (
-            AccessControl(_TOKEN, page_files().get, self.socket.serve).before_viser(),
-            contextlib.redirect_stdout(io.StringIO()),
-        ):
-            self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        self._field = self._server.gui.add_slider("Speed", min=0.0, max=1.0, step=0.1, initial_value=0.5)
-        self._port = self._server.get_port()
+        view = SceneView(SceneState(), MeshStore(), "/drone")
+        takes = {"drag": view.drag, "push": lambda _browser, message: view.push(message)}
+        self.socket = PageSocket(HeldCommands(lambda _: None), self._answers, takes)
+        self._server = PageServer("127.0.0.1", 0)
+        self._server.begin(self.socket.serve, lambda _path: None)
+        self._port = self._server.port
+        self._token = self._server.address.partition("?token=")[2]
 
     def hear(self, data: Data, folder: Path) -> Iterator[str]:
         """Let browsers say all that; yield each line that they, and the user, are told. Raises Wrong."""
@@ -73,10 +64,9 @@ class Cockpit:
         log.emit = lambda record: lines.append(record.getMessage())  # type: ignore[method-assign]
         logging.getLogger("rosout").addHandler(log)
         try:
-            requests, messages, told = data
+            requests, messages = data
             for one in requests:
                 self._request(one)
-            self._tell_viser(told)
             lines += self._ask(messages)
         finally:
             logging.getLogger("rosout").removeHandler(log)
@@ -91,12 +81,18 @@ class Cockpit:
         os.mkfifo(own / "fifo.py")
         (own / "d.py").mkdir()
         self._outside = folder / "outside.py"
-        windows = ScriptWindows("/drone_sim", _Cameras(), self.socket)  # type: ignore[arg-type]
+        asked = Asked(ScriptStore(own))
+        panel = Panel(asked.node, CommandPublisher(), SceneList(own), self.socket.tell)  # type: ignore[arg-type]
+        panel.offer(FoundTopics("/drone", ("drone", "wing"), (), {"/drone/range": "sensor_msgs/Range"}), "", "pilot")
+        panel.follow("drone")
+        cameras = CameraSwitches(panel.board, self.socket)
+        cameras.offer((ImageTopic("/drone/front"),), ("drone", "wing"))
+        windows = ScriptWindows("/drone_sim", cameras, self.socket)
         windows.listen(True)
-        self._answers.update({**Asked(ScriptStore(own)).answers, **windows.answers})
+        self._answers.update({**asked.answers, **panel.answers, **windows.answers})
 
     def _filled(self, content: bytes) -> bytes:
-        known = {b"PORT": str(self._port), b"TOKEN": _TOKEN, b"FIELD": self._field._impl.uuid}
+        known = {b"PORT": str(self._port), b"TOKEN": self._token}
         for word, value in known.items():
             content = content.replace(word, value.encode())
         return content
@@ -112,19 +108,14 @@ class Cockpit:
         if b" 500 " in said[:20] or b"Traceback" in said:
             raise Wrong(f"a request gets {said[:200]!r}")
 
-    def _open(self, protocol: str) -> Any:
-        cookie = {"Cookie": f"drone_sim_{self._port}={_TOKEN}"}
+    def _open(self) -> Any:
+        cookie = {"Cookie": f"drone_sim_{self._port}={self._token}"}
         address = f"ws://127.0.0.1:{self._port}/"
-        return connect(address, subprotocols=[protocol], additional_headers=cookie)  # type: ignore[list-item]
-
-    def _tell_viser(self, messages: list[bytes]) -> None:
-        for one in messages:
-            with self._open(f"viser-v{viser.__version__}") as scene, contextlib.suppress(ConnectionClosed):
-                scene.send(self._filled(one))
+        return connect(address, subprotocols=[SUBPROTOCOL], additional_headers=cookie)  # type: ignore[list-item]
 
     def _ask(self, messages: list[bytes]) -> Iterator[str]:
         try:
-            with self._open(SUBPROTOCOL) as page:
+            with self._open() as page:
                 for one in messages:
                     page.send(one.decode("utf-8", "replace"))
                 page.send(json.dumps({"id": _LAST, "ask": "look"}))

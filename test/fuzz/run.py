@@ -32,6 +32,7 @@ KINDS = (
     "messages",
     "requests",
     "connections",
+    "legacy_commands",
     "bags",
     "browsers",
     "parameters",

@@ -26,6 +26,7 @@ from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.mechanics.urdf import UrdfError
 from drone_sim.offline import fly
 from drone_sim.offline.timeline import TimelineError
+from drone_sim.remote.legacy.server import LegacyServer
 from drone_sim.remote.server import RemoteApiServer
 from drone_sim.render.renderer import Renderer
 from drone_sim.run import parameters
@@ -332,6 +333,58 @@ def _send_all(server: RemoteApiServer, pieces: list[bytes]) -> None:
     raise Fault("a peer that has said all is not let go")
 
 
+# ---- V-REP's legacy remote API
+
+
+def _legacy_commands(case: Case, folder: Path) -> str:
+    """Let clients send what they like while the simulation steps; when they have gone it does, and one is heard."""
+    simulation = Simulation(parameters.load(_with_small_pictures({"script_time_limit": _SCRIPT_LIMIT})), started=False)
+    player = Player(simulation, simulation.step, lambda _state: None, simulated_time=False)
+    server, log = LegacyServer(player, "127.0.0.1", 0), _Log()
+    logging.getLogger("drone_sim.remote").addHandler(log)
+    try:
+        for pieces in case.data:
+            _talk(server, player, pieces)
+        while server._guests:
+            server.wait(0.001)
+        if server.holds:
+            raise Fault("nobody is there, and the simulation waits")
+        _hear_one(server)
+    finally:
+        logging.getLogger("drone_sim.remote").removeHandler(log)
+        server.close()
+        simulation.close()
+    return next((one_line(line, folder) for line in log.lines), "")
+
+
+def _talk(server: LegacyServer, player: Player, pieces: list[bytes]) -> None:
+    """Send, read, and step; whatever comes of it."""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=5) as peer:
+        peer.setblocking(False)
+        for piece in pieces:
+            with contextlib.suppress(OSError):  # it was let go before it had said all
+                peer.send(piece)
+            for _ in range(5):
+                server.wait(0.001)
+                if player.playing and not server.holds:
+                    player.step()
+            with contextlib.suppress(OSError):
+                peer.recv(65536)
+
+
+def _hear_one(server: LegacyServer) -> None:
+    """Raise Fault where a client that says nothing but its header is not answered."""
+    with socket.create_connection(("127.0.0.1", server.port), timeout=5) as peer:
+        peer.setblocking(False)
+        peer.send(b"\1\0" + b"\x12\0" + b"\0\0" + bytes(18))
+        for _ in range(1000):
+            server.wait(0.005)
+            with contextlib.suppress(BlockingIOError):
+                if len(peer.recv(65536)) == 24:
+                    return
+    raise Fault("a client has no answer any more")
+
+
 # ---- browsers
 
 
@@ -370,6 +423,7 @@ _TRIALS: dict[str, Callable[[Case, Path], Any]] = {
     "messages": _messages,
     "requests": _requests,
     "connections": _connections,
+    "legacy_commands": _legacy_commands,
     "bags": _bags,
     "browsers": _browsers,
 }

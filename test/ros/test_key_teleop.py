@@ -131,7 +131,7 @@ class KeyTeleop(unittest.TestCase):
         time.sleep(0.5)  # the input has been flushed by now
         self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
         self.assertLess(max(m.linear.x for m in [Twist(), *self.sent.messages[before:]]), 0.35)  # but for the last ones
-        self.terminal.type(b"q")
+        self.terminal.type(b"\x1b")
         self.assert_it_says_stop()
 
     def test_keys_command_and_escape_leaves(self):
@@ -140,10 +140,11 @@ class KeyTeleop(unittest.TestCase):
         self.wait_for_command(0.1, 0.1)
         self.terminal.type(b"\x1b", b"[", b"A", delay=0.3)
         self.wait_for_command(0.2, 0.1)
-        self.terminal.type(b"\x1b[6~", b"z")
-        self.terminal.wait_for("no such key")
-        self.terminal.wait_for("command  vx +0.20  vy +0.10")
-        self.assertEqual(self.in_force.messages[-1].twist.linear.x, 0.2)
+        self.terminal.type(b"w", b"d")
+        self.wait_for_command(0.3, 0.0)
+        self.terminal.type(b"z")
+        self.terminal.wait_for("no such key: the drone is stopped", "command  vx +0.00  vy +0.00")
+        self.wait_for_command(0.0)
         self.terminal.type(b"\x1b")
         self.assert_it_says_stop()
 
@@ -159,9 +160,9 @@ class KeyTeleop(unittest.TestCase):
         self.terminal.wait_for("command  vx +0.00  vy +0.50")
         self.terminal.type(UP)
         self.wait_for_command(0.1, 0.5)
-        self.terminal.type(b"s")
+        self.terminal.type(b"\r")
         self.terminal.wait_for("state    stopped", "command  vx +0.00  vy +0.00", "stop: stopped")
-        self.terminal.type(b"s")
+        self.terminal.type(b"\r")
         self.terminal.wait_for("state    flying", "start: started")
         self.terminal.type(b"p")
         self.terminal.wait_for("state    paused", "pause: paused at t")

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""The node, driven by CoppeliaSim's own client of the ZeroMQ remote API, with services and topics beside it."""
+"""The node, driven by clients of both remote APIs, with services and topics beside them."""
 
+import struct
 import sys
 import threading
+import time
 import unittest
+from pathlib import Path
 
 import rospy
 import rostest
@@ -14,6 +17,13 @@ from std_srvs.srv import Trigger
 
 from drone_sim.ros.node.node import Node
 from drone_sim.run import parameters
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "unit"))
+from legacy_client import Client as LegacyClient
+from legacy_client import command, floats, ints, text
+
+SYNCHRONOUS, TRIGGER, POSITION, SET_POSITION = 0x0001, 0x0003, 0x200E, 0x101B
+TOOLBAR_START = 0x1007, ints(0)
 
 
 class RemoteApi(unittest.TestCase):
@@ -36,9 +46,10 @@ class RemoteApi(unittest.TestCase):
     @classmethod
     def run_node(cls):
         """Make and run it in one thread, which the simulation belongs to."""
-        given = {"script": "target", "cameras": {}, "remote_api": {"serve": True, "port": 0}, "real_time_factor": 0}
+        served = {"serve": True, "port": 0, "legacy_port": 0}
+        given = {"script": "target", "cameras": {}, "remote_api": served, "real_time_factor": 0}
         node = Node(parameters.load(given))
-        cls.port = node._outside.port
+        cls.port, cls.legacy_port = node._outside.zeromq.port, node._outside.legacy.port
         cls.ready.set()
         node.run()
         node.close()
@@ -87,6 +98,26 @@ class RemoteApi(unittest.TestCase):
             pass
         watcher.stopSimulation()
         self.state.wait_for(lambda message: message.data == "stopped", after=0)
+
+    def test_d_a_client_of_the_legacy_api_triggers_steps(self):
+        client = LegacyClient(self.legacy_port, time.sleep)
+        for code, key in ((SYNCHRONOUS, b""), TOOLBAR_START):
+            client.call(code, key)
+        target = ints(client.handle("Quadricopter_target"))
+        client.call(SET_POSITION, target, ints(-1) + floats(0.3, 0.0, 1.0))
+        for _ in range(60):
+            client.call(TRIGGER)
+        reply = client.ask(command(POSITION, ints(client.handle("Quadricopter_base"), -1)))
+        self.assertEqual(reply.times, [3000])
+        (position,) = reply.answers.values()
+        self.assertAlmostEqual(struct.unpack("<3f", position)[2], 1.0, delta=0.1)
+        self.services["stop"]()  # answered although the client holds the simulation
+        client.vanish()
+        self.services["start"]()
+        watcher = LegacyClient(self.legacy_port, time.sleep)
+        while watcher.ask(command(0x3001, text("Floor"))).times[0] < 1000:
+            pass
+        self.services["stop"]()
 
 
 if __name__ == "__main__":

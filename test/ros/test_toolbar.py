@@ -18,7 +18,7 @@ from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
 from listening import Listener, connected
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import Float64, String
+from std_msgs.msg import Bool, Float64, String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerUpdate, Marker, MarkerArray
 
@@ -50,6 +50,13 @@ def sysCall_cleanup():
 LETS_GO = """
 def sysCall_init():
     sim.setObjectParent(sim.getObjectHandle('DronePosition'), -1, True)
+"""
+LISTENS = """
+def sysCall_init():
+    simROS.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist")
+
+def on_twist(msg):
+    pass
 """
 DRAWS = """
 def sysCall_init():
@@ -154,6 +161,34 @@ class Toolbar(unittest.TestCase):
         self.call("stop")
         windows.wait_for(lambda m: not any(json.loads(m.data).values()), after=0)
         answers.unregister()
+
+    def test_variables_of_a_script_and_a_breakpoint(self):
+        variables, names = Listener("~variables", String), Listener("~names", String)
+        self.call("restart")
+
+        def steps(shown):
+            rows = [row for script in json.loads(shown)["scripts"] for row in dict(script["scopes"])["self"]]
+            return [int(value) for name, _, value, _ in rows if name == "steps"]
+
+        variables.wait_for(lambda m: any(count > 0 for count in steps(m.data)), after=0)
+        known = json.loads(names.wait_for(lambda m: '"objects"' in m.data, after=0).data)
+        self.assertTrue("Quadricopter_base" in known["objects"] and "Kzref" in known["parameters"])
+        breakpoints = rospy.Publisher("~breakpoints", String, queue_size=5, latch=True)
+        connected(breakpoints)
+        breakpoints.publish('{"script.py": [1]}')
+        self.log.wait_for(lambda m: m.msg.startswith("breakpoints: refused: "), after=0)
+        line = SCRIPT.split("\n").index("    self.steps += 1") + 1
+        breakpoints.publish(json.dumps({str(self.script): [line]}))
+        said = json.loads(variables.wait_for(lambda m: '"paused"' in m.data and '"line"' in m.data, after=0).data)
+        self.assertEqual((said["reached"]["file"], said["reached"]["line"]), (str(self.script), line))
+        at_the_line = dict(said["reached"]["scopes"])["self"]
+        self.assertEqual(int(at_the_line[0][2]) + 1, steps(json.dumps(said))[0])
+        self.call("step")
+        variables.wait_for(lambda m: json.loads(m.data)["reached"].get("time", 0) > said["reached"]["time"], after=0)
+        breakpoints.unregister()
+        variables.close()
+        names.close()
+        self.pause(False)
 
     def test_pause_and_single_steps(self):
         self.call("step", expected=False)
@@ -319,6 +354,42 @@ class Toolbar(unittest.TestCase):
             # As rviz does while the mouse moves; the server takes none in the first second of a handle.
             self.wait_until(lambda *, sent=message, name=name, where=where: self.dragged(feedback, sent, name) == where)
         self.assertEqual(self.place_of("DronePosition"), (1.0, 2.0, 3.0), "the drone does not take it along")
+
+    def test_a_drone_stands_still_while_it_is_held_and_flies_on_when_it_is_let_go(self):
+        self.call("start")
+        handles = Listener("/drone/markers/update", InteractiveMarkerUpdate)
+        handles.wait_for(lambda m: "Drone" in {one.name for one in (*m.markers, *m.poses)}, after=0)
+        feedback = connected(rospy.Publisher("/drone/markers/feedback", InteractiveMarkerFeedback, queue_size=10))
+
+        def tell(*kinds):
+            for kind in kinds:
+                message = InteractiveMarkerFeedback(client_id="rviz", marker_name="Drone", event_type=kind)
+                message.pose.position.x, message.pose.position.y, message.pose.position.z = 1.0, 0.5, 2.0
+                message.pose.orientation.w = 1.0
+                feedback.publish(message)
+            return self.simulation.drone.body.state
+
+        held = InteractiveMarkerFeedback.MOUSE_DOWN, InteractiveMarkerFeedback.POSE_UPDATE
+        self.wait_until(lambda: tell(*held).position == (1.0, 0.5, 2.0))
+        flown = self.simulation.steps + 20
+        self.wait_until(lambda: self.simulation.steps > flown or tell(InteractiveMarkerFeedback.KEEP_ALIVE) is None)
+        state = self.simulation.drone.body.state
+        self.assertEqual((state.position, state.linear_velocity), ((1.0, 0.5, 2.0), (0.0, 0.0, 0.0)))
+        self.wait_until(lambda: tell(InteractiveMarkerFeedback.MOUSE_UP).position[2] < 0.9)
+
+    def test_what_the_drone_does_is_told_and_whether_it_listens(self):
+        state, hears = Listener("/drone/state", String), Listener("/drone/hears_commands", Bool)
+        self.script.write_text(LISTENS)
+        self.call("restart")
+        hears.wait_for(lambda m: m.data, after=0)
+        self.script.write_text(LETS_GO)
+        self.call("restart")
+        hears.wait_for(lambda m: not m.data, after=0)
+        state.wait_for(lambda m: m.data == "flying", after=0)
+        pose = PoseStamped()
+        pose.pose.position.z, pose.pose.orientation.w = 0.1, 1.0
+        connected(rospy.Publisher("/drone/set_pose", PoseStamped, queue_size=10)).publish(pose)
+        state.wait_for(lambda m: m.data == "on the ground", after=0)
 
     def test_an_object_is_dragged_and_falls_when_it_is_let_go(self):
         ball = "{name: Ball, shape: sphere, size: [0.1], position: [1, 0, 0.1], mass: 1}"

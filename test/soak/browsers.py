@@ -18,10 +18,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import msgspec
-import viser
-import zstandard
-from viser import _messages as said
 from websockets.asyncio.client import ClientConnection, connect
 
 AT_ONCE = 4
@@ -32,8 +28,7 @@ PATIENCE = 30.0  # s until the scene is there
 PING = 100.0  # s; who is deaf does not hear the answers to its own, either
 MINE = "mine/soak.py"
 TEXTS = ("# a line\n", "1 / 0\n", "")
-SCENES = ("", *(f"package://drone_sim/config/scenes/{name}.yaml" for name in ("gates", "room")))
-BUTTONS = ("start", "stop", "restart", "pause", "resume", "step", "snapshot", "restore")
+REACH = 0.3  # m, how far a drone is dragged
 
 
 class Door:
@@ -58,11 +53,11 @@ class Door:
         finally:
             connection.close()
 
-    def open(self, protocol: str) -> Any:
-        """Open a socket: `drone_sim`, or viser's."""
+    def open(self) -> Any:
+        """Open a socket."""
         return connect(
             f"ws://{self.host}:{self.port}/",
-            subprotocols=[protocol],  # type: ignore[list-item]
+            subprotocols=["drone_sim"],  # type: ignore[list-item]
             additional_headers={"Cookie": self.cookie},
             compression=None,
             max_size=None,
@@ -71,46 +66,40 @@ class Door:
 
 
 class Browser:
-    """One visit: both sockets, and what the panel offers, by its label."""
+    """One visit, and the handles that it has heard of: server and name."""
 
-    def __init__(self, scene: ClientConnection, wire: ClientConnection, dice: random.Random):
-        """Take open sockets."""
-        self.scene, self.wire, self.dice = scene, wire, dice
-        self.fields: dict[str, str] = {}
+    def __init__(self, wire: ClientConnection, dice: random.Random):
+        """Take an open socket."""
+        self.wire, self.dice = wire, dice
+        self.handles: list[tuple[str, str]] = []
         self._number = 0
 
     async def look(self) -> float:
-        """Say where it looks from, take the whole scene; return how long that took (s)."""
+        """Take the whole scene; return how long that took (s)."""
         began = time.monotonic()
-        eye = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": (-2.0, 0.0, 1.5), "look_at": (0.0, 0.0, 1.0)}
-        seen = {"fov": 0.9, "near": 0.01, "far": 1000.0, "image_height": 400, "image_width": 640}
-        await self.tell(said.ViewerCameraMessage(**eye, **seen, up_direction=(0.0, 0.0, 1.0)))  # type: ignore[arg-type]
         await asyncio.wait_for(self._take_all(), PATIENCE)
         return time.monotonic() - began
 
     async def _take_all(self) -> None:
-        while not self._take(await self.scene.recv()):
-            pass
+        """Take messages until a drone is there."""
+        layers: set[str] = set()
+        while "view/bodies" not in layers:
+            message = await self.wire.recv()
+            layers |= {one["layer"] for one in await self.take(message)}
 
-    def _take(self, data: Any) -> bool:
-        """Note what a message offers; return whether the scene is complete with it."""
-        size, packed = (int.from_bytes(data[at : at + 8], "little") for at in (0, 8))
-        inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
-        messages = msgspec.msgpack.decode(inner)["messages"]
-        for one in messages:
-            props = one.get("props")
-            if one["type"].startswith("Gui") and isinstance(props, dict) and "label" in props:
-                self.fields[props["label"]] = one["uuid"]
-        return any(one["type"] == "ReplayDoneMessage" for one in messages)
+    async def take(self, message: str | bytes) -> list[dict[str, Any]]:
+        """Say of a picture, or of a part of the scene, that it has been shown; return the markers that it brings."""
+        if isinstance(message, str):
+            return []
+        said = json.loads(message.partition(b"\n")[0])
+        await self.say(shown=said.get("picture", "scene"))
+        markers: list[dict[str, Any]] = said.get("markers", [])
+        self.handles += [(one["layer"], one["ns"]) for one in markers if one["kind"] == "handle"]
+        return markers
 
-    async def tell(self, message: Any) -> None:
-        """Tell viser something."""
-        await self.scene.send(msgspec.msgpack.encode(message.as_serializable_dict()))
-
-    async def set(self, label: str, value: Any) -> None:
-        """Set a field of the panel, or press a button of a group, where there is one."""
-        if label in self.fields:
-            await self.tell(said.GuiUpdateMessage(self.fields[label], {"value": value}))
+    async def say(self, **message: Any) -> None:
+        """Tell the node something."""
+        await self.wire.send(json.dumps(message))
 
     async def ask(self, ask: str, **more: Any) -> dict[str, Any]:
         """Ask the node something; return the answer."""
@@ -121,60 +110,48 @@ class Browser:
     async def _hear(self, number: int) -> dict[str, Any]:
         while True:
             message = await self.wire.recv()
-            answer = json.loads(message) if isinstance(message, str) else {}  # or a picture
+            await self.take(message)
+            answer = json.loads(message) if isinstance(message, str) else {}
             if answer.get("id") == number:
                 return dict(answer)
 
     async def stay(self, seconds: float) -> None:
         """Take what comes, without looking at it."""
         with contextlib.suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(asyncio.gather(_ignore(self.scene), _show(self.wire)), seconds)
+            await asyncio.wait_for(self._stay(), seconds)
+
+    async def _stay(self) -> None:
+        async for message in self.wire:
+            await self.take(message)
 
     def vanish(self) -> None:
         """Be gone without a word, as a browser that is killed."""
-        for one in (self.scene, self.wire):
-            one.transport.abort()
-
-
-async def _ignore(connection: ClientConnection) -> None:
-    async for _ in connection:
-        pass
-
-
-async def _show(wire: ClientConnection) -> None:
-    """Say of every picture that it has been shown, or there would be no other."""
-    async for message in wire:
-        if isinstance(message, bytes):
-            name = json.loads(message.partition(b"\n")[0])["picture"]
-            await wire.send(json.dumps({"shown": name}))
+        self.wire.transport.abort()
 
 
 async def watch(browser: Browser) -> None:
-    """Look, with a camera switched on; half of them switch it off again."""
-    await browser.set("drone/front", True)
+    """Look on."""
     await browser.stay(browser.dice.uniform(1.0, LONGEST))
-    await browser.set("drone/front", False)
 
 
 async def fly(browser: Browser) -> None:
     """Hold a key, and vanish while it is held."""
     taking = asyncio.create_task(browser.stay(LONGEST))
     for _ in range(browser.dice.randrange(10, 200)):
-        await browser.wire.send(json.dumps({"hold": {"vx": 0.3, "wz": browser.dice.choice([-1.0, 1.0])}}))
+        await browser.say(hold={"vx": 0.3, "wz": browser.dice.choice([-1.0, 1.0])})
         await asyncio.sleep(0.1)
     taking.cancel()
     browser.vanish()
 
 
-async def press(browser: Browser) -> None:
-    """Press buttons, in any order."""
-    labels = ("Simulation", "Pause", "Snapshot")
-    for _ in range(browser.dice.randrange(1, 8)):
-        await browser.set(browser.dice.choice(labels), browser.dice.choice(BUTTONS))
-        await browser.stay(browser.dice.uniform(0.0, 2.0))
-    await browser.set("Scene", browser.dice.choice(SCENES))
-    await browser.set("Simulation", "restart")
-    await browser.set("Frames", browser.dice.random() < 0.3)
+async def drag(browser: Browser) -> None:
+    """Push the drone, drag it about, and let go of it, or vanish meanwhile."""
+    await browser.say(push="drone", ray=[1.0, 0.0, 0.0], newtons=0.5)
+    for server, name in browser.handles[:1]:
+        for phase in ("start", *("move" for _ in range(20)), "end"):
+            x, y = (browser.dice.uniform(-REACH, REACH) for _ in "xy")
+            await browser.say(drag=phase, server=server, name=name, pose=[x, y, 0.8, 0.0, 0.0, 0.0, 1.0])
+            await browser.stay(0.05)
 
 
 async def write(browser: Browser) -> None:
@@ -193,23 +170,22 @@ async def write(browser: Browser) -> None:
 
 async def be_deaf(browser: Browser) -> None:
     """Take nothing of what is sent, until the node gives up."""
-    await browser.set("drone/front", True)
     await asyncio.sleep(DEAF)
     browser.vanish()
 
 
 ROLES: dict[str, Callable[[Browser], Awaitable[None]]] = {
-    one.__name__: one for one in (watch, fly, press, write, be_deaf)
+    one.__name__: one for one in (watch, fly, drag, write, be_deaf)
 }
 
 
 async def visit(door: Door, role: str, dice: random.Random) -> float:
     """Open the cockpit, and do what the role does; return how long the scene took to come (s)."""
-    for path in ("/", "/cockpit.js", "/scene/")[: dice.randrange(4)]:
+    for path in ("/", "/cockpit.js", "/cockpit.css")[: dice.randrange(4)]:
         await asyncio.to_thread(door.get, path, door.cookie)
     await asyncio.to_thread(door.get, "/?token=wrong")
-    async with door.open(f"viser-v{viser.__version__}") as scene, door.open("drone_sim") as wire:
-        browser = Browser(scene, wire, dice)
+    async with door.open() as wire:
+        browser = Browser(wire, dice)
         waited = await browser.look()
         await ROLES[role](browser)
         if dice.random() < 0.5:

@@ -16,7 +16,7 @@ from typing import Any
 from playwright.sync_api import sync_playwright
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "web"))
-from cockpit_page import wait_for
+from cockpit_page import STARTED, wait_for
 
 SIZE = {"width": 640, "height": 400}  # px
 PATIENCE = 90_000  # ms; others may use the processor
@@ -29,11 +29,12 @@ def visit(driver: Any, chromium: str, address: str, dice: random.Random) -> floa
     browser = driver.chromium.launch(executable_path=chromium, timeout=10 * PATIENCE)
     try:
         page = browser.new_context(viewport=SIZE).new_page()
+        page.add_init_script(STARTED)
         page.set_default_timeout(PATIENCE)
         began = time.monotonic()
         page.goto(address)
         wait_for(page, "document.querySelector('.cm-content')?.innerText.length > 100")
-        page.frame_locator("#scene").locator("canvas").first.wait_for()
+        page.locator("#scene canvas").wait_for()
         waited = time.monotonic() - began
         page.locator("#command").click(force=True)
         for _ in range(dice.randrange(2, 8)):

@@ -141,6 +141,10 @@ SIM: dict[str, list[Example]] = {
     "getJointForce": [Example("NAME(HINGE)", [0])],
     "getJointVelocity": [Example("NAME(HINGE)", [0])],
     "setSphericalJointMatrix": [Example(f"NAME(BALL, {TURNED})", [])],
+    "getObjectChildPose": [
+        Example("NAME(BALL)", [near(0, 0, 0, 0, 0, HALF, HALF)]),
+        Example("NAME(LINE)", [near(0, 0, 0, 0, 0, 0, 1)]),
+    ],
     "getJointMatrix": [Example("NAME(BALL)", [near(0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0)])],
     "getPathLength": [Example("NAME(LINE)", [2])],
     "getPositionOnPath": [Example("NAME(LINE, 0.25)", [near(0.5, 0, 0)])],
@@ -149,11 +153,16 @@ SIM: dict[str, list[Example]] = {
     "getPathPosition": [Example("NAME(LINE)", [1.5])],
     "getPathLengths": [Example("NAME({0,0,0, 3,4,0}, 3)", [[0, 5], 5])],
     "getPathInterpolatedConfig": [Example("NAME({0,0,0, 3,4,0}, {0,5}, 2.5)", [near(1.5, 2, 0)])],
+    "getClosestPosOnPath": [Example("NAME({0,0,0, 3,4,0}, {0,5}, {9,9,9})", [5])],
+    "resamplePath": [Example("NAME({0,0,0, 3,4,0}, {0,5}, 3)", [near(0, 0, 0, 1.5, 2, 0, 3, 4, 0)])],
     "getDataOnPath": [Example("NAME(LINE, 0.25)", [0, [0, 0, 0, 0]])],
     "getClosestPositionOnPath": [Example("NAME(LINE, {0.5,3,0})", [approx(0.25)])],
     "createPath": [
         Example("sim.getPathLength(NAME({0,0,0,0,0,0,1, 3,4,0,0,0,0,1}))", [approx(5)]),
+        Example("sim.getPathLength(NAME(-1))", [0]),
     ],
+    "insertPathCtrlPoints": [Example("NAME(sim.createPath(-1), 0, 0, 1, {1,2,3,0,0,0,1,0,15,0.5,0.5})", [1])],
+    "cutPathCtrlPoints": [Example("NAME(sim.createPath(-1), -1, 0)", [1])],
     "resetDynamicObject": [Example("NAME(BASE)", [])],
     "isDynamicallyEnabled": [Example("NAME(BASE)", [True]), Example("NAME(FLOOR)", [False])],
     "getShapeMass": [Example("NAME(DRONE)", [approx(0.12)]), Example("NAME(FLOOR)", [0])],
@@ -251,6 +260,7 @@ SIM: dict[str, list[Example]] = {
     "getScriptName": [Example("NAME(sim.handle_self)", ["Drone"])],
     "getScriptExecutionCount": [Example("NAME()", [0])],
     "callScriptFunction": [Example("REFUSED(NAME, 'nothing', sim.handle_self)", [NO_FUNCTION])],
+    "executeScriptString": [Example("NAME('1 + 1', sim.handle_self)", [0, 2])],
     "getScriptFunctions": [Example("NAME(sim.handle_self) ~= nil", [True], "NAME(sim.handle_self) is not None")],
     # ---- threads, of a script that has none
     "switchThread": [Example("REFUSED(NAME)", [NO_THREAD])],
@@ -326,6 +336,11 @@ SIM: dict[str, list[Example]] = {
     "setStringParam": [Example("NAME(sim.stringparam_video_filename, 'x')", [])],
     "getArrayParam": [Example("NAME(sim.arrayparam_gravity)", [[0, 0, -9.81]])],
     "setArrayParam": [Example("NAME(sim.arrayparam_gravity, {0,0,0})", [])],
+    "addGraphStream": [Example("NAME(BASE, 'height', 'm') == NAME(BASE, 'height')", [True])],
+    "setGraphStreamValue": [Example("NAME(BASE, sim.addGraphStream(BASE, 's'), 1.5)", [])],
+    "setGraphUserData": [Example("NAME(BASE, 's', 1.5)", [])],
+    "destroyGraphCurve": [Example("NAME(BASE, sim.addGraphStream(BASE, 's'))", [])],
+    "resetGraph": [Example("NAME(BASE)", [])],
     "setFloatSignal": [Example("NAME('f', 1.5)", [])],
     "getFloatSignal": [Example("NAME('f')", [1.5])],
     "clearFloatSignal": [Example("NAME('f')", []), Example("sim.getFloatSignal('f')", [])],
@@ -335,6 +350,10 @@ SIM: dict[str, list[Example]] = {
     "setStringSignal": [Example("NAME('n', 2.5)", []), Example("NAME('s', 'text')", [])],
     "getStringSignal": [Example("NAME('n')", ["2.5"]), Example("NAME('s')", ["text"])],
     "clearStringSignal": [Example("NAME('s')", []), Example("sim.getStringSignal('s')", [])],
+    "extRemoteApiStart": [Example("NAME(19999)", [-1])],  # nobody serves it here
+    "extRemoteApiStop": [Example("NAME(19999)", [-1])],
+    "extRemoteApiReset": [Example("NAME(19999)", [-1])],
+    "extRemoteApiStatus": [Example("NAME(19999)", [-1])],
     "tubeOpen": [Example("NAME(0, 'a', 1)", [1]), Example("NAME(0, 'a', 1)", [2])],
     "tubeWrite": [Example("NAME(1, 'x')", [1]), Example("NAME(1, 'y')", [1])],
     "tubeStatus": [Example("NAME(1)", [1, 0, 1])],
@@ -345,7 +364,11 @@ SIM: dict[str, list[Example]] = {
         Example("NAME(sim.handle_tree, 0, 'a', 'x', TARGET, 5, 1, 2, 10)", [1]),
     ],
     "receiveData": [Example("NAME(0, 'a')", [])],
-    "writeCustomDataBlock": [Example("NAME(DRONE, 'tag', 'text')", [])],
+    "writeCustomDataBlock": [
+        Example("NAME(DRONE, 'tag', 0.5)", []),
+        Example("sim.readCustomDataBlock(DRONE, 'tag')", ["0.5"]),
+        Example("NAME(DRONE, 'tag', 'text')", []),
+    ],
     "readCustomDataBlock": [Example("NAME(DRONE, 'tag')", ["text"]), Example("NAME(BASE, 'tag')", [])],
     "readCustomDataBlockTags": [Example("NAME(DRONE)", [["tag"]])],
     "writeCustomTableData": [Example("NAME(BASE, 'table', {1,2})", [])],
@@ -416,6 +439,16 @@ SIM: dict[str, list[Example]] = {
     "saveModel": [Example("REFUSED(NAME, HINGE, 'none.yaml')", [NO_SCENE_FILE])],
     "setShapeColor": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 0), '', 0, {1,0,0})", [1])],
     "getShapeColor": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 0), '', 0)", [1, near(0.7, 0.7, 0.7)])],
+    "setShapeMassAndInertia": [
+        Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), 2, {1,0,0, 0,2,0, 0,0,3}, {0,0,0.1})", [1]),
+    ],
+    "setShapeInertia": [
+        Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), {1,0,0, 0,2,0, 0,0,3}, {1,0,0,0, 0,1,0,0, 0,0,1,0})", [1]),
+    ],
+    "getShapeGeomInfo": [
+        Example("NAME(sim.createPureShape(2, 0, {0.2,0.2,3}, 1))", [6, 5, near(0.2, 0.2, 3, 0)]),
+        Example("NAME(DRONE)", [0, 0, near(0, 0, 0, 0)]),
+    ],
     "setShapeMass": [Example("NAME(sim.createPureShape(0, 0, {1,1,1}, 1), 2)", [])],
     "getShapeBB": [
         Example("NAME(sim.createPureShape(0, 0, {1,2,3}, 1))", [near(1, 2, 3), near(0, 0, 0, 0, 0, 0, 1)]),
@@ -431,3 +464,5 @@ SIM: dict[str, list[Example]] = {
     ],
     "ungroupShape": [Example("REFUSED(NAME, FLOOR)", ["only objects of the scene can be changed"])],
 }
+
+REMOTE_API = {name: [Example("NAME(19999)", [-1])] for name in ("start", "stop", "reset", "status")}  # nobody serves it

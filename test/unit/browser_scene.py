@@ -1,58 +1,57 @@
-"""A scene of viser's without a browser, and markers to put into it."""
+"""Markers as the simulation makes them, and what a browser is told of them."""
 
-import asyncio
-from types import SimpleNamespace
+import json
 
+import numpy as np
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-
-class Scene:
-    """Remembers what has been added, as viser would show it."""
-
-    def __init__(self):
-        self.nodes = {}
-        self.added = []
-
-    def configure_default_lights(self, enabled):
-        self.lit = enabled
-
-    def __getattr__(self, kind):
-        if not kind.startswith("add_"):
-            raise AttributeError(kind)
-
-        def add(name, *arguments, **options):
-            self.nodes[name] = node = Node(self, name, kind, arguments, options)
-            self.added.append(name)
-            return node
-
-        return add
+from drone_sim.ros.cockpit.scene.scene_state import SceneState
 
 
-class Node:
-    def __init__(self, scene, name, kind, arguments, options):
-        self.scene, self.name, self.kind, self.arguments = scene, name, kind, arguments
-        self.position, self.wxyz = options.get("position", (0.0, 0.0, 0.0)), options.get("wxyz", (1.0, 0.0, 0.0, 0.0))
-        self.options, self.callbacks = options, []
-        self.receive_shadow = options.get("receive_shadow")
-
-    def remove(self):
-        del self.scene.nodes[self.name]
-
-    def on_update(self, callback):
-        self.callbacks.append(callback)
-
-    def drag(self, phase, browser=1, **pose):
-        for key, value in pose.items():
-            setattr(self, key, value)
-        event = SimpleNamespace(phase=phase, client_id=browser, target=self)
-        for callback in self.callbacks:
-            asyncio.run(callback(event))
-
-
-def marker(number, kind=Marker.CUBE, **values):
-    made = Marker(ns="a", id=number, type=kind, **values)
+def marker(number, kind=Marker.CUBE, ns="a", **values):
+    made = Marker(ns=ns, id=number, type=kind, **values)
     made.header.frame_id = "world"
     made.scale.x = made.scale.y = made.scale.z = 1.0
     made.color = ColorRGBA(1, 0, 0, 1)
     return made
+
+
+class Browser:
+    """What one browser knows: it reads messages as the page does."""
+
+    def __init__(self, state=None):
+        self.state = SceneState() if state is None else state
+        self.version = -1
+        self.frames, self.markers, self.poses = {}, {}, {}
+
+    def hear(self):
+        """Take what has changed; return what is said of it, None for nothing."""
+        self.version, message = self.state.since(self.version)
+        if not message:
+            return None
+        line, _, rest = message.partition(b"\n")
+        said = json.loads(line)
+        self._take(said, np.frombuffer(rest, "<f4").tolist())
+        return said
+
+    def _take(self, said, numbers):
+        if said["whole"]:
+            self.frames, self.markers, self.poses = {}, {}, {}
+        for number in said["gone"]:
+            del self.markers[number]
+        self.frames.update({index: (name, parent) for index, name, parent in said["frames"]})
+        moved = said["moved"] + said["placed"]
+        poses = [tuple(numbers[at : at + 7]) for at in range(0, 7 * len(moved), 7)]
+        numbers = numbers[7 * len(moved) :]
+        self.poses.update({self.frames[index][0]: pose for index, pose in zip(said["moved"], poses)})
+        for one in said["markers"]:
+            for name, count in one.pop("arrays", []):
+                one[name], numbers = numbers[:count], numbers[count:]
+            self.markers[one["id"]] = one
+        for number, pose in zip(said["placed"], poses[len(said["moved"]) :]):
+            self.markers[number]["pose"] = pose
+        assert not numbers
+
+    def named(self, ns):
+        return [one for one in self.markers.values() if one["ns"] == ns]

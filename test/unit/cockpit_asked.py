@@ -9,10 +9,12 @@ LESSONS = Lessons()
 class Node:
     """A simulator that remembers what it was asked, and fails as it is told."""
 
+    node = "/drone_sim"
+
     def __init__(self):
         self.parameters, self.asked, self.fails = {"scene_file": "none", "script": "pilot"}, [], {}
 
-    def call(self, service):
+    def call(self, service, *_request):
         self.asked.append(service)
         return service not in self.fails, self.fails.get(service, service)
 

@@ -337,6 +337,80 @@ def test_a_script_calls_its_own_functions(build, language):
     assert customization.endswith("'Floor': those of V-REP's files are not brought")
 
 
+LUA_RUNS = """
+count = 1
+function sysCall_init() end
+function add(a, b) return a + b end
+"""
+PYTHON_RUNS = """
+count = 1
+def add(a, b): return a + b
+def sysCall_init(): pass
+"""
+RUNS_IN_LUA = """
+function sysCall_init() end
+function sysCall_actuation()
+    local other = sim.getScriptHandle('DronePosition')
+    local function same(got, ...)
+        for index, wanted in ipairs{...} do
+            assert(got[index] == wanted, tostring(got[index]) .. ' is not ' .. tostring(wanted))
+        end
+    end
+    same({sim.executeScriptString('add(count, 2)', other)}, 0, 3)
+    same({sim.executeScriptString(other, 'count = count + 1; return count, "x"')}, 0, 2, 'x')
+    same({sim.executeScriptString('count@DronePosition', sim.scripttype_childscript)}, 0, 2)
+    same({simExecuteScriptString('return count@lua', other)}, 0, 2)
+    same({sim.executeScriptString('mine = 7', sim.handle_self)}, 0)
+    local result, nothing = sim.executeScriptString('count = 9', other)
+    assert(result == 0 and #nothing == 0 and mine == 7)
+    local ok, why = pcall(sim.executeScriptString, 'x = nothing.y', other)
+    sim.setStringSignal('why', why)
+end
+"""
+RUNS_IN_PYTHON = """
+def sysCall_actuation():
+    other = sim.getScriptHandle("DronePosition")
+    assert sim.executeScriptString("add(count, 2)", other) == (0, 3)
+    assert sim.executeScriptString(other, "count = count + 1") == (0, [])
+    assert sim.executeScriptString("count@DronePosition", sim.scripttype_childscript) == (0, 2)
+    sim.executeScriptString("mine = 7", sim.handle_self)
+    assert mine == 7
+    try:
+        sim.executeScriptString("nothing.y", other)
+    except ValueError as error:
+        sim.setStringSignal("why", str(error))
+"""
+
+
+@pytest.mark.parametrize("asks, answers", [(RUNS_IN_LUA, LUA_RUNS), (RUNS_IN_PYTHON, PYTHON_RUNS)])
+def test_a_text_is_run_in_another_script(build, asks, answers):
+    simulation = build({"Floor": asks, "DronePosition": answers})
+    simulation.step()
+    why = simulation.context.signals.get(str, "why")
+    assert "[executeScriptString]" in why and "/1." in why and "nothing" in why, "it is the other one's error"
+
+
+@pytest.mark.parametrize(
+    "text, answers, words",
+    [
+        ("'while true do end', sim.getScriptHandle('DronePosition')", LUA_RUNS, "stopped after 0.2 s"),
+        ("'1', sim.getScriptHandle('DronePosition')", PYTHON_RUNS, "in Python: only Python scripts run a text"),
+        ("'1@python', sim.getScriptHandle('DronePosition')", LUA_RUNS, "'DronePosition' is in Lua, not Python"),
+        ("'1@', sim.scripttype_sandboxscript", LUA_RUNS, "there are no scripts but those of objects"),
+        ("'1@Floor', sim.scripttype_customizationscript", LUA_RUNS, "no customization script is attached to 'Floor'"),
+        ("'return return', sim.getScriptHandle('DronePosition')", LUA_RUNS, "unexpected symbol"),
+        ("'\\27Lua', sim.getScriptHandle('DronePosition')", LUA_RUNS, "precompiled code"),
+        ("1, 2", LUA_RUNS, "a text and the handle of a script are expected"),
+    ],
+)
+def test_a_text_that_is_not_run_gets_one_line(build, text, answers, words):
+    own = f"function sysCall_init() end function sysCall_actuation() sim.executeScriptString({text}) end"
+    simulation = build({"Floor": LUA_RUNS, "DronePosition": answers}, own, script_time_limit=0.2)
+    with pytest.raises(ScriptError, match=words) as caught:
+        simulation.step()
+    assert "\n" not in str(caught.value)
+
+
 def test_a_call_of_ones_own_is_on_ones_own_time(build):
     own = """
     function hangs() while true do end end
@@ -410,7 +484,8 @@ def test_without_scripts_nothing_is_otherwise(build):
 
 
 def test_the_example_leads_the_drone_along_a_circle(tmp_path):
-    scene, circle = re.findall(r"```(?:yaml|lua)\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.DOTALL)
+    page = DOCS.read_text(encoding="utf-8")
+    scene, circle = (re.findall(rf"```{kind}\n(.*?)```", page, re.DOTALL)[-1] for kind in ("yaml", "lua"))
     (tmp_path / "scene.yaml").write_text(scene, encoding="utf-8")
     (tmp_path / "circle.lua").write_text(circle, encoding="utf-8")
     (tmp_path / "gate.py").write_text("def sysCall_init(): pass", encoding="utf-8")

@@ -4,6 +4,7 @@ import pytest
 
 pytest.importorskip("rosbag", reason="needs ROS")
 
+import numpy as np
 import rosbag
 import rospy
 from diagnostic_msgs.msg import KeyValue
@@ -15,6 +16,7 @@ from drone_sim.mechanics.state import Pose, State, Twist, Vector3
 from drone_sim.offline import timeline
 from drone_sim.ros.core import message_conversion as messages
 from drone_sim.ros.tools import bag_commands
+from drone_sim.ros.tools.bags import BagSteps, RecordedMessage
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -44,7 +46,7 @@ def twist(vx, wz=0.0):
 
 TOLD = {  # by step: topic, message, and how many steps late the recorder heard of it
     4: ("takeoff", Empty(), 1),
-    70: ("cmd_vel", twist(0.5), 1),
+    70: ("cmd_vel", twist(0.5), 4),
     90: ("cmd_vel", twist(float("nan")), 0),
     95: ("cmd_vel", twist(0.1, 0.3), 0),
     120: ("set_wind", wind(0.5), 0),
@@ -92,6 +94,27 @@ def record(path, began):
             states.append(drone.body.state)
     simulation.close()
     return states
+
+
+def test_twists_are_obeyed_in_their_order_however_late_they_were_heard_of():
+    """The recorder was 4 steps late, more than half of what lay between two commands; two came within one step."""
+    commands = np.zeros((60, 4))
+    for row in range(10, 46, 6):
+        commands[row : row + 3, 0] = 1.0
+    commands[40:, 1] = 0.5
+    steps = BagSteps(np.arange(1, 61) * 0.05, commands)
+    told = [(row, (float(row % 6 == 4), 0.0)) for row in range(10, 40, 3)]
+    told += [(40, (1.0, 0.2)), (40, (1.0, 0.5)), (43, (0.0, 0.5))]
+    heard = [
+        RecordedMessage((row + 4) * 0.05 + 0.01 + 1e-4 * index, twist(x)) for index, (row, (x, _)) in enumerate(told)
+    ]
+    for one, (_, (_, y)) in zip(heard, told):
+        one.message.linear.y = y
+    found = list(bag_commands._twists(iter(heard), steps))
+    truth = [round(row * 0.05, 9) for row, _ in told]
+    assert [one["at"] for one, (_, (_, y)) in zip(found, told) if y != 0.2] == [
+        at for at, (_, (_, y)) in zip(truth, told) if y != 0.2
+    ]
 
 
 @pytest.mark.parametrize("began", [0.0, 1.7e9])

@@ -1,5 +1,7 @@
 """The parts of the cockpit that need no browser: who comes in, who flies, which files may be written, what is shown."""
 
+import asyncio
+import gzip
 import http.client
 import json
 import socket
@@ -9,12 +11,10 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
-pytest.importorskip("viser")
 
 import rospy
 import trimesh
-import viser
-from browser_scene import Scene, marker
+from browser_scene import Browser, marker
 from geometry_msgs.msg import Point, TransformStamped
 from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
@@ -23,9 +23,9 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from drone_sim.ros.cockpit.cockpit import Cockpit
-from drone_sim.ros.cockpit.scene import looks
 from drone_sim.ros.cockpit.scene.frames import FrameTree
-from drone_sim.ros.cockpit.scene.markers import MarkerNodes
+from drone_sim.ros.cockpit.scene.markers import MarkerTopic
+from drone_sim.ros.cockpit.scene.meshes import MeshStore, as_glb
 from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
 from drone_sim.ros.cockpit.server.page_server import PageServer, page_files
 from drone_sim.ros.cockpit.server.page_socket import PageSocket
@@ -45,9 +45,17 @@ class Served:
         self.sent = []
         self.flying = HeldCommands(self.sent.append, lambda: 0.0)
         self.socket = PageSocket(self.flying, {"double": lambda message: {"twice": 2 * message["number"]}})
-        with AccessControl(TOKEN, page_files().get, self.socket.serve).before_viser():
-            self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        self.host = f"127.0.0.1:{self.server.get_port()}"
+        self.loop = asyncio.new_event_loop()
+        threading.Thread(target=self.loop.run_forever, daemon=True).start()
+        serving = AccessControl(TOKEN, page_files().get, self.socket.serve).serve("127.0.0.1", 0)
+        self.server = asyncio.run_coroutine_threadsafe(serving, self.loop).result(10)
+        self.port = next(iter(self.server.sockets)).getsockname()[1]
+        self.host = f"127.0.0.1:{self.port}"
+
+    def stop(self):
+        self.server.close()
+        asyncio.run_coroutine_threadsafe(self.server.wait_closed(), self.loop).result(10)
+        self.loop.call_soon_threadsafe(self.loop.stop)
 
     def get(self, path, **headers):
         connection = http.client.HTTPConnection(self.host, timeout=5)
@@ -68,11 +76,11 @@ class Served:
 def _served():
     served = Served()
     yield served
-    served.server.stop()
+    served.stop()
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/scene/", "/cockpit.js", "/?token=", "/?token=wrong", "/../../etc/passwd", "/socket"]
+    "path", ["/", "/mesh/a.glb", "/cockpit.js", "/?token=", "/?token=wrong", "/../../etc/passwd", "/socket"]
 )
 def test_without_the_token_nothing_is_served(served, path):
     status, _, body = served.get(path)
@@ -85,14 +93,14 @@ def test_the_token_lets_in_and_leaves_the_address(served):
     assert status == 303 and answer.headers["Location"] == "/"
     cookie = answer.headers["Set-Cookie"]
     assert cookie.startswith(served.cookie) and "HttpOnly" in cookie and "SameSite=Strict" in cookie
-    for path, word in (("/", b"cockpit.js"), ("/cockpit.js", b"cm-editor"), ("/scene/", b"<html")):
+    for path, word in (("/", b"cockpit.js"), ("/cockpit.js", b"cm-editor")):
         status, _, body = served.get(path, Cookie=served.cookie)
         assert status == 200 and word in body.lower()
     assert served.get("/nothing.html", Cookie=served.cookie)[0] == 404
     assert served.get("/__init__.py", Cookie=served.cookie)[0] == 404
 
 
-@pytest.mark.parametrize("path", ["/", "/cockpit.js", "/scene/", "/scene/nothing", "/nothing", "/?token=wrong"])
+@pytest.mark.parametrize("path", ["/", "/cockpit.js", "/nothing", "/?token=wrong"])
 def test_every_answer_says_what_a_browser_may_do_with_it(served, path):
     cookie = {} if "wrong" in path else {"Cookie": served.cookie}
     _, answer, _ = served.get(path, **cookie)
@@ -102,14 +110,23 @@ def test_every_answer_says_what_a_browser_may_do_with_it(served, path):
     policy = dict(one.strip().partition(" ")[::2] for one in answer.headers["Content-Security-Policy"].split(";"))
     assert policy["default-src"] == policy["base-uri"] == policy["form-action"] == "'none'"
     assert policy["frame-ancestors"] == "'self'"
-    here = ("'self'", "data:", "blob:", f"ws://{served.host}", f"wss://{served.host}")
+    here = ("'self'", "blob:", f"ws://{served.host}", f"wss://{served.host}")
     assert set(policy.get("connect-src", "").split()) <= set(here)
-    assert "unsafe" not in policy.get("script-src", "") or path.startswith("/scene/")
+    assert policy["script-src"] == "'self'", "no script in the page, and none made of text"
+
+
+def test_a_browser_that_takes_it_gets_the_page_compressed(served):
+    plain = served.get("/cockpit.js", Cookie=served.cookie)[2]
+    for accepts in ("gzip, deflate", "br;q=1.0, gzip;q=0.8"):
+        _, answer, body = served.get("/cockpit.js", **{"Cookie": served.cookie, "Accept-Encoding": accepts})
+        assert answer.headers["Content-Encoding"] == "gzip" and int(answer.headers["Content-Length"]) == len(body)
+        assert gzip.decompress(body) == plain and len(body) < len(plain) / 2
+    assert "Content-Encoding" not in served.get("/cockpit.js", Cookie=served.cookie)[1].headers
 
 
 def raw(served, *lines):
     """Return the status and the text that such lines get for an answer."""
-    with socket.create_connection(("127.0.0.1", served.server.get_port()), timeout=5) as one:
+    with socket.create_connection(("127.0.0.1", served.port), timeout=5) as one:
         one.sendall(b"\r\n".join((*lines, b"", b"")))
         said = b"".join(iter(lambda: one.recv(4096), b""))
     head, _, body = said.partition(b"\r\n\r\n")
@@ -123,7 +140,7 @@ def raw(served, *lines):
         ("/", ["Host: a", "Host: b"], 400, "Host: must not be given twice"),
         ("/", ["Host: a", "Origin: a", "Origin: b"], 400, "Origin: must not be given twice"),
         ("/", ["Host: a", "Upgrade: websocket", "Upgrade: websocket"], 400, "Upgrade: must not be given twice"),
-        ("/scene/", ["Host: a", "Accept-Encoding: gzip", "Accept-Encoding: br"], 400, "Accept-Encoding: must not be"),
+        ("/", ["Host: a", "Accept-Encoding: gzip", "Accept-Encoding: br"], 400, "Accept-Encoding: must not be"),
         ("/", ["Host: a; script-src *"], 400, "Host: must be a name or an address"),
         ("/?token=\xff\xe9", ["Host: a"], 403, "?token="),
         ("/?token=%ff%ed%a0%80", ["Host: a"], 403, "?token="),
@@ -146,7 +163,7 @@ def test_odd_headers_get_an_answer_and_leave_no_traceback(served, caplog, path, 
     "junk", [b"\x01\x00\x02\x00x", b"POST / HTTP/1.1", b"GET / HTTP/1.1\r\nno header", b"\x16\x03\x01"]
 )
 def test_what_is_no_browser_is_hung_up_on(served, caplog, junk):
-    with socket.create_connection(("127.0.0.1", served.server.get_port()), timeout=5) as one:
+    with socket.create_connection(("127.0.0.1", served.port), timeout=5) as one:
         one.sendall(junk + b"\r\n\r\n")
         said = b"".join(iter(lambda: one.recv(4096), b""))
     assert b"Traceback" not in said and b"200 OK" not in said and not caplog.records
@@ -158,7 +175,7 @@ def test_the_page_that_is_served_is_the_one_in_the_source():
         assert page_files().get(f"/{name}")[1] == (source / name).read_bytes(), "cd web && npm ci && npm run build"
 
 
-@pytest.mark.parametrize("path", ["/socket", "/scene"])
+@pytest.mark.parametrize("path", ["/socket", "/anything"])
 def test_sockets_want_the_token_and_our_origin(served, path):
     for cookie, origin in (("", None), ("drone_sim=1", None), (None, "http://evil.example"), (None, "null")):
         with pytest.raises(InvalidStatus, match="403"):
@@ -268,49 +285,84 @@ def test_what_the_master_knows():
 LINE = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)]
 
 
+class Topic(MarkerTopic):
+    """A topic whose markers one browser sees."""
+
+    def __init__(self, layer="drawing", **options):
+        super().__init__(layer, **options)
+        self.browser = Browser()
+
+    def show(self, *markers):
+        self.on_markers(MarkerArray(markers))
+        self.browser.state.change({}, self.take())
+        return self.browser.hear()
+
+    @property
+    def shown(self):
+        return list(self.browser.markers.values())
+
+
 def test_markers_come_move_and_go():
-    scene = Scene()
-    markers = MarkerNodes(scene, "scene", FrameTree(scene))
-    markers.on_markers(MarkerArray([marker(0), marker(1)]))
-    markers.show()
-    assert sorted(scene.nodes) == ["/scene/a/0", "/scene/a/1"]
+    topic = Topic()
+    topic.show(marker(0), marker(1))
+    assert len(topic.shown) == 2 and topic.shown[0]["kind"] == "cube" and topic.shown[0]["color"] == [1, 0, 0, 1]
     moved = marker(0)
     moved.pose.position.x = 3.0
-    markers.on_markers(MarkerArray([moved, Marker(ns="a", id=1, action=Marker.DELETE)]))
-    markers.show()
-    assert list(scene.nodes) == ["/scene/a/0"] and scene.nodes["/scene/a/0"].position == (3.0, 0.0, 0.0)
-    assert scene.added.count("/scene/a/0") == 1, "moved, not made anew"
-    hanging = marker(5)
-    hanging.header.frame_id = "nowhere"
-    markers.on_markers(MarkerArray([hanging]))
-    markers.show()
-    assert list(scene.nodes) == ["/scene/a/0"], "it waits for its frame"
-    markers.on_markers(MarkerArray([Marker(action=Marker.DELETEALL)]))
-    markers.show()
-    assert not scene.nodes
+    said = topic.show(moved, Marker(ns="a", id=1, action=Marker.DELETE))
+    assert not said["markers"] and len(said["placed"]) == len(said["gone"]) == 1, "moved, not told anew"
+    assert [one["pose"] for one in topic.shown] == [(3, 0, 0, 0, 0, 0, 1)]
+    assert topic.show(moved) is None, "nothing new"
+    topic.show(Marker(action=Marker.DELETEALL))
+    assert not topic.shown
+
+
+def test_what_is_told_anew_as_a_whole_is_sent_where_it_differs():
+    """The simulation numbers the objects of its scene; one that goes changes the numbers of all that follow."""
+    topic, everything = Topic(), Marker(action=Marker.DELETEALL)
+    made = [marker(number, ns=name) for number, name in enumerate(["Crate", "Pole", "Pole", "Wall"], 1)]
+    topic.show(everything, *made)
+    assert len(topic.shown) == 4
+    for number, one in enumerate(made[1:], 1):
+        one.id = number
+    said = topic.show(everything, *made[1:])
+    assert (len(said["gone"]), said["markers"], said["placed"]) == (1, [], [])
+    assert [one["ns"] for one in topic.shown] == ["Pole", "Pole", "Wall"]
+
+
+def test_a_browser_that_comes_late_gets_the_whole_and_one_that_is_slow_what_it_lacks():
+    topic = Topic()
+    for x in range(3):
+        moved = marker(0)
+        moved.pose.position.x = x
+        topic.on_markers(MarkerArray([moved, marker(x + 1)]))
+        topic.browser.state.change({}, topic.take())
+        if x == 0:
+            topic.browser.hear()
+    late = Browser(topic.browser.state)
+    assert late.hear()["whole"] and not topic.browser.hear()["whole"]
+    assert late.markers == topic.browser.markers and len(late.markers) == 4
+    topic.browser.state.clear()
+    assert topic.browser.hear()["whole"] and not topic.shown
 
 
 @pytest.mark.parametrize(
     "before, after, seen",
     [
-        ({"type": Marker.TEXT_VIEW_FACING, "text": "one"}, {"text": "three"}, lambda node: node.text == "three"),
-        ({"type": Marker.LINE_STRIP, "points": LINE[:2]}, {"points": LINE}, lambda node: len(node.points) == 2),
-        ({"type": Marker.LINE_LIST, "points": LINE[:2]}, {"points": LINE[1:]}, lambda node: node.points[0][0][0] == 1),
+        ({"type": Marker.TEXT_VIEW_FACING, "text": "one"}, {"text": "three"}, lambda told: told["text"] == "three"),
+        ({"type": Marker.LINE_STRIP, "points": LINE[:2]}, {"points": LINE}, lambda told: len(told["points"]) == 9),
+        ({"type": Marker.LINE_LIST, "points": LINE[:2]}, {"points": LINE[1:]}, lambda told: told["points"][0] == 1),
     ],
 )
-def test_words_and_lines_change_in_place(before, after, seen):
-    scene = Scene()
-    markers = MarkerNodes(scene, "scene", FrameTree(scene))
+def test_words_and_lines_change(before, after, seen):
+    topic = Topic()
     for number, values in enumerate((before, {**before, **after})):
         message = Marker(ns="a", **values)
         message.header.frame_id, message.pose.position.x = "world", number
-        markers.on_markers(MarkerArray([message]))
-        markers.show()
-    (node,) = scene.nodes.values()
-    assert scene.added == ["/scene/a/0"] and seen(node) and node.position[0] == 1.0
-    markers.on_markers(MarkerArray([Marker(ns="a", type=before["type"], header=message.header)]))
-    markers.show()
-    assert len(scene.nodes) == (before["type"] == Marker.TEXT_VIEW_FACING), "lines of no points are nothing"
+        topic.show(message)
+    (told,) = topic.shown
+    assert seen(told) and told["pose"][0] == 1.0
+    topic.show(Marker(ns="a", type=before["type"], header=message.header))
+    assert len(topic.shown) == (before["type"] == Marker.TEXT_VIEW_FACING), "lines of no points are nothing"
 
 
 def transform(parent, child, x=0.0):
@@ -320,75 +372,114 @@ def transform(parent, child, x=0.0):
 
 
 def test_a_frame_waits_for_its_parents():
-    scene = Scene()
-    frames = FrameTree(scene)
+    browser, frames = Browser(), FrameTree()
     loop = [transform("a", "b"), transform("b", "a"), transform("c", "c")]
     for message, shown in (
         ([transform("propeller", "blades"), *loop], []),
         ([transform("body", "propeller", 0.1)], []),
-        ([transform("world", "body")], ["/body", "/body/propeller", "/body/propeller/blades"]),
+        ([transform("world", "body")], [("body", -1), ("propeller", 0), ("blades", 1)]),
     ):
         frames.on_transforms(TFMessage(message))
-        frames.show()
-        assert sorted(scene.nodes) == [f"/frames{name}" for name in shown]
-    frames.on_transforms(TFMessage([transform("world", "body", 2.0)]))
-    frames.show()
-    assert scene.nodes["/frames/body"].position == (2.0, 0.0, 0.0) and len(scene.added) == 3
-    frames.forget()
-    assert not scene.nodes
+        browser.state.change(frames.take(), {})
+        browser.hear()
+        assert list(browser.frames.values()) == shown
+    frames.on_transforms(TFMessage([transform("world", "body", 2.0), transform("body", "blades", 1.0)]))
+    browser.state.change(frames.take(), {})
+    said = browser.hear()
+    assert said["moved"] == [0, 2] and browser.poses["body"][0] == 2.0
+    assert said["frames"] == [[2, "blades", 0]], "hung on another one"
 
 
-def test_lines_of_another_colour_are_made_anew():
-    scene = Scene()
-    markers = MarkerNodes(scene, "scene", FrameTree(scene))
-    painted = marker(0, Marker.LINE_STRIP, points=LINE)
-    painted.color = ColorRGBA(0, 1, 0, 1)
-    for message in (marker(0, Marker.LINE_STRIP, points=LINE[:2]), painted):
-        markers.on_markers(MarkerArray([message]))
-        markers.show()
-    assert scene.added == ["/scene/a/0"] * 2
+def test_what_happens_in_one_step_is_one_message():
+    browser, frames, topic = Browser(), FrameTree(), MarkerTopic("view/path")
+    frames.on_transforms(TFMessage([transform("world", "a"), transform("world", "b")]))
+    topic.on_markers(MarkerArray([marker(0)]))
+    assert browser.state.change(frames.take(), topic.take())
+    said = browser.hear()
+    assert said["moved"] == [0, 1] and len(said["markers"]) == 1 and browser.hear() is None
 
 
 @pytest.mark.parametrize(
-    "kind, added",
+    "kind, name",
     [
-        (Marker.CUBE, "add_box"),
-        (Marker.SPHERE, "add_icosphere"),
-        (Marker.CYLINDER, "add_cylinder"),
-        (Marker.ARROW, "add_arrows"),
-        (Marker.LINE_STRIP, "add_line_segments"),
-        (Marker.LINE_LIST, "add_line_segments"),
-        (Marker.POINTS, "add_point_cloud"),
-        (Marker.TEXT_VIEW_FACING, "add_label"),
-        (Marker.TRIANGLE_LIST, "add_glb"),
+        (Marker.CUBE, "cube"),
+        (Marker.SPHERE, "sphere"),
+        (Marker.CYLINDER, "cylinder"),
+        (Marker.ARROW, "arrow"),
+        (Marker.LINE_STRIP, "strip"),
+        (Marker.LINE_LIST, "lines"),
+        (Marker.CUBE_LIST, "cubes"),
+        (Marker.SPHERE_LIST, "spheres"),
+        (Marker.POINTS, "points"),
+        (Marker.TEXT_VIEW_FACING, "text"),
+        (Marker.TRIANGLE_LIST, "triangles"),
     ],
 )
-def test_every_kind_of_marker_is_shown(kind, added):
-    points = [Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)]
-    shape = [] if kind == Marker.ARROW else points
-    node = looks.show(Scene(), "/x", marker(0, kind, points=shape, text="<b>words</b>"))
-    assert node.kind == added and node.wxyz == (1.0, 0.0, 0.0, 0.0)
+def test_every_kind_of_marker_is_told(kind, name):
+    topic = Topic()
+    topic.show(marker(0, kind, points=[] if kind == Marker.ARROW else LINE, text="<b>words</b>"))
+    (told,) = topic.shown
+    assert told["kind"] == name and told["pose"] == (0, 0, 0, 0, 0, 0, 1), "no orientation is upright"
+    assert told.get("text", "<b>words</b>") == "<b>words</b>"
 
 
 @pytest.mark.parametrize("kind", [Marker.LINE_STRIP, Marker.LINE_LIST, Marker.POINTS, Marker.TRIANGLE_LIST, 99])
 def test_markers_of_nothing_are_nothing(kind):
-    assert looks.show(Scene(), "/x", marker(0, kind)) is None
+    topic = Topic()
+    topic.show(marker(0, kind))
+    assert not topic.shown
 
 
-def test_a_mesh_that_cannot_be_read_is_told_and_left_out(tmp_path, caplog):
+def test_light_that_is_painted_on_for_rviz_is_left_out_where_there_is_a_sun():
+    painted = marker(0, Marker.TRIANGLE_LIST, points=LINE)
+    painted.colors = [ColorRGBA(0, 0, 0.5, 0.25)] * 3
+    for is_shaded in (True, False):
+        topic = Topic(is_shaded=is_shaded)
+        topic.show(painted)
+        (told,) = topic.shown
+        assert ("colors" in told, "lit" in told) == (not is_shaded, not is_shaded)
+
+
+def test_a_sky_is_hidden_and_an_object_called_sky_is_shown():
+    for layer, hidden in (("view/surroundings", ("sky",)), ("scene", ())):
+        topic = Topic(layer, hidden=hidden)
+        topic.show(marker(0, ns="sky"))
+        assert bool(topic.shown) == (not hidden)
+
+
+# ---- meshes
+
+
+def test_a_mesh_is_served_once_by_what_is_in_it(tmp_path):
+    meshes, file = MeshStore(), tmp_path / "a box.stl"
+    trimesh.creation.box().export(file)
+    topic = Topic(mesh_url=meshes.url)
+    topic.show(marker(0, Marker.MESH_RESOURCE, mesh_resource=file.as_uri()))
+    (told,) = topic.shown
+    kind, content = meshes.find(told["mesh"])
+    assert kind == "model/gltf-binary" and content == as_glb(file)
+    assert meshes.find("/mesh/../a.glb") is None and meshes.find("/") is None
+    trimesh.creation.icosphere().export(file)
+    again = meshes.url(file.as_uri())
+    assert again != told["mesh"] and meshes.find(again)[1] == as_glb(file), "the file has changed"
+
+
+def test_a_mesh_that_cannot_be_read_is_told_once_and_left_out(tmp_path, caplog):
     file = tmp_path / "broken.stl"
     file.write_text("solid nothing", encoding="utf-8")
-    scene = Scene()
-    assert looks.show(scene, "/x", marker(0, Marker.MESH_RESOURCE, mesh_resource=f"file://{file}")) is None
-    assert "broken.stl" in caplog.text
+    topic = Topic(mesh_url=MeshStore().url)
+    for missing in (file, file, tmp_path / "none.stl"):
+        topic.show(marker(0, Marker.MESH_RESOURCE, mesh_resource=f"file://{missing}"))
+        assert not topic.shown
+    assert "broken.stl" in caplog.text and "none.stl" in caplog.text
 
 
 def test_a_mesh_has_no_metal(tmp_path):
     file = tmp_path / "box.stl"
     trimesh.creation.box().export(file)
-    node = looks.show(Scene(), "/x", marker(0, Marker.MESH_RESOURCE, mesh_resource=f"file://{file}"))
-    length = int.from_bytes(node.arguments[0][12:16], "little")
-    tree = json.loads(node.arguments[0][20 : 20 + length])
+    content = as_glb(file)
+    length = int.from_bytes(content[12:16], "little")
+    tree = json.loads(content[20 : 20 + length])
     assert [one["pbrMetallicRoughness"]["metallicFactor"] for one in tree["materials"]] == [0.0]
 
 
@@ -409,7 +500,7 @@ def test_a_page_that_is_opened_early_is_answered_when_all_is_there():
     connection = http.client.HTTPConnection(host, timeout=5)
     connection.request("GET", "/a.png", headers=cookie)
     assert connection.getresponse().read() == b"/a.png"
-    serving.server.stop()
+    serving.stop()
 
 
 def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
@@ -418,24 +509,15 @@ def test_a_master_that_goes_is_waited_for(monkeypatch, tmp_path):
     def refuse(*_):
         raise ConnectionRefusedError(111, "Connection refused")
 
+    def answer():
+        return [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
+
     shown = Cockpit(PageServer("127.0.0.1", 0), "drone_sim", tmp_path)
-    monkeypatch.setattr(
-        rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
-    )
-    monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
-    shown._ask_master()
-    assert shown._topics.namespace == "/drone"
-    for gone in ("get_param", "get_published_topics"):  # it may go between the two
-        monkeypatch.setattr(rospy, gone, refuse)
+    monkeypatch.setattr(rospy, "get_param", lambda _name, otherwise: otherwise)
+    for master, namespace in ((answer, "/drone"), (refuse, ""), (refuse, ""), (answer, "/drone")):
+        monkeypatch.setattr(rospy, "get_published_topics", master)
         shown._ask_master()
-        assert shown._topics == FoundTopics()
-        assert shown._panel._status.value == "no simulation"
-        assert shown._panel._message.content.endswith(">no ROS master answers: waiting for one</div>")
-    monkeypatch.setattr(
-        rospy, "get_published_topics", lambda: [["/drone/view/bodies", "visualization_msgs/MarkerArray"]]
-    )
-    monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
-    shown._ask_master()
-    assert shown._topics.namespace == "/drone"
-    assert shown._panel._message.content.endswith(">the ROS master is there again</div>")
+        assert shown._topics.namespace == namespace
+        assert shown._panel.board.get("master") is (master is answer)
+    assert shown._panel.board.get("status") == "no simulation"
     shown._server.stop()

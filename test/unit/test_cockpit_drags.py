@@ -1,52 +1,58 @@
-"""The cockpit's handles, and its light, without a browser."""
+"""The cockpit's handles without a browser: what is told of them, who holds one, what the simulation hears."""
 
-import io
+import json
 
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
-pytest.importorskip("viser")
 
-import numpy as np
-import trimesh
-from browser_scene import Scene, marker
+from browser_scene import Browser, marker
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import (
     InteractiveMarker,
+    InteractiveMarkerControl,
     InteractiveMarkerInit,
+    InteractiveMarkerPose,
     InteractiveMarkerUpdate,
     Marker,
-    MarkerArray,
 )
 from visualization_msgs.msg import InteractiveMarkerFeedback as Feedback
 
-from drone_sim.ros.cockpit.scene import looks
-from drone_sim.ros.cockpit.scene.frames import FrameTree
-from drone_sim.ros.cockpit.scene.handles import DragControls, Selection
-from drone_sim.ros.cockpit.scene.markers import MarkerNodes
-from drone_sim.ros.cockpit.scene.scene_view import Sunlight
+from drone_sim.ros.cockpit.scene.handles import Drag, DragControls, read_drag
+from drone_sim.ros.cockpit.scene.scene_view import read_push
+
+HERE, THERE = (1.0, 0, 0, 0, 0, 0, 1), (2.0, 0, 0, 0, 0, 0, 1)
 
 
 class Dragged:
-    """Handles whose feedback is kept, with one marker at (1, 0, 0), turned by 90 degrees."""
+    """Handles whose feedback is kept, with one marker at (1, 0, 0), turned by 90 degrees, of a green sphere."""
 
-    def __init__(self, **options):
-        self.scene, self.said, self.now = Scene(), [], 0.0
-        self.handles = DragControls(self.scene, self.said.append, clock=lambda: self.now, **options)
-        self.hear(x=1.0)
+    def __init__(self):
+        self.said, self.now, self.browser = [], 0.0, Browser()
+        self.handles = DragControls("markers", self.said.append, clock=lambda: self.now)
+        ball, unseen = marker(0, Marker.SPHERE), marker(1, Marker.SPHERE)
+        unseen.color = ColorRGBA(0, 0, 0, 0.01)
+        looks = InteractiveMarkerControl(always_visible=True, markers=[ball, unseen])
+        pose = Pose(Point(1, 0, 0), Quaternion(0, 0, 0.5**0.5, 0.5**0.5))
+        self.handles.on_init(InteractiveMarkerInit(markers=[InteractiveMarker(name="a", pose=pose, controls=[looks])]))
+        self.show()
 
-    def hear(self, **position):
-        pose = Pose(Point(**position), Quaternion(0, 0, 0.5**0.5, 0.5**0.5))
-        self.handles.on_init(InteractiveMarkerInit(markers=[InteractiveMarker(name="a", pose=pose)]))
-        self.handles.show((1, 2))
+    def show(self):
+        self.browser.state.change({}, self.handles.take())
+        return self.browser.hear()
+
+    def hear(self, x):
+        pose = InteractiveMarkerPose(name="a", pose=Pose(Point(x, 0, 0), Quaternion(0, 0, 0, 1)))
+        self.handles.on_update(InteractiveMarkerUpdate(poses=[pose]))
+        return self.show()
+
+    def drag(self, phase, pose=HERE, browser=1):
+        self.handles.drag(browser, Drag("markers", "a", phase, pose))
 
     @property
     def kinds(self):
         return [one.event_type for one in self.said]
-
-    def place(self):
-        return self.scene.nodes["/handles/a"].position
 
 
 @pytest.fixture(name="dragged")
@@ -54,120 +60,100 @@ def _dragged():
     return Dragged()
 
 
-def test_a_handle_follows_unless_it_is_dragged(dragged):
-    arrows = dragged.scene.nodes["/handles/a"]
-    assert arrows.position == (1.0, 0.0, 0.0) and arrows.wxyz == (0.5**0.5, 0, 0, 0.5**0.5)
-    arrows.drag("start")
-    assert dragged.handles.held
-    arrows.drag("update", position=(2.0, 0.0, 0.0))
-    dragged.hear(x=1.5)
-    assert dragged.place() == (2.0, 0.0, 0.0)
-    arrows.drag("end")
-    dragged.hear(x=1.9)
-    assert dragged.place() == (1.9, 0.0, 0.0) and not dragged.handles.held
+def test_a_handle_is_a_place_and_what_is_always_seen_of_it(dragged):
+    told = {one["kind"]: one for one in dragged.browser.named("a")}
+    assert set(told) == {"handle", "sphere"} and told["handle"]["layer"] == "markers"
+    for one in told.values():
+        assert one["pose"] == pytest.approx((1, 0, 0, 0, 0, 0.5**0.5, 0.5**0.5)) and one["frame"] == "world"
+    said = dragged.hear(x=1.5)
+    assert len(said["placed"]) == 2 and not said["markers"]
+    assert {one["pose"][0] for one in dragged.browser.named("a")} == {1.5}
+    dragged.handles.on_update(InteractiveMarkerUpdate(erases=["a"]))
+    dragged.show()
+    assert not dragged.browser.markers
+
+
+def test_the_simulation_hears_what_is_dragged(dragged):
+    for phase, pose in (("start", HERE), ("move", THERE), ("end", THERE)):
+        dragged.drag(phase, pose)
     assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.POSE_UPDATE, Feedback.MOUSE_UP]
     told = dragged.said[1]
     assert (told.marker_name, told.header.frame_id, told.pose.position.x) == ("a", "world", 2.0)
-
-
-def test_the_ring_turns_about_the_vertical(dragged):
-    ring = dragged.scene.nodes["/handles/a/turn"]
-    ring.drag("start")
-    ring.drag("update", wxyz=(0.5**0.5, 0.0, 0.0, 0.5**0.5))
-    turn = dragged.said[-1].pose.orientation
-    assert (abs(turn.z), abs(turn.w)) == pytest.approx((1, 0), abs=1e-9), "180 degrees in all"
-    ring.drag("end")
-    dragged.handles.show((1,))
-    assert ring.wxyz == (1.0, 0.0, 0.0, 0.0), "the arrows have turned instead"
-    assert abs(dragged.scene.nodes["/handles/a"].wxyz[3]) == pytest.approx(1)
+    assert told.client_id == "cockpit/1"
 
 
 def test_a_handle_that_is_held_still_is_told_again(dragged):
-    dragged.scene.nodes["/handles/a"].drag("start")
+    dragged.drag("start")
     for dragged.now in (0.1, 0.3, 0.4):
-        dragged.handles.show((1,))
+        dragged.handles.keep((1,))
     assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.KEEP_ALIVE]
 
 
 def test_a_browser_that_is_gone_lets_go(dragged):
-    dragged.scene.nodes["/handles/a"].drag("start")
-    dragged.handles.show((2,))
-    assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.MOUSE_UP] and not dragged.handles.held
-
-
-def test_a_marker_that_goes_while_it_is_held_takes_its_handle_along(dragged):
-    arrows = dragged.scene.nodes["/handles/a"]
-    arrows.drag("start")
-    dragged.handles.on_update(InteractiveMarkerUpdate(erases=["a"]))
-    dragged.handles.show((1,))
-    assert not dragged.scene.nodes and dragged.kinds[-1] == Feedback.MOUSE_UP
-    arrows.drag("update")
+    dragged.drag("start")
+    dragged.handles.keep((2,))
+    assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.MOUSE_UP]
+    dragged.drag("move", THERE)
     assert len(dragged.said) == 2, "what comes late is nothing"
 
 
-def test_only_the_object_that_is_chosen_has_arrows():
-    choice = Selection()
-    dragged = Dragged(is_offered=lambda name: name == choice.name)
-    assert not dragged.scene.nodes and dragged.handles.names == ("a",)
-    choice.toggle("a")
-    dragged.handles.show()
-    assert "/handles/a" in dragged.scene.nodes
-    choice.toggle("a")
-    dragged.handles.show()
-    assert not dragged.scene.nodes
+def test_whoever_comes_second_waits_until_the_first_lets_go(dragged):
+    dragged.drag("start", browser=1)
+    for phase in ("start", "move", "end"):
+        dragged.drag(phase, THERE, browser=2)
+    assert dragged.kinds == [Feedback.MOUSE_DOWN]
+    dragged.drag("end", browser=1)
+    dragged.drag("start", browser=2)
+    assert [one.client_id for one in dragged.said] == ["cockpit/1"] * 2 + ["cockpit/2"]
 
 
-# ---- light
+def test_a_handle_that_goes_while_it_is_held_is_let_go_of(dragged):
+    dragged.drag("start")
+    dragged.handles.on_update(InteractiveMarkerUpdate(erases=["a"]))
+    dragged.handles.keep((1,))
+    assert dragged.kinds == [Feedback.MOUSE_DOWN, Feedback.MOUSE_UP]
+    dragged.drag("start")
+    assert len(dragged.said) == 2, "there is none"
 
 
-def test_solid_objects_throw_shadows_on_the_floor_if_they_are_wanted():
-    scene = Scene()
-    sun = Sunlight(scene)
-    light = scene.nodes["/sun"]
-    assert not scene.lit and light.position[2] > abs(light.position[0]) > 0
-    floor, wall = (looks.show(scene, f"/{name}", marker(0)) for name in ("floor", "wall"))
-    sun.shine_on(Marker(ns="floor"), floor)
-    sun.shine_on(Marker(ns="wall"), wall)
-    assert floor.receive_shadow > 0 and wall.receive_shadow is False
-    sun.cast(False)
-    assert floor.receive_shadow is False and light.cast_shadow is False
-    glass = marker(1)
-    glass.color.a = 0.5
-    shadows = [looks.show(scene, "/x", one, casts=True).options["cast_shadow"] for one in (marker(0), glass)]
-    assert shadows == [True, False]
+GOOD = {"drag": "move", "server": "markers", "name": "a", "pose": [1, 2, 3, 0, 0, 0, 2]}
 
 
-def test_an_object_called_sky_is_shown():
-    scene = Scene()
-    markers = MarkerNodes(scene, "scene", FrameTree(scene))
-    sky = marker(0)
-    sky.ns = "sky"
-    markers.on_markers(MarkerArray([sky]))
-    markers.show()
-    assert scene.nodes
+def test_what_a_browser_says_of_a_drag_is_read():
+    assert read_drag(GOOD) == Drag("markers", "a", "move", (1, 2, 3, 0, 0, 0, 1))
 
 
-def test_colours_look_as_they_do_in_the_cameras():
-    painted = marker(0, Marker.TRIANGLE_LIST, points=[Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)])
-    painted.color = ColorRGBA(0.5, 1.0, 0.0, 1.0)
-    data = looks.show(Scene(), "/x", painted).arguments[0]
-    (mesh,) = trimesh.load(io.BytesIO(data), file_type="glb").geometry.values()
-    np.testing.assert_array_equal(
-        mesh.visual.vertex_attributes["color"][0], (55, 255, 0, 255), "0.5 is 21.4 % of the light"
-    )
+@pytest.mark.parametrize(
+    "wrong, words",
+    [
+        ({"drag": "throw"}, "drag = 'throw': must be one of start, move, end"),
+        ({"drag": {}}, "drag = {}: must be one of"),
+        ({"name": 3}, "name = 3: must be a name"),
+        ({"server": None}, "server = None: must be a name"),
+        *(
+            ({"pose": pose}, "pose: must be x, y, z")
+            for pose in (None, [], [0] * 7, [1e9, 0, 0, 0, 0, 0, 1], ["1", 0, 0, 0, 0, 0, 1], [True, 0, 0, 0, 0, 0, 1])
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_drag_is_said(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        read_drag({**GOOD, **wrong})
 
 
-def test_what_changes_too_little_to_be_seen_or_is_only_rvizs_light_is_not_made_anew():
-    def shown(alpha, size):
-        painted = marker(0, Marker.TRIANGLE_LIST, points=[Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)])
-        painted.colors = [ColorRGBA(0, 0, 0, alpha)] * 3
-        painted.scale.x = size
-        return painted
-
-    for casts, alphas, made in ((False, (0.5, 0.501), 1), (False, (0.5, 0.7), 2), (True, (0.5, 0.7), 1)):
-        scene = Scene()
-        markers = MarkerNodes(scene, "scene", FrameTree(scene), casts=casts)
-        for alpha, size in zip(alphas, (1.0, 1.001)):
-            markers.on_markers(MarkerArray([shown(alpha, size)]))
-            markers.show()
-        assert len(scene.added) == made, (casts, alphas)
+@pytest.mark.parametrize(
+    "wrong, words",
+    [
+        ({"push": 1}, "push = 1: must be the name of a vehicle"),
+        ({"ray": [0, 0, 0]}, "ray: must be x, y and z"),
+        ({"ray": [1, 0]}, "ray: must be x, y and z"),
+        ({"newtons": -1}, "newtons = -1: must be a number above 0"),
+        ({"newtons": 1000}, "newtons = 1000: must be"),
+        ({"newtons": True}, "newtons = True: must be"),
+    ],
+)
+def test_what_is_wrong_with_a_push_is_said(wrong, words):
+    good = {"push": "drone", "ray": [1, 0, 0], "newtons": 0.5}
+    assert read_push(good) == ("drone", [1, 0, 0], 0.5)
+    with pytest.raises(ValueError, match=words):
+        read_push(json.loads(json.dumps({**good, **wrong})))

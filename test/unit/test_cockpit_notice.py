@@ -46,7 +46,7 @@ def test_the_token_is_on_the_terminal_and_in_a_file_and_in_no_log(home, logged, 
         def run(self):
             file = home / "drone_sim" / f"cockpit_{self.served.port}.txt"
             seen.append((file, file.read_text(), stat.S_IMODE(file.stat().st_mode)))
-            self.served.server.stop()
+            self.served.stop()
 
     monkeypatch.setattr(cockpit, "Cockpit", Looked)
     monkeypatch.setattr(rospy, "get_param", lambda *_: {"port": 0})

@@ -261,7 +261,8 @@ def test_a_folder_that_is_a_link_is_the_users_choice(tmp_path):
 def test_every_stage_and_every_task_has_a_text_and_a_script(ask):
     lists = ask("scripts")
     groups = {one["name"]: one["scripts"] for one in lists["groups"]}
-    assert list(groups) == ["built-in", "tutorial", "tasks", "mine"] and lists["flown"] == "built-in/pilot.py"
+    assert list(groups) == ["built-in", "tutorial", "solutions", "tasks", "mine"]
+    assert lists["flown"] == "built-in/pilot.py"
     assert groups["tutorial"] == STAGES and groups["tasks"] == [f"tasks/{name}.py" for name in tasks.names()]
     for script in (*STAGES, *groups["tasks"]):
         opened = ask("open", script=script)
@@ -277,6 +278,13 @@ def test_ones_own_script_belongs_to_a_text_by_its_name(ask):
     assert ask("open", script="mine/2_elevation_of_mine.py")["lesson"] == "stage-2-elevation"
     assert ask("lesson", lesson="stage-2-elevation")["script"] == "mine/2_elevation_of_mine.py"
     assert ask("open", script="mine/hoverfly.py")["lesson"] == ""
+
+
+def test_a_solution_and_a_copy_of_one_belong_to_the_stage_of_their_number(ask):
+    assert ask("open", script="solutions/5_square.py")["lesson"] == "stage-5-roll"
+    ask("save_as", name="5_square.py", text="")
+    assert ask("open", script="mine/5_square.py")["lesson"] == "stage-5-roll"
+    assert ask("lesson", lesson="stage-5-roll")["script"] == "tutorial/5_roll.py"
 
 
 def test_a_section_ends_where_the_next_begins_and_code_is_no_heading(tmp_path):
@@ -296,3 +304,65 @@ def test_only_the_pictures_of_the_texts_are_served():
         "/docs/pictures/tutorial_no.png",
     ):
         assert LESSONS.picture(path) is None
+
+
+# ---- files
+
+
+def test_a_script_is_renamed_and_takes_the_place_of_nothing(store, own):
+    script, version = store.save_as("x.py", "text")
+    store.save(script, "changed", version)
+    renamed, version = store.rename(script, "y.lua")
+    assert renamed.name == "mine/y.lua" and (own / "y.lua").read_text() == "changed" and not (own / "x.py").exists()
+    assert store.original(renamed) == "text" and store.version("mine/y.lua") == version
+    other, _ = store.save_as("z.py", "other")
+    for name in ("z.py", "../z.py", "z.txt", ".z.py", ""):
+        with pytest.raises(ScriptStoreError):
+            store.rename(renamed, name)
+    with pytest.raises(ScriptStoreError, match="belongs to the package"):
+        store.rename(store.find("built-in/pilot.py"), "mine.py")
+    assert store.read(other)[0] == "other" and (own / "y.lua").exists()
+
+
+def test_a_script_is_duplicated_as_it_is_shown(store, own):
+    copy, _ = store.duplicate(store.find("built-in/pilot.py"), "shown")
+    again, _ = store.duplicate(copy, "shown too")
+    assert (copy.name, again.name) == ("mine/pilot.py", "mine/pilot_2.py")
+    assert (own / "pilot_2.py").read_text() == "shown too"
+
+
+def test_a_deleted_script_comes_back_with_every_byte(store, own):
+    own.mkdir()
+    (own / "x.py").write_bytes(b"a\r\nb\xff")
+    store.remove(store.find("mine/x.py"))
+    assert not (own / "x.py").exists()
+    (own / "x.py").write_text("another's")
+    back, _ = store.bring_back("mine/x.py")
+    assert back.name == "mine/x_2.py" and back.path.read_bytes() == b"a\r\nb\xff"
+    with pytest.raises(ScriptStoreError, match="not deleted here"):
+        store.bring_back("mine/x.py")
+    with pytest.raises(ScriptStoreError, match="belongs to the package"):
+        store.remove(store.find("built-in/pilot.py"))
+
+
+def test_a_link_out_of_the_folder_is_neither_renamed_nor_deleted(store, own, tmp_path):
+    own.mkdir()
+    (tmp_path / "outside.py").write_text("outside")
+    (own / "x.py").symlink_to(tmp_path / "outside.py")
+    link = next(one for one in store.scripts() if one.is_own)
+    for act in (store.remove, lambda one: store.rename(one, "y.py")):
+        with pytest.raises(ScriptStoreError, match="leads out"):
+            act(link)
+    assert (tmp_path / "outside.py").read_text() == "outside" and (own / "x.py").is_symlink()
+
+
+def test_the_simulation_knows_a_renamed_script_that_flies(ask, own):
+    ask("save_as", name="x.py", text="x = 1")
+    ask.node.parameters["script"] = str(own / "x.py")
+    assert ask("rename", script="mine/x.py", name="y.py")["script"] == "mine/y.py"
+    assert ask.node.parameters["script"] == str(own / "y.py")
+    assert ask("locate", file=str(own / "y.py")) == {"script": "mine/y.py"} and ask("locate", file=1) == {"script": ""}
+    ask("delete", script="mine/y.py")
+    assert ask("bring back", script="mine/y.py")["script"] == "mine/y.py"
+    assert ask("check", text="x = = 1", lua=False)["found"][0]["line"] == 1
+    assert any(row[1] == "getObjectPosition" for row in ask("api")["functions"])

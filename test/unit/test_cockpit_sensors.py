@@ -1,7 +1,7 @@
-"""The chart of one sensor in the cockpit's panel."""
+"""The numbers that the cockpit's page plots: of a vehicle, of sensors while somebody asks, of signals."""
 
+import json
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,39 +9,16 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, Range
+from std_msgs.msg import String
 
-from drone_sim.ros.cockpit.panel.plots import EVERY, SensorPlot
+from drone_sim.ros.cockpit.panel.board import Board
+from drone_sim.ros.cockpit.panel.plots import Plots
 from drone_sim.ros.cockpit.topics import PLOTTED
 
 RANGE, IMU = "/drone/range", "/drone/imu/data"
 KINDS = {RANGE: "sensor_msgs/Range", IMU: "sensor_msgs/Imu"}
-
-
-class Gui:
-    """What has been drawn."""
-
-    def __init__(self):
-        self.charts = []
-
-    def add_folder(self, _name):
-        return self
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
-
-    def add_dropdown(self, _name, options):
-        self.choice = SimpleNamespace(options=options, value=options[0])
-        return self.choice
-
-    def add_uplot(self, data, series, **_):
-        chart = SimpleNamespace(data=data, series=series)
-        chart.remove = lambda: self.charts.remove(chart)
-        self.charts.append(chart)
-        return chart
 
 
 @pytest.fixture(name="heard")
@@ -50,9 +27,9 @@ def _heard(monkeypatch):
     heard = {}
 
     class Subscriber:
-        def __init__(self, topic, _kind, callback, reading):
+        def __init__(self, topic, _kind, callback, *arguments, **_options):
             self.topic = topic
-            heard[topic] = lambda message: callback(message, reading)
+            heard[topic] = lambda message: callback(message, *arguments)
 
         def unregister(self):
             del heard[self.topic]
@@ -61,12 +38,28 @@ def _heard(monkeypatch):
     return heard
 
 
-@pytest.fixture(name="plot")
-def _plot(heard):
-    gui = Gui()
-    plot = SensorPlot(gui)
-    plot.offer(KINDS)
-    return plot, gui
+class Clock:
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture(name="clock")
+def _clock():
+    return Clock()
+
+
+@pytest.fixture(name="board")
+def _board():
+    return Board(lambda _: None)
+
+
+@pytest.fixture(name="plots")
+def _plots(heard, board, clock):
+    plots = Plots(board, clock)
+    plots.offer(KINDS)
+    return plots
 
 
 def stamped(message, time):
@@ -74,54 +67,79 @@ def stamped(message, time):
     return message
 
 
-def drawn(plot, gui):
-    for _ in range(EVERY):
-        plot.show()
-    return gui.charts[0].data
+def asked(plots, chart, run=0, at=-1):
+    found = plots.answer({"charts": {chart: [run, at]}})["charts"][chart]
+    return found["run"], found["rows"]
 
 
-def test_only_the_sensor_that_is_chosen_is_listened_to(plot, heard):
-    plot, gui = plot
-    plot.show()
-    assert tuple(gui.choice.options) == ("none", RANGE, IMU) and heard == {} and gui.charts == []
-    for topic in (RANGE, IMU):
-        gui.choice.value = topic
-        plot.show()
-        assert list(heard) == [topic] and len(gui.charts) == 1
-    assert [line["label"] for line in gui.charts[0].series][1:4] == [f"acceleration {one}, m/s²" for one in "xyz"]
-    plot.show(listening=False)
-    assert heard == {} and gui.charts == []
+def test_a_sensor_is_listened_to_while_somebody_asks(plots, heard, board, clock):
+    charts = [one["chart"] for one in board.get("charts")]
+    imu = [f"{IMU} drone/imu/data: {what}" for what in ("acceleration", "rate")]
+    assert charts == [f"{RANGE} drone/range", *imu]
+    assert heard == {}
+    asked(plots, charts[0])
+    clock.now = 4.0
+    asked(plots, charts[1])
+    assert set(heard) == {RANGE, IMU}
+    clock.now = 6.0
+    plots.rest()
+    assert set(heard) == {IMU}
+    plots.offer({})
+    assert asked(plots, charts[1]) == (0, [])
 
 
-def test_the_last_half_minute_is_drawn_and_what_is_out_of_range_is_a_gap(plot, heard):
-    plot, gui = plot
-    gui.choice.value = RANGE
-    plot.show()
+def test_the_last_half_minute_is_told_once_and_what_is_out_of_range_is_a_gap(plots, heard):
+    chart = f"{RANGE} drone/range"
+    asked(plots, chart)
     for time in np.arange(0, 40, 0.5):
         heard[RANGE](stamped(Range(range=math.inf if time == 30 else time), time))
-    times, values = drawn(plot, gui)
-    assert (times[0], times[-1]) == (-30.0, 0.0) and values[-1] == 39.5
-    assert np.isnan(values[list(times + 39.5).index(30)]) and np.isnan(values).sum() == 1
+    run, rows = asked(plots, chart)
+    assert (rows[0], rows[-1]) == ([9.5, 9.5], [39.5, 39.5])
+    assert [time for time, value in rows if value is None] == [30.0]
+    assert asked(plots, chart, run, 39.0)[1] == [[39.5, 39.5]]
+    assert asked(plots, chart, run + 1, 39.0)[1] == rows, "who knows another run gets all of this one"
 
 
-def test_another_run_begins_anew_and_many_points_are_thinned(plot, heard):
-    plot, gui = plot
-    gui.choice.value = IMU
-    plot.show()
+def test_another_run_begins_anew_and_a_fast_sensor_is_thinned(plots, heard):
+    chart = f"{IMU} drone/imu/data: rate"
+    asked(plots, chart)
     heard[IMU](stamped(Imu(), 100.0))
+    message = Imu()
+    message.angular_velocity.z = 3.0
     for step in range(4000):
-        heard[IMU](stamped(Imu(), step * 0.005))
-    columns = drawn(plot, gui)
-    assert len(columns) == 7 and 300 < len(columns[0]) <= 600 and columns[0][0] > -20.1
+        heard[IMU](stamped(message, step * 0.005))
+    run, rows = asked(plots, chart)
+    assert run == 1 and 500 < len(rows) <= 1000 and rows[-1][1:] == [0.0, 0.0, 3.0]
 
 
-def test_a_sensor_that_goes_is_chosen_no_more(plot, heard):
-    plot, gui = plot
-    gui.choice.value = RANGE
-    plot.show()
-    plot.offer({IMU: KINDS[IMU]})
-    plot.show()
-    assert gui.choice.value == "none" and heard == {}
+def test_what_a_vehicle_does_is_kept_without_being_asked(plots, heard, board):
+    plots.follow("drone")
+    assert [one["chart"] for one in board.get("charts")][:4] == ["velocity", "height", "attitude", "propellers"]
+    message = stamped(Odometry(), 2.0)
+    message.pose.pose.position.z, message.pose.pose.orientation.w, message.twist.twist.linear.x = 0.8, 1.0, 0.5
+    heard["/drone/odom"](message)
+    assert asked(plots, "height")[1] == [[2.0, 0.8]]
+    assert asked(plots, "velocity")[1] == [[2.0, 0.0, 0.5, 0.0, 0.0]]
+    assert asked(plots, "propellers")[1] == [[2.0, None, None, None, None, None]], "nothing is known of them"
+    plots.follow("")
+    assert asked(plots, "height")[1] == [] and not heard
+
+
+def test_signals_have_charts_as_they_come(plots, board):
+    for time in (1.0, 2.0):
+        plots.on_signals(String(json.dumps({"time": time, "signals": {"gain": time / 2}})))
+    assert [one["title"] for one in board.get("charts")][-1] == "gain"
+    assert asked(plots, "signal gain")[1] == [[1.0, 0.5], [2.0, 1.0]]
+    for wrong in ("nonsense", "[" * 100_000, "3", '{"time": 1}', '{"time": 1, "signals": {"a": "b"}}'):
+        plots.on_signals(String(wrong))
+    assert asked(plots, "signal gain", 0, 1.0)[1] == [[2.0, 1.0]]
+
+
+@pytest.mark.parametrize("wrong", [None, [], {"height": 3}, {"height": [1]}, {"height": [True, "x"]}])
+def test_what_is_no_question_for_plots_is_refused_in_one_line(plots, wrong):
+    with pytest.raises(ValueError, match=r"^charts = [^\n]*: must be \[run, time\] by name"):
+        plots.answer({"charts": wrong})
+    assert plots.answer({"charts": {"no such chart": [0, 0.0]}})["charts"]["no such chart"]["rows"] == []
 
 
 def test_every_reading_has_a_name_for_each_number():

@@ -9,39 +9,37 @@ import struct
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
-pytest.importorskip("viser")
 
-import msgspec
-import viser
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
-from drone_sim.ros.cockpit.server.page_server import page_files
+from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL
+from drone_sim.ros.cockpit.server.page_server import PageServer
 from drone_sim.ros.cockpit.server.page_socket import PageSocket
 from drone_sim.ros.cockpit.teleop import HeldCommands
 
-TOKEN = "secret-token"
-VISER = f"viser-v{viser.__version__}"
 GIGABYTE = 1 << 30
 
 
 class Served:
     def __init__(self):
-        socket = PageSocket(
-            HeldCommands(lambda _: None, lambda: 0.0), {"twice": lambda message: {"twice": 2 * message["number"]}}
-        )
-        with AccessControl(TOKEN, page_files().get, socket.serve).before_viser():
-            self.server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        self.port = self.server.get_port()
-        self.asked = []
-        self.server.request_share_url = lambda *_: self.asked.append("share")
-        self.server.disconnect_share_url = lambda *_: self.asked.append("share no more")
+        self.server = PageServer("127.0.0.1", 0)
+        self.token = self.server.address.partition("?token=")[2]
+        held = HeldCommands(lambda _: None, lambda: 0.0)
+        self.server.begin(PageSocket(held, {"twice": _twice}, {"fail": _fail}).serve, lambda _path: None)
 
-    def connect(self, protocol):
-        cookie = {"Cookie": f"drone_sim_{self.port}={TOKEN}"}
-        address = f"ws://127.0.0.1:{self.port}/"
+    def connect(self, protocol=SUBPROTOCOL):
+        cookie = {"Cookie": f"drone_sim_{self.server.port}={self.token}"}
+        address = f"ws://127.0.0.1:{self.server.port}/"
         return connect(address, subprotocols=[protocol], additional_headers=cookie, max_size=None)
+
+
+def _twice(message):
+    return {"twice": 2 * message["number"]}
+
+
+def _fail(_browser, _message):
+    raise RuntimeError("of two\nlines")
 
 
 @pytest.fixture(name="served", scope="module")
@@ -71,51 +69,23 @@ def ended(one):
     return closed.value.rcvd.code, closed.value.rcvd.reason
 
 
-@pytest.mark.parametrize(
-    "kind", ["ShareUrlRequest", "ShareUrlDisconnect", "FileTransferStartUpload", "FileTransferPart"]
-)
-def test_what_would_open_the_cockpit_to_the_world_is_refused_in_the_server(served, said, kind):
-    with served.connect(VISER) as one:
-        one.send(msgspec.msgpack.encode({"type": kind}))
-        assert ended(one) == (1008, f"{kind}: is not for this page")
-    assert served.asked == [] and said() == f"a browser at 127.0.0.1 is sent away: {kind}: is not for this page"
+def test_another_protocol_than_ours_opens_no_socket(served):
+    with pytest.raises(InvalidStatus, match="400"):
+        served.connect("viewer-1")
 
 
-@pytest.mark.parametrize(
-    "message",
-    [b"", b"\xc1", "text", b"\x81\xa4type\x01", msgspec.msgpack.encode([1]), b"\x91" * 5000, b"\xdf\xff\xff\xff\xff"],
-)
-def test_what_is_no_message_of_visers_ends_that_socket_with_one_line(served, said, message):
-    with served.connect(VISER) as one:
-        one.send(message)
-        assert ended(one) == (1008, "no message of viser's")
-    assert said() == "a browser at 127.0.0.1 is sent away: no message of viser's"
+def test_a_fault_of_ours_ends_that_socket_with_one_line(served, said):
+    with served.connect() as one:
+        one.send('{"fail": 1}')
+        assert ended(one)[0] == 1011
+    assert said() == "a browser's socket: RuntimeError: of two lines"
 
 
-def test_a_message_of_visers_that_it_cannot_read_ends_that_socket_with_one_line(served, said):
-    for message in ({"type": "NoSuchMessage"}, {"type": "ViewerCameraMessage", "fov": "wide"}):
-        with served.connect(VISER) as one:
-            one.send(msgspec.msgpack.encode(message))
-            assert ended(one)[0] == 1011
-        assert said().startswith("a browser's socket: ")
-
-
-def test_what_viser_cannot_do_with_a_message_is_one_line_and_nothing_else(served, said):
-    field = served.server.gui.add_slider("Speed", min=0.0, max=1.0, step=0.1, initial_value=0.5)
-    with served.connect(VISER) as one:
-        update = {"type": "GuiUpdateMessage", "uuid": field._impl.uuid, "updates": {"value": [1]}}
-        one.send(msgspec.msgpack.encode(update))
-        assert said().startswith("a browser's message: TypeError: ") and field.value == 0.5
-        one.ping().wait(10)
-    field.remove()
-
-
-@pytest.mark.parametrize("protocol", [SUBPROTOCOL, VISER])
 @pytest.mark.parametrize("parts", [1, 1000])
-def test_a_gigabyte_is_refused_before_it_is_taken(served, said, protocol, parts):
+def test_a_gigabyte_is_refused_before_it_is_taken(served, said, parts):
     """In one frame, of which the head alone is believed, or in many."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with served.connect(protocol) as one, socket.socket(fileno=one.socket.fileno()) as plain:
+    with served.connect() as one, socket.socket(fileno=one.socket.fileno()) as plain:
         size = GIGABYTE // parts
         try:
             for part in range(parts):  # binary, more to come; masked

@@ -2,24 +2,22 @@
 
 import asyncio
 import json
+import re
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
-pytest.importorskip("viser")
 
 import cv2
 from cv_bridge import CvBridge
-from dynamic_reconfigure.encoding import encode_config
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
 from drone_sim.ros.cockpit.panel import cameras as cameras_module
-from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, packed
-from drone_sim.ros.cockpit.panel.panel import TextLog
-from drone_sim.ros.cockpit.panel.tuning import SpeedControl
+from drone_sim.ros.cockpit.panel.board import Board
+from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, camera_name, packed
 from drone_sim.ros.cockpit.server.page_socket import SendQueue
 from drone_sim.ros.cockpit.topics import ImageTopic, find_topics
 
@@ -138,60 +136,6 @@ def test_every_topic_of_pictures_is_offered_once():
 # ---- switches
 
 
-class Box:
-    """A checkbox, or text, as viser has it."""
-
-    def __init__(self, value):
-        self._value, self.then, self.there = value, lambda event: None, True
-        self.content = value
-
-    def on_update(self, then):
-        self.then = then
-
-    @property
-    def value(self):
-        return self._value
-
-    @value.setter
-    def value(self, value):
-        self._value = value
-        self.then(type("Event", (), {"target": self, "client": None}))
-
-    def remove(self):
-        self.there = False
-
-
-class Gui:
-    def __init__(self):
-        self.boxes = {}
-
-    def add_folder(self, _name):
-        return self
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        return None
-
-    def add_checkbox(self, name, value):
-        self.boxes[name] = Box(value)
-        return self.boxes[name]
-
-    def add_dropdown(self, name, options, initial_value, hint):
-        assert hint
-        self.boxes[name] = Box(initial_value)
-        self.boxes[name].options = options
-        return self.boxes[name]
-
-    def add_text(self, name, value, disabled, hint):
-        assert disabled and hint
-        return self.add_checkbox(name, value)
-
-    def add_html(self, content):
-        return Box(content)
-
-
 class Sent:
     """Remembers what would go to the browsers."""
 
@@ -232,8 +176,8 @@ def _sent():
 def _cameras(monkeypatch, sent):
     monkeypatch.setattr(cameras_module.rospy, "Subscriber", Subscriber)
     Subscriber.there.clear()
-    found = CameraSwitches(Gui(), sent)
-    found.offer((ImageTopic("/drone/front", "/drone/front/compressed"), ImageTopic("/drone/depth/image")))
+    found = CameraSwitches(Board(lambda _: None), sent)
+    found.offer((ImageTopic("/drone/front", "/drone/front/compressed"), ImageTopic("/drone/depth/image")), ("drone",))
     return found
 
 
@@ -247,7 +191,7 @@ def test_cameras_are_listened_to_while_they_are_shown_to_somebody(cameras, sent)
         hear(CompressedImage(data=b"%d" % number))
     cameras.show()
     cameras.show()
-    assert sent.pictures == [({"picture": "/drone/front", "name": "drone/front", "note": ""}, b"2")]
+    assert sent.pictures == [({"picture": "/drone/front", "name": "front", "note": ""}, b"2")]
     sent.ready = False
     hear(CompressedImage(data=b"3"))
     cameras.show()
@@ -291,22 +235,31 @@ def test_what_is_no_state_of_windows_changes_nothing(cameras, sent, wrong):
         windows.answers["answer"]({"handle": 1, "button": "ok"})
 
 
-def test_the_speed_follows_what_others_set():
-    gui = Gui()
-    speed = SpeedControl(gui, "/drone_sim", print)
-    for factor, words in ((2.0, "2 times real time"), (0.0, "as fast as it can"), (3.7, "3.7 times real time")):
-        speed.show_set(encode_config({"real_time_factor": factor}))
-        assert gui.boxes["Speed"].value == words and words in gui.boxes["Speed"].options
-    speed.show_set(encode_config({"real_time_factor": 1.0}))
-    speed.show_set(encode_config({"Kzref": 3.0}))
-    assert gui.boxes["Speed"].value == "real time"
-    for said, words in (("1.98", "1.98 times real time"), ("not known", ""), ("", "")):
-        speed.show_actual(said)
-        assert gui.boxes["Actual speed"].value == words
+@pytest.mark.parametrize(
+    "topic, vehicles, name",
+    [
+        ("/drone/front", ("drone",), "front"),
+        ("/drone/track/image", ("drone",), "tracking"),
+        ("/drone/depth/image", ("drone", "wing"), "drone, depth"),
+        ("/drone_sim/views/Spy", ("drone",), "Spy"),
+        ("/robot/eye", (), "robot/eye"),
+    ],
+)
+def test_cameras_go_by_the_names_that_people_use(topic, vehicles, name):
+    assert camera_name(topic, vehicles) == name
 
 
-def test_words_are_text():
-    words = TextLog(Gui(), "<i>Log</i>")
-    words.show(["<script>alert(1)</script>", "x" * 10_000])
-    assert "<script>" not in words._drawn.content and "&lt;script&gt;" in words._drawn.content
-    assert len(words._drawn.content) < 2000
+@pytest.mark.parametrize(
+    "wrong, said",
+    [
+        ({"topic": "/drone/frond", "on": True}, "topic = '/drone/frond': is none of those that there are; near names"),
+        ({"topic": "/drone/front", "on": 1}, "on = 1: must be true or false"),
+        ({"on": True}, "topic = None: "),
+    ],
+)
+def test_what_a_browser_asks_of_a_camera_is_checked(cameras, wrong, said):
+    with pytest.raises(ValueError, match=f"^{re.escape(said)}"):
+        cameras.turn_asked(wrong)
+    assert cameras.shown == []
+    cameras.turn_asked({"topic": "/drone/front", "on": True})
+    assert cameras.shown == ["/drone/front"]

@@ -1,6 +1,15 @@
 """What a key press changes: the command in force, or what was sent a moment ago."""
 
-from drone_sim.ros.tools.commands import RIGHT, UNKNOWN, UP, Command, CommandInForce
+import re
+from pathlib import Path
+
+import pytest
+
+from drone_sim.ros.tools.commands import DOWN, KEY_MAPS, LEFT, RIGHT, UNKNOWN, UP, Command, CommandInForce
+
+COCKPIT, COURSE = KEY_MAPS["cockpit"], KEY_MAPS["course"]
+ARROWS = {"ArrowUp": UP, "ArrowDown": DOWN, "ArrowLeft": LEFT, "ArrowRight": RIGHT}
+PAGE = Path(__file__).parents[2] / "web" / "src" / "teleop.js"
 
 
 class Clock:
@@ -11,19 +20,44 @@ class Clock:
 
 
 def press(in_force, key):
-    command = in_force.next.after(key)
+    command = in_force.next.after(key, COCKPIT)
     in_force.send(command)
     return command
 
 
 def test_keys_add_up_and_space_stops():
     command = Command()
-    for key in (UP, UP, UP, RIGHT, "u", "r", "e", "e"):
-        command = command.after(key)
+    for key in (UP, "w", UP, RIGHT, "r", "e", "q", "q"):
+        command = command.after(key, COCKPIT)
     assert command == Command(0.3, -0.1, 0.1, 0.2)
-    assert command.after(" ") == Command()
-    assert command.after("x") is None
-    assert command.after(UNKNOWN) is None
+    assert command.after("W", COCKPIT) == Command(0.55, -0.1, 0.1, 0.2)
+    assert command.after(" ", COCKPIT) == Command()
+    assert command.after("x", COCKPIT) is None
+    assert command.after(UNKNOWN, COCKPIT) is None
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [
+        (UP, Command(vx=0.1)),
+        (DOWN, Command(vx=-0.1)),
+        (LEFT, Command(vy=0.1)),
+        (RIGHT, Command(vy=-0.1)),
+        ("e", Command(wz=0.2)),
+        ("r", Command(wz=-0.2)),
+    ],
+)
+def test_the_courses_keys_do_what_they_do_in_its_own_node(key, change):
+    assert Command().after(key, COURSE) == change
+    assert Command().after("w", COURSE) is None, "any other key stops"
+
+
+def test_the_keys_are_those_of_the_page():
+    page = re.findall(r"""(Key[A-Z]|Arrow\w+): \["(\w+)", (-?1)\]""", PAGE.read_text(encoding="utf-8"))
+    signs = {ARROWS.get(code, code[-1].lower()): (axis, int(sign)) for code, axis, sign in page}
+    assert signs.keys() == COCKPIT.keys()
+    for key, (axis, sign) in signs.items():
+        assert {name: change * sign > 0 for name, change in COCKPIT[key]._asdict().items() if change} == {axis: True}
 
 
 def test_quick_presses_add_up_before_the_simulator_has_answered():

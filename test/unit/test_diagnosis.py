@@ -3,6 +3,7 @@
 import pytest
 
 from drone_sim.files.resources import package_path
+from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.frames import from_rpy, to_quaternion
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
@@ -13,6 +14,7 @@ from drone_sim.run.pacing import Pacer
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.errors import ScriptError
+from drone_sim.vehicles.situation import doing
 
 FORWARD = Twist(Vector3(0.5, 0, 0), Vector3(0, 0, 0))
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
@@ -146,12 +148,63 @@ def test_who_flies_on_after_its_commander_has_gone(looked):
 def test_a_script_that_does_not_listen_is_told(looked):
     looked.script.write_text("def sysCall_init():\n    pass\n")
     looked.player.restart()
+    deaf = "this script does not listen to commands: the tutorial's do from stage 6 on, and `pilot` does"
+    found = looked.look()
+    assert (found.level, found.message) == (OK, f"flying; {deaf}")
+    assert found.values["listens to commands"] == "no"
     looked.command()
     found = looked.look()
-    assert (found.level, found.message) == (
-        WARN,
-        "commands come in, but the child script does not subscribe to cmd_vel",
-    )
+    assert (found.level, found.message) == (WARN, deaf)
+    looked.renew()
+    assert looked.look().values["listens to commands"] == "yes"
+
+
+@pytest.mark.parametrize(
+    ("place", "turn", "word", "level"),
+    [
+        ((0, 0, 0.8), 0.0, "flying", OK),
+        ((0, 0, 0.1), 0.0, "on the ground", WARN),
+        ((1.0, 0, 4.1), 0.0, "on Wall", WARN),
+        ((0, 0, 0.1), 3.1, "upside down", WARN),
+        ((0, 0, 3.0), 3.1, "upside down", WARN),
+    ],
+)
+def test_what_its_body_does_is_told_whatever_the_script_means(looked, place, turn, word, level):
+    looked.script.write_text("def sysCall_init():\n    pass\n")
+    looked.player.restart()
+    looked.drone.body.move(Pose(place, to_quaternion(from_rpy((0, 0, 0), (turn, 0, 0)))))
+    looked.fly(1 if level == OK or place[2] == 3.0 else 30)
+    found = looked.look()
+    assert (found.values["does"], found.level) == (word, level)
+    assert doing(looked.drone) == word
+    assert word in found.message or word == "upside down"
+
+
+def test_a_drone_that_slides_or_hangs_on_a_wall_says_so(looked):
+    looked.script.write_text("def sysCall_init():\n    pass\n")
+    looked.player.restart()
+    looked.drone.body.move(Pose((0, 0, 0.06), UPRIGHT))
+    looked.fly(20)
+    looked.drone.pushes.add(Push((6, 0, 0), (0, 0, 0), 0.2))
+    looked.fly(3)
+    assert looked.look().values["does"] == "slides on the ground"
+    looked.renew()
+    looked.command()
+    looked.fly(120)
+    assert looked.look().values["does"] == "touches Wall"
+
+
+def test_the_pilots_own_states_count_and_its_flying_is_looked_at():
+    simulation = Simulation(parameters.load({"start": "landed"}))
+    simulation.step()
+    assert doing(simulation.drone) == "landed"
+    simulation.drone.ask("takeoff")
+    for _ in range(100):
+        simulation.step()
+    assert doing(simulation.drone) == "flying"
+    simulation.drone.body.hold()
+    assert doing(simulation.drone) == "held"
+    simulation.close()
 
 
 def test_a_script_error_is_told_until_the_next_start(looked):

@@ -163,6 +163,21 @@ def test_the_camera_stage_draws_no_picture_that_nobody_gets(monkeypatch):
         fly(simulation, 0.15)
 
 
+READ = {"1": 1, "2": 4, "3": 5, "4": 10, "5": 10, "6": 10, "7": 10}  # parameters, by stage
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stage_reads_its_gains_from_parameters_that_can_be_tuned(stage):
+    with flying(stage, "cameras.front.width=32", "cameras.front.height=24") as simulation:
+        fly(simulation, 4)
+        tuning = simulation.child_scripts["drone"].tuning
+        gains = {name: value for name, value in tuning.values().items() if name in vars(simulation.parameters.control)}
+        assert len(gains) == READ[stage[0]]
+        before = simulation.drone.body.state.position[2]
+        tuning.change({"thrust_gravity": 5.0})
+        assert fly(simulation, 2).z[-1] < before - 0.05
+
+
 # ---- the text
 
 

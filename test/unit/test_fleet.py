@@ -177,7 +177,8 @@ def test_who_comes_and_goes_disturbs_nobody(fly):
 
 def test_fifty_times_leave_nothing_behind(fly):
     simulation = fly(vehicles=2)
-    files, names, visuals = open_files(), set(simulation.context.objects.names), len(simulation.world.visuals())
+    files, names = open_files(), set(simulation.context.objects.names)
+    visuals = len(simulation.world.pictures.visuals())
     for _ in range(50):
         simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {"position": [-2, 0, 1]}})
         simulation.step()
@@ -185,7 +186,7 @@ def test_fifty_times_leave_nothing_behind(fly):
         simulation.step()
     assert open_files() == files
     assert set(simulation.context.objects.names) == names
-    assert len(simulation.world.visuals()) == visuals
+    assert len(simulation.world.pictures.visuals()) == visuals
     simulation.set_vehicles({"drone1": {}, "drone2": {}, "guest": {}})
     assert simulation.vehicles["guest"].object_name == "Drone#1", "the suffix that is free"
 
@@ -239,11 +240,11 @@ def test_a_new_one_whose_script_fails_goes_again(fly, tmp_path):
 
 def test_one_that_cannot_be_built_leaves_nothing(fly):
     simulation = fly(vehicles=1)
-    names, bodies = set(simulation.context.objects.names), len(simulation.world.visuals())
+    names, bodies = set(simulation.context.objects.names), len(simulation.world.pictures.visuals())
     wrong = {"guest": {"cameras": {"front": {"frame": "nowhere"}}, "position": [2, 0, 1]}}
     with pytest.raises(parameters.ParameterError, match="nowhere"):
         simulation.set_vehicles({"drone1": {}, **wrong})
-    assert set(simulation.context.objects.names) == names and len(simulation.world.visuals()) == bodies
+    assert set(simulation.context.objects.names) == names and len(simulation.world.pictures.visuals()) == bodies
     simulation.step()
 
 

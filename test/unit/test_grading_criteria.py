@@ -133,7 +133,8 @@ def test_a_vehicle_that_is_put_elsewhere_has_not_been_in_between():
     at = times(2.0, 0.05)
     jumping = flown(at, x=np.where(at < 1, 0.0, 4.0))
     assert not judged(jumping, "reach", places=[[2, 0, 0]], within=0.5).passed
-    assert judged(jumping, "reach", places=[[4, 0, 0]], within=0.5).passed
+    put = judged(jumping, "reach", places=[[4, 0, 0]], within=0.5)
+    assert not put.passed and put.value == 0  # who is put there has not arrived
 
 
 def test_the_distance_from_a_path():

@@ -68,6 +68,13 @@ def test_what_tumbles_keeps_its_angular_velocity_as_in_vrep(add, pushed):
         assert turning(world, body)[0] == pytest.approx(TUMBLE, abs=1e-8)
 
 
+def test_what_is_pushed_no_more_still_keeps_its_angular_velocity():
+    with tumbling(False, add_box) as (world, body):
+        for pushed in (True, False, True, False):
+            world.advance({body: Wrench()} if pushed else {}, 100)
+        assert turning(world, body)[0] == pytest.approx(TUMBLE, abs=1e-8)
+
+
 @pytest.mark.parametrize("pushed", [False, True])
 def test_the_textbooks_tumble_keeps_momentum_and_energy_over_10_s(pushed):
     with tumbling(True, add_box) as (world, body):

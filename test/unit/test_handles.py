@@ -8,6 +8,7 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 from visualization_msgs.msg import InteractiveMarkerFeedback
 
+from drone_sim.forces.pushes import Push
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.rviz import vehicle_handles
 from drone_sim.run import parameters
@@ -39,3 +40,100 @@ def test_it_moves_nothing_where_the_vehicle_has_gone(dragged):
     simulation.set_vehicles({"other": {}})
     inbox.empty()
     assert simulation.vehicles["other"].body.state.position[0] == 0
+
+
+class Hand:
+    """Somebody who holds the drone's handle, and says so."""
+
+    def __init__(self, shown, simulation, inbox):
+        self.shown, self.simulation, self.inbox = shown, simulation, inbox
+
+    def tell(self, kind, *place):
+        feedback = InteractiveMarkerFeedback(event_type=kind, marker_name="Drone", client_id="hand")
+        feedback.pose.orientation.w = 1.0
+        if place:
+            feedback.pose.position.x, feedback.pose.position.y, feedback.pose.position.z = place
+        self.shown._on_feedback(feedback)
+        self.inbox.empty()
+
+    def fly(self, steps):
+        for _ in range(steps):
+            self.simulation.step()
+            self.shown.update()
+
+    @property
+    def state(self):
+        return self.simulation.drone.body.state
+
+
+@pytest.fixture(name="hand")
+def _hand(monkeypatch):
+    monkeypatch.setattr(vehicle_handles, "MarkerServer", mock.MagicMock())
+    simulation, inbox = Simulation(parameters.load({"script": "", "weather": {"wind": [5, 0, 0]}})), Inbox()
+    yield Hand(vehicle_handles.VehicleHandles(simulation, inbox), simulation, inbox)
+    simulation.close()
+
+
+DOWN, MOVED, UP = (
+    InteractiveMarkerFeedback.MOUSE_DOWN,
+    InteractiveMarkerFeedback.POSE_UPDATE,
+    InteractiveMarkerFeedback.MOUSE_UP,
+)
+
+
+def test_a_vehicle_stands_still_while_it_is_held_and_flies_on_from_rest(hand):
+    hand.fly(20)
+    hand.tell(DOWN)
+    held = hand.state.position
+    hand.fly(20)
+    assert hand.state.position == held and hand.state.linear_velocity == (0, 0, 0)
+    hand.tell(MOVED, 1.0, 2.0, 3.0)
+    hand.simulation.drone.pushes.add(Push((3, 0, 0), (0, 0, 0), 0.2))
+    hand.fly(40)
+    assert hand.state.position == pytest.approx((1, 2, 3)) and hand.state.linear_velocity == (0, 0, 0)
+    objects = hand.simulation.context.objects
+    base = objects.handle("Quadricopter_base")
+    assert hand.simulation.context.velocities.velocity(base)[0] == (0, 0, 0), "nor does the script measure a speed"
+    hand.tell(UP)
+    hand.fly(1)
+    assert abs(hand.state.linear_velocity[2]) < 0.5, "let go at rest"
+    hand.fly(100)
+    assert hand.state.position[2] == pytest.approx(0.8, abs=0.05), "the controller goes on"
+
+
+def test_who_is_silent_for_a_second_lets_go(hand):
+    hand.shown._held._clock = lambda: 0.0
+    hand.tell(DOWN)
+    assert hand.simulation.drone.body.is_held
+    hand.shown._held._clock = lambda: 5.0
+    hand.fly(1)
+    assert not hand.simulation.drone.body.is_held
+
+
+@pytest.mark.parametrize("begin", ["start", "stop"])
+def test_a_start_and_a_stop_let_go(hand, begin):
+    hand.tell(DOWN)
+    getattr(hand.simulation, begin)()
+    assert not hand.simulation.drone.body.is_held
+
+
+def test_a_restored_snapshot_lets_go_and_flies_on_as_before(hand):
+    hand.fly(5)
+    snapshot = hand.simulation.snapshot()
+    hand.fly(20)
+    flown = hand.state
+    hand.simulation.restore(snapshot)
+    hand.tell(DOWN)
+    hand.simulation.restore(snapshot)
+    hand.tell(UP)
+    hand.fly(20)
+    assert hand.state == flown
+
+
+def test_a_held_vehicle_may_go(hand):
+    hand.tell(DOWN)
+    hand.simulation.set_vehicles({"other": {}})
+    hand.fly(1)
+    hand.tell(UP)
+    hand.fly(1)
+    assert not hand.simulation.vehicles["other"].body.is_held

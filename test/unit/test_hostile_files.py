@@ -247,7 +247,7 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
     read, loaded = [], trimesh.load
     monkeypatch.setattr(trimesh, "load", lambda *given, **how: read.append(how["file_type"]) or loaded(*given, **how))
     simulation = Simulation(parameters.load({"scene_file": str(tmp_path / "scene.yaml")}))
-    for visual in simulation.world.visuals():
+    for visual in simulation.world.pictures.visuals():
         load(visual)
     simulation.start()
     assert read.count("stl") == 1

@@ -240,12 +240,46 @@ def test_nobody_flies_in_a_file_without_a_quadricopter_unless_that_is_asked_for(
         parameters.load(scene).first  # noqa: B018
 
 
+TWICE = {
+    "roots": (shape(0, "water12", mesh()), shape(1, "water12", mesh())),
+    "one in the other": (shape(0, "water12", mesh()), shape(1, "water12", mesh(), parent=0)),
+    "beside each other": (scene_object("DMY", 0, "D"), *(shape(n, "water12", mesh(), parent=0) for n in (1, 2))),
+    "of two trees": (shape(0, "water12", mesh()), scene_object("DMY", 1, "D"), shape(2, "water12", mesh(), parent=1)),
+    "by their aliases": tuple(shape(handle, "", mesh(), alias="water12") for handle in (0, 1)),
+}
+
+
+@pytest.mark.parametrize("objects_twice", TWICE.values(), ids=TWICE)
+def test_of_two_objects_of_one_name_the_second_gets_a_free_one(imported, objects_twice):
+    content = imported(*objects_twice)
+    names = [one["name"] for one in content["objects"]]
+    assert len({*names}) == len(names) and "water12" in names
+    assert ": is called water12" in imported.said
+    Simulation(parameters.load({"scene_file": str(imported.scene)}), started=False).close()
+
+
+def test_scripts_on_each_other_have_an_object_each(imported):
+    def scripted(handle, name, parent):
+        own = script(99, f"function sysCall_init() sim.setInt32Signal('{name}', 1) end", tag="Soo")
+        return scene_object("SCT", handle, name, parent=parent, own=own, alias="Script")
+
+    content = imported(
+        scene_object("DMY", 0, "D"), scripted(1, "one", 0), scripted(2, "two", 0), scripted(3, "on", 2), version=25
+    )
+    assert sorted(one["object"] for one in content["scripts"]) == ["D", "on", "two"]
+    values = {"scene_file": str(imported.scene), "vehicles": {"drone": {}}}
+    simulation = Simulation(parameters.load(values))
+    found = [simulation.context.signals.get(int, name) for name in ("one", "two", "on")]
+    simulation.close()
+    assert found == [1, 1, 1]
+
+
 def test_what_cannot_be_brought_is_said_object_by_object(imported):
-    own = scene_object("PAT", 0, "Way"), scene_object("GRH", 1, "Graph"), scene_object("DMY", 2, "Drone")
+    own = scene_object("PTC", 0, "Points"), scene_object("GRH", 1, "Graph"), scene_object("DMY", 2, "Drone")
     imported(*own, script(2, "x = 1", kind=6), script(2, "y = 1", switches=10))
     listed = (imported.scene.parent / "IMPORT.txt").read_text()
     for line in (
-        "Way: a path: only its place is brought",
+        "Points: a point cloud: only its place is brought",
         "Drone: is called Drone#0 here",
         "Drone: its customization script is not brought",
     ):
@@ -524,6 +558,14 @@ def test_what_hangs_on_a_quadricopter_goes_with_it(imported):
     parameters.load({"scene_file": str(imported.scene)})
 
 
+def test_a_vision_sensor_that_is_called_like_a_camera_of_v_reps_sees(imported):
+    own = numbers("_cp", "Ccp", 1, 1.0, 0.01, 50) + integers("Res", 64, 48) + chunk("Va3", b"\1")
+    content = imported(*quadricopter(), scene_object("RSN", 70, "DroneFloorCamera", 0, (0, 0, -0.1), own=own))
+    vehicle = content["vehicles"]["drone"]
+    assert "Quadricopter_floorCamera" not in vehicle["objects"]
+    assert [one["object"] for one in vehicle["cameras"].values()] == ["DroneFloorCamera"]
+
+
 def test_a_rope_weighs_where_it_hangs_and_a_hand_is_of_one_piece(imported):
     def link(handle, parent, name):
         thread = {"dynamic": True, "wrapper": weight(0.05, (1e-4, 1e-4, 1e-4))}
@@ -589,7 +631,7 @@ def test_a_target_that_the_file_has_not_is_where_the_base_is(imported):
 
 def test_a_file_of_v_reps_is_a_scene(tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    (tmp_path / "My scene.ttt").write_bytes(file(*quadricopter(), scene_object("PAT", 90, "Way")))
+    (tmp_path / "My scene.ttt").write_bytes(file(*quadricopter(), scene_object("PTC", 90, "Points")))
     with caplog.at_level(logging.INFO):
         first, second = (parameters.load({"scene_file": str(tmp_path / "My scene.ttt")}) for _ in range(2))
     assert first.scene_file == second.scene_file and first.scene_file.startswith(str(tmp_path / "cache"))

@@ -2,7 +2,18 @@
 
 import pytest
 
-from drone_sim.ros.tools.commands import BACKSPACE, DOWN, ESCAPE, KEY_PATIENCE, LEFT, RIGHT, UNKNOWN, UP, KeyDecoder
+from drone_sim.ros.tools.commands import (
+    BACKSPACE,
+    DOWN,
+    ENTER,
+    ESCAPE,
+    KEY_PATIENCE,
+    LEFT,
+    RIGHT,
+    UNKNOWN,
+    UP,
+    KeyDecoder,
+)
 
 
 class Clock:
@@ -38,6 +49,7 @@ SEQUENCES = [
     ("é".encode(), [UNKNOWN]),
     (b"\x00\x01", [UNKNOWN, UNKNOWN]),
     (b"\x7f\x08", [BACKSPACE, BACKSPACE]),
+    (b"\r\n", [ENTER, ENTER]),
     (b"eR q", ["e", "R", " ", "q"]),
 ]
 

@@ -76,8 +76,8 @@ def _simulate():
 def test_every_shape_is_read_drawn_and_hit(write, simulate, renderer, shape, mass):
     simulation = simulate(write(f"drone: {{position: [1, 0, 3]}}\nobjects: [{SHAPES[shape] % (1, mass)}]"))
     view = looking((-3, 0, 1.5), (1, 0, 0.3))
-    labels = seen(renderer, simulation.world.visuals(), simulation.world.visual_poses(), view)
-    things = [index for index, visual in enumerate(simulation.world.visuals()) if visual.key[0] == 1]
+    labels = seen(renderer, simulation.world.pictures.visuals(), simulation.world.pictures.visual_poses(), view)
+    things = [index for index, visual in enumerate(simulation.world.pictures.visuals()) if visual.key[0] == 1]
     assert np.isin(labels, things).sum() > 500
     ball = simulation.world.add_object(Sphere((0.05,)), Pose((1.0, 0, 0.7)), mass=0.1)
     simulation.world.advance({}, 100)
@@ -100,7 +100,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     assert loaded.parameters.scene.floor == simulation.parameters.scene.floor
     # The body's own number does not count, nor does where a propeller's blades stand.
     np.testing.assert_allclose(
-        loaded.world.visual_poses()[:10], simulation.world.visual_poses()[:10], rtol=0, atol=1e-9
+        loaded.world.pictures.visual_poses()[:10], simulation.world.pictures.visual_poses()[:10], rtol=0, atol=1e-9
     )
     looks = [[visual.shape, visual.rgba, visual.texture] for visual in simulation.scene.visuals()[0]]
     assert [[v.shape, v.rgba, v.texture] for v in loaded.scene.visuals()[0]] == looks
@@ -192,8 +192,8 @@ objects:
 """
     )
     shapes = "'box', 'cylinder', 'sphere', 'mesh', 'urdf', 'capsule', 'compound'"
-    kinds = "; or `kind`: one of 'dummy', 'joint', 'proximity_sensor', 'vision_sensor', 'path', 'force_sensor', "
-    kinds += "'script'"
+    kinds = "; or `kind`: one of 'dummy', 'joint', 'proximity_sensor', 'vision_sensor', 'path', 'curved_path', "
+    kinds += "'force_sensor', 'script'"
     with pytest.raises(ParameterError) as refused:
         parameters.load({"scene_file": file, "gravity": "down"})
     first, *others = str(refused.value).split("; line ")
@@ -236,7 +236,7 @@ def test_a_color_of_three_numbers_is_opaque(write):
     assert [one.color for one in scene.objects] == [(1, 0, 0.5, 1), (1, 0, 0.5, 0.2)]
 
 
-README = """
+SCENE = """
 floor: {size: 20.0}                                # m
 drone: {position: [0, 0, 1], yaw: 0}               # m, rad
 objects:
@@ -250,7 +250,7 @@ objects:
 
 
 def test_one_entry_of_each_shape_to_copy(write, simulate):
-    simulation = simulate(write(README))
+    simulation = simulate(write(SCENE))
     for _ in range(10):
         simulation.step()
     assert {"Crate", "Pillar", "Ball", "Chair", "Barrel"} <= set(simulation.context.objects.names)
@@ -267,11 +267,11 @@ def test_a_scene_that_is_not_there_gets_one_line(file):
 @pytest.mark.parametrize("name", ["empty", "gates", "room"])
 def test_the_shipped_scenes_load_and_let_the_drone_hover(simulate, name):
     simulation = simulate(f"package://drone_sim/config/scenes/{name}.yaml")
-    (x, y, z), things = simulation.drone.body.state.position, simulation.world.visual_poses()[:, :3, 3]
+    (x, y, z), things = simulation.drone.body.state.position, simulation.world.pictures.visual_poses()[:, :3, 3]
     for _ in range(100):
         simulation.step()
     assert simulation.drone.body.state.position == pytest.approx((x, y, z), abs=0.002)
-    np.testing.assert_allclose(simulation.world.visual_poses()[:, :3, 3], things, rtol=0, atol=0.005)
+    np.testing.assert_allclose(simulation.world.pictures.visual_poses()[:, :3, 3], things, rtol=0, atol=0.005)
 
 
 def test_the_drone_flies_through_the_first_gate(simulate):
@@ -288,8 +288,8 @@ def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
     view = looking((-3, 0, 1), (1, 0, 1))
 
     def picture():
-        renderer.set_visuals(world.visuals())
-        return renderer.render(CAMERA, view, world.visual_poses()).astype(int)
+        renderer.set_visuals(world.pictures.visuals())
+        return renderer.render(CAMERA, view, world.pictures.visual_poses()).astype(int)
 
     empty = picture()
     first = world.add_object(Sphere((0.5,)), Pose((1, 1, 1)), color=(1, 0, 0, 1))
@@ -299,10 +299,10 @@ def test_pictures_follow_what_is_added_painted_moved_and_removed(renderer):
     assert np.argmax(both[120, 100]) == 0
     world.set_color(first, (0, 0, 1, 1))
     assert np.argmax(picture()[120, 100]) == 2
-    painted, snapshot = picture(), world.snapshot()
+    painted, snapshot = picture(), world.saved_states.snapshot()
     world.set_pose(first, Pose((1, 9, 1)))
     np.testing.assert_array_equal(picture()[:, :150], empty[:, :150])
-    world.restore(snapshot)
+    world.saved_states.restore(snapshot)
     np.testing.assert_array_equal(picture(), painted)
     world.remove(first)
     np.testing.assert_array_equal(picture()[:, :150], empty[:, :150])

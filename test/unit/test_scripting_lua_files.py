@@ -162,6 +162,10 @@ def test_a_script_is_no_helper_of_its_own(run, dialect):
     assert run(dialect + "print(require 'main')", main__init="return 7") == ["7"]
 
 
+def test_a_function_may_be_called_goto_as_in_lua_5_1(run):
+    assert run("function goto(place) return place end\nprint(goto('there'))") == ["there"]
+
+
 def test_flat_names_and_operators_of_newer_luas_may_stand_in_one_script(run):
     assert run(FLAT + "print(5 | 2, 1 << 3)") == ["7\t8"]
     assert run(FLAT + "print('5 | 2', table.getn({1, 2}))") == ["5 | 2\t2"], "in 5.1, where nothing else is asked for"

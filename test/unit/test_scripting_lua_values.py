@@ -120,3 +120,12 @@ def test_lua_multiplies_matrices_as_python_does(tmp_path, prologue):
     found = simulation.child_scripts["drone"].parameters
     assert found["product"] == list(frames.transform(m, v)) and found["inverse"] == list(frames.invert(m))
     simulation.close()
+
+
+def test_what_counts_in_a_loop_may_be_set():
+    """As up to Lua 5.4, which CoppeliaSim has."""
+    said = []
+    api = Api("test", {"f": lambda value: said.append(value)}, {})
+    source = b"for key, value in pairs({a = 1}) do key = key .. '!' test.f(key) end"
+    LuaScript("script.lua", source, {"test": api}, TimeLimit(20)).close()
+    assert said == ["a!"]

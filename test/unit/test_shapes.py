@@ -64,7 +64,7 @@ def test_what_a_urdf_shows_comes_back_from_bullet_as_it_was_given(world, torus, 
         ),
         Pose((0, 0, 1)),
     )
-    shown = [visual.shape for visual in world.visuals([body])]
+    shown = [visual.shape for visual in world.pictures.visuals([body])]
     assert shown == [*SIZED, Mesh(torus, (1.0, -2.0, 0.5)), Plane()]
     assert {type(shape) for shape in shown} == set(REPORTED_SHAPES.values())
 

@@ -8,6 +8,7 @@ import yaml
 from drone_sim.files.resources import package_path
 
 show = pytest.importorskip("drone_sim.ros.tools.show")
+rospkg = pytest.importorskip("rospkg")
 pytestmark = pytest.mark.ros
 
 FOLDER = package_path() / "rviz"
@@ -72,3 +73,13 @@ def test_without_rviz_one_line_says_what_to_do_and_a_launch_goes_on(monkeypatch,
     monkeypatch.setattr(show.signal, "signal", lambda *_: None)
     assert show.main() == status
     assert capsys.readouterr() == ("", f"show: rviz is not installed: {show.INSTEAD}\n")
+
+
+def test_rviz_finds_the_package_that_it_asks_for_and_nothing_else_does():
+    own = str(package_path())
+    environment = show.with_media_export({"ROS_PACKAGE_PATH": own, "HOME": "/home/me"})
+    assert environment["HOME"] == "/home/me" and environment["ROS_PACKAGE_PATH"].startswith(f"{own}:")
+    found = rospkg.RosPack(environment["ROS_PACKAGE_PATH"].split(":"))
+    assert {"drone_sim", "media_export"} <= set(found.list())
+    assert "media_export" not in rospkg.RosPack([own]).list()
+    assert show.with_media_export({})["ROS_PACKAGE_PATH"] == f"{own}/rviz/packages"

@@ -243,6 +243,72 @@ def test_a_script_declares_parameters_and_hears_of_new_values(simulate, tmp_path
     assert "script_parameters/speed" not in tuning_of(simulation).values()
 
 
+DECLARES = """
+def sysCall_init():
+    sim.setScriptSimulationParameter(sim.handle_self, "Kzref", {Kzref})
+
+def sysCall_actuation():
+    sim.getScriptSimulationParameter(sim.handle_self, "Kzref")
+"""
+READ = {"takeoff_height", "Kzref", "Dzref", "thrust_gravity", "thrust_limits/lowest", "Pangle", "Precovery"}
+
+
+def gains_of(simulation):
+    """Return the gains that may be tuned, by name."""
+    return {name: value for name, value in tuning_of(simulation).values().items() if name in READ}
+
+
+def test_only_what_the_script_reads_is_offered(simulate, tmp_path):
+    script = tmp_path / "own.py"
+    script.write_text(DECLARES.format(Kzref=4), encoding="utf-8")
+    simulation = simulate(script_parameters={"of_the_file": 1})
+    assert set(gains_of(simulation)) == READ
+    simulation.script = str(script)
+    simulation.start()
+    assert set(gains_of(simulation)) == READ, "until a step has been flown, nobody knows what will be read"
+    simulation.step()
+    assert gains_of(simulation) == {"Kzref": 4}
+    assert {"weather/wind/x", "script_parameters/of_the_file", "cmd_vel_limits/linear"} <= set(
+        tuning_of(simulation).values()
+    )
+    simulation.stop()
+    assert set(gains_of(simulation)) == {"Kzref"}
+
+
+def test_before_the_first_flight_everything_is_offered():
+    simulation = Simulation(parameters.load({"cameras": SMALL}), started=False)
+    assert set(gains_of(simulation)) == READ
+    simulation.close()
+
+
+def test_a_parameter_that_is_asked_for_later_is_counted(simulate, tmp_path):
+    script = tmp_path / "own.py"
+    text = 'def sysCall_actuation():\n    if sim.getSimulationTime() > 0.1:\n        sim.{}(sim.handle_self, "Dzref")\n'
+    script.write_text(text.format("getScriptSimulationParameter"), encoding="utf-8")
+    simulation = simulate(str(script))
+    simulation.step()
+    asked = simulation.context.scripts.asked
+    fly(simulation, 4)
+    assert simulation.context.scripts.asked == asked + 1 and set(gains_of(simulation)) == {"Dzref"}
+
+
+def test_a_gain_of_the_scripts_text_gives_way_to_files_and_to_tuning_until_it_is_another(simulate, tmp_path):
+    script = tmp_path / "own.py"
+
+    def begun(simulation, text):
+        script.write_text(DECLARES.format(Kzref=text), encoding="utf-8")
+        simulation.start()
+        simulation.step()
+        return simulation.child_scripts["drone"].parameters["Kzref"]
+
+    script.write_text(DECLARES.format(Kzref=4), encoding="utf-8")
+    simulation = simulate(str(script))
+    tuning_of(simulation).change({"Kzref": 8.0})
+    assert [begun(simulation, text) for text in (4, 4, 6, 6)] == [8, 8, 6, 6]
+    simulation = simulate(str(script), control={"Kzref": 2})
+    assert [begun(simulation, text) for text in (4, 6)] == [2, 2]
+
+
 def test_what_a_script_puts_where_a_gain_was_breaks_nothing(simulate):
     simulation = simulate()
     own = simulation.child_scripts["drone"].parameters

@@ -46,28 +46,33 @@ def wait_for(page, expression, *argument):
     wait_until(page, lambda: page.evaluate(expression, *argument))
 
 
+# Where a point of the world is in the page, px.
+PROJECT = """point => {
+    const at = scene.camera.position.clone().set(...point).project(scene.camera);
+    const box = scene.canvas.dom.getBoundingClientRect();
+    return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
+}"""
+# Where the tip of a handle's part is in the world: 0 to 2 are the arrows along x, y and z, 6 is the ring.
+TIP = "([part, at]) => scene.gizmo.parts[part].localToWorld(scene.camera.position.clone().set(...at)).toArray()"
+
+STARTED = "localStorage['drone_sim/started'] = 'true';"  # the start page has been answered
+
+
 @contextlib.contextmanager
-def open_page(cockpit, browser, init="", scene_first=False, **options):
+def open_page(cockpit, browser, init="", started=True, **options):
     """Give the page in a browser of its own, with the flown script in the editor.
 
-    `init` is run in it before anything else; `scene_first`: the scene is there before the page's own script comes;
-    `options` are of the browser's context.
+    `init` is run in it before anything else; `started`: the start page has been answered before; `options` are of the
+    browser's context.
     """
-    context = browser.new_context(viewport={"width": 1000, "height": 500}, **options)
-    context.add_init_script(init)
+    context = browser.new_context(**{"viewport": {"width": 1280, "height": 720}, **options})
+    context.add_init_script((STARTED if started else "") + init)
     page = context.new_page()
     page.set_default_timeout(WAIT)
     page.troubles = []
     page.on("pageerror", lambda error: page.troubles.append(str(error)))
     page.on("console", lambda message: message.type == "error" and page.troubles.append(message.text))
-    held = []
-    if scene_first:
-        page.route("**/cockpit.js", lambda route: held.append(route))
     page.goto(cockpit.address, wait_until="commit")
-    if scene_first:
-        page.frame_locator("#scene").locator("canvas").first.wait_for()
-        page.frames[1].wait_for_load_state()
-        held.pop().continue_()
     ready(page)
     wait_until(page, lambda: cockpit.drone.place is not None)
     yield page
@@ -76,51 +81,50 @@ def open_page(cockpit, browser, init="", scene_first=False, **options):
 
 
 class Panel:
-    """The panel beside the scene, as a user reads and presses it."""
+    """Toolbar and panels, as a user reads and presses them."""
 
     def __init__(self, page):
         self.page = page
-        self.scene = page.frame_locator("#scene")
 
     def field(self, label):
-        """What stands beside a label; viser's text fields are not tied to theirs."""
-        beside = f"//label[normalize-space()='{label}']/ancestor::div[following-sibling::div][1]/following-sibling::div"
-        return self.scene.locator(f"xpath={beside}//*[self::input or self::textarea]").first
+        return self.page.get_by_label(label, exact=True)
 
     @property
     def message(self):
-        return self.scene.get_by_role("status").inner_text()
+        return self.page.inner_text("#notice span")
 
     @property
     def status(self):
-        return self.field("Status").input_value()
+        return self.page.inner_text("#status").lower()
 
     def press(self, button, answer=""):
-        """Press a button, and wait until the panel answers so."""
-        self.scene.get_by_role("button", name=button, exact=True).click()
+        """Press a button, and wait until the message line answers so."""
+        self.page.get_by_role("button", name=button, exact=True).click()
         if answer:
             self.wait_for(answer)
 
     def wait_for(self, answer):
         wait_until(self.page, lambda: answer in self.message)
 
-    def show(self, tab):
-        self.scene.get_by_role("tab", name=tab).click()
+    def show(self, name):
+        """Unfold a panel."""
+        button = self.page.locator("#rail").get_by_role("button", name=name, exact=True)
+        if button.get_attribute("aria-expanded") != "true":
+            button.click()
 
     def choose(self, field, choice):
         """Choose something of a list."""
-        self.field(field).click()
-        self.scene.get_by_role("option", name=choice, exact=True).click()
+        self.field(field).select_option(label=choice)
 
 
 def ready(page):
-    """Wait until the editor has its script, and the scene a canvas."""
-    wait_for(page, "document.querySelector('.cm-content')?.innerText.length > 100")
-    page.frame_locator("#scene").locator("canvas").first.wait_for()
+    """Wait until the editor has its script, the scene a canvas, and the panels what the simulation does."""
+    wait_for(page, "document.querySelector('.cm-content')?.textContent.length > 100")
+    page.locator("#scene canvas").wait_for()
+    wait_for(page, "document.querySelector('#status').dataset.is !== 'no simulation'")
 
 
-def switch_camera(page, name="drone/front"):
+def switch_camera(page, name="front"):
     """Switch a camera on, or off."""
-    scene = page.frame_locator("#scene")
-    scene.get_by_role("tab", name="Cameras").click()
-    scene.get_by_label(name).click()
+    Panel(page).show("Cameras")
+    page.locator("#camera-list").get_by_label(name, exact=True).click()

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import wait_until
+from cockpit_page import PROJECT, TIP, wait_until
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import InteractiveMarkerFeedback, MarkerArray
 
@@ -17,34 +17,40 @@ objects:
   - {name: Crate, shape: box, size: [0.3, 0.3, 0.3], position: [1.5, -0.5, 0.8], color: [1, 0, 0, 1], mass: 1}
   - {name: Shelf, shape: box, size: [0.4, 0.4, 0.1], position: [1.5, -0.5, 0.59]}
 """
-EYE, AIM = np.array((-1.6, 0.0, 0.7)), np.array((0.4, 0.0, 0.0))  # from the drone, which looks along x: `sight`
-HALF_ANGLE = math.radians(75 / 2)  # viser's, upwards
-ARROW, ARROW_PIXELS = 0.25, 90  # its length: m, the drone's; the object's
+ARROW, RING = (0.0, 0.0, 0.95), (0.0, 0.72, 0.0)  # in parts; the ring's is to the left
 
 
-class Screen:
-    """Where a point of the world is among the pixels of the page, seen from behind a drone that hovers."""
+class Mouse:
+    """The mouse on a page, whose eyes stand still while something is dragged."""
 
-    def __init__(self, page, drone):
-        box = page.frame_locator("#scene").locator("canvas[data-engine]").bounding_box()
-        self.middle = np.array((box["x"] + box["width"] / 2, box["y"] + box["height"] / 2))
-        self.pixels = box["height"] / 2 / math.tan(HALF_ANGLE)
-        self.eye = np.array(drone.place) + EYE
-        ahead = AIM - EYE
-        self.ahead = ahead / np.linalg.norm(ahead)
-        self.right = np.cross(self.ahead, (0, 0, 1))
-        self.right /= np.linalg.norm(self.right)
+    def __init__(self, page):
+        self.page = page
 
-    def of(self, point):
-        ray = np.asarray(point) - self.eye
-        down = np.cross(self.ahead, self.right)
-        return self.middle + self.pixels * np.array((ray @ self.right, ray @ down)) / (ray @ self.ahead)
+    def over(self, point):
+        """Go to a point of the world; there is another picture when the page has seen it."""
+        self.page.mouse.move(*self.page.evaluate(PROJECT, list(map(float, point))))
+        self.page.evaluate("new Promise(done => scene.canvas.then(done))")
+
+    def take(self, part, place=ARROW):
+        """Press the button on a part of the handle; return where that is in the world."""
+        wait_until(self.page, lambda: self.page.evaluate("scene.gizmo.isShown"))
+        tip = np.array(self.page.evaluate(TIP, [part, place]))
+        self.over(tip)
+        self.page.mouse.down()
+        return tip
+
+    def drag(self, point):
+        self.page.mouse.move(*self.page.evaluate(PROJECT, list(map(float, point))), steps=5)
+
+    def drop(self):
+        self.page.mouse.up()
 
 
 @pytest.fixture(name="mouse")
 def _mouse(opened):
-    yield opened.mouse
-    opened.mouse.up()
+    mouse = Mouse(opened)
+    yield mouse
+    mouse.drop()
     load("")  # as it was
 
 
@@ -53,66 +59,84 @@ def load(scene):
     assert rospy.ServiceProxy("/drone_sim/load_scene", Trigger)().success
 
 
-def take(page, point, feedback):
-    """Press the button on a handle, which may not be there yet, until the simulation hears of it."""
-
-    def is_taken():
-        page.mouse.up()
-        page.mouse.move(*point)
-        page.mouse.down()
-        page.wait_for_timeout(1000)
-        return any(one.event_type == one.MOUSE_DOWN for one in feedback)
-
-    wait_until(page, is_taken, seconds=60)
-
-
 def listen(topic, kind):
     heard = []
     rospy.Subscriber(topic, kind, heard.append)
     return heard
 
 
+def hover(cockpit, page):
+    wait_until(page, lambda: cockpit.drone.place[2] > 0.75 and abs(cockpit.drone.velocity.z) < 0.05)
+    wait_until(page, lambda: page.evaluate("Boolean(scene.bodies?.has('drone') && scene.handleOf('drone'))"))
+
+
+def test_a_drone_has_handles_and_thrust_arrows_while_the_mouse_is_on_it(cockpit, opened, mouse):
+    hover(cockpit, opened)
+    seen = """[scene.gizmo.isShown, scene.outline.scene.children.length > 0, [...scene.tree.markers.values()]
+        .some((one) => one.userData.said.layer === 'view/forces' && one.visible)]"""
+    wait_until(opened, lambda: opened.evaluate(seen) == [False, False, False])
+    mouse.over(cockpit.drone.place)
+    wait_until(opened, lambda: opened.evaluate(seen) == [True, True, True])
+    mouse.over(np.add(cockpit.drone.place, (0.5, 0.6, -0.6)))
+    wait_until(opened, lambda: opened.evaluate(seen) == [False, False, False])
+
+
 def test_the_drone_goes_where_its_arrow_is_dragged(cockpit, opened, mouse):
-    drone, feedback = cockpit.drone, listen("/drone/markers/feedback", InteractiveMarkerFeedback)
-    before = np.array(drone.place)
-    screen = Screen(opened, drone)
-    tip, aside = np.array((0, 0.8 * ARROW, 0)), np.array((0, 0.3, 0))
-    take(opened, screen.of(before + tip), feedback)
-    mouse.move(*screen.of(before + tip + aside), steps=5)
+    hover(cockpit, opened)
+    drone, before, aside = cockpit.drone, np.array(cockpit.drone.place), np.array((0, 0.3, 0))
+    feedback = listen("/drone/markers/feedback", InteractiveMarkerFeedback)
+    mouse.over(before)
+    tip = mouse.take(1)
+    eye = opened.evaluate("scene.camera.position.toArray()")
+    mouse.drag(tip + aside)
     wait_until(opened, lambda: np.allclose(drone.place, before + aside, atol=0.06))
+    assert np.allclose(opened.evaluate("scene.camera.position.toArray()"), eye, atol=0.02), "the eyes stay"
+    mouse.drop()
+    wait_until(opened, lambda: feedback[-1].event_type == InteractiveMarkerFeedback.MOUSE_UP)
+    assert feedback[0].event_type == InteractiveMarkerFeedback.MOUSE_DOWN
+    assert {one.client_id for one in feedback} == {feedback[0].client_id}
+
+
+def test_the_drone_turns_with_its_ring(cockpit, opened, mouse):
+    hover(cockpit, opened)
+    before, place = cockpit.drone.pose.orientation, np.array(cockpit.drone.place)
+    assert abs(before.z) < 0.05
+    mouse.over(place)
+    grip = mouse.take(6, RING) - place
+    (x, y), sine, cosine = grip[:2], math.sin(0.6), math.cos(0.6)
+    mouse.drag(np.add(place, (x * cosine - y * sine, x * sine + y * cosine, 0.0)))
+    wait_until(opened, lambda: abs(2 * math.asin(cockpit.drone.pose.orientation.z) - 0.6) < 0.1)
 
 
 def test_an_object_that_is_clicked_on_has_arrows_and_falls_when_it_is_let_go(cockpit, opened, mouse, tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text(SCENE)
     load(scene)
-    shown, feedback = (
-        listen("/drone/scene", MarkerArray),
-        listen("/drone/objects/feedback", InteractiveMarkerFeedback),
-    )
+    shown = listen("/drone/scene", MarkerArray)
 
     def crate():
         found = [one.pose.position for one in shown[-1].markers if one.ns == "Crate"] if shown else []
         return np.array([(at.x, at.y, at.z) for at in found]).reshape(-1, 3)
 
     wait_until(opened, lambda: len(crate()) and math.dist(cockpit.drone.place, (0, 0, 0.8)) < 0.02)
-    screen, before, aside = Screen(opened, cockpit.drone), crate()[0], np.array((0, 0.5, 0))
-    middle = screen.of(before)
-    panel = opened.frame_locator("#scene")
-    panel.get_by_role("tab", name="View").click()
-
-    def is_chosen():
-        opened.mouse.click(*middle)  # which takes it, or lets it go
-        opened.wait_for_timeout(1000)
-        return panel.get_by_label("Drag").input_value() == "Crate"
-
-    wait_until(opened, is_chosen)
-    left = screen.of(before + aside) - middle
-    grip = middle + 0.8 * ARROW_PIXELS * left / np.linalg.norm(left)
-    take(opened, grip, feedback)
-    mouse.move(*(grip + left), steps=5)
+    before, aside = crate()[0], np.array((0, 0.5, 0))
+    wait_until(opened, lambda: opened.evaluate("Boolean(scene.handleOf('Crate'))"))
+    opened.evaluate("scene.frame('Crate')")
+    opened.mouse.move(200, 400)
+    for _ in range(4):  # away from it: it is to be dragged for half a metre
+        opened.mouse.wheel(0, 300)
+    wait_until(opened, lambda: opened.evaluate("scene.view.distance") > 4.2)
+    opened.evaluate("new Promise(done => scene.canvas.then(done))")
+    mouse.over(before)
+    opened.mouse.down()
+    opened.mouse.up()
+    assert opened.evaluate("scene.selected") == "Crate"
+    tip = mouse.take(1)
+    mouse.drag(tip + aside)
     wait_until(opened, lambda: np.allclose(crate(), before + aside, atol=0.1))
     opened.wait_for_timeout(1500)
     assert abs(crate()[0, 2] - before[2]) < 0.1, "it is held"
-    mouse.up()
+    mouse.drop()
     wait_until(opened, lambda: crate()[0, 2] < 0.2)
+    opened.keyboard.press("Escape")
+    assert opened.evaluate("scene.selected") == ""

@@ -12,8 +12,8 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 from cockpit_page import wait_until
 
-SOCKET = """([path, protocol]) => new Promise(said => {
-    const socket = new WebSocket(`ws://${path}`, protocol);
+SOCKET = """path => new Promise(said => {
+    const socket = new WebSocket(`ws://${path}`, "drone_sim");
     socket.onopen = () => said("open");
     socket.onerror = () => said("refused");
 })"""
@@ -22,7 +22,7 @@ SOCKET = """([path, protocol]) => new Promise(said => {
 @pytest.mark.parametrize("query", ["", "?token=", "?token=wrong"])
 def test_an_address_without_the_right_token_is_refused(cockpit, browser, query):
     with_nothing = browser.new_context()
-    for path in ("", "scene/", "cockpit.js"):
+    for path in ("", "mesh/a.glb", "cockpit.js"):
         answer = with_nothing.request.get(f"{cockpit.address.partition('?')[0]}{path}{query}")
         assert answer.status == 403 and "token" in answer.text()
     with_nothing.close()
@@ -55,8 +55,7 @@ def test_a_page_of_another_origin_opens_no_socket_though_the_browser_has_the_coo
     page = context.new_page()
     for address, outcome in ((f"http://{host}/cockpit.css", "open"), (stranger, "refused")):
         page.goto(address)
-        for path, protocol in ((f"{host}/socket", "drone_sim"), (f"{host}/scene/", "viser-v1.1.0")):
-            assert page.evaluate(SOCKET, [path, protocol]) == outcome, (address, path)
+        assert page.evaluate(SOCKET, f"{host}/socket") == outcome, address
     context.close()
 
 
@@ -85,15 +84,13 @@ def test_a_page_under_a_foreign_name_gets_nothing(cockpit, rebound):
     page = context.new_page()
     page.goto(cockpit.address)  # the browser has the cookie, for this machine's own name
     foreign = f"http://evil.example:{port}"
-    for path in ("/", "/scene/", "/cockpit.js"):
+    for path in ("/", "/mesh/a.glb", "/cockpit.js"):
         answer = page.goto(foreign + path)
         assert answer.status == 403 and "token" in page.inner_text("body")
     host = f"evil.example:{port}"
-    for path, protocol in ((f"{host}/socket", "drone_sim"), (f"{host}/scene/", "viser-v1.1.0")):
-        assert page.evaluate(SOCKET, [path, protocol]) == "refused"
+    assert page.evaluate(SOCKET, f"{host}/socket") == "refused"
     # From there to this machine's own name: the browser would send the cookie, were it of the same site.
-    for path, protocol in ((f"127.0.0.1:{port}/socket", "drone_sim"), (f"127.0.0.1:{port}/scene/", "viser-v1.1.0")):
-        assert page.evaluate(SOCKET, [path, protocol]) == "refused"
+    assert page.evaluate(SOCKET, f"127.0.0.1:{port}/socket") == "refused"
     context.close()
 
 
@@ -104,12 +101,10 @@ def test_nobody_elses_page_shows_the_cockpit_in_a_frame(cockpit, browser, strang
     refused = []
     page.on("console", lambda message: refused.append(message.text))
     page.goto(stranger)
-    for path in ("", "scene/"):
-        refused.clear()
-        here = cockpit.address.partition("?")[0] + path
-        page.evaluate('there => { document.body.innerHTML = `<iframe src="${there}"></iframe>` }', here)
-        wait_until(page, lambda: any("frame" in line and "ancestors" in line for line in refused))
-        assert not any(frame.url.startswith(here) for frame in page.frames)
+    here = cockpit.address.partition("?")[0]
+    page.evaluate('there => { document.body.innerHTML = `<iframe src="${there}"></iframe>` }', here)
+    wait_until(page, lambda: any("frame" in line and "ancestors" in line for line in refused))
+    assert not any(frame.url.startswith(here) for frame in page.frames)
     context.close()
 
 
@@ -122,9 +117,7 @@ def test_a_script_in_our_page_can_neither_load_nor_tell_what_is_not_from_here(co
         script.onerror = () => said("refused");
         document.head.append(script);
     })"""
-    scene = next(frame for frame in opened.frames if "/scene/" in frame.url)
-    for where in (opened, scene):
-        assert where.evaluate(tell, stranger) == where.evaluate(load, stranger) == "refused"
+    assert opened.evaluate(tell, stranger) == opened.evaluate(load, stranger) == "refused"
     assert (
         opened.evaluate(
             "new Promise(said => { const s = document.createElement('script'); "

@@ -13,7 +13,7 @@ STILL = (0.0, 0.0, 0.0)
 @pytest.fixture(name="tablet", scope="module")
 def _tablet(cockpit, browser):
     """A page on a touch screen, with a gamepad at hand."""
-    with open_page(cockpit, browser, init=PAD, scene_first=True, has_touch=True, is_mobile=True) as page:
+    with open_page(cockpit, browser, init=PAD, has_touch=True, is_mobile=True) as page:
         yield page
 
 
@@ -37,9 +37,9 @@ def test_two_sticks_on_a_touch_screen(cockpit, tablet):
         fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     touch("touchStart", (0, 0), (0, 0))
-    touch("touchMove", (0, -40), (0, -40))  # both up: climb, and forward
+    touch("touchMove", (0, -52), (0, -52))  # both up: climb, and forward
     wait_until(tablet, lambda: nearly(cockpit.drone.command, (0.85, 0.85, 0.0)))
-    touch("touchMove", (40, 0), (0, 0))  # turn to the right
+    touch("touchMove", (52, 0), (0, 0))  # turn to the right
     wait_until(tablet, lambda: nearly(cockpit.drone.command, (0.0, 0.0, -0.85)))
     touch("touchEnd")
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
@@ -58,10 +58,11 @@ def test_keys_are_released_when_the_window_is_left(cockpit, tablet):
     wait_until(tablet, lambda: cockpit.drone.command[0] == 1.0)
     tablet.locator("#script").focus()  # still in the window
     assert cockpit.drone.command[0] == 1.0
-    tablet.frame_locator("#scene").locator("body").evaluate("body => { body.tabIndex = -1; body.focus() }")
+    tablet.evaluate("window.dispatchEvent(new Event('blur'))")
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
     tablet.keyboard.up("w")
-    tablet.keyboard.down("w")  # in the scene
+    tablet.locator("#scene").focus()
+    tablet.keyboard.down("w")
     wait_until(tablet, lambda: cockpit.drone.command[0] == 1.0)
     tablet.keyboard.up("w")
     wait_until(tablet, lambda: cockpit.drone.command == STILL)
@@ -70,9 +71,9 @@ def test_keys_are_released_when_the_window_is_left(cockpit, tablet):
 def test_two_browsers_see_the_same_and_the_keys_of_both_count(cockpit, browser, tablet):
     with open_page(cockpit, browser) as other:
         panels = Panel(tablet), Panel(other)
-        panels[1].press("pause", "paused at")
+        panels[1].press("Pause", "paused at")
         wait_until(tablet, lambda: panels[0].status == panels[1].status == "paused")
-        panels[0].press("resume", "resumed")
+        panels[0].press("Start", "resumed")
         wait_until(other, lambda: panels[1].status == "flying")
         for page in (tablet, other):
             page.locator("#command").click()

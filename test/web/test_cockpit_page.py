@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
-from cockpit_page import wait_for, wait_until
+from cockpit_page import open_page, ready, switch_camera, wait_for, wait_until
 
 
 def test_a_key_that_is_held_flies_and_one_that_is_released_stops(cockpit, opened):
@@ -20,7 +20,7 @@ def test_a_key_that_is_held_flies_and_one_that_is_released_stops(cockpit, opened
     opened.keyboard.up("w")
     wait_until(opened, lambda: cockpit.drone.command == (0.0, 0.0, 0.0))
     opened.keyboard.down("ArrowUp")
-    wait_until(opened, lambda: cockpit.drone.command[1] == 1.0)
+    wait_until(opened, lambda: cockpit.drone.command == (1.0, 0.0, 0.0))
     opened.close()
     opened_again = time.monotonic()
     while cockpit.drone.command != (0.0, 0.0, 0.0):
@@ -46,7 +46,8 @@ def test_a_script_is_edited_into_an_error_mended_and_flown(cockpit, opened):
     opened.click("#run")
     wait_until(opened, lambda: "line 1: ZeroDivisionError" in opened.inner_text("#said"))
     assert opened.locator(".cm-lintRange-error").inner_text() == "1 / 0"
-    opened.click("#revert")
+    opened.click("#more")
+    opened.get_by_role("menuitem", name="Revert").click()
     wait_for(opened, "!document.querySelector('.cm-content').innerText.includes('1 / 0')")
     opened.click("#run")
     wait_until(opened, lambda: opened.inner_text("#said") == "started")
@@ -65,29 +66,45 @@ def test_what_a_script_prints_stands_under_it(cockpit, opened):
     wait_until(opened, lambda: "<b>same</b>  (3 times)" in opened.inner_text("#console"))
 
 
-def test_buttons_fields_and_pictures(cockpit, opened):
-    scene = opened.frame_locator("#scene")
-    scene.get_by_role("button", name="pause").click()
-    wait_until(opened, lambda: "paused at" in scene.get_by_role("status").inner_text())
-    scene.get_by_role("button", name="resume").click()
-    wait_until(opened, lambda: scene.locator("input[disabled]").first.input_value() == "flying")
-    scene.get_by_role("tab", name="Cameras").click()
-    scene.get_by_label("drone/front").click()
+def test_a_key_flies_while_a_switch_has_the_focus(cockpit, opened):
+    switch_camera(opened)
     picture = opened.locator(".picture img")
     wait_until(opened, lambda: picture.evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
+    assert opened.locator(".picture header").inner_text() == "front"
     opened.keyboard.down("w")  # the focus is on a switch, into which nobody writes
     wait_until(opened, lambda: cockpit.drone.command[0] == 1.0)
     opened.keyboard.up("w")
-    scene.get_by_label("drone/front").click()
+    switch_camera(opened)
     wait_until(opened, lambda: not picture.count())
-    scene.get_by_role("tab", name="Tune").click()
-    field = scene.get_by_label("Kzref", exact=True)
-    before = field.input_value()
-    for value in ("2.5", before):
-        field.press("Control+a")
-        field.press_sequentially(value)  # as a hand does: it holds what is written so far
-        field.press("Enter")
-        wait_until(opened, lambda value=value: f"Kzref = {value}" in scene.get_by_role("status").inner_text())
+
+
+def test_three_doors_and_the_way_back(cockpit, browser):
+    with open_page(cockpit, browser, started=False) as page:
+        doors = page.get_by_role("dialog", name="drone_sim")
+        assert doors.is_visible() and not page.locator("#go-on").is_visible()
+        for picture in doors.locator("img").all():
+            wait_until(page, lambda picture=picture: picture.evaluate("one => one.naturalWidth") > 100)
+        doors.get_by_role("button", name="Tutorial").click()
+        wait_for(page, "document.querySelector('#script').value.startsWith('tutorial/1')")
+        wait_until(page, lambda: page.locator("#lesson-body").is_visible())
+        assert not doors.is_visible() and page.locator("#scene").bounding_box()["width"] > 0.5 * 1280
+        page.click("#home")
+        doors.get_by_role("button", name="Tasks").click()
+        wait_for(page, "document.querySelector('#script').value.startsWith('tasks/')")
+        page.click("#home")
+        doors.get_by_role("button", name="Just fly").click()
+        wait_until(page, lambda: page.locator("#scene").bounding_box()["width"] == 1280)
+        assert not page.locator("#editor").is_visible()
+        page.reload()
+        ready(page)
+        assert not doors.is_visible(), "it is answered"
+        page.click("#home")
+        page.keyboard.press("Escape")
+        assert not doors.is_visible()
+        page.click("#home")
+        page.get_by_role("button", name="Go on with").click()
+        wait_for(page, "document.querySelector('#script').value.startsWith('tasks/')")
+        assert page.locator("#editor").is_visible()
 
 
 def test_a_second_address_needs_the_token(cockpit, browser):

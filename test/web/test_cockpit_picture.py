@@ -1,5 +1,6 @@
 """The cockpit's picture: the drone is seen where odometry says, flies as it does without ROS, and is pushed."""
 
+import base64
 import io
 
 import cv2
@@ -10,7 +11,7 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
 import trimesh
-from cockpit_page import wait_until
+from cockpit_page import open_page, wait_until
 from geometry_msgs.msg import WrenchStamped
 from PIL import Image
 from visualization_msgs.msg import Marker, MarkerArray
@@ -21,7 +22,7 @@ from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
 # Nothing but sky is behind the drone then.
-EYE, AIM, FOV = np.array((1.5, -4.0, 0.1)), np.array((1.5, 0.0, 1.0)), 0.8  # m, m, rad
+EYE, AIM, FOV = np.array((1.0, -2.2, 0.1)), np.array((1.0, 0.0, 0.9)), np.radians(50)  # m, m, rad
 STEP = 0.05  # s
 SEARCHED = 12  # px each way
 
@@ -43,20 +44,35 @@ def moved(points, pose):
     return points @ matrix[:, :3].T + matrix[:, 3]
 
 
+# Puts the eyes of a page somewhere; pan and zoom do so for whoever looks.
+LOOK = """([center, yaw, pitch, far]) => {
+    scene.look("free");
+    Object.assign(scene.view, { yaw, pitch, zoom: far });
+    scene.view.center.set(...center);
+    scene.show({ labels: false, path: false, command: false, handles: false });
+}"""
+UNTIL_PAINTED = "new Promise(done => scene.canvas.then(done))"
+# Where the camera, the drone and the words above it are in the world, in the picture that was painted last.
+PLACES = """(() => {
+    const at = (one) => [...one.matrixWorld.elements].slice(12, 15);
+    const label = [...scene.tree.markers.values()].find((one) => one.userData.said.layer === "view/state");
+    const track = scene.tree.byName.get("Track_base");
+    const ahead = [...track.matrixWorld.elements].slice(0, 3);
+    return { eye: at(scene.camera), drone: at(scene.tree.byName.get("base_link")), label: at(label), ahead };
+})()"""
+
+
 class Picture:
     """The scene seen by a camera that is known."""
 
-    def __init__(self, panel):
-        self.page = panel.page
-        self.page.click("#toggle")  # without the editor, the scene is wide
-        panel.show("View")
-        panel.choose("Look", "free")
-        panel.scene.get_by_role("checkbox", name="Handles").click()
-        words = {"Position": EYE, "LookAt": AIM, "Up": (0, 0, 1), "Fov": (FOV,)}
-        query = "&".join(f"initialCamera{name}={','.join(map(str, value))}" for name, value in words.items())
-        self.page.evaluate("at => { document.getElementById('scene').src = at }", f"/scene/?{query}&fixedDpr=1")
-        self.canvas = panel.scene.locator("canvas").first
-        self.canvas.wait_for()
+    def __init__(self, page):
+        self.page = page
+        page.click("#toggle")  # without the editor, the scene is wide
+        ahead = AIM - EYE
+        far = np.linalg.norm(ahead)
+        yaw, pitch = np.arctan2(ahead[1], ahead[0]), np.arcsin(-ahead[2] / far)
+        page.evaluate(LOOK, [AIM.tolist(), float(yaw), float(pitch), float(far)])
+        self.canvas = page.locator("#scene canvas")
         self.bodies = rospy.wait_for_message("/drone/view/bodies", MarkerArray, 30).markers
 
     def project(self, points):
@@ -78,14 +94,14 @@ class Picture:
         return mask.astype(bool)
 
     def look(self):
+        self.page.evaluate(UNTIL_PAINTED)
         return np.asarray(Image.open(io.BytesIO(self.canvas.screenshot())).convert("RGB")).astype(int)
 
     def seen(self):
-        """Return the pixels that are neither sky, whose colour is its row's, nor the green of thrusts."""
+        """Return the pixels that are not sky, whose colour is its row's."""
         picture = self.look()
         sky = np.median(picture[:, -40:], axis=1, keepdims=True)
-        green = picture[..., 1] > picture[..., [0, 2]].max(axis=2) + 40
-        return (np.abs(picture - sky).max(axis=2) > 25) & ~green
+        return np.abs(picture - sky).max(axis=2) > 25
 
     def misplaced(self, pose):
         """Return how far the drone is seen from where it should be, px each way; nan where it is not seen."""
@@ -102,13 +118,9 @@ class Picture:
         return np.mean([shift for shift, score in scores.items() if score == best], axis=0)
 
 
-@pytest.fixture(name="picture", scope="module")
-def _picture(cockpit, panel):
-    yield Picture(panel)
-    panel.show("View")
-    panel.choose("Look", "behind the drone")
-    panel.scene.get_by_role("checkbox", name="Handles").click()
-    cockpit.start_afresh()
+@pytest.fixture(name="picture")
+def _picture(opened):
+    return Picture(opened)
 
 
 def is_where_odometry_says(cockpit, picture):
@@ -141,8 +153,8 @@ def fly_alike(steps):
         simulation.close()
 
 
-def test_a_key_held_for_2_s_flies_as_the_same_commands_without_ros_and_the_page_shows_it(cockpit, panel, picture):
-    page, drone = panel.page, cockpit.drone
+def test_a_key_held_for_2_s_flies_as_the_same_commands_without_ros_and_the_page_shows_it(cockpit, picture):
+    page, drone = picture.page, cockpit.drone
     wait_until(page, lambda: abs(drone.velocity.z) < 0.01 and drone.place[2] > 0.5)
     cockpit.call("pause", True)
     wait_until(page, lambda: is_where_odometry_says(cockpit, picture))
@@ -167,17 +179,189 @@ def test_a_key_held_for_2_s_flies_as_the_same_commands_without_ros_and_the_page_
     assert np.abs(picture.project([drone.place]) - picture.project([before])).max() > 100
 
 
-def test_a_click_on_the_drone_pushes_it_away_from_who_looks(cockpit, panel, picture):
+def test_a_click_on_the_drone_pushes_it_away_from_who_looks(cockpit, picture):
     cockpit.call("pause", True)
     heard = []
     pushes = rospy.Subscriber("/drone/push", WrenchStamped, heard.append)
-    wait_until(panel.page, lambda: is_where_odometry_says(cockpit, picture))
+    wait_until(picture.page, lambda: is_where_odometry_says(cockpit, picture))
     box, (across, down) = picture.canvas.bounding_box(), picture.project([cockpit.drone.place])[0]
-    panel.page.mouse.click(box["x"] + across, box["y"] + down)
-    wait_until(panel.page, lambda: heard)
+    picture.page.mouse.click(box["x"] + across, box["y"] + down)
+    wait_until(picture.page, lambda: heard)
+    picture.page.wait_for_timeout(600)
+    picture.page.mouse.dblclick(box["x"] + across, box["y"] + down)  # it is selected by now; this looks at it
+    wait_until(picture.page, lambda: len(heard) > 1)
+    picture.page.wait_for_timeout(600)
+    assert len(heard) == 2, "a double click is one push"
     pushes.unregister()
     force = heard[0].wrench.force
     along = np.subtract(cockpit.drone.place, EYE)
     assert np.allclose((force.x, force.y, force.z), 0.5 * along / np.linalg.norm(along), atol=0.01)
     cockpit.call("pause", False)
-    wait_until(panel.page, lambda: cockpit.drone.velocity.y > 0.05)
+    wait_until(picture.page, lambda: cockpit.drone.velocity.y > 0.05)
+
+
+def hover(cockpit, page):
+    wait_until(page, lambda: cockpit.drone.place[2] > 0.75 and abs(cockpit.drone.velocity.z) < 0.05)
+    there = "scene.bodies?.has('drone') && scene.tree.byName.has('Track_base')"
+    label = "[...scene.tree.markers.values()].some((one) => one.userData.said.layer === 'view/state')"
+    wait_until(page, lambda: page.evaluate(f"{there} && {label}"))
+
+
+def drag(page, right, down, button="left"):
+    box = page.locator("#scene canvas").bounding_box()
+    x, y = box["x"] + 0.2 * box["width"], box["y"] + 0.8 * box["height"]  # where there is only floor
+    page.mouse.move(x, y)
+    page.mouse.down(button=button)
+    page.mouse.move(x + right, y + down, steps=4)
+    page.mouse.up(button=button)
+    page.evaluate(UNTIL_PAINTED)
+
+
+def seen_from(places):
+    """Return where the camera is in the drone's level frame: ahead, to the left, above."""
+    way = np.subtract(places["eye"], places["drone"])
+    x, y = np.array(places["ahead"])[:2] / np.linalg.norm(places["ahead"][:2])
+    return np.array((way[0] * x + way[1] * y, way[1] * x - way[0] * y, way[2]))
+
+
+def test_the_drone_is_large_and_an_orbit_behind_it_goes_with_it(cockpit, opened):
+    hover(cockpit, opened)
+    before = seen_from(opened.evaluate(PLACES))
+    assert before[0] < -0.5 and abs(before[1]) < 0.05 and before[2] > 0.1, "behind it, and above"
+    assert np.linalg.norm(before) < 1.5, "it is near"
+    drag(opened, 150, 0)
+    orbited = seen_from(opened.evaluate(PLACES))
+    assert abs(orbited[1]) > 0.3 and np.linalg.norm(orbited) == pytest.approx(np.linalg.norm(before), abs=0.05)
+    opened.mouse.wheel(0, 300)
+    opened.evaluate(UNTIL_PAINTED)
+    farther = seen_from(opened.evaluate(PLACES))
+    assert np.linalg.norm(farther) > 1.2 * np.linalg.norm(orbited)
+    opened.keyboard.down("w")
+    wait_until(opened, lambda: cockpit.drone.velocity.x > 0.8)
+    opened.evaluate(UNTIL_PAINTED)
+    places = opened.evaluate(PLACES)
+    opened.keyboard.up("w")
+    assert np.allclose(seen_from(places), farther, atol=0.05), "in flight as it was"
+    assert opened.evaluate("scene.view.name") == "behind"
+    opened.keyboard.press("Home")
+    opened.evaluate(UNTIL_PAINTED)
+    assert np.allclose(seen_from(opened.evaluate(PLACES)), before, atol=0.05)
+
+
+def test_what_hangs_on_the_drone_does_not_trail_it(cockpit, opened):
+    hover(cockpit, opened)
+    still = opened.evaluate(PLACES)
+    opened.keyboard.down("w")
+    wait_until(opened, lambda: cockpit.drone.velocity.x > 0.9)
+    seen = []
+    for _ in range(10):
+        opened.evaluate(UNTIL_PAINTED)
+        seen.append(opened.evaluate(PLACES))
+    opened.keyboard.up("w")
+    offsets = [np.subtract(one["label"], one["drone"]) for one in (still, *seen)]
+    assert np.abs(np.subtract(offsets[1:], offsets[0])).max() < 0.03  # m, of a drone that leans
+    assert seen[-1]["drone"][0] > seen[0]["drone"][0]
+
+
+def test_a_cameras_view_is_the_cameras_and_a_drag_makes_it_free(cockpit, opened):
+    hover(cockpit, opened)
+    assert opened.evaluate("scene.views") == ["behind", "free", "floor_optical", "front_optical", "track_optical"]
+    opened.evaluate("scene.look('front_optical')")
+    opened.evaluate(UNTIL_PAINTED)
+    places = opened.evaluate(PLACES)
+    assert np.linalg.norm(np.subtract(places["eye"], places["drone"])) < 0.2
+    drag(opened, 60, 0)
+    assert opened.evaluate("scene.view.name") == "free"
+    drag(opened, 60, 30, button="right")
+    assert np.linalg.norm(np.subtract(opened.evaluate(PLACES)["eye"], places["eye"])) > 0.05
+
+
+def test_one_browsers_view_is_its_own_and_is_kept(cockpit, browser, opened):
+    hover(cockpit, opened)
+    with open_page(cockpit, browser) as other:
+        opened.evaluate("scene.look('free'); scene.show({ frames: true }); scene.select('drone')")
+        drag(opened, 100, 0)
+        wait_until(other, lambda: other.evaluate("scene.canvas.frames") > 20)
+        assert other.evaluate("[scene.view.name, scene.shown.frames, scene.selected]") == ["behind", False, ""]
+    opened.reload()
+    wait_until(opened, lambda: opened.evaluate("window.scene?.bodies?.has('drone')"))
+    assert opened.evaluate("[scene.view.name, scene.shown.frames]") == ["free", True]
+
+
+def test_nothing_is_painted_while_nothing_changes(cockpit, opened):
+    hover(cockpit, opened)
+    cockpit.call("pause", True)
+    opened.wait_for_timeout(1500)  # words say that it is paused
+    before = opened.evaluate("scene.canvas.frames")
+    opened.wait_for_timeout(1000)
+    assert opened.evaluate("scene.canvas.frames") - before <= 1
+    cockpit.call("pause", False)
+    wait_until(opened, lambda: opened.evaluate("scene.canvas.frames") > before + 10)
+
+
+def test_shadows_can_be_switched_on_without_a_gpu(cockpit, opened):
+    hover(cockpit, opened)
+    cockpit.call("pause", True)
+    opened.wait_for_timeout(1500)
+    canvas, pictures = opened.locator("#scene canvas"), []
+    for shadows in ("false", "true", "false"):
+        opened.evaluate(f"scene.show({{ shadows: {shadows}, labels: false }})")
+        opened.evaluate(UNTIL_PAINTED)
+        pictures.append(np.asarray(Image.open(io.BytesIO(canvas.screenshot())).convert("L")).astype(int))
+    without, shaded, again = pictures
+    assert np.abs(without - again).max() < 3
+    assert 100 < (np.abs(without - shaded) > 20).sum() < without.size / 4
+
+
+def test_frames_glide_from_step_to_step_where_there_is_a_gpu(cockpit, opened):
+    hover(cockpit, opened)
+    cockpit.call("pause", True)
+    opened.wait_for_timeout(1500)
+    glide = """() => {
+        const base = scene.tree.byName.get("base_link"), index = scene.tree.frames.indexOf(base);
+        const told = { whole: false, gone: [], frames: [], moved: [index], placed: [], markers: [] };
+        const go = (z) => scene.take(told, new Uint8Array(new Float32Array([0, 0, z, 0, 0, 0, 1]).buffer));
+        go(1);
+        scene.tree.smooth = 0.05;
+        go(1.2);
+        const [{ began }] = scene.tree.moving.values(), seen = [];
+        for (const after of [0, 25, 50]) {
+            seen.push(scene.tree.advance(began + after), base.position.z);
+        }
+        go(3);
+        return [...seen, base.position.z];
+    }"""
+    assert opened.evaluate(glide) == pytest.approx([True, 1, True, 1.1, False, 1.2, 3], abs=1e-6), "far is at once"
+
+
+def test_many_objects_are_painted_at_once(cockpit, opened, tmp_path):
+    hover(cockpit, opened)
+    places = [[2 + number // 20, number % 20 - 10, 0.1] for number in range(400)]
+    look = "shape: box, size: [0.2, 0.2, 0.2], position"
+    boxes = [f"  - {{name: B{number}, {look}: {place}}}" for number, place in enumerate(places)]
+    scene = tmp_path / "many.yaml"
+    scene.write_text("\n".join(["objects:", *boxes]))
+    rospy.set_param("/drone_sim/scene_file", str(scene))
+    cockpit.call("load_scene")
+    there = "[...scene.tree.markers.values()].filter((one) => one.userData.said.layer === 'scene').length"
+    wait_until(opened, lambda: opened.evaluate(there) >= 400)
+    opened.evaluate(UNTIL_PAINTED)
+    assert opened.evaluate("scene.canvas.renderer.info.render.calls") < 150
+    opened.evaluate("scene.select('B30')")
+    opened.evaluate(UNTIL_PAINTED)
+    assert opened.evaluate("scene.selected") == "B30" and opened.evaluate("scene.outline.scene.children.length") == 9
+    rospy.set_param("/drone_sim/scene_file", "")
+    cockpit.call("load_scene")
+    wait_until(opened, lambda: opened.evaluate(there) == 0)
+
+
+def test_a_picture_and_a_video_of_the_scene(cockpit, opened):
+    hover(cockpit, opened)
+    shot = "scene.snapshot().then(blob => new Promise(done => { const reader = new FileReader(); "
+    shot += "reader.onload = () => done(reader.result); reader.readAsDataURL(blob) }))"
+    kind, _, content = opened.evaluate(shot).partition(",")
+    picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(content))).convert("RGB"))
+    box = opened.locator("#scene canvas").bounding_box()
+    assert kind == "data:image/png;base64" and picture.shape[:2] == (round(box["height"]), round(box["width"]))
+    assert picture.reshape(-1, 3).std(axis=0).min() > 10, "it is not empty"
+    assert opened.evaluate("scene.stream().getVideoTracks().map(one => one.readyState)") == ["live"]

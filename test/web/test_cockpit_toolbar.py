@@ -4,30 +4,38 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
+from pathlib import Path
+
 import rospy
-from cockpit_page import Drone, wait_for, wait_until
+from cockpit_page import Drone, ready, wait_for, wait_until
 from diagnostic_msgs.msg import KeyValue
 
 HOSTILE = '<img src=x onerror="window.top.hacked = true">'
-# Of the chart of heights: the first time, the last height, how many pixels have its line's colour, the axis's ends.
-HEIGHTS = """() => {
-    const charts = Object.values(window.__viserTestpoints?.uplots ?? {}).map((one) => one.chart);
-    const chart = charts.find((one) => one.series[1].label === "z");
-    if (!chart?.ctx.canvas.width) return null;
-    const canvas = chart.ctx.canvas;
-    const colours = chart.ctx.getImageData(0, 0, canvas.width, canvas.height).data;
-    let red = 0;
-    for (let at = 0; at < colours.length; at += 4)
-        red += colours[at] > colours[at + 1] + 80 && colours[at] > colours[at + 2] + 80 && colours[at + 3] > 90;
-    return [chart.data[0].at(0), chart.data[1].at(-1), red, chart.scales.y.min, chart.scales.y.max];
+# How many pixels of a chart have about the colour of its first line.
+COLOURED = """(figure) => {
+    const canvas = figure.querySelector("canvas");
+    const wanted = getComputedStyle(document.documentElement).getPropertyValue("--line-1").match(/\\w\\w/g);
+    const [r, g, b] = wanted.map((one) => parseInt(one, 16));
+    const found = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+    let count = 0;
+    for (let at = 0; at < found.length; at += 4)
+        count += [r, g, b].every((one, which) => Math.abs(found[at + which] - one) < 25) && found[at + 3] > 90;
+    return count;
 }"""
+SIGNALS = """
+def sysCall_init():
+    self.graph = sim.addGraphStream(sim.getObjectHandle('Quadricopter_base'), 'twice', 'm')
+
+def sysCall_actuation():
+    sim.setFloatSignal('height', 1.25)
+    sim.setGraphStreamValue(sim.getObjectHandle('Quadricopter_base'), self.graph, 2.5)
+"""
 
 
 @pytest.fixture(autouse=True)
 def _afresh(cockpit, panel):
     cockpit.start_afresh()
     wait_until(panel.page, lambda: panel.status == "flying")
-    panel.show("Fly")
 
 
 def stands(panel, drone):
@@ -40,45 +48,91 @@ def stands(panel, drone):
 
 
 def test_pause_one_step_snapshot_and_restore(cockpit, panel):
-    panel.press("pause", "paused at t =")
+    panel.press("Pause", "paused at t =")
     assert panel.status == "paused"
     before = stands(panel, cockpit.drone)
     time = float(panel.message.rpartition("= ")[2].removesuffix(" s"))
-    panel.press("snapshot", f"snapshot at t = {time:.2f} s")
+    assert panel.page.get_attribute("#sim-pause", "aria-pressed") == "true"
+    panel.press("Snapshot", f"snapshot at t = {time:.2f} s")
     cockpit.drone.flown.clear()
-    panel.press("step", f"step: t = {time + 0.05:.2f} s")
+    panel.press("Step", f"t = {time + 0.05:.2f} s")
     assert stands(panel, cockpit.drone) != before
     assert len({one["place"] for one in cockpit.drone.flown.values() if "place" in one} - {before}) == 1
-    panel.press("restore", f"restored t = {time:.2f} s")
+    panel.press("Restore", f"restored t = {time:.2f} s")
     wait_until(panel.page, lambda: cockpit.drone.place == before)
-    panel.press("resume", "resumed at t =")
+    panel.press("Start", "resumed at t =")
     wait_until(panel.page, lambda: panel.status == "flying")
 
 
 def test_stop_start_and_restart(cockpit, panel):
-    panel.press("stop", "stop: stopped")
+    panel.press("Stop", "stopped")
     wait_until(panel.page, lambda: panel.status == "stopped")
-    panel.press("step", "failed: ")
-    panel.press("start", "start: started")
+    panel.press("Step", "step: failed: ")
+    assert "bad" in panel.page.get_attribute("#notice", "class")
+    panel.press("Start", "started")
     wait_until(panel.page, lambda: panel.status == "flying")
-    panel.press("restart", "restart: started")
+    assert panel.page.get_by_role("button", name="Start", exact=True).is_disabled()
+    panel.press("Restart", "started")
+
+
+def test_keys_of_the_toolbar_are_none_where_somebody_writes(cockpit, panel):
+    page = panel.page
+    page.locator("#command").click()
+    page.keyboard.press("Space")
+    wait_until(page, lambda: panel.status == "paused")
+    page.keyboard.press("n")
+    panel.wait_for("t = ")
+    page.keyboard.press("Space")
+    wait_until(page, lambda: panel.status == "flying")
+    page.keyboard.press("Enter")
+    wait_until(page, lambda: panel.status == "stopped")
+    panel.show("Tune")
+    page.locator("#tune-filter").click()
+    page.keyboard.type("n p?")
+    assert page.input_value("#tune-filter") == "n p?" and not page.locator("#sheet").is_visible()
+    page.locator("#tune-filter").fill("")
+    page.locator("#command").click()
+    page.keyboard.press("Enter")
+    wait_until(page, lambda: panel.status == "flying")
+    page.keyboard.press("?")
+    assert page.locator("#sheet").is_visible()
+    page.keyboard.press("Escape")
+
+
+def test_a_message_moves_nothing_and_an_error_stays_until_the_next_action(cockpit, panel):
+    page = panel.page
+    page.evaluate(
+        "() => { const plain = setTimeout; window.setTimeout = (then, ms) => plain(then, Math.min(ms, 1500)) }"
+    )
+    before = page.locator("#scene").bounding_box()
+    panel.press("Pause", "paused")
+    wait_until(page, lambda: panel.message == "")
+    panel.press("Stop")
+    wait_until(page, lambda: panel.status == "stopped")
+    panel.press("Step", "failed")
+    page.wait_for_timeout(300)
+    assert "failed" in panel.message and page.locator("#scene").bounding_box() == before
+    panel.press("Put the message away")
+    assert panel.message == ""
+    page.reload()
+    ready(page)
 
 
 def test_landing_and_takeoff(cockpit, panel):
-    panel.press("land", "land sent to drone")
+    panel.press("Land", "land sent to drone")
     wait_until(panel.page, lambda: cockpit.drone.place[2] < 0.1)
-    wait_until(panel.page, lambda: cockpit.drone.state == "landed")
-    panel.press("takeoff", "takeoff sent to drone")
+    wait_until(panel.page, lambda: panel.status == "landed")
+    panel.press("Take off", "takeoff sent to drone")
     wait_until(panel.page, lambda: cockpit.drone.place[2] > 0.5)
 
 
 def test_another_scene(cockpit, panel):
     scene = "package://drone_sim/config/scenes/empty.yaml"
     panel.choose("Scene", "empty")
-    panel.wait_for(f"load_scene: started in {scene}")
+    panel.wait_for(f"started in {scene}")
     assert rospy.get_param("/drone_sim/scene_file") == scene
-    panel.choose("Scene", "none")
-    panel.wait_for("load_scene: started in the scene of the parameters")
+    panel.choose("Scene", "as launched")
+    panel.wait_for("started in the scene of the parameters")
 
 
 def test_the_keys_fly_the_drone_that_is_chosen(cockpit, panel):
@@ -86,7 +140,9 @@ def test_the_keys_fly_the_drone_that_is_chosen(cockpit, panel):
     try:
         assert cockpit.call("set_vehicles") == "wing added"
         wing = Drone("wing")
+        wait_until(panel.page, lambda: panel.field("Vehicle").is_visible())
         panel.choose("Vehicle", "wing")
+        panel.wait_for("the keys fly wing")
         panel.page.locator("#command").click()
         panel.page.keyboard.down("w")
         wait_until(panel.page, lambda: wing.command is not None and wing.command[0] == 1.0)
@@ -97,31 +153,95 @@ def test_the_keys_fly_the_drone_that_is_chosen(cockpit, panel):
     finally:
         rospy.set_param("/drone_sim/vehicles", {"drone": {}})
         cockpit.call("set_vehicles")
-    wait_until(panel.page, lambda: panel.field("Vehicle").input_value() == "drone")
+    wait_until(panel.page, lambda: not panel.field("Vehicle").is_visible())
     panel.page.keyboard.down("r")
     wait_until(panel.page, lambda: cockpit.drone.command[1] == 1.0)
     panel.page.keyboard.up("r")
 
 
-def test_plots_are_drawn_and_a_slider_tunes(cockpit, panel):
+def test_plots_are_drawn_enlarged_and_saved(cockpit, panel):
+    page = panel.page
     panel.show("Plots")
+    height = page.get_by_role("group", name="Height, m")
+    wait_until(page, lambda: height.evaluate(COLOURED) > 50)
+    small = height.bounding_box()["width"]
+    height.get_by_role("button", name="Enlarge").click()
+    wait_until(page, lambda: height.bounding_box()["width"] > 1.3 * small)
+    velocity = page.get_by_role("group", name="Velocity, m/s")
+    velocity.locator(".plot").click()
+    wait_until(page, lambda: page.locator("#enlarged .chart").count() == 2)
+    with page.expect_download() as saved:
+        height.get_by_role("button", name="CSV").click()
+    head, *rows = Path(saved.value.path()).read_text().splitlines()
+    assert head == '"t, s","height, m"' and len(rows) > 10
+    assert abs(float(rows[-1].split(",")[1]) - cockpit.drone.place[2]) < 0.1
+    with page.expect_download() as saved:
+        height.get_by_role("button", name="PNG").click()
+    assert Path(saved.value.path()).read_bytes().startswith(b"\x89PNG") and saved.value.suggested_filename.endswith(
+        ".png"
+    )
+    for chart in (height, velocity):
+        chart.get_by_role("button", name="Back to the panel").click()
+    panel.press("Close the panel")
 
-    def plotted():
-        began, height, red, low, high = panel.scene.locator("body").evaluate(HEIGHTS) or (0, 0, 0, 0, 0)
-        return began < -1 and abs(height - cockpit.drone.place[2]) < 0.02 and red > 50 and low <= 0 and high >= 1
 
-    wait_until(panel.page, plotted)
+def test_what_a_script_signals_is_drawn(cockpit, panel):
+    page = panel.page
+    cockpit.scripts.mkdir(exist_ok=True)
+    script = cockpit.scripts / "signals.py"
+    script.write_text(SIGNALS)
+    rospy.set_param("/drone_sim/script", str(script))
+    cockpit.call("restart")
+    panel.show("Plots")
+    for name in ("height", "twice"):
+        page.locator("#plot-list").get_by_label(name, exact=True).check()
+        chart = page.get_by_role("group", name=name, exact=True)
+        wait_until(page, lambda chart=chart: chart.count() and chart.evaluate(COLOURED) > 20)
+        chart.get_by_role("button", name="Close").click()
+    cockpit.start_afresh()
+    script.unlink()
+
+
+def test_a_number_is_taken_as_it_is_written_and_a_wrong_one_is_refused(cockpit, panel):
+    page = panel.page
     panel.show("Tune")
-    slider = panel.scene.get_by_role("slider").first  # those of other tabs are hidden
-    before = float(slider.get_attribute("aria-valuenow"))
-    slider.focus()
-    slider.press("ArrowRight")
-    wait_until(panel.page, lambda: " = " in panel.message and "refused" not in panel.message)
-    name, _, value = panel.message.partition(" = ")
-    assert float(value) > before
-    slider.press("ArrowLeft")
-    wait_until(panel.page, lambda: panel.message.startswith(f"{name} = ") and panel.message != f"{name} = {value}")
-    assert float(slider.get_attribute("aria-valuenow")) == before
+    field = panel.field("Kzref (m/s) per m")
+    for value in ("2.5", "5"):
+        field.fill(value)
+        field.press("Enter")
+        panel.wait_for(f"Kzref = {value}")
+        assert field.input_value() == value
+    field.fill("1e9")
+    field.press("Enter")
+    panel.wait_for("Kzref = 1000000000: must be a number from 0 to 10000")
+    wait_until(page, lambda: field.input_value() == "5")
+    slider = page.get_by_role("slider", name="Kzref, slider")
+    slider.evaluate("one => { one.value = 4; one.dispatchEvent(new Event('input')) }")
+    panel.wait_for("Kzref = 4")
+    assert float(field.input_value()) == 4
+    field.fill("5")
+    field.press("Enter")
+    panel.wait_for("Kzref = 5")
+    page.locator("#tune-filter").fill("wind/x")
+    wait_until(page, lambda: page.locator("#tune-groups .field:visible").count() == 1)
+    page.locator("#tune-filter").fill("")
+
+
+def test_only_what_the_script_reads_is_tuned_and_who_does_not_listen_says_so(cockpit, panel):
+    page = panel.page
+    panel.show("Tune")
+    wait_until(page, lambda: page.locator("#deaf").is_hidden() and panel.field("Kzref (m/s) per m").is_visible())
+    script = cockpit.scripts / "deaf.py"
+    cockpit.scripts.mkdir(exist_ok=True)
+    script.write_text("def sysCall_init():\n    sim.getScriptSimulationParameter(sim.handle_self, 'Dzref')\n")
+    rospy.set_param("/drone_sim/script", str(script))
+    cockpit.call("restart")
+    wait_until(page, lambda: page.locator("#deaf").is_visible())
+    wait_until(page, lambda: "deaf.py does not listen to commands" in page.inner_text("#deaf"))
+    wait_until(page, lambda: panel.field("Kzref (m/s) per m").count() == 0)
+    assert panel.field("Dzref (m/s) per (m/s)").is_visible()
+    cockpit.start_afresh()
+    script.unlink()
 
 
 def test_the_log_shows_a_warning_and_text_is_never_html(cockpit, panel):
@@ -129,7 +249,7 @@ def test_the_log_shows_a_warning_and_text_is_never_html(cockpit, panel):
     weather.publish(KeyValue(HOSTILE, "3"))
     panel.show("Log")
     said = f"warning: weather refused: {HOSTILE}: unknown key"
-    wait_until(panel.page, lambda: any(said in text for text in panel.scene.locator("pre").all_inner_texts()))
+    wait_until(panel.page, lambda: said in panel.page.inner_text("#log-lines"))
     weather.unregister()
     script = cockpit.scripts / "<img src=x onerror=hacked()>.py"
     script.parent.mkdir(exist_ok=True)
@@ -142,6 +262,5 @@ def test_the_log_shows_a_warning_and_text_is_never_html(cockpit, panel):
     page.click("#run")
     wait_until(page, lambda: f"ValueError: {HOSTILE}" in page.inner_text("#said"))
     script.unlink()
-    for frame in page.frames:
-        assert frame.locator("img[src='x']").count() == 0
+    assert page.locator("img[src='x']").count() == 0
     assert page.evaluate("window.hacked") is None

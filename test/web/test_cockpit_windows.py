@@ -1,10 +1,12 @@
 """What scripts open, in the page: a sensor's picture, a dialog that is answered, a console; and the pace."""
 
+from pathlib import Path
+
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import wait_for, wait_until
+from cockpit_page import switch_camera, wait_for, wait_until
 from dynamic_reconfigure.client import Client
 
 SCRIPT = """
@@ -58,14 +60,26 @@ def test_views_dialogs_and_consoles_of_a_script(flown):
 
 def test_the_pace_is_changed_and_follows(cockpit, opened):
     node = Client("/drone_sim", timeout=20)
-    scene = opened.frame_locator("#scene")
-    field = scene.get_by_label("Speed")
-    field.click()
-    scene.get_by_role("option", name="0.5 times real time", exact=True).click()
+    field = opened.get_by_label("Speed", exact=True)
+    field.select_option("0.5")
     wait_until(opened, lambda: (node.get_configuration() or {}).get("real_time_factor") == 0.5)
-    reached = scene.locator("input[disabled]").nth(1)
-    wait_until(opened, lambda: reached.input_value().startswith(("0.4", "0.5")))
+    wait_until(opened, lambda: opened.locator("#pace").text_content().startswith(("0.4", "0.5")))
     node.update_configuration({"real_time_factor": 3.0})
-    wait_until(opened, lambda: field.input_value() == "3 times real time")
+    wait_until(opened, lambda: field.input_value() == "3")
     node.update_configuration({"real_time_factor": 1.0})
     node.close()
+
+
+def test_a_camera_is_recorded_and_the_films_name_says_which(cockpit, opened):
+    switch_camera(opened)
+    picture = opened.locator(".picture img")
+    wait_until(opened, lambda: picture.evaluate_all("all => all.some(one => one.naturalWidth === 640)"))
+    film = opened.get_by_role("button", name="Record /drone/front")
+    film.click()
+    wait_until(opened, lambda: film.get_attribute("aria-pressed") == "true")
+    opened.wait_for_timeout(1500)  # of the film
+    with opened.expect_download() as saved:
+        film.click()
+    assert saved.value.suggested_filename.startswith("drone_sim-drone_front-")
+    assert Path(saved.value.path()).stat().st_size > 1000
+    switch_camera(opened)

@@ -1,24 +1,20 @@
-// The page around the scene: held keys, the script in an editor with its text, and what floats over the scene. The rest
-// is viser's, in the frame.
+// The page: the scene, held keys, the script in an editor with its text, panels, and what floats over the scene.
 import { Teleop } from "./teleop.js";
-import { Console } from "./console.js";
+import { Desk } from "./desk.js";
 import { Lesson } from "./lesson.js";
 import { Scripts } from "./scripts.js";
+import { Panels } from "./panels.js";
+import { Scene } from "./scene/scene.js";
+import { putInto } from "./snippets.js";
 import { split } from "./split.js";
 import { Windows } from "./windows.js";
 import { PageSocket } from "./socket.js";
 
+const LINE_FEED = 10;
 const at = (id) => document.getElementById(id);
 
-// Does something with the scene's window, which may have been there before this script.
-function inScene(act) {
-  const frame = at("scene");
-  if (frame.contentDocument.readyState === "complete" && frame.contentWindow.location.href !== "about:blank") act(frame.contentWindow);
-  frame.addEventListener("load", () => act(frame.contentWindow));
-}
-
 function show({ saved, said, bad = false, lists, script, of, question, flown }) {
-  if (flown !== undefined) at("flown").textContent = flown && `${flown} flies`;
+  if (flown !== undefined) flies(flown);
   if (saved !== undefined) {
     at("saved").textContent = saved;
     at("saved").classList.toggle("bad", bad);
@@ -28,9 +24,21 @@ function show({ saved, said, bad = false, lists, script, of, question, flown }) 
     at("said").classList.toggle("bad", bad);
   }
   if (lists) offer(lists);
-  if (script) at("script").value = script;
+  if (script) {
+    at("script").value = script;
+    panels.opened(script);
+  }
+  flies();
   if (of !== undefined) lesson.has(script, of);
   if (question !== undefined) ask(question);
+}
+
+// Which script flies, beside the button that would fly this one, too.
+function flies(flown = flies.flown ?? "") {
+  flies.flown = flown;
+  at("flown").textContent = flown;
+  at("flying").classList.toggle("is-shown", flown === at("script").value);
+  at("flying").textContent = !flown ? "" : flown === at("script").value ? "flies" : `${flown} flies`;
 }
 
 function offer({ groups, lessons, folder }) {
@@ -60,25 +68,51 @@ function ask(question) {
 const tell = (error) => show({ said: error.message, bad: true });
 
 function told(message) {
+  panels.told(message);
   if (message.windows) windows.show(message.windows);
   if (message.pictures) windows.showPictures(message.pictures);
   if (message.failure) scripts.fail(message.failure);
-  if (message.log) log.add(message.log);
+  if (message.log) desk.console.add(message.log);
+  if (message.variables !== undefined) desk.take(message.variables);
 }
 
-// viser paints everything, shadows too, with whatever the browser has.
-function paintsInSoftware() {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  const names = gl?.getExtension("WEBGL_debug_renderer_info");
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "");
+// A message of bytes is a line of JSON, and what belongs to it.
+function took(data) {
+  const bytes = new Uint8Array(data);
+  const end = bytes.indexOf(LINE_FEED);
+  const said = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+  const rest = bytes.subarray(end + 1);
+  if ("scene" in said) scene.take(said, rest);
+  else windows.picture(said, rest);
 }
 
 const run = () => {
-  log.clear();
+  desk.console.clear();
   return scripts.run(lesson.name).catch(tell);
 };
 const open = (script) => scripts.open(script).catch(tell);
+const put = (code) => {
+  try {
+    show({ said: putInto(scripts.editor.view, scripts.is.script, code) });
+    return true;
+  } catch (error) {
+    tell(error);
+    return false;
+  }
+};
 
+const first = (isTask) => {
+  const text = lesson.all.find((one) => Boolean(one.task) === isTask && one.script);
+  if (text) open(text.script);
+};
+const scene = new Scene(at("scene"), { say: (message) => socket.say(message), ask: (...question) => socket.ask(...question) });
+window.scene = scene; // for who looks into it from the browser's console, and for tests
+const panels = new Panels({
+  socket: () => socket,
+  scene: () => scene,
+  go: { tutorial: () => first(false), tasks: () => first(true) },
+  open,
+});
 const lesson = new Lesson(
   {
     choice: at("lesson"), before: at("before"), after: at("after"), fold: at("fold"),
@@ -86,29 +120,32 @@ const lesson = new Lesson(
     grade: at("grade"), graded: at("graded"),
   },
   (...question) => socket.ask(...question),
-  open,
-  () => scripts.save(),
+  { open, put, run, save: () => scripts.save() },
 );
 let isLost = false;
 const socket = new PageSocket(
   told,
-  (data) => windows.picture(data),
+  took,
   () => {
     if (isLost) show({ said: "" });
     isLost = false;
-    if (paintsInSoftware()) socket.ask("spare").catch(tell);
+    panels.connected().catch(tell);
     socket.ask("windows").then(told, () => {}); // told anyway, once the node is ready
     scripts.connected().catch(tell);
+    desk.connected().catch(tell);
   },
   () => {
     isLost = true;
+    panels.lost();
     windows.clear();
     show({ said: "the cockpit's node does not answer; what you write is kept here until it does. Started anew, it has a new address.", bad: true });
   },
 );
-const log = new Console(at("console"));
-const windows = new Windows(at("windows"), socket);
-const scripts = new Scripts(at("text"), socket, { show }, (name) => lesson.go(name));
+const windows = new Windows(at("windows"), socket, panels.notice);
+const desk = new Desk(socket, show);
+const shown = { show, say: (line) => desk.say(line), ran: () => desk.tell() };
+const scripts = new Scripts(at("text"), socket, shown, (name) => lesson.go(name), desk.known, () => desk.look());
+desk.serve(scripts);
 scripts.onRun = run;
 const teleop = new Teleop(
   (command) => socket.hold(command),
@@ -120,23 +157,6 @@ const teleop = new Teleop(
 
 at("script").onchange = () => open(at("script").value);
 at("run").onclick = run;
-at("revert").onclick = () => scripts.revert().catch(tell);
-at("as").onclick = () => {
-  at("as-form").hidden = !at("as-form").hidden;
-  at("name").value = scripts.is.script.split("/").pop();
-  if (!at("as-form").hidden) at("name").select();
-};
-at("as-form").onsubmit = (event) => {
-  event.preventDefault();
-  scripts.saveAs(at("name").value.trim()).then(() => (at("as-form").hidden = true)).catch(tell);
-};
-at("name").onkeydown = (event) => {
-  if (event.key === "Escape") at("as-form").hidden = true;
-};
-at("toggle").onclick = () => {
-  const wide = document.body.classList.toggle("wide");
-  at("toggle").setAttribute("aria-expanded", String(!wide));
-};
 window.addEventListener("keydown", (event) => {
   if (event.defaultPrevented || !(event.ctrlKey || event.metaKey)) return;
   if (event.key === "Enter") run();
@@ -144,16 +164,10 @@ window.addEventListener("keydown", (event) => {
   event.preventDefault(); // the browser would save the page
   scripts.save().catch(tell);
 });
-at("help-open").onclick = () => at("sheet").showModal();
-at("help-close").onclick = () => at("sheet").close();
-const letGo = (event) => event.key === "Escape" && socket.ask("let go").catch(tell);
-window.addEventListener("keydown", letGo);
-inScene((scene) => scene.addEventListener("keydown", letGo));
 window.addEventListener("beforeunload", (event) => scripts.drafts.isSafe(scripts.is.script) || event.preventDefault());
-split(at("beside"), "--editor", "x", 300, () => window.innerWidth - 320, (event) => window.innerWidth - event.clientX);
+split(at("beside"), "--editor", "x", 300, () => Math.max(300, window.innerWidth - 320), (event) => window.innerWidth - event.clientX);
 const above = () => at("lesson-body").getBoundingClientRect().top;
 split(at("under"), "--lesson", "y", 60, () => window.innerHeight - 260, (event) => event.clientY - above());
 teleop.listenTo(window);
-inScene((scene) => teleop.listenTo(scene));
 teleop.stick(at("left"), "wz", "vz");
 teleop.stick(at("right"), "vy", "vx");

@@ -1,10 +1,14 @@
-// What the simulation says, and its script with it, under the script: counts instead of repeats.
+// What the simulation says, and its script with it, under the script: counts instead of repeats, lines to click.
 const MOST = 200; // lines
 const RECENT = 5; // lines among which one is sought that says the same
+const PLACE = /(\/[^\s:]+\.(?:py|lua)):(\d+)/;
+const OF_TIME = /^(?:warning: step late by|(?:paused|stopped\b[^:]*): \/clock)/;
 
 export class Console {
-  constructor(list) {
+  // `goTo(file, line)` shows a line of a script.
+  constructor(list, goTo) {
     this.list = list;
+    this.goTo = goTo;
   }
 
   add(line) {
@@ -16,10 +20,30 @@ export class Console {
       this.list.append(item);
     }
     item.times += 1;
-    item.className = /^(warning|error): /.exec(line)?.[1] ?? "";
-    item.textContent = item.times > 1 ? `${line}  (${item.times} times)` : line;
+    const ofTime = OF_TIME.test(line) ? "of-time" : "";
+    item.className = [/^(warning|error): /.exec(line)?.[1] ?? "", ofTime].join(" ").trim();
+    item.replaceChildren(...this.parts(line), ...(item.times > 1 ? [`  (${item.times} times)`] : []));
     while (this.list.children.length > MOST) this.list.firstElementChild.remove();
     if (follows) this.list.scrollTop = this.list.scrollHeight;
+  }
+
+  // The place of an error is a button that goes there.
+  parts(line) {
+    const found = PLACE.exec(line);
+    if (!found) return [line];
+    const [place, file, number] = found;
+    const button = Object.assign(document.createElement("button"), {
+      textContent: `${file.split("/").pop()}:${number}`,
+      title: `Go to line ${number} of ${file}`,
+      className: "place",
+      onclick: () => this.goTo(file, Number(number)),
+    });
+    return [line.slice(0, found.index), button, line.slice(found.index + place.length)];
+  }
+
+  // Shows what is said of lateness and clocks, or not.
+  showTime(on) {
+    this.list.classList.toggle("without-time", !on);
   }
 
   clear() {

@@ -1,25 +1,50 @@
-// The text of one script at a time; each keeps its own cursor and its own history of changes.
+// The text of one script at a time; each keeps its own cursor, its own history of changes, and its breakpoints.
 import { basicSetup } from "codemirror";
 import { indentWithTab } from "@codemirror/commands";
 import { EditorState, Prec } from "@codemirror/state";
 import { EditorView, keymap } from "@codemirror/view";
-import { StreamLanguage, indentUnit } from "@codemirror/language";
+import { HighlightStyle, StreamLanguage, indentUnit, syntaxHighlighting } from "@codemirror/language";
 import { forEachDiagnostic, setDiagnostics } from "@codemirror/lint";
 import { python } from "@codemirror/lang-python";
 import { lua } from "@codemirror/legacy-modes/mode/lua";
+import { tags } from "@lezer/highlight";
+import { breakpointGutter, linesOf, showPaused } from "./breakpoints.js";
+import { completion } from "./completion.js";
+
+const QUIET = 500; // ms without a key before the text is checked
+const FLOWN = "flight"; // the source of a failure while it flew
+
+const colors = HighlightStyle.define([
+  { tag: [tags.keyword, tags.operatorKeyword, tags.modifier], color: "var(--code-keyword)" },
+  { tag: [tags.comment, tags.meta], color: "var(--code-comment)" },
+  { tag: [tags.string, tags.special(tags.string)], color: "var(--code-string)" },
+  { tag: [tags.number, tags.bool, tags.null], color: "var(--code-number)" },
+  { tag: [tags.function(tags.variableName), tags.function(tags.propertyName), tags.function(tags.definition(tags.variableName))], color: "var(--code-function)" },
+  { tag: [tags.className, tags.definition(tags.className)], color: "var(--code-class)" },
+  { tag: tags.invalid, color: "var(--error)" },
+]);
+
+export const isLua = (script) => script.endsWith(".lua");
 
 export class Editor {
-  constructor(parent, onChange, onRun) {
+  // `on` has change(), run(), check(text, isLua) which answers with findings, and breakpoints(); `known` is the API.
+  constructor(parent, on, known) {
     this.states = new Map(); // of scripts that have been open, by name
     this.script = "";
+    this.on = on;
+    this.known = known;
     const changed = EditorView.updateListener.of((update) => {
-      if (!update.docChanged || this.filling) return;
+      if (!update.docChanged) return;
+      this.checkSoon();
+      if (this.filling) return;
       this.unmark(update);
-      onChange();
+      on.change();
     });
-    const run = { key: "Mod-Enter", run: () => (onRun(), true) }; // else it would begin a line, too
+    const run = { key: "Mod-Enter", run: () => (on.run(), true) }; // else it would begin a line, too
     this.common = [
       Prec.highest(keymap.of([run])),
+      breakpointGutter(() => on.breakpoints()),
+      syntaxHighlighting(colors),
       basicSetup,
       keymap.of([indentWithTab]),
       indentUnit.of("    "),
@@ -30,8 +55,8 @@ export class Editor {
   }
 
   begin(script, text) {
-    const language = script.endsWith(".lua") ? StreamLanguage.define(lua) : python();
-    return EditorState.create({ doc: text, extensions: [this.common, language] });
+    const language = isLua(script) ? StreamLanguage.define(lua) : python();
+    return EditorState.create({ doc: text, extensions: [this.common, language, completion(this.known, isLua(script))] });
   }
 
   get text() {
@@ -46,6 +71,8 @@ export class Editor {
     this.view.setState(known?.state ?? this.begin(script, text));
     this.fill(text);
     if (known) this.view.dispatch({ effects: known.scroll });
+    this.check();
+    this.on.breakpoints();
   }
 
   leave() {
@@ -55,6 +82,12 @@ export class Editor {
   rename(script) {
     this.states.delete(this.script);
     this.script = script;
+    this.on.breakpoints();
+  }
+
+  forget(script) {
+    this.states.delete(script);
+    if (this.script === script) this.script = "";
   }
 
   // Puts another text there, as one change that can be undone; what is the same stays, and the cursor with it.
@@ -73,20 +106,80 @@ export class Editor {
     this.filling = false;
   }
 
+  goTo(line) {
+    const { doc } = this.view.state;
+    const { from } = doc.line(Math.min(Math.max(1, line), doc.lines));
+    this.view.dispatch({ selection: { anchor: from }, effects: EditorView.scrollIntoView(from, { y: "center" }) });
+    this.view.focus();
+  }
+
+  // ---- what is wrong
+
+  get diagnostics() {
+    const found = [];
+    forEachDiagnostic(this.view.state, (one, from, to) => found.push({ ...one, from, to }));
+    return found;
+  }
+
+  put(diagnostics) {
+    this.view.dispatch(setDiagnostics(this.view.state, diagnostics));
+  }
+
   // A failure in a line that is written anew is none of that line any more.
   unmark({ startState, changes }) {
-    forEachDiagnostic(startState, (_, from, to) => changes.touchesRange(from, to) && this.mark(null));
+    let touched = false;
+    forEachDiagnostic(startState, (one, from, to) => (touched ||= one.source === FLOWN && changes.touchesRange(from, to) !== false));
+    if (touched) this.put(this.diagnostics.filter((one) => one.source !== FLOWN));
   }
 
   // Shows a failure at its line, or none.
   mark(failure) {
-    const doc = this.view.state.doc;
-    const found = [];
+    const { doc } = this.view.state;
+    const found = this.diagnostics.filter((one) => one.source !== FLOWN);
     if (failure && failure.line >= 1 && failure.line <= doc.lines) {
       const { from, to } = doc.line(failure.line);
-      found.push({ from, to, severity: "error", message: failure.said });
+      found.push({ from, to, severity: "error", message: failure.said, source: FLOWN });
       this.view.dispatch({ effects: EditorView.scrollIntoView(from, { y: "center" }) });
     }
-    this.view.dispatch(setDiagnostics(this.view.state, found));
+    this.put(found);
+  }
+
+  checkSoon() {
+    clearTimeout(this.later);
+    this.later = setTimeout(() => this.check(), QUIET);
+  }
+
+  // Underlines what is wrong with the text; returns that. What was written meanwhile is checked later.
+  async check() {
+    clearTimeout(this.later);
+    const { script, text } = this;
+    if (!script) return [];
+    const found = await this.on.check(text, isLua(script)).catch(() => null);
+    if (!found || script !== this.script || text !== this.text) return found ?? [];
+    const flown = this.diagnostics.filter((one) => one.source === FLOWN);
+    this.put([...flown, ...found.map((one) => this.placed(one))]);
+    return found;
+  }
+
+  placed({ line, column, end, said, severity }) {
+    const { doc } = this.view.state;
+    const whole = doc.line(Math.min(Math.max(1, line), doc.lines));
+    const from = Math.min(whole.from + column - 1, whole.to);
+    const to = end ? Math.min(whole.from + end - 1, whole.to) : whole.to;
+    return { from: from === to ? Math.max(whole.from, from - 1) : from, to, severity, message: said };
+  }
+
+  // ---- breakpoints
+
+  // The lines of all scripts that have any.
+  get breakpoints() {
+    const states = [...this.states].filter(([script]) => script !== this.script).map(([script, { state }]) => [script, linesOf(state)]);
+    if (this.script) states.push([this.script, linesOf(this.view.state)]);
+    return Object.fromEntries(states.filter(([, lines]) => lines.length));
+  }
+
+  // Shows where it is paused, 0 for nowhere.
+  paused(line) {
+    showPaused(this.view, line);
   }
 }

@@ -1,8 +1,6 @@
 // The text beside the script: a section of the tutorial, or a task. What it says of a scene, Run flies in.
 import { render } from "./markdown.js";
-
-// The tutorial is written for a terminal: what does the same here.
-const HERE = "Here, Run is its roslaunch; a click on the drone pushes it, its arrows put it elsewhere, the keys below are its commands.";
+import { hasFunctions } from "./snippets.js";
 
 const ASK_AGAIN = 500; // ms, for what is being graded
 
@@ -18,16 +16,14 @@ function showGrade(element, script, { error, points, of, rows = [] }) {
 }
 
 export class Lesson {
-  // `parts` are elements: choice, before, after, fold, body, start, flies, grade, graded, text. `save` saves the script.
-  constructor(parts, ask, open, save) {
-    this.parts = parts;
-    this.ask = ask;
-    this.open = open; // a script
-    this.save = save;
+  // `parts` are elements: choice, before, after, fold, body, start, flies, grade, graded, text. Of `script`, `open` opens one,
+  // `save` saves it, `put` puts lines of Python into it, `run` flies it.
+  constructor(parts, ask, { open, save, put, run }) {
+    Object.assign(this, { parts, ask, open, save, put, run });
     this.all = []; // { lesson, title, task, script } in the order of reading
     this.name = "";
     this.opened = { script: "", lesson: "" };
-    parts.choice.onchange = () => this.go(parts.choice.value);
+    parts.choice.onchange = () => this.take(parts.choice.value);
     parts.before.onclick = () => this.turn(-1);
     parts.after.onclick = () => this.turn(1);
     parts.fold.onclick = () => this.folded(!parts.body.hidden);
@@ -61,11 +57,10 @@ export class Lesson {
     if (name !== this.name) return; // another one has been chosen meanwhile
     this.parts.graded.replaceChildren();
     this.script = this.opened.lesson === name ? this.opened.script : script; // there may be several
-    const isTask = this.all[this.place]?.task;
-    this.parts.flies.textContent = [flies && `Run flies ${flies}.`, isTask ? "" : HERE].filter(Boolean).join(" ");
+    this.parts.flies.textContent = flies && `Run flies ${flies}.`;
     this.folded(false);
     const knows = (to) => to.script || this.all.some((one) => one.lesson === to.lesson);
-    render(this.parts.text, text, folder, knows, (to) => (to.script ? this.open(to.script) : this.go(to.lesson)));
+    render(this.parts.text, text, folder, knows, (to) => (to.script ? this.open(to.script) : this.take(to.lesson)), (code) => this.actions(code));
     this.parts.body.scrollTop = 0;
     this.aim();
   }
@@ -76,12 +71,22 @@ export class Lesson {
     });
   }
 
-  // Goes on to the next text, and to its script where it has one.
+  // What can be done with lines of Python in the text.
+  actions(code) {
+    const put = { label: "Put into the script", title: "A function in the place of its namesake; other lines at the cursor", act: () => this.put(code) };
+    const run = { label: "Run", title: "Put it into the script, and fly that", act: () => this.put(code) && this.run() };
+    return hasFunctions(code) ? [put, run] : [put];
+  }
+
+  // Goes to a text, and to its script where it has one.
+  async take(name) {
+    await this.go(name);
+    if (name === this.name && this.script && this.opened.lesson !== name) this.open(this.script);
+  }
+
   async turn(way) {
     const next = this.all[this.place + way];
-    if (!next) return;
-    await this.go(next.lesson);
-    if (this.script) this.open(this.script);
+    if (next) await this.take(next.lesson);
   }
 
   // Grades the script by this task, beside what flies, and shows how it did.

@@ -6,6 +6,7 @@ import { pythonLanguage } from "@codemirror/lang-python";
 
 const FORMULA = /\$\$([\s\S]+?)\$\$|\$(?!\s)((?:[^$\\`]|\\.)+?)(?<!\s)\$(?!\d)/y; // $$on a line of its own$$, $in a line$
 const STAGE = /^\/docs\/tutorial\/([0-9][^/]*\.(?:py|lua))$/;
+const SOLUTION = /^\/docs\/tutorial\/(solutions\/[^/]+\.(?:py|lua))$/;
 const BUILT_IN = /^\/src\/drone_sim\/child_scripts\/([^/]+\.(?:py|lua))$/;
 const PICTURE = /^\/(?:docs\/pictures|tasks\/\w+)\/\w+\.png$/;
 
@@ -53,15 +54,52 @@ function target(href, folder) {
   const url = within(href, folder);
   if (!url) return {};
   if (href.startsWith("#") || url.pathname === "/docs/tutorial.md") return { lesson: url.hash.slice(1) };
-  const stage = STAGE.exec(url.pathname);
-  const builtIn = BUILT_IN.exec(url.pathname);
-  if (stage || builtIn) return { script: stage ? `tutorial/${stage[1]}` : `built-in/${builtIn[1]}` };
-  return {};
+  const [stage, solution, builtIn] = [STAGE, SOLUTION, BUILT_IN].map((one) => one.exec(url.pathname)?.[1]);
+  const script = (stage && `tutorial/${stage}`) || solution || (builtIn && `built-in/${builtIn}`);
+  return script ? { script } : {};
+}
+
+// A picture that a click, or Enter, shows as large as the window is.
+function enlargeable(picture) {
+  const button = document.createElement("button");
+  button.className = "enlarge";
+  button.title = "Click to enlarge";
+  button.setAttribute("aria-label", `Enlarge: ${picture.alt}`);
+  button.onclick = () => enlarge(picture);
+  picture.replaceWith(button);
+  button.append(picture);
+}
+
+function enlarge({ src, alt }) {
+  const dialog = document.createElement("dialog");
+  dialog.className = "enlarged";
+  dialog.setAttribute("aria-label", alt);
+  const close = document.createElement("button");
+  close.textContent = "×";
+  close.setAttribute("aria-label", "Close");
+  dialog.append(close, Object.assign(new Image(), { src, alt }));
+  dialog.onclick = () => dialog.close();
+  dialog.onclose = () => dialog.remove();
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
+// What can be done with a block of Python: a row of buttons below it, one for each of `actions(code)`.
+function withButtons(code, actions) {
+  const row = document.createElement("p");
+  row.className = "do";
+  const made = actions(code.textContent).map(({ label, title, act }) => {
+    const button = document.createElement("button");
+    Object.assign(button, { textContent: label, title, onclick: act });
+    return button;
+  });
+  row.append(...made);
+  code.parentElement.after(row);
 }
 
 // Fills an element with a text whose links and pictures are seen from `folder`; `go` follows a link that is ours.
-// `knows` tells whether there is such a text or script.
-export function render(element, text, folder, knows, go) {
+// `knows` tells whether there is such a text or script; `actions` returns { label, title, act } for a block of Python.
+export function render(element, text, folder, knows, go, actions = () => []) {
   element.innerHTML = markdown.render(text);
   for (const link of element.querySelectorAll("a")) {
     const to = target(link.getAttribute("href"), folder);
@@ -73,7 +111,10 @@ export function render(element, text, folder, knows, go) {
   }
   for (const picture of element.querySelectorAll("img")) {
     const path = within(picture.getAttribute("src"), folder)?.pathname;
-    if (path && PICTURE.test(path)) picture.src = path;
-    else picture.replaceWith(picture.alt);
+    if (path && PICTURE.test(path)) {
+      picture.src = path;
+      enlargeable(picture);
+    } else picture.replaceWith(picture.alt);
   }
+  for (const code of element.querySelectorAll("pre > code.language-python")) withButtons(code, actions);
 }

@@ -1,6 +1,6 @@
 // The scripts: opened, written to the node's disk soon after every change, watched, and flown. No edit is ever lost.
 import { Drafts } from "./drafts.js";
-import { Editor } from "./editor.js";
+import { Editor, isLua } from "./editor.js";
 
 const QUIET = 800; // ms without a key before it is saved
 const LOOK = 1000; // ms between two looks at the file
@@ -11,13 +11,14 @@ const size = (text) => new TextEncoder().encode(text).length;
 
 export class Scripts {
   // `page` shows what is told: { saved, said, bad, lists, script, question, flown }; `onOpen` hears of the text that a script has.
-  constructor(parent, socket, page, onOpen) {
+  constructor(parent, socket, page, onOpen, known, onBreakpoints) {
     this.ask = (...question) => socket.ask(...question);
     this.socket = socket;
     this.page = page;
     this.onOpen = onOpen;
     this.drafts = new Drafts();
-    this.editor = new Editor(parent, () => this.change(), () => this.onRun());
+    const check = async (text, lua) => (socket.open ? (await this.ask("check", { text, lua })).found : null);
+    this.editor = new Editor(parent, { change: () => this.change(), run: () => this.onRun(), check, breakpoints: onBreakpoints }, known);
     this.is = { script: "", file: "", version: "", text: "" }; // what the disk has, as far as we know
     this.dirty = false;
     this.conflict = false;
@@ -132,9 +133,7 @@ export class Scripts {
     if (before !== this.is.script) return this.list();
   }
 
-  // A name without an ending gets that of the script whose text it is.
-  async saveAs(given) {
-    const name = /\.\w+$/.test(given) ? given : given + this.is.script.slice(this.is.script.lastIndexOf("."));
+  async saveAs(name) {
     await this.inTurn(async () => {
       const text = this.editor.text;
       const answer = await this.ask("save_as", { name, text });
@@ -142,6 +141,65 @@ export class Scripts {
       this.page.show({ question: null });
       await this.written(answer, text);
     });
+  }
+
+  // ---- files
+
+  // Makes a new script with a text, and opens it.
+  async create(name, text) {
+    await this.save();
+    const { script } = await this.inTurn(() => this.ask("save_as", { name, text }));
+    await this.list();
+    await this.open(script);
+  }
+
+  async rename(name) {
+    if (name === this.is.script.split("/").pop()) return;
+    await this.save();
+    await this.inTurn(async () => {
+      const answer = await this.ask("rename", { script: this.is.script, name });
+      if (isLua(answer.script) === isLua(this.is.script)) return this.written(answer, this.editor.text);
+      this.editor.forget(this.is.script); // it is written in another language now
+      await this.list();
+      await this.take(answer.script);
+    });
+  }
+
+  async duplicate() {
+    const { script } = await this.inTurn(() => this.ask("duplicate", { script: this.is.script, text: this.editor.text }));
+    await this.list();
+    await this.open(script);
+  }
+
+  // Deletes the script that is shown, and opens the one that flies, or any other; returns what it was called.
+  async remove() {
+    await this.save();
+    const { script } = this.is;
+    await this.inTurn(() => this.ask("delete", { script }));
+    this.drafts.drop(script);
+    this.editor.forget(script);
+    this.is = { ...this.is, script: "" };
+    const { flown, groups } = await this.list();
+    const all = groups.flatMap((one) => one.scripts);
+    await this.open([flown, "built-in/pilot.py", all[0]].find((one) => all.includes(one)));
+    return script;
+  }
+
+  async bringBack(name) {
+    const { script } = await this.inTurn(() => this.ask("bring back", { script: name }));
+    this.page.show({ question: null });
+    await this.list();
+    await this.open(script);
+  }
+
+  // Goes to a line of a file, be it that of another script.
+  async goTo(file, line) {
+    if (file !== this.is.file) {
+      const { script } = await this.ask("locate", { file });
+      if (!script) throw new Error(`${file} is none of the scripts on the list`);
+      await this.open(script);
+    }
+    this.editor.goTo(line);
   }
 
   async revert() {
@@ -227,19 +285,29 @@ export class Scripts {
 
   // ---- flown
 
+  // Saves what is shown, and flies that, unless it cannot even be read.
   async run(lesson) {
     await this.save();
+    const wrong = (await this.editor.check()).find(({ said }) => /^syntax ?error/i.test(said));
+    if (wrong) {
+      this.page.say(`error: [load] ${this.is.file}:${wrong.line}: ${wrong.said}`);
+      return this.fail({ file: this.is.file, line: wrong.line, said: wrong.said, phase: "not started" }, false);
+    }
     this.editor.mark(null);
-    this.page.show({ said: "starting ..." });
-    const { done, said, failure } = await this.ask("run", { script: this.is.script, lesson });
+    const { script } = this.is;
+    this.page.show({ said: `starting ${script} ...` });
+    const { done, said, failure } = await this.ask("run", { script, lesson });
+    if (done) this.page.show({ flown: script });
     if (failure) this.fail(failure);
     else this.page.show({ said, bad: !done });
+    this.page.ran(); // it may have come to a breakpoint before that is told
   }
 
   // A failure while it flies, or at its start: that one comes as the answer and from the node's log, in either order.
-  fail({ file, line, said, phase }) {
+  fail({ file, line, said, phase }, isToBeMarked = true) {
     const where = file === this.is.file ? `line ${line}` : `${file.split("/").pop()}, line ${line}`;
     this.page.show({ said: `${phase}, ${where}: ${said}`, bad: true });
-    if (file === this.is.file) this.editor.mark({ line, said });
+    if (file === this.is.file && isToBeMarked) this.editor.mark({ line, said });
+    else if (file === this.is.file) this.editor.goTo(line);
   }
 }

@@ -3,9 +3,10 @@ const SPEED = 1; // m/s, rad/s
 const FAST = 2.5; // times, with Shift
 const AGAIN = 100; // ms
 const DEAD = 0.1; // of a stick's way
+// The one map of keys: key_teleop has it, too (KEY_MAPS in src/drone_sim/ros/tools/commands.py), as a test sees.
 const KEYS = {
   KeyW: ["vx", 1], KeyS: ["vx", -1], KeyA: ["vy", 1], KeyD: ["vy", -1], KeyQ: ["wz", 1], KeyE: ["wz", -1],
-  KeyR: ["vz", 1], KeyF: ["vz", -1], ArrowUp: ["vz", 1], ArrowDown: ["vz", -1], ArrowLeft: ["wz", 1], ArrowRight: ["wz", -1],
+  KeyR: ["vz", 1], KeyF: ["vz", -1], ArrowUp: ["vx", 1], ArrowDown: ["vx", -1], ArrowLeft: ["vy", 1], ArrowRight: ["vy", -1],
 };
 const PAD = { vx: [3, -1], vy: [2, -1], vz: [1, -1], wz: [0, -1] }; // the standard gamepad's axes: down and right are +1
 const AXES = ["vx", "vy", "vz", "wz"];
@@ -28,7 +29,6 @@ export class Teleop {
       if (event.key === "Shift") this.fast = true;
       if (!(event.code in KEYS) || takes(event) || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
-      event.stopPropagation(); // viser moves its eyes by the same keys
       this.keys.add(event.code);
       this.tell();
     }, true);

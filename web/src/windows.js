@@ -1,10 +1,12 @@
 // What floats over the scene: pictures of cameras, and what scripts open: views, dialogs, consoles. All text is text.
-const LINE_FEED = 10;
+import { create, icon } from "./dom.js";
+import { Recorder } from "./recorder.js";
 
 export class Windows {
-  constructor(parent, socket) {
+  constructor(parent, socket, notice) {
     this.parent = parent;
     this.socket = socket; // { ask, say }
+    this.notice = notice;
     this.open = new Map(); // windows, by kind and handle or topic
     this.labels = new Map(); // of views, by topic
   }
@@ -53,8 +55,8 @@ export class Windows {
   frame(kind, title, onClose) {
     const element = create("section", { className: `window ${kind}` });
     const header = create("header", {}, create("span", { textContent: title, title }));
-    if (onClose) header.append(create("button", { textContent: "×", title: "Close", onclick: onClose }));
-    header.onpointerdown = (event) => event.target.tagName !== "BUTTON" && drag(element, header, event);
+    if (onClose) header.append(create("button", { className: "plain", title: "Close", "aria-label": `Close ${title}`, onclick: onClose }, icon("close")));
+    header.onpointerdown = (event) => event.target.closest("button") || drag(element, header, event);
     element.append(header);
     return element;
   }
@@ -67,7 +69,7 @@ export class Windows {
 
   dialog({ handle, title, text, buttons, typed }) {
     const element = this.frame("dialog", title);
-    const field = typed === null ? null : create("input", { value: typed, ariaLabel: title });
+    const field = typed === null ? null : create("input", { value: typed, "aria-label": title });
     const press = (button) => this.socket.ask("answer", { handle, button, typed: field?.value ?? "" }).catch(() => {});
     if (field) field.onkeydown = (event) => event.key === "Enter" && press(buttons[0]);
     element.append(create("p", { textContent: text }));
@@ -93,20 +95,31 @@ export class Windows {
     const element = this.frame("picture", topic, () => this.socket.ask("camera", { topic, on: false }).catch(() => {}));
     const image = create("img", { alt: topic });
     const note = create("p");
+    const name = topic.replace(/\W+/g, "_").replace(/^_/, "");
+    const film = create("button", { className: "plain", title: "Record a video of this camera", "aria-label": `Record ${topic}` }, icon("video"));
+    const made = { element, image, note, title: element.querySelector("span") };
+    new Recorder(film, () => this.film(made), name, this.notice, () => (made.canvas = null));
+    element.querySelector("header button").before(film);
     element.append(image, note);
-    return { element, image, note, title: element.querySelector("span") };
+    return made;
+  }
+
+  // What a camera shows, as a stream: each picture is drawn on a canvas that nobody sees.
+  film(figure) {
+    figure.canvas = create("canvas", { width: figure.image.naturalWidth || 640, height: figure.image.naturalHeight || 480 });
+    figure.canvas.getContext("2d").drawImage(figure.image, 0, 0, figure.canvas.width, figure.canvas.height);
+    return figure.canvas.captureStream();
   }
 
   // A picture is answered for when it is on the screen; only then the node sends another.
-  picture(message) {
-    const bytes = new Uint8Array(message);
-    const end = bytes.indexOf(LINE_FEED);
-    const said = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+  picture(said, bytes) {
     const shown = () => requestAnimationFrame(() => this.socket.say({ shown: said.picture }));
     const there = this.open.get(`picture ${said.picture}`);
     if (!there) return shown();
-    const address = URL.createObjectURL(new Blob([bytes.subarray(end + 1)]));
+    const address = URL.createObjectURL(new Blob([bytes]));
     there.image.onload = there.image.onerror = () => {
+      const { canvas } = there;
+      canvas?.getContext("2d").drawImage(there.image, 0, 0, canvas.width, canvas.height);
       URL.revokeObjectURL(address);
       shown();
     };
@@ -114,12 +127,6 @@ export class Windows {
     there.title.textContent = this.labels.get(said.picture) ?? said.name;
     there.note.textContent = said.note;
   }
-}
-
-function create(tag, properties = {}, ...children) {
-  const element = Object.assign(document.createElement(tag), properties);
-  element.append(...children);
-  return element;
 }
 
 function drag(element, handle, { pointerId, clientX, clientY }) {

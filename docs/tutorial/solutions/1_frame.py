@@ -3,7 +3,9 @@
 It stays where the drone began, and with it the tracking camera and the view of rviz: they see the drone slide away.
 """
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
+PARAMETERS = {
+    "thrust_gravity": 5.33,  # m/s, compensation for gravity
+}
 
 
 def sysCall_init():
@@ -13,9 +15,15 @@ def sysCall_init():
     sim.setObjectParent(self.trackBase, -1, True)  # from here on it moves only when this script moves it
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
 
-    self.thrust_gravity = 5.33  # m/s, compensation for gravity
-    self.thrust = self.thrust_gravity
+    for name, value in PARAMETERS.items():
+        sim.setScriptSimulationParameter(sim.handle_self, name, value)
+    self.thrust = gain("thrust_gravity")
     self.pitch_corr = self.yaw_corr = self.roll_corr = 0
+
+
+def gain(name):
+    """Return one of PARAMETERS as it is now: it may be tuned while the drone flies."""
+    return sim.getScriptSimulationParameter(sim.handle_self, name)
 
 
 def sysCall_actuation():
@@ -30,4 +38,5 @@ def sysCall_actuation():
 
 
 def sysCall_sensing():
-    """Leave the track frame where it is."""
+    """Leave the track frame where it is; set the thrust for the next actuation."""
+    self.thrust = gain("thrust_gravity")

@@ -4,9 +4,16 @@
 end of the command; 1.40 rad, since the drone, too, needs its time to follow 0.5 rad/s.
 """
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 import math
+
+PARAMETERS = {
+    "thrust_gravity": 5.33,  # m/s, compensation for gravity
+    "Dthrust": 1,  # (m/s) per (m/s)
+    "Kzref": 5,  # (m/s) per m
+    "Dzref": 3,  # (m/s) per (m/s)
+    "Dyaw": 1,  # 1 per (rad/s)
+    "Kyaw": 1,  # (rad/s) per rad
+}
 
 
 def sysCall_init():
@@ -16,18 +23,17 @@ def sysCall_init():
     sim.setObjectParent(self.trackBase, -1, True)  # from here on it moves only when this script moves it
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
 
-    self.thrust_gravity = 5.33  # m/s, compensation for gravity
-    self.thrust = self.thrust_gravity
+    for name, value in PARAMETERS.items():
+        sim.setScriptSimulationParameter(sim.handle_self, name, value)
+    self.thrust = gain("thrust_gravity")
     self.pitch_corr = self.yaw_corr = self.roll_corr = 0
-
-    self.Dthrust = 1  # (m/s) per (m/s)
-    self.Kzref = 5  # (m/s) per m
-    self.Dzref = 3  # (m/s) per (m/s)
     self.zref = sim.getObjectPosition(self.d, -1)[2]  # m, used if the z-speed command is null
-
-    self.Dyaw = 1  # 1 per (rad/s)
-    self.Kyaw = 1  # (rad/s) per rad
     self.yaw_ref = sim.getObjectOrientation(self.d, -1)[2]  # rad, used if the yaw command is null
+
+
+def gain(name):
+    """Return one of PARAMETERS as it is now: it may be tuned while the drone flies."""
+    return sim.getScriptSimulationParameter(sim.handle_self, name)
 
 
 def flight_plan(t):
@@ -58,14 +64,14 @@ def sysCall_sensing():
     d_global_pos, d_global_ori = sim.getObjectVelocity(self.d)  # linear in the world frame, angular in its own
 
     if twist[2] == 0:
-        self.thrust = self.thrust_gravity + self.Kzref * (self.zref - pos[2]) - self.Dzref * d_global_pos[2]
+        self.thrust = gain("thrust_gravity") + gain("Kzref") * (self.zref - pos[2]) - gain("Dzref") * d_global_pos[2]
     else:
-        self.thrust = self.thrust_gravity + self.Dthrust * (twist[2] - d_global_pos[2])
+        self.thrust = gain("thrust_gravity") + gain("Dthrust") * (twist[2] - d_global_pos[2])
         self.zref = pos[2]  # to be held when the z-speed command is null again
 
     if twist[5] == 0:
         error = math.remainder(self.yaw_ref - ori[2], 2 * math.pi)  # the short way round
-        self.yaw_corr = self.Dyaw * (self.Kyaw * error - d_global_ori[2])
+        self.yaw_corr = gain("Dyaw") * (gain("Kyaw") * error - d_global_ori[2])
     else:
-        self.yaw_corr = self.Dyaw * (twist[5] - d_global_ori[2])
+        self.yaw_corr = gain("Dyaw") * (twist[5] - d_global_ori[2])
         self.yaw_ref = ori[2]  # to be held when the yaw command is null again

@@ -1,6 +1,17 @@
 """Stage 5 with a guard: the collective thrust stays positive."""
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
+PARAMETERS = {
+    "thrust_gravity": 5.33,  # m/s, compensation for gravity
+    "Dthrust": 1,  # (m/s) per (m/s)
+    "Kzref": 5,  # (m/s) per m
+    "Dzref": 3,  # (m/s) per (m/s)
+    "Dyaw": 1,  # 1 per (rad/s)
+    "angle_min": 0.2,  # rad, while braking
+    "angle_max": 0.5,  # rad, while speeding up
+    "Pangle": 0.3,  # 1 per rad
+    "Dangle": 0.2,  # 1 per (rad/s)
+    "Kvcorr": 0.5,  # rad per (m/s)
+}
 
 
 def sysCall_init():
@@ -10,25 +21,19 @@ def sysCall_init():
     sim.setObjectParent(self.trackBase, -1, True)  # from here on it moves only when this script moves it
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
 
-    self.thrust_gravity = 5.33  # m/s, compensation for gravity
-    self.thrust = self.thrust_gravity
+    for name, value in PARAMETERS.items():
+        sim.setScriptSimulationParameter(sim.handle_self, name, value)
+    self.thrust = gain("thrust_gravity")
     self.pitch_corr = self.yaw_corr = self.roll_corr = 0
-
-    self.Dthrust = 1  # (m/s) per (m/s)
-    self.Kzref = 5  # (m/s) per m
-    self.Dzref = 3  # (m/s) per (m/s)
     self.zref = sim.getObjectPosition(self.d, -1)[2]  # m, used if the z-speed command is null
-
-    self.Dyaw = 1  # 1 per (rad/s)
-
     self.dt = sim.getSimulationTimeStep()
-    self.angle_min = 0.2  # rad, while braking
-    self.angle_max = 0.5  # rad, while speeding up
-    self.Pangle = 0.3  # 1 per rad
-    self.Dangle = 0.2  # 1 per (rad/s)
-    self.Kvcorr = 0.5  # rad per (m/s)
     self.pitch_prev = 0
     self.roll_prev = 0
+
+
+def gain(name):
+    """Return one of PARAMETERS as it is now: it may be tuned while the drone flies."""
+    return sim.getScriptSimulationParameter(sim.handle_self, name)
 
 
 def flight_plan(t):
@@ -63,30 +68,30 @@ def sysCall_sensing():
     d_local_pos = sim.multiplyVector(track_mat_inv, d_global_pos)  # linear velocity in the track frame
 
     if twist[2] == 0:
-        self.thrust = self.thrust_gravity + self.Kzref * (self.zref - pos[2]) - self.Dzref * d_global_pos[2]
+        self.thrust = gain("thrust_gravity") + gain("Kzref") * (self.zref - pos[2]) - gain("Dzref") * d_global_pos[2]
     else:
-        self.thrust = self.thrust_gravity + self.Dthrust * (twist[2] - d_global_pos[2])
+        self.thrust = gain("thrust_gravity") + gain("Dthrust") * (twist[2] - d_global_pos[2])
         self.zref = pos[2]  # to be held when the z-speed command is null again
     self.thrust = min(max(self.thrust, 3), 8)  # the corrections are multiplied by it
 
-    self.yaw_corr = self.Dyaw * (twist[5] - d_global_ori[2])
+    self.yaw_corr = gain("Dyaw") * (twist[5] - d_global_ori[2])
 
     pitch = local_ori[1]
     dpitch = (pitch - self.pitch_prev) / self.dt
     self.pitch_prev = pitch
     pitch_target = target_angle(twist[0], d_local_pos[0])
-    self.pitch_corr = self.Pangle * (pitch_target - pitch) - self.Dangle * dpitch
+    self.pitch_corr = gain("Pangle") * (pitch_target - pitch) - gain("Dangle") * dpitch
 
     roll = -local_ori[0]
     droll = (roll - self.roll_prev) / self.dt
     self.roll_prev = roll
     roll_target = target_angle(twist[1], d_local_pos[1])
-    self.roll_corr = self.Pangle * (roll_target - roll) - self.Dangle * droll
+    self.roll_corr = gain("Pangle") * (roll_target - roll) - gain("Dangle") * droll
 
 
 def target_angle(command, speed):
     """Return the lean (rad) that a speed error asks for; less of it for braking than for speeding up."""
-    target = self.Kvcorr * (command - speed)
+    target = gain("Kvcorr") * (command - speed)
     if command >= 0:
-        return min(max(target, -self.angle_min), self.angle_max)
-    return min(max(target, -self.angle_max), self.angle_min)
+        return min(max(target, -gain("angle_min")), gain("angle_max"))
+    return min(max(target, -gain("angle_max")), gain("angle_min"))

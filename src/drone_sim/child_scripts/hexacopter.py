@@ -12,8 +12,6 @@ from pilot import (  # noqa: F401 -- phases and callbacks, called as they are
     sysCall_sensing,
 )
 
-# ruff: noqa: F821 -- `sim` and `self` are there when a child script runs
-
 # Propellers 1 to 6, from the front left once around: how far ahead and to the left, in 0.1 m, which gives corrections
 # the effect that they have on the quadricopter; and which way they turn.
 MIXING = ((1.559, 0.9, -1), (0, 1.8, 1), (-1.559, 0.9, -1), (-1.559, -0.9, 1), (0, -1.8, -1), (1.559, -0.9, 1))

@@ -10,8 +10,6 @@ import math
 import tutorial
 from tutorial import sysCall_actuation  # noqa: F401 -- a phase, called as it is
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 LANDED, TAKING_OFF, FLYING, LANDING, CRASHED = "landed", "taking off", "flying", "landing", "crashed"
 
 CLIMB = 0.6  # m/s
@@ -42,8 +40,9 @@ def sysCall_init():
     yaw = sim.getObjectOrientation(self.d, -1)[2]
     self.still = 0.0  # s, that it stands or lies where it should move
     self.goal = None  # x, y, z (m), yaw (rad)
+    height = takeoff_height()
     if sim.getScriptSimulationParameter(sim.handle_self, "start") == LANDED:
-        self.home = (x, y, z + takeoff_height(), yaw)
+        self.home = (x, y, z + height, yaw)
         rest(LANDED)
     else:
         self.home = (x, y, z, yaw)

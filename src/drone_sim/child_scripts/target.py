@@ -4,8 +4,6 @@ V-REP's target-following controller, before the tutorial removes it. Its gains a
 0.05 s: what they call changes are differences from one step to the next.
 """
 
-# ruff: noqa: F821 -- `sim` and `self` are there when a child script runs
-
 THRUST_GRAVITY = {"3.x": 5.335, "4.x": 5.45}  # m/s, by the propellers' law
 
 

@@ -7,8 +7,6 @@ more than it is ever told to, as against a wall, first rights itself.
 
 import math
 
-# ruff: noqa: F821 -- `sim`, `simROS` and `self` are there when a child script runs
-
 GAINS = (
     "thrust_gravity",  # compensation for gravity
     "thrust_limits",

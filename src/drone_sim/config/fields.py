@@ -8,6 +8,8 @@ from functools import lru_cache
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
+import yaml
+
 from drone_sim.config.types import Checked, Location, Parts, Within
 from drone_sim.files.resources import package_path
 
@@ -114,3 +116,14 @@ def rows(text: str) -> Iterator[Row]:
 def comments() -> Mapping[str, str]:
     """Return what config/drone.yaml says of each of its keys, by names with slashes."""
     return {row.name: row.comment for row in rows(CONFIG.read_text(encoding="utf-8"))}
+
+
+@lru_cache(maxsize=1)
+def _defaults() -> Mapping[str, Any]:
+    text = CONFIG.read_text(encoding="utf-8")
+    return {row.name: yaml.safe_load(row.default) if row.default else None for row in rows(text)}
+
+
+def default_of(location: Location) -> Any:
+    """Return what config/drone.yaml has at a location; None where it has nothing."""
+    return _defaults().get("/".join(map(str, location)))

@@ -74,7 +74,7 @@ class Runner:
         if options.fresh:
             self.store.forget()
         self._flight_options = FlightOptions(
-            numbers.limits, numbers.batches, _is_sandboxed(program, options.sandbox), tables, numbers.workers.patience
+            numbers.limits, numbers.batches, is_sandboxed(program, options.sandbox), tables, numbers.workers.patience
         )
         self._program = program
         self.all_kept = True
@@ -158,7 +158,11 @@ def _interrupt() -> NoReturn:
     raise KeyboardInterrupt
 
 
-def _is_sandboxed(program: str, wanted: str) -> bool:
+def is_sandboxed(program: str, wanted: str) -> bool:
+    """Tell whether scripts are to be in the sandbox, as is `wanted` (auto, on, off); say where there is none.
+
+    Raises NoSandbox.
+    """
     if wanted == "off":
         return False
     try:

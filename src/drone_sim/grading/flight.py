@@ -7,20 +7,27 @@ import hashlib
 import random
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import IO, Any, cast
 
 import numpy as np
 
 from drone_sim.command_line import EXPECTED, format_error
 from drone_sim.files import writing
 from drone_sim.grading.flight_recorder import FlightRecorder, OfflineBackend
+from drone_sim.grading.permissions import Permissions
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
 from drone_sim.grading.rules import Rules
 from drone_sim.offline.recording import Recording
 from drone_sim.offline.timeline import first_step
 from drone_sim.run.simulation import Simulation
+from drone_sim.scripting import load
+from drone_sim.scripting.api.calls import Api
+from drone_sim.scripting.api.control import Turns
+from drone_sim.scripting.breakpoints import Breakpoints
+from drone_sim.scripting.door.simulation_end import SimulationEnd
 from drone_sim.scripting.load import DEFAULT
+from drone_sim.scripting.time_limit import TimeLimit
 
 
 def grade(
@@ -54,18 +61,37 @@ def ungraded(plan: Plan, script: str | None, seed: int, changes: Mapping[str, An
 class Flight:
     """A flight that is ready: all is read and built, and no line of a script has run."""
 
-    def __init__(self, plan: Plan, script: str | None = None, seed: int = 0, changes: Mapping[str, Any] | None = None):
-        """Build it; `plan`, `script`, `seed` and `changes` are as in `grade`. Raises one of EXPECTED."""
+    def __init__(
+        self,
+        plan: Plan,
+        script: str | None = None,
+        seed: int = 0,
+        changes: Mapping[str, Any] | None = None,
+        door: SimulationEnd | None = None,
+    ):
+        """Build it; `plan`, `script`, `seed` and `changes` are as in `grade`. Raises one of EXPECTED.
+
+        Through a `door` the script runs in another process, and may call what the plan allows; what belongs to the
+        scene runs here.
+        """
         self._plan, self._seed, self._changes = plan, seed, changes or {}
         parameters = plan.parameters(seed, None, changes)
         self._script = plan.script_of(script) or (parameters.script if script is None else "")
         self._timeline = plan.timeline_of(parameters)
         self._steps = first_step(plan.duration, parameters.time_step)
         backend = OfflineBackend(plan.topics_of(parameters))
+        flown = self._script or DEFAULT
         self._simulation = Simulation(
-            parameters, script=self._script or DEFAULT, backend=backend if backend.wanted else None, started=False
+            parameters,
+            script=flown,
+            backend=backend if backend.wanted else None,
+            started=False,
+            load_script=load.load if door is None else _through(door, flown),
         )
         backend.clock = lambda: self._simulation.time
+        self._permissions = Permissions(plan, self._simulation, flown)
+        if door is not None:
+            door.begin(self._simulation.context.objects, self._is_quiet, self._permissions)
         try:
             self._recorder = FlightRecorder(plan, self._simulation, backend)
             self._rules = Rules(plan, self._simulation)
@@ -82,10 +108,12 @@ class Flight:
                 closed = _failure(self._simulation.close)  # cleanup may fail, too
         plan, wrong, record = self._plan, failed or closed, self._recorder.record()
         if record is None:
-            return ungraded(plan, self._script, self._seed, self._changes, wrong or "nothing was flown")
+            nothing = ungraded(plan, self._script, self._seed, self._changes, wrong or "nothing was flown")
+            return nothing.with_tried(self._permissions.tried)
         outcomes = tuple(one.judge(record) for one in plan.criteria)
         digest = digest_of(record.rows)
-        return result_of(plan.name, self._script, self._seed, self._changes, outcomes, record.end, wrong, digest)
+        result = result_of(plan.name, self._script, self._seed, self._changes, outcomes, record.end, wrong, digest)
+        return result.with_tried(self._permissions.tried)
 
     @property
     def rows(self) -> np.ndarray:
@@ -105,6 +133,12 @@ class Flight:
             if self._recorder.is_over:
                 return
 
+    def _is_quiet(self) -> bool:
+        """Tell whether the script that flies will hear nothing before its actuation of the next step: it is alone."""
+        simulation = self._simulation
+        scripts = len(simulation.child_scripts) + len(simulation.scene.scripts)
+        return scripts == 1 and simulation.drone.commands.is_quiet and not self._timeline.is_due(simulation.steps)
+
     def _failed_scripts(self) -> str | None:
         names = self._simulation.failed_scripts
         return f"the scripts of {', '.join(names)} failed: the log says why" if names else None
@@ -118,9 +152,32 @@ def digest_of(rows: np.ndarray) -> str:
 def write(rows: np.ndarray, path: str | Path) -> None:
     """Write a table (N, 22) as `fly --csv` does. Raises OSError."""
     with writing.replacing(str(path)) as file:
-        recording = Recording(file)
-        for row in cast("list[list[float]]", rows.tolist()):
-            recording.write_row(row)
+        write_to(file, rows)
+
+
+def write_to(file: IO[str], rows: np.ndarray) -> None:
+    """Write a table (N, 22) into an open file. Raises OSError."""
+    recording = Recording(file)
+    for row in cast("list[list[float]]", rows.tolist()):
+        recording.write_row(row)
+
+
+def random_of(seed: int) -> int:
+    """Return the seed of what scripts draw from Python's and numpy's own generators, from which `seed` is not known."""
+    return int.from_bytes(hashlib.sha256(b"what scripts draw, %d" % seed).digest()[:8], "little")
+
+
+def _through(door: SimulationEnd, submission: str) -> load.Loader:
+    """Return what loads a submission through a door, and any other script here."""
+
+    def load_script(
+        path: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns, breakpoints: Breakpoints | None = None
+    ) -> load.Script:
+        if path == submission:
+            return door.load(path, modules, limit, turns)
+        return load.load(path, modules, limit, turns, breakpoints)
+
+    return load_script
 
 
 def _failure(action: Callable[[], None]) -> str | None:
@@ -136,8 +193,8 @@ def _failure(action: Callable[[], None]) -> str | None:
 def _seeded(seed: int) -> Iterator[None]:
     """Let scripts that draw from Python's and numpy's own generators draw the same in every flight of a seed."""
     kept, kept_numpy = random.getstate(), np.random.get_state()
-    random.seed(seed)
-    np.random.seed(seed % 2**32)
+    random.seed(random_of(seed))
+    np.random.seed(random_of(seed) % 2**32)
     try:
         yield
     finally:

@@ -15,8 +15,8 @@ from pathlib import Path
 from tqdm import tqdm
 
 from drone_sim.files import writing
+from drone_sim.grading import evidence, tasks, verify
 from drone_sim.grading import plan as plans
-from drone_sim.grading import tasks
 from drone_sim.grading.arguments import WRONG, GradingParser, Runner, add_to, all_done, on_standard_output, status_of
 from drone_sim.grading.jobs.files import Unreadable, given_script, read
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
@@ -24,6 +24,7 @@ from drone_sim.grading.outputs import as_json, gradescope, junit, table
 from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
+from drone_sim.grading.submissions import scripts_of
 from drone_sim.message_text import printable, shown
 from drone_sim.run.guardian import Guardian
 
@@ -31,7 +32,7 @@ PROGRAM = "grade"
 FAILED = 1
 _SHORTEST_SECRET, _LARGEST_SECRET = 16, 2**16  # bytes
 _LARGEST_SEED = 10**12
-_WRITERS = {"junit": junit.write, "json": as_json.write, "gradescope": gradescope.write}
+_WRITERS: dict[str, Callable[..., None]] = {"junit": junit.write, "json": as_json.write, "gradescope": gradescope.write}
 
 
 def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = None) -> int:
@@ -39,7 +40,10 @@ def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = Non
 
     With a guardian a signal ends it, with what has been flown so far kept, told and written, and 128 + its number.
     """
-    options = _parser().parse_intermixed_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    if verify.asks_for_it(given):
+        return verify.main(given, guardian)
+    options = _parser().parse_intermixed_args(given)
     return status_of(PROGRAM, lambda: _Grading(options, guardian).run(), guardian)
 
 
@@ -51,9 +55,11 @@ class _Grading:
         self._options = options
         self._guardian = guardian
         self._plan = plans.read(tasks.find(options.plan))
-        self._jobs = jobs_of(self._plan, options.script, seeds_of(options.seeds or self._plan.seeds, options.secret))
+        scripts = [one for given in options.script for one in scripts_of(given)]
+        self._jobs = jobs_of(self._plan, scripts, seeds_of(options.seeds or self._plan.seeds, options.secret))
         self._scripts = len({job.script for job in self._jobs})
         _check_outputs(options, self._scripts)
+        self._key = evidence.key_in(options.key) if options.key else None
         self._runner = Runner(PROGRAM, options, self._plan, tables=bool(options.html))
         self._results: dict[Job, Result] = {}
 
@@ -100,7 +106,8 @@ class _Grading:
         outputs: list[Callable[[], None]] = [lambda: self._show(results)]
         for option, write in _WRITERS.items():
             if path := getattr(self._options, option):
-                outputs.append(functools.partial(write, self._plan, results, path))
+                signed = {"key": self._key} if option == "json" else {}
+                outputs.append(functools.partial(write, self._plan, results, path, **signed))
         if self._options.html:
             outputs.append(lambda: self._write_html(results))
         return all_done(PROGRAM, outputs)
@@ -178,11 +185,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="SCRIPT",
         nargs="*",
         default=[],
-        help="child scripts (default: the plan's, or the built-in one)",
+        help="child scripts, or folders of them (default: the plan's, or the built-in one)",
     )
     parser.add_argument("--secret", metavar="FILE", help="fly seeds that follow from a file which only the teacher has")
     parser.add_argument("--junit", metavar="OUT.xml", help="write results as JUnit's XML")
     parser.add_argument("--json", metavar="OUT.json", help="write all results and figures")
+    parser.add_argument("--key", metavar="FILE", help="sign what --json writes")
+    parser.add_argument("--verify", metavar="RESULTS.json", help="fly what --json wrote once more, and compare")
     parser.add_argument("--gradescope", metavar="results.json", help="write one script's results for Gradescope")
     parser.add_argument("--html", metavar="DIR", help="write a report with plots and a replay of every flight")
     return parser

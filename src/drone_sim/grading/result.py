@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 
@@ -38,17 +38,28 @@ class Result:
     error: str | None  # one line; None where the flight came to its end
     outcomes: tuple[Outcome, ...] = field(default=())
     digest: str = ""  # SHA-256 of the table's numbers, as little-endian doubles; '' where nothing was flown
+    tried: tuple[str, ...] = ()  # what the script tried that the plan does not allow, in one line each
+
+    def with_tried(self, tried: Sequence[str]) -> Result:
+        """Return it with what the script tried; such a flight is not passed."""
+        return replace(self, tried=tuple(tried), passed=self.passed and not tried)
+
+    @property
+    def troubles(self) -> list[str]:
+        """What went wrong beside the criteria, in one line each: the error, and what was tried."""
+        return [*filter(None, [self.error]), *(f"the script {one}" for one in self.tried)]
 
     def to_json(self) -> dict[str, Any]:
         """Return it as what the module json writes: an infinite or undefined figure is None."""
-        return asdict(self)
+        return {**asdict(self), "tried": list(self.tried)}
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Result:
         """Return what `to_json` gave. Raises ValueError for anything else."""
         try:
             outcomes = tuple(Outcome(**one) for one in values["outcomes"])
-            return cls(**{**{one.name: values[one.name] for one in fields(cls)}, "outcomes": outcomes})
+            own = {one.name: values[one.name] for one in fields(cls)}
+            return cls(**{**own, "outcomes": outcomes, "tried": tuple(values["tried"])})
         except (KeyError, TypeError) as error:
             raise ValueError(f"no result of a flight: {error}") from None
 

@@ -45,6 +45,7 @@ class HostedScript(ABC):
         bus.backend = context.backend
         self.context = context
         self.script: load.Script = load.no_script()
+        self.path = ""  # of the script that is loaded
         self._filters = False  # whether its script is to see every picture of the vision sensor that it is on
 
     @abstractmethod
@@ -106,9 +107,9 @@ class HostedScript(ABC):
             "simVision": make_sim_vision(self, around),
             **make_plugins(self),
         }
-        script = load.load(path, modules, limit, turns)
+        script = context.load_script(path, modules, limit, turns, context.breakpoints)
         self._filters = filters_pictures(context, self.own_script, script)
-        self.script = guarded(script)
+        self.script, self.path = guarded(script), load.script_path(path)
         context.scripts.attached_to(self.own_script).loaded(self.script, context.clock.time)
 
     def _call_init(self) -> None:
@@ -135,7 +136,7 @@ class HostedScript(ABC):
 
     def close(self) -> None:
         """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
-        self._filters = False
+        self._filters, self.path = False, ""
         self.script.close()
         self.script = load.no_script()
         self.bus.close()
@@ -198,8 +199,9 @@ class ChildScript(HostedScript):
             if not self.script.is_empty:
                 raise ScriptError("load", load.script_path(path), 0, self.script.idle)
             _LOG.warning("%s: %s", path, self.script.idle)
+        before = dict(self.parameters)
         self._call_init()
-        self.tuning.begin()
+        self.tuning.begin(before)
 
     def actuation(self) -> None:
         """Let the vehicle take its commands, hand waiting messages to the script, and let it command propellers."""
@@ -208,6 +210,8 @@ class ChildScript(HostedScript):
 
     def close(self) -> None:
         """Let go of the script (cleanup is not called) and of its subscriptions; may be called twice."""
+        if self.vehicle.flight_state.is_flown:
+            self.tuning.keep_read()
         super().close()
         self.vehicle.flight_state.is_flown = False
 
@@ -300,7 +304,7 @@ class AttachedScript(HostedScript):
     def split_off(self) -> AttachedScript:
         """Return what still runs of it, with its messages, to be ended later; this one calls nothing any more."""
         running = copy.copy(self)
-        self.script, self.bus = load.no_script(), MessageBus(_EVERYWHERE, {})
+        self.script, self.path, self.bus = load.no_script(), "", MessageBus(_EVERYWHERE, {})
         return running
 
     def close(self) -> None:

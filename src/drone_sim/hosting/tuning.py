@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from drone_sim.config.errors import changed
-from drone_sim.config.fields import ParameterField
+from drone_sim.config.fields import ParameterField, default_of
 from drone_sim.config.types import ParameterError, ParameterProblem
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.hosting.tunable import CONTROL, LONGEST, SCRIPT, nested, tunables, value_at
@@ -21,6 +21,7 @@ _LOG = logging.getLogger(__name__)
 TOPIC = "parameter_updates"
 _CONDITIONS = ("weather", "faults")  # of a flight: the next one begins with its own
 _HEIGHT = "takeoff_height"  # which scripts read, too
+_READ = (CONTROL, _HEIGHT)  # what is of no effect where the script does not read it
 _TEXT = f"a text of at most {LONGEST} characters"
 _WORDS = {float: "a finite number", int: "a whole number", bool: "true or false", str: _TEXT}
 
@@ -70,17 +71,43 @@ class Tuning:
         self._vehicle = vehicle
         self._parameters = parameters
         self.chosen: dict[str, Any] = {}  # by name: what stays so through every start
+        self._initial: dict[str, Any] = {}  # by name: what the script's init has set, or found
+        self._read_before: frozenset[str] | None = None  # by the script of the last run; None where there was none
 
     @property
-    def known(self) -> dict[str, ParameterField]:
-        """What may be changed now, by name."""
+    def everything(self) -> dict[str, ParameterField]:
+        """What may be changed now, by name, whether the script reads it or not."""
         own = self._vehicle.context.scripts.attached_to(self._vehicle.object_name)
         declared = {name: value for name, value in own.parameters.items() if name not in own.read}
         return tunables(self._vehicle.parameters, declared)
 
+    @property
+    def known(self) -> dict[str, ParameterField]:
+        """What may be changed now, by name, and counts: no gains that the script does not read."""
+        read = self._read()
+        return {
+            name: one
+            for name, one in self.everything.items()
+            if read is None or one.location[0] not in _READ or str(one.location[one.location[0] == CONTROL]) in read
+        }
+
+    def _read(self) -> frozenset[str] | None:
+        """Return the parameters that the script reads; until it has flown a step, what the last one did, too."""
+        read = frozenset(self._vehicle.context.scripts.attached_to(self._vehicle.object_name).asked)
+        if self._vehicle.context.clock.steps:
+            return read
+        return None if self._read_before is None else read | self._read_before
+
+    def keep_read(self) -> None:
+        """Remember what the script reads, which is let go."""
+        self._read_before = self._read()
+
     def values(self) -> dict[str, Any]:
         """Return what holds now, by name: floats, ints, bools and strs."""
-        return {name: self._value(one) for name, one in self.known.items()}
+        return self._values(self.known)
+
+    def _values(self, known: Mapping[str, ParameterField]) -> dict[str, Any]:
+        return {name: self._value(one) for name, one in known.items()}
 
     def _value(self, leaf: ParameterField) -> Any:
         vehicle, (first, *rest) = self._vehicle, leaf.location
@@ -100,14 +127,14 @@ class Tuning:
 
     def check(self, changes: Mapping[str, Any]) -> _Checked:
         """Return what other values, by name, come to. Raises ParameterError for what is not allowed."""
-        known = self.known
+        known = self.everything
         for name, value in changes.items():
             if name not in known:
                 near = near_names(name[:80], known)
                 raise ParameterError(f"cannot be changed in flight; {near}", (shown(name),))
             if not _fits(known[name], value):
                 raise ParameterError(f"must be {_WORDS[known[name].kind]}", (name,), shown(value))
-        laid = nested(known, self.values(), changes)
+        laid = nested(known, self._values(known), changes)
         own = self._vehicle
         present = {key: getattr(own.parameters, key) for key in EquipmentParameters.model_fields}
         present.update(weather=own.context.weather.now, faults=own.faults.now)
@@ -118,7 +145,7 @@ class Tuning:
 
     def change(self, changes: Mapping[str, Any]) -> None:
         """Let other values hold, by name, from the next step on: all of them, or none. Raises ParameterError."""
-        now = self.values()
+        now = self._values(self.everything)
         changes = {name: value for name, value in changes.items() if name not in now or now[name] != value}
         laid, new = self.check(changes)  # without what holds already: a wind of 0 would bring air
         vehicle = self._vehicle
@@ -132,7 +159,7 @@ class Tuning:
             vehicle.context.change_weather(laid["weather"])
         if "faults" in laid:
             vehicle.change_faults(laid["faults"])
-        known = self.known
+        known = self.everything
         self.chosen.update({name: one for name, one in changes.items() if known[name].location[0] not in _CONDITIONS})
         self._tell()
 
@@ -160,20 +187,41 @@ class Tuning:
 
     def take_over(self, before: Tuning) -> None:
         """Be tuned as the vehicle was that this one takes the place of; say so where that is not possible."""
-        self.chosen = dict(before.chosen)
-        known = self.known
+        self.chosen, self._initial = dict(before.chosen), dict(before._initial)
+        self._read_before = before._read_before
+        known = self.everything
         try:
             self.change({name: one for name, one in self.chosen.items() if name in known})
         except ParameterError as error:
             _LOG.warning("%s is not tuned as it was: %s", self._vehicle.name, error)
 
-    def begin(self) -> None:
-        """Give the script's parameters the values that files or tuning say: those of its init are only defaults."""
+    def begin(self, before: Mapping[str, Any]) -> None:
+        """Give the script's parameters the values that files or tuning say: those of its init are only defaults.
+
+        `before` are its parameters before its init. A default that is another one than at the last start has been
+        written since, and comes before what was tuned.
+        """
         own = self._parameters
         own.update(self._vehicle.parameters.script_parameters)
-        for name, leaf in self.known.items() if self.chosen else ():
-            if name in self.chosen and leaf.location[0] == SCRIPT and _fits(leaf, self.chosen[name]):
-                own[str(leaf.location[1])] = self.chosen[name]
+        for name, leaf in self.everything.items():
+            if leaf.location[0] in (CONTROL, SCRIPT) and not leaf.part:
+                key = str(leaf.location[1])
+                initial = own.get(key)
+                if key not in before or before[key] != initial:
+                    own[key] = self._begun(name, leaf, initial)
+                    self._initial[name] = initial
+                elif name not in self.chosen:
+                    self._initial[name] = initial
+
+    def _begun(self, name: str, leaf: ParameterField, initial: Any) -> Any:
+        """Return what a parameter begins with that the script's init has set."""
+        if name in self.chosen and _fits(leaf, self.chosen[name]):
+            if self._initial.get(name, initial) == initial:
+                return self.chosen[name]
+            del self.chosen[name]
+            return initial
+        from_file = value_at(self._vehicle.parameters, leaf.location)
+        return from_file if leaf.location[0] == CONTROL and from_file != default_of(leaf.location) else initial
 
     def save_state(self) -> Restore:
         """Return a function that brings back what was changed; commands, cameras, sensors have theirs themselves."""

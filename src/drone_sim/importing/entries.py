@@ -7,10 +7,19 @@ from collections.abc import Callable
 from typing import Any
 
 from drone_sim.importing.folder import Report, number, numbers, pose_keys
+from drone_sim.importing.paths import curved_path
 from drone_sim.importing.placing import Placed
 from drone_sim.importing.shapes import MeshWriter, TooLarge, form
 from drone_sim.mechanics import frames
-from drone_sim.vrep_files.model import VrepCamera, VrepDummy, VrepInertia, VrepJoint, VrepProximitySensor, VrepShape
+from drone_sim.vrep_files.model import (
+    VrepCamera,
+    VrepDummy,
+    VrepInertia,
+    VrepJoint,
+    VrepPath,
+    VrepProximitySensor,
+    VrepShape,
+)
 
 _LARGEST_PICTURE = 4096  # px, of a side
 _NEAREST, _FARTHEST = 1e-4, 1e5  # m
@@ -29,6 +38,7 @@ class Entries:
         self._readers: dict[type, Callable[[Placed], dict[str, Any] | None]] = {
             VrepShape: self._shape,
             VrepDummy: self._dummy,
+            VrepPath: self._path,
             VrepJoint: self._joint,
             VrepCamera: self._camera,
             VrepProximitySensor: self._proximity_sensor,
@@ -92,6 +102,11 @@ class Entries:
         if of.linked >= 0:
             self._report.add(one.name, "its link to another dummy is not brought")
         return {"kind": "dummy", "size": number(of.size)} if of.size > 0 else {"kind": "dummy"}
+
+    def _path(self, one: Placed) -> dict[str, Any]:
+        path = one.object.of
+        assert isinstance(path, VrepPath)
+        return curved_path(one.name, path, self._report)
 
     def _joint(self, one: Placed) -> dict[str, Any]:
         joint = one.object.of

@@ -211,6 +211,7 @@ class _Import:
         }
         roots = {id(vehicle.root) for vehicle in self._vehicles}
         kept = self._kept | self._of_vehicles
+        scripted: set[int] = set()
         for one in self._objects:
             own = self._scripts.get(one.object.handle, [])
             if id(one) in built_in:
@@ -218,12 +219,15 @@ class _Import:
             if own and id(one) not in kept:
                 self._report.add(one.name, "its child script is not brought: neither is the object")
                 continue
-            for index, script in enumerate(own):
-                on = one if index == 0 else self._by_handle.get(script.own_object)
+            for script in own:
+                places = (one, self._by_handle.get(script.own_object))  # another script may be on the first already
+                on = next((place for place in places if place is not None and id(place) not in scripted), None)
                 if on is None:
                     self._report.add(one.name, "has a second child script: not brought")
-                elif index > 0 or id(one) not in roots:
-                    yield self._entry_of(script, on, index > 0 or script.is_embedded)
+                    continue
+                scripted.add(id(on))
+                if on is not one or id(one) not in roots:
+                    yield self._entry_of(script, on, on is not one or script.is_embedded)
 
     def _entry_of(self, script: VrepScript, on: Placed, embedded: bool) -> dict[str, Any]:
         entry: dict[str, Any] = {"object": on.name, "script": self.script_files.write(on.name, script)}

@@ -62,7 +62,8 @@ class ImportedVehicle:
             found[SCRIPT] = script
         for one in quadricopter.inside():
             ours = next((name for end, name in _BY_NAME.items() if plain_name(one).lower().endswith(end)), None)
-            if ours is not None and ours not in found and one.object.shape is None:
+            sees = isinstance(one.object.of, VrepCamera) and one.object.of.resolution is not None
+            if ours is not None and ours not in found and one.object.shape is None and not sees:
                 found[ours] = one
         return found
 

@@ -35,7 +35,7 @@ class Path(SceneObject):
         if closed and self.points[0] != self.points[-1]:
             self.points.append(self.points[0])
         self._turns = [*turns, turns[0]][: len(self.points)] if turns else []
-        self.position_along = 0.0  # m, of who follows it, as V-REP 3.x keeps it
+        self._position_along = 0.0
         pieces = (math.dist(one, other) for one, other in itertools.pairwise(self.points))
         self._ends = list(itertools.accumulate(pieces, initial=0.0))
 
@@ -45,9 +45,23 @@ class Path(SceneObject):
         return self._ends[-1]
 
     @property
+    def position_along(self) -> float:
+        """How far (m) who follows it is, as V-REP 3.x keeps it: not beyond its ends, and anew where it is closed."""
+        return self._position_along
+
+    @position_along.setter
+    def position_along(self, along: float) -> None:
+        self._position_along = self._within(along)
+
+    def _within(self, along: float) -> float:
+        if self.closed and self.length:
+            return along % self.length
+        return min(max(along, 0.0), self.length)
+
+    @property
     def table(self) -> list[float]:
         """Its points as 4.x keeps them in an object's data PATH: x, y, z and the quaternion x, y, z, w of each."""
-        if self._turns:
+        if self._turns or not self.points:
             return [one for point, turn in zip(self.points, self._turns) for one in (*point, *turn)]
         ends = [self.at(min(along, math.nextafter(self.length, 0.0))) for along in self._ends]
         return [one for m, point in zip(ends, self.points) for one in (*point, *frames.to_quaternion(m))]
@@ -57,7 +71,7 @@ class Path(SceneObject):
 
         Beyond its ends it is at them; where it is closed, it begins again.
         """
-        along = along % self.length if self.closed and self.length else min(max(along, 0.0), self.length)
+        along = self._within(along)
         index = min(max(bisect.bisect_right(self._ends, along) - 1, 0), len(self.points) - 2)
         one, other = self.points[index], self.points[index + 1]
         piece = self._ends[index + 1] - self._ends[index]
@@ -66,15 +80,25 @@ class Path(SceneObject):
         ahead = tuple(b - a for a, b in zip(one, other))
         return looking_along((x, y, z), (ahead[0], ahead[1], ahead[2]))
 
+    def carried(self, along: float) -> tuple[int, list[float]]:
+        """Return flags and four numbers that it carries so far (m) from its beginning."""
+        return 0, [0.0] * 4
+
     def nearest(self, place: Vector) -> float:
         """Return how far (m) from its beginning it comes nearest to a place."""
-        found = []
-        for begin, (one, other) in zip(self._ends, itertools.pairwise(self.points)):
-            piece = math.dist(one, other)
-            ahead = sum((b - a) * (c - a) for a, b, c in zip(one, other, place)) / piece**2 if piece else 0.0
-            share = min(max(ahead, 0.0), 1.0)
-            found.append((math.dist([a + share * (b - a) for a, b in zip(one, other)], place), begin + share * piece))
-        return min(found)[1]
+        return nearest(self.points, self._ends, place)
+
+
+def nearest(points: Sequence[Sequence[float]], ends: Sequence[float], place: Vector) -> float:
+    """Return how far along a line comes nearest to a place, where its points are so far along."""
+    found = [(math.inf, 0.0)]
+    for (begin, end), (one, other) in zip(itertools.pairwise(ends), itertools.pairwise(points)):
+        piece = math.dist(one, other)
+        ahead = sum((b - a) * (c - a) for a, b, c in zip(one, other, place)) / piece**2 if piece else 0.0
+        share = min(max(ahead, 0.0), 1.0)
+        there = [a + share * (b - a) for a, b in zip(one, other)]
+        found.append((math.dist(there, place), begin + share * (end - begin)))
+    return min(found)[1]
 
 
 def looking_along(position: Vector, ahead: Vector) -> Matrix:

@@ -15,6 +15,9 @@ from drone_sim.mechanics.frames import (
     transform,
 )
 
+# Where a body's centre of mass is (m), how its principal axes are turned, and its velocities (m/s, rad/s).
+Motion = tuple[Vector, Quaternion, Vector, Vector]
+
 
 class Pose(NamedTuple):
     """A position (m) and a unit quaternion (x, y, z, w), of a body in the world."""

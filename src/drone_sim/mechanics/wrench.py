@@ -48,7 +48,7 @@ class Wrench:
 
     def torque_under(self, orientation: Quaternion) -> Vector:
         """Return the torque about the centre of mass (N m, world) while the body has this orientation."""
-        # Written out, without a loop but the one over directions: World.advance does the same in every sub-step.
+        # Written out, without a loop but the one over directions: Dynamics.advance does the same in every sub-step.
         x, y, z, w = orientation
         sum_x, sum_y, sum_z = self._torque
         for lx, ly, lz, ax, ay, az in self._levers:

@@ -159,6 +159,10 @@ class Timeline:
         """Return what happens to one vehicle, which is the first where an entry names none."""
         return Timeline([one for one in self.entries if one.vehicle in ("", vehicle)], self._time_step)
 
+    def is_due(self, step: int) -> bool:
+        """Tell whether anything is due in a step."""
+        return step in self._due
+
     def apply(self, step: int, vehicles: Mapping[str, Vehicle]) -> None:
         """Do what is due in a step (counted from 0), just before it runs."""
         for entry in self._due.get(step, ()):

@@ -18,8 +18,8 @@ from drone_sim.offline import hud
 from drone_sim.offline.recording import OutputError
 from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.camera_parameters import CameraParameters
-from drone_sim.vehicles.commands import UNKNOWN
 from drone_sim.vehicles.parameters import EquipmentParameters
+from drone_sim.vehicles.situation import doing
 
 _CODEC: Final = "libx264"
 # Half the size of MPEG-4 Part 2 of the same quality; slower presets take twice the time for a tenth less. The matrix is
@@ -191,8 +191,7 @@ class CameraRecorder:
             self._video.add(to_color(self._camera.image), hud.HudState.of(row, state))
 
     def _state(self, simulation: Simulation) -> str:
-        said = str(self._vehicle.flight_state)
-        return "stopped" if not simulation.running else "flying" if said.startswith(UNKNOWN) else said
+        return doing(self._vehicle) if simulation.running else "stopped"
 
     def __str__(self) -> str:
         """Return what it has become, in words."""

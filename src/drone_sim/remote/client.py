@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from typing import Any
 
 from drone_sim.message_text import near_names
@@ -58,6 +58,11 @@ class Client:
         self._modules: dict[str, Api] = {}
         self._functions: dict[str, Function] = {}
 
+    def functions(self) -> Mapping[str, Function]:
+        """Return what it may call now, by names such as sim.getObject; another mapping where that has changed."""
+        self._keep_up()
+        return self._functions
+
     def answer(self, request: ClientRequest) -> Task:
         """Carry out a request; raises RequestRefused."""
         self._keep_up()
@@ -74,10 +79,8 @@ class Client:
                 values = yield from values
         except RequestRefused:
             raise
-        except _OWN_LINES as error:
-            raise RequestRefused(str(error)) from None
         except Exception as error:
-            raise RequestRefused(explain(request.function, function, arguments, error)) from None
+            raise RequestRefused(one_line(request.function, function, arguments, error)) from None
         finally:
             script_log.end_call()
         return _values(request.function, values)
@@ -164,6 +167,11 @@ class Client:
                 yield Call(name, [message])
             elif not message.is_abandoned:
                 message.answer((yield Call(name, [message.content])))
+
+
+def one_line(name: str, function: Function, arguments: Sequence[Any], error: Exception) -> str:
+    """Return what a client is told of an error in a call of a function, under the name that it knows it by."""
+    return str(error) if isinstance(error, _OWN_LINES) else explain(name, function, arguments, error)
 
 
 def _argument(value: Any) -> Any:

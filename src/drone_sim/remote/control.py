@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
@@ -111,15 +112,19 @@ class ClientControl:
 
     @sim("345")
     def startSimulation(self) -> None:
-        """Begin at time 0, or go on after a pause; what was moved while it was stopped begins where it was put."""
+        """Begin at time 0, or go on after a pause; what was moved while it was stopped begins where it was put.
+
+        Signals that were set then are set, unless a script's init has set them.
+        """
         if self._player.playing:
             return
         if self._simulation.running:
             self._player.pause(False)
             return
-        changed = self._moved.changed()
+        changed, signals = self._moved.changed(), copy.deepcopy(self._simulation.context.signals)
         self._player.start()
         self._moved.arrange(changed)
+        self._simulation.context.signals.add_those_of(signals)
 
     @sim("345")
     def pauseSimulation(self) -> None:

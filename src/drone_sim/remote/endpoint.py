@@ -54,6 +54,10 @@ class Endpoint:
         """The port that it listens on."""
         return int(self.address.rpartition(":")[2])
 
+    def watch(self, number: int) -> None:
+        """Let a `wait` end, too, when something else can be read, by its file number."""
+        self._poller.register(number, zmq.POLLIN)
+
     def wait(self, seconds: float) -> None:
         """Sleep until a message comes, a client goes, somebody calls `wake`, or for so long."""
         milliseconds = int(1e3 * seconds)

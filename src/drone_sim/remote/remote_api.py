@@ -1,4 +1,4 @@
-"""Whether anybody outside may drive the simulation: the server where it is on, nobody where it is off."""
+"""Whether anybody outside may drive the simulation: the servers where they are on, nobody where they are off."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def start_server(parameters: RemoteApiParameters, player: Player, backend: Backe
     if not parameters.serve:
         return RemoteApi()
     try:
-        from drone_sim.remote.server import RemoteApiServer  # whoever serves nobody needs neither pyzmq nor cbor2
+        from drone_sim.remote.servers import RemoteApiServers  # whoever serves nobody needs neither pyzmq nor cbor2
     except ImportError as error:
         raise OSError(f"the remote API needs pyzmq and cbor2 (pip install pyzmq cbor2): {error}") from None
-    return RemoteApiServer(player, parameters.address, parameters.port, backend)
+    return RemoteApiServers(parameters, player, backend)

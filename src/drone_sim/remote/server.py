@@ -39,14 +39,16 @@ class RemoteApiServer(RemoteApi):
         port: int,
         backend: Backend | None = None,
         clock: Callable[[], float] = time.monotonic,
+        moved: MovedObjects | None = None,
     ):
         """Listen for who drives a `player`, on an `address`, and a `port`, of which 0 is a free one.
 
-        `backend` carries clients' messages, `clock` counts real seconds. Raises OSError.
+        `backend` carries clients' messages, `clock` counts real seconds, `moved` watches where objects are put. Raises
+        OSError.
         """
         self._player = player
         self._backend = backend
-        self._moved = MovedObjects(player.simulation)
+        self._moved = moved or MovedObjects(player.simulation)
         self._clients: dict[str, Client] = {}
         self._waiting: list[_Waiting] = []
         self._clock = clock
@@ -58,6 +60,10 @@ class RemoteApiServer(RemoteApi):
     def holds(self) -> bool:
         """Whether a client wants to be asked before the next step, and has not said so yet."""
         return any(one.stepping.holds for one in self._clients.values())
+
+    def watch(self, number: int) -> None:
+        """Let a `wait` end, too, when something else can be read, by its file number."""
+        self._endpoint.watch(number)
 
     def wait(self, seconds: float) -> None:
         """Sleep for so long, or until something has been done for a client."""
@@ -152,13 +158,14 @@ class RemoteApiServer(RemoteApi):
         if client is None:
             if len(self._clients) >= _MOST_CLIENTS:
                 raise ValueError(f"{_MOST_CLIENTS} clients are there already")
-            client = Client(self._player, self._moved, self._backend, self._everybody, self._clock)
+            client = Client(self._player, self._moved, self._backend, self.everybody, self._clock)
             client.patience = request.patience
             self._clients[name] = client
         client.connections.add(incoming.connection)
         return client
 
-    def _everybody(self) -> Iterator[Stepping]:
+    def everybody(self) -> Iterator[Stepping]:
+        """Yield the say in the steps that each client has."""
         return (one.stepping for one in self._clients.values())
 
     def _forget(self) -> None:

@@ -18,6 +18,8 @@ SHADE = 0.55  # what a shadow leaves of the floor's brightness
 VERTEX_LAYOUT = (("position", "3f", 12), ("normal", "3f", 12), ("uv", "2f", 8))
 MOVING_LAYOUT = (("row0", "4f", 16), ("row1", "4f", 16), ("row2", "4f", 16))
 FIXED_LAYOUT = (("paint", "4f", 16),)
+IDENTITY_LAYOUT = (("identity", "1f", 4),)
+BEFORE_LAYOUT = (("before0", "4f", 16), ("before1", "4f", 16), ("before2", "4f", 16))
 ANISOTROPY = 8.0
 
 Programs = dict[str, Any]  # moderngl.Program by role
@@ -56,7 +58,7 @@ class Batch:
     arrays: dict[str, moderngl.VertexArray] = field(default_factory=dict)
 
     def draw(self, role: str) -> None:
-        """Draw with the program of this role: surface, shadow or depth."""
+        """Draw with the program of this role: surface, shadow, or one that `DrawBatches.link` has linked."""
         if role == "surface" and self.surface.texture is not None:
             self.surface.texture.use(0)
         self.arrays[role].render(instances=len(self.members))
@@ -66,7 +68,7 @@ class DrawBatches:
     """The visuals as batches; must be used with its context current."""
 
     def __init__(self, context: moderngl.Context, programs: Programs, software: bool) -> None:
-        """Empty. programs: by name: plain, textured, floor, shadow, depth; software: whether the CPU draws."""
+        """Empty. programs: by name: plain, textured, floor, shadow; software: whether the CPU draws."""
         self._context = context
         self._programs = programs
         self._software = software
@@ -111,12 +113,30 @@ class DrawBatches:
         """
         if poses.shape != (len(self.visuals), 4, 4):
             raise ValueError(f"poses of shape {poses.shape} for {len(self.visuals)} visuals")
-        if not self._buffers:
-            return
+        if self._buffers:
+            self._buffers[0].write(self._rows(origin, poses))
+
+    def _rows(self, origin: np.ndarray, poses: np.ndarray) -> np.ndarray:
         rows = poses[self._members, :3, :]
         rows[:, :, 3] -= origin
         rows[:, :, :3] *= self._scales
-        self._buffers[0].write(rows.astype(np.float32))
+        return np.asarray(rows, dtype=np.float32)
+
+    def link(self, role: str, program: Any) -> None:
+        """Let the batches be drawn with another program, in this role."""
+        for batch in self.all:
+            if role not in batch.arrays:
+                batch.arrays[role] = self._array(batch, program)
+
+    def identify(self, instances: np.ndarray) -> None:
+        """Write whose each visual is, (N,), for outputs that show it."""
+        if self._buffers:
+            self._buffers[2].write(np.asarray(instances)[self._members].astype(np.float32))
+
+    def move_before(self, origin: np.ndarray, poses: np.ndarray) -> None:
+        """Write where the visuals were in the picture before, as `move` does for this one."""
+        if self._buffers:
+            self._buffers[3].write(self._rows(origin, poses))
 
     def floor_height(self, poses: np.ndarray) -> float | None:
         """World z of the top of the first floor, metres, or None without a floor."""
@@ -207,10 +227,12 @@ class DrawBatches:
         records = [self._paint(batch, index) for batch in self.all for index in batch.members]
         moving = self._context.buffer(reserve=48 * len(records), dynamic=True)
         fixed = self._context.buffer(np.array(records, dtype=np.float32))
-        self._buffers = [moving, fixed]
+        identity = self._context.buffer(reserve=4 * len(records), dynamic=True)
+        before = self._context.buffer(reserve=48 * len(records), dynamic=True)
+        self._buffers = [moving, fixed, identity, before]
         for batch in self.all:
             look = "plain" if batch.surface.texture is None else "floor" if batch.floor else "textured"
-            for role, name in (("surface", look), ("shadow", "shadow"), ("depth", "depth")):
+            for role, name in (("surface", look), ("shadow", "shadow")):
                 batch.arrays[role] = self._array(batch, self._programs[name])
 
     def _paint(self, batch: Batch, index: int) -> tuple[float, ...]:
@@ -219,11 +241,10 @@ class DrawBatches:
 
     def _array(self, batch: Batch, program: Any) -> moderngl.VertexArray:
         array = self._context.vertex_array(program, [], index_buffer=batch.surface.indices, index_element_size=4)
-        moving, fixed = self._buffers
+        layouts = (MOVING_LAYOUT, FIXED_LAYOUT, IDENTITY_LAYOUT, BEFORE_LAYOUT)
         for layout, buffer, first, divisor in (
             (VERTEX_LAYOUT, batch.surface.vertices, 0, 0),
-            (MOVING_LAYOUT, moving, batch.first, 1),
-            (FIXED_LAYOUT, fixed, batch.first, 1),
+            *((layout, buffer, batch.first, 1) for layout, buffer in zip(layouts, self._buffers)),
         ):
             stride = sum(size for _, _, size in layout)
             offset = first * stride

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -65,6 +66,33 @@ class Intrinsics:
     def P(self) -> tuple[float, ...]:
         """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo."""
         return (self.fx, 0.0, self.cx, 0.0, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+    @property
+    def distortion(self) -> tuple[str, tuple[float, ...]]:
+        """The model of the lens and its coefficients, as in sensor_msgs/CameraInfo."""
+        return "plumb_bob", (0.0,) * 5
+
+    @property
+    def is_fisheye(self) -> bool:
+        """Whether it may see what is beside the camera, or behind it: depths are then along the ray."""
+        return False
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """The pixels' coordinates u, v, (height, width, 2)."""
+        return np.stack(np.meshgrid(np.arange(self.width), np.arange(self.height)), axis=-1)
+
+    @cached_property
+    def rays(self) -> np.ndarray:
+        """Directions of the pixels in the optical frame, of unit length, (height, width, 3)."""
+        across = (self.pixels - (self.cx, self.cy)) / (self.fx, self.fy)
+        rays = np.concatenate([across, np.ones((*across.shape[:2], 1))], axis=-1)
+        return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Return the pixels (..., 2) of points (..., 3) in the optical frame, m; NaN of what is behind the camera."""
+        ahead = np.where(points[..., 2:] > 0, points[..., 2:], np.nan)
+        return np.asarray(points[..., :2] / ahead * (self.fx, self.fy) + (self.cx, self.cy))
 
     def projection(self) -> np.ndarray:
         """OpenGL clip matrix (4, 4) float64 of the optical frame, acting on column vectors.

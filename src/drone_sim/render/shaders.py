@@ -1,7 +1,7 @@
 """The shaders, GLSL 3.30. World coordinates are relative to the camera's position, axes those of the world."""
 
 # Per instance: a world-from-mesh matrix by rows, which may scale; `paint.a` is what alpha the picture gets.
-_INPUTS = """
+INPUTS = """
 #version 330 core
 uniform mat4 clip_from_world;
 in vec3 position;
@@ -17,7 +17,7 @@ vec3 world_point() {
 # Light is computed per vertex: floors and boxes have one normal per face, and round things enough vertices.
 # FLAT spares what is level the interpolation of a colour that is the same everywhere.
 SURFACE_VERTEX = (
-    _INPUTS
+    INPUTS
     + """
 uniform vec3 to_sun;
 in vec3 normal;
@@ -65,7 +65,7 @@ void main() {
 
 # Every vertex slides along the light onto the floor; what lies below the floor casts nothing beyond itself.
 SHADOW_VERTEX = (
-    _INPUTS
+    INPUTS
     + """
 uniform vec3 to_sun;
 uniform float floor_height;
@@ -101,22 +101,4 @@ SKY_FRAGMENT = """
 in vec3 colour;
 out vec4 pixel;
 void main() { pixel = vec4(colour, 1.0); }
-"""
-
-# Depth along the optical axis is the clip w, which a perspective projection makes equal to the optical z. Where rays
-# are parallel it is `parallel.x`, the near plane's, and the buffer's part of `parallel.y`, the way to the far one.
-DEPTH_VERTEX = (
-    _INPUTS
-    + """
-void main() { gl_Position = clip_from_world * vec4(world_point(), 1.0); }
-"""
-)
-
-DEPTH_FRAGMENT = """
-#version 330 core
-uniform vec2 parallel;
-out float depth;
-void main() {
-    depth = parallel.y > 0.0 ? parallel.x + parallel.y * gl_FragCoord.z : 1.0 / gl_FragCoord.w;
-}
 """

@@ -53,6 +53,7 @@ class RemoteApiParameters(Checked):
     serve: Switch
     address: Annotated[str, Field(pattern=ADDRESS, max_length=MAX_NAME)]
     port: Annotated[int, Within(0, 65535)]
+    legacy_port: Annotated[int, Within(0, 65535)]
     scenes: FileName
 
 

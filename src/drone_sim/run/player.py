@@ -66,6 +66,7 @@ class Player:
         self.attempt(lambda: self.simulation.start(scene_file))
         self.simulation.look()  # meshes and textures are read now, which the first step would be late for
         self.begun = True
+        self._pause_at_breakpoint()
         scene = self.simulation.parameters.scene_file
         _LOG.info(f"started{f' in {scene}' if scene else ''}")
         return "started"
@@ -115,8 +116,16 @@ class Player:
             self.attempt(self._step)
         except (ScriptError, Diverged):
             return False
+        self._pause_at_breakpoint()
         asked = self.simulation.context.control.take()
         return not asked or self._obey(asked)
+
+    def _pause_at_breakpoint(self) -> None:
+        """Pause where a script has reached one in the step, or in its init."""
+        reached = self.simulation.breakpoints.reached
+        if reached is not None and self.playing:
+            _LOG.info(f"breakpoint at {reached.file}:{reached.line}, t = {reached.time:.2f} s")
+            self.pause(True)
 
     def _obey(self, asked: str) -> bool:
         """Stop or pause, as a script asked for; return whether the simulation still runs."""
@@ -129,6 +138,7 @@ class Player:
 
     def attempt(self, action: Callable[[], None]) -> None:
         """Start or step. When script or dynamics fails, log its one line, run cleanup, and raise it again."""
+        self.simulation.breakpoints.reached = None
         try:
             action()
         except (ScriptError, Diverged) as error:

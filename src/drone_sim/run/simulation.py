@@ -10,7 +10,7 @@ For example:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,9 +27,11 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.drawings import Drawings
 from drone_sim.scripting.api.windows import Windows
+from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
 from drone_sim.sensors.camera import Vision
+from drone_sim.sensors.truth import VEHICLE, Identity, category_of
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.world import World
 
@@ -59,12 +61,13 @@ class Simulation:
         backend: Backend | None = None,
         drawings: Drawings | None = None,
         started: bool = True,
+        load_script: load.Loader = load.load,
     ):
         """Build the scene and, if `started`, run the init of the child scripts.
 
         `script` flies the vehicles that name none of their own; '' is the parameters', or the pilot. `backend`
         carries what scripts subscribe to and publish; without it the messages go nowhere.
-        `drawings` takes what scripts draw; without it that is ignored.
+        `drawings` takes what scripts draw; without it that is ignored. `load_script` loads scripts, as load.load does.
 
         Raises ParameterError, UrdfError, ScriptError, and RuntimeError where `gui` finds no display.
         """
@@ -74,13 +77,16 @@ class Simulation:
         self.windows = Windows()
         self.clock = Clock(parameters.time_step)
         self.vision = Vision(parameters.samples)
+        self.breakpoints = Breakpoints(lambda: self.clock.time)
         self._set_up = partial(
             SimulationSetup,
             clock=self.clock,
             vision=self.vision,
             drawings=self._drawings,
             windows=self.windows,
+            breakpoints=self.breakpoints,
             backend=backend,
+            load_script=load_script,
         )
         self._handles = NO_HANDLES  # of the objects as the scene began
         self._is_arranged = False  # whether that is what was made of it, not what the scene file says
@@ -120,8 +126,16 @@ class Simulation:
         self.world, self.scene, self.operations = built.context.world, built.scene, built.operations
         self.vehicles: dict[str, Vehicle] = built.vehicles  # by name
         self.child_scripts: dict[str, ChildScript] = built.scripts.child_scripts  # that fly them, by vehicle
-        self.vision.look_at(self.world, self.context.blades)
+        self.vision.look_at(self.world.pictures, self.context.blades, self._identify)
         self._begin()
+
+    def _identify(self) -> list[Identity]:
+        """Return whose each of the world's visuals is."""
+        categories = self.scene.categories()
+        return [
+            Identity(name, categories.get(name) or (VEHICLE if name in self.vehicles else category_of(name)))
+            for name in map(self.context.person_name_of, self.world.pictures.places())
+        ]
 
     def _begin(self) -> None:
         """Be at time 0 of a new run, in the initial scene."""
@@ -269,11 +283,26 @@ class Simulation:
         for vehicle in self.vehicles.values():
             vehicle.take_pictures(self.steps, now=True)
 
+    # ---- what scripts hold
+
+    def set_breakpoints(self, lines: Mapping[str, frozenset[int]]) -> None:
+        """Have breakpoints at these lines of scripts, from 1, by the paths of their files, and at no others."""
+        if self.breakpoints.set(lines):
+            for one in self._setup.scripts.all():
+                one.script.follow_breakpoints()
+
+    def variables(self) -> Iterator[tuple[str, str, list[Scope]]]:
+        """Yield the object and the file of every script that is loaded, and its variables as a person reads them."""
+        for one in self._setup.scripts.all():
+            if one.path:
+                yield one.own_script, one.path, one.script.variables()
+
     # ---- snapshots and files
 
     def snapshot(self) -> Snapshot:
         """Remember the exact dynamic state, the scripts' variables included, until the next start or stop."""
-        return Snapshot(self.era, self._setup.scripts.changes, self.world.snapshot(), self._setup.save_state())
+        number = self.world.saved_states.snapshot()
+        return Snapshot(self.era, self._setup.scripts.changes, number, self._setup.save_state())
 
     def restore(self, snapshot: Snapshot) -> None:
         """Bring a snapshot back: the flight goes on as it did from there, to the last bit. May be repeated.
@@ -281,18 +310,20 @@ class Simulation:
         Raises ValueError for a snapshot of another era.
         """
         is_same = snapshot.era == self.era and snapshot.scripts == self._setup.scripts.changes
-        if not is_same or not self.world.has_snapshot(snapshot.world):
+        if not is_same or not self.world.saved_states.has_snapshot(snapshot.world):
             said = "start, stop, and a vehicle or shape that comes or goes, or a script on one, forget it"
             raise ValueError(f"the snapshot is of an earlier run: {said}")
         self.scene.drag.let_go_of_all()
-        self.world.restore(snapshot.world)
+        for vehicle in self.vehicles.values():
+            vehicle.body.let_go()
+        self.world.saved_states.restore(snapshot.world)
         snapshot.restore()
         self._stepper.feel_weather()
 
     def forget(self, snapshot: Snapshot) -> None:
         """Free a snapshot; start and stop forget all of theirs."""
         if snapshot.era == self.era:
-            self.world.forget(snapshot.world)
+            self.world.saved_states.forget_snapshot(snapshot.world)
 
     def save_scene(self, path: Path) -> None:
         """Write floor, objects, vehicles and weather as they are now: a scene file. Raises ParameterError, OSError."""

@@ -23,6 +23,7 @@ from drone_sim.run.parameters import Parameters
 from drone_sim.scene import object_collections
 from drone_sim.scene.operations import SceneOperations
 from drone_sim.scene.scene import Scene
+from drone_sim.scripting.api.remote_ports import RemotePorts
 from drone_sim.scripting.load import NO_SCRIPT
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
@@ -61,6 +62,7 @@ class SimulationSetup:
             objects=objects,
             velocities=VelocityMeter(objects, clock),
             weather=Weather(parameters.weather, clock),
+            remote_ports=RemotePorts(parameters.remote_api.serve),
             **lasting,
         )
         self.vehicles: dict[str, Vehicle] = {}
@@ -82,7 +84,7 @@ class SimulationSetup:
 
     def begin_anew(self) -> None:
         """Put everything where it began, at rest, without scripts."""
-        self._world.begin_anew()
+        self._world.saved_states.begin_anew()
         self.context.weather.reset()
         self._empty_tree()
         for vehicle in self.vehicles.values():
@@ -93,7 +95,16 @@ class SimulationSetup:
     def save_state(self) -> Restore:
         """Return a function that brings back all but what the world itself does."""
         own, scripts = self.context, self.scripts
-        left = (own.signals, own.data, own.tubes, own.collections, own.broadcasts, own.drawings, own.windows)
+        left = (
+            own.signals,
+            own.graphs,
+            own.data,
+            own.tubes,
+            own.collections,
+            own.broadcasts,
+            own.drawings,
+            own.windows,
+        )
         hosted = (*scripts.child_scripts.values(), *scripts.attached)
         carried = (*self.vehicles.values(), self.scene, own.weather)
         parts: list[Any] = [own.objects, own.velocities, *left, *hosted, *carried]
@@ -133,7 +144,7 @@ class SimulationSetup:
         """
         vehicle = self._put(parameters)
         self.scripts.attach()
-        self._world.keep_initial_pose(vehicle.body.number)
+        self._world.saved_states.keep(vehicle.body.number)
         try:
             self.load_scripts(self.scripts.of(vehicle.name) if running else (), script)
         except BaseException:

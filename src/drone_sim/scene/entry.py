@@ -26,12 +26,14 @@ class EntryParameters(Checked):
     """An entry; `position` (m) and `rpy` (rad) are in the frame of the object named `parent`, '' the world.
 
     No other object has its `name` (V-REP 3.x); siblings may share the `alias` (4.x), which is the name where none is
-    given. `model`: it is the base of a model, from which paths with a colon begin (`:/`).
+    given. `model`: it is the base of a model, from which paths with a colon begin (`:/`). `category`: of its pixels and
+    boxes in a camera's truth, the name without its number where none is given.
     """
 
     name: Label = ""
     alias: Label = ""
     model: Switch = False
+    category: Label = ""
     parent: Label = ""
     position: Point
     rpy: Angles = (0.0, 0.0, 0.0)

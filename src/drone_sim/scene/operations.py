@@ -293,8 +293,11 @@ class SceneOperations:
     def change(self, handle: int, **values: Any) -> None:
         """Let an entry say something else, such as another `mass` or `size`. Raises ParameterError."""
         entry = self.entry(handle)
+        if values.get("mass") and isinstance(entry, ObjectParameters) and not entry.mass:
+            values.setdefault("static", True)  # as it was
         checked = changed(entry, values)
-        if "mass" in values and isinstance(entry, ObjectParameters) and entry.inertia is not None and entry.mass:
+        is_kept = "mass" in values and "inertia" not in values
+        if is_kept and isinstance(entry, ObjectParameters) and entry.inertia is not None and entry.mass:
             moments = [one * values["mass"] / entry.mass for one in entry.inertia.moments]  # how it lies stays
             values["inertia"] = {"moments": moments}
             checked = changed(entry, values)
@@ -326,6 +329,14 @@ class SceneOperations:
         low, high = models.bounds(self.entry(handle))
         (a, b, c), (x, y, z) = map(float, high - low), map(float, (low + high) / 2)
         return (a, b, c), (x, y, z)
+
+    def forms(self, handle: int) -> list[tuple[str, tuple[float, ...]]]:
+        """Return of which forms an object is, each with its size, as a scene file says; none for no shape of it."""
+        index = self._index_of(self._scene.tree[handle])
+        entry = None if index is None else self._scene.entries[index]
+        if isinstance(entry, CompoundParameters):
+            return [(one.shape, getattr(one, "size", ())) for one in entry.parts]
+        return [(entry.shape, getattr(entry, "size", ()))] if isinstance(entry, ObjectParameters) else []
 
     def scale(self, handles: Collection[int], factors: Sequence[float], positions: bool = False) -> None:
         """Let objects be so many times as large along x, y and z, and as heavy; `positions`: and as far from parents.

@@ -9,6 +9,7 @@ from drone_sim.config.errors import changed
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.joint import PRISMATIC
 from drone_sim.scene.entry import EntryParameters
+from drone_sim.scene.kinds.curved_path import CurvedPathParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters, PartParameters
 
@@ -69,6 +70,8 @@ def _kind(entry: EntryParameters, factors: Vector) -> dict[str, Any]:
     kind = getattr(entry, "kind", "")
     if kind == "path":
         return {"points": [[a * b for a, b in zip(factors, one)] for one in getattr(entry, "points", ())]}
+    if isinstance(entry, CurvedPathParameters):
+        return _curved_path(entry, factors)
     if isinstance(entry, JointParameters):
         if entry.type != PRISMATIC:
             return {}
@@ -77,6 +80,15 @@ def _kind(entry: EntryParameters, factors: Vector) -> dict[str, Any]:
     known = [key for key in _LENGTHS.get(kind, ()) if getattr(entry, key)]
     factor = _same(entry, factors, f"a {kind}") if known else 1.0
     return {key: factor * getattr(entry, key) for key in known}
+
+
+def _curved_path(entry: CurvedPathParameters, factors: Vector) -> dict[str, Any]:
+    mean = math.prod(factors) ** (1 / 3)  # as V-REP has it
+    points = [
+        {**one.model_dump(), "position": [a * b for a, b in zip(factors, one.position)]} for one in entry.control_points
+    ]
+    lengths = ("metres_per_radian", "metres_per_pause", "along")
+    return {"control_points": points, **{key: mean * getattr(entry, key) for key in lengths}}
 
 
 def _same(entry: EntryParameters, factors: Vector, what: str) -> float:

@@ -354,7 +354,11 @@ class Scene:
     def visuals(self) -> tuple[list[Visual], np.ndarray]:
         """Return how the objects look, the floor aside, and the poses world from visual, (N, 4, 4)."""
         numbers = self._numbers()
-        return self._world.visuals(numbers), self._world.visual_poses(numbers)
+        return self._world.pictures.visuals(numbers), self._world.pictures.visual_poses(numbers)
+
+    def categories(self) -> dict[str, str]:
+        """Return the categories of the objects that are given one, by name."""
+        return {one.name: one.category for one in self.entries.values() if one.category}
 
     def visual_names(self) -> list[str]:
         """Return whose each of the visuals is, as `things` calls it."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from drone_sim.scripting.api.service_servers import Unanswered
 from drone_sim.scripting.api.types import Callback
+from drone_sim.scripting.breakpoints import Scope
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import Script
 from drone_sim.scripting.script_log import LOG
@@ -19,7 +20,7 @@ class GuardedScript:
         """Take the script, loaded."""
         self._script = script
         self.failure: ScriptError | None = None
-        self.idle, self.is_empty = script.idle, script.is_empty
+        self.language, self.idle, self.is_empty = script.language, script.idle, script.is_empty
         self._calls = 0  # that have not returned
 
     @property
@@ -42,13 +43,25 @@ class GuardedScript:
 
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function for another script, whose error it is where it fails. Raises ScriptError."""
-        if self.failure is not None:
-            raise ScriptError(name, self.failure.path, 0, "the script has failed, and is not called any more")
+        self._refuse_if_failed(name)
         return self._called(self._script.call_function, name, arguments)
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
         """Call a global function for the script itself. Raises ScriptError."""
         return self._script.call_own(name, arguments)
+
+    def execute(self, text: str) -> Any:
+        """Run a text in the script for another one, whose error it is where it fails. Raises ScriptError."""
+        self._refuse_if_failed("executeScriptString")
+        return self._called(self._script.execute, text)
+
+    def execute_own(self, text: str) -> Any:
+        """Run a text for the script itself. Raises ScriptError."""
+        return self._script.execute_own(text)
+
+    def _refuse_if_failed(self, name: str) -> None:
+        if self.failure is not None:
+            raise ScriptError(name, self.failure.path, 0, "the script has failed, and is not called any more")
 
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message."""
@@ -66,6 +79,14 @@ class GuardedScript:
     def check(self, callback: Callback) -> None:
         """Fail where the script has no such function to call back."""
         self._attempt(self._script.check, callback)
+
+    def follow_breakpoints(self) -> None:
+        """Look at the lines that have breakpoints by now, or at none."""
+        self._script.follow_breakpoints()
+
+    def variables(self) -> list[Scope]:
+        """Return its variables; none of one that has failed in a way that leaves nothing to be read."""
+        return self._script.variables()
 
     def save_state(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now."""

@@ -12,6 +12,7 @@ from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import Api
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.types import Callback
+from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError, read_source
 from drone_sim.scripting.python.helpers import BUILT_IN
 from drone_sim.scripting.python.script import PythonScript
@@ -24,6 +25,7 @@ NO_SCRIPT = "none"  # what a vehicle says that has none, for others to fly it: t
 class Script(Protocol):
     """A child script that is loaded."""
 
+    language: str  # lua or python
     idle: str  # why none of its phases is ever called, '' where one is
     is_empty: bool
 
@@ -43,6 +45,12 @@ class Script(Protocol):
     def call_own(self, name: str, arguments: list[Any]) -> Any:
         """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
 
+    def execute(self, text: str) -> Any:
+        """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
+
+    def execute_own(self, text: str) -> Any:
+        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+
     def callback(self, callback: Callback, message: Any) -> None:
         """Call a function of the script with a message. Raises ScriptError."""
 
@@ -52,11 +60,20 @@ class Script(Protocol):
     def check(self, callback: Callback) -> None:
         """Raise ScriptError where the script has no such function to call back."""
 
+    def follow_breakpoints(self) -> None:
+        """Look at the lines that have breakpoints by now, or at none."""
+
+    def variables(self) -> list[Scope]:
+        """Return its variables, as a person reads them; none where it cannot be called any more."""
+
     def save_state(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now."""
 
     def close(self) -> None:
         """Free what the script holds; may be called twice."""
+
+
+Loader = Callable[[str, Mapping[str, Api], TimeLimit, Turns, "Breakpoints | None"], Script]  # as `load` below
 
 
 @functools.cache
@@ -84,18 +101,24 @@ def script_path(script: str) -> str:
         raise ScriptError("load", name, 0, str(error)) from None
 
 
-def load(script: str, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns | None = None) -> Script:
-    """Load a child script, whose thread has those `turns`; raises ScriptError."""
+def load(
+    script: str,
+    modules: Mapping[str, Api],
+    limit: TimeLimit,
+    turns: Turns | None = None,
+    breakpoints: Breakpoints | None = None,
+) -> Script:
+    """Load a child script, whose thread has those `turns`, and all scripts those `breakpoints`; raises ScriptError."""
     path = script_path(script)
     try:
         source = read_source(path)
     except ValueError as error:
         raise ScriptError("load", path, 0, str(error)) from None
     if path.endswith(".py"):
-        return PythonScript(path, source, modules, limit, turns or Turns())
+        return PythonScript(path, source, modules, limit, turns or Turns(), breakpoints)
     try:
         from drone_sim.scripting.lua.script import LuaScript  # whoever flies Python needs no lupa
 
-        return LuaScript(path, source, modules, limit)
+        return LuaScript(path, source, modules, limit, breakpoints)
     except ImportError as error:
         raise ScriptError("load", path, 0, f"Lua scripts need lupa (pip install lupa): {error}") from None

@@ -14,6 +14,7 @@ import contextlib
 import ctypes
 import functools
 import math
+import os
 import signal
 import sys
 import threading
@@ -290,14 +291,19 @@ class _Timer:
         # Where the process had to wait for its turn, what was left of the time has passed by now.
         _setitimer(signal.ITIMER_REAL, min(max(seconds, _SOONEST), _LONGEST), _UNTIL_HEARD)
 
+    def forget(self) -> None:
+        """Know that it is not set: a process does not inherit the timer of the one that forked it."""
+        self.next = math.inf
+
     def rest(self) -> None:
         """Do not go off any more."""
-        self.next = math.inf
+        self.forget()
         _setitimer(signal.ITIMER_REAL, 0)
 
 
 _MAIN = threading.main_thread().ident
 _timer = _Timer()
+os.register_at_fork(after_in_child=_timer.forget)
 _watched: weakref.WeakSet[TimeLimit] = weakref.WeakSet()
 _watching = threading.Lock()
 _watchdog: threading.Thread | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -12,10 +12,12 @@ import numpy as np
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.render.context import RendererUnavailable
+from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
-from drone_sim.render.renderer import Renderer
+from drone_sim.render.renderer import Moment, Renderer
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.sensor import Failure, Reading, Sensor
+from drone_sim.sensors.truth import Identity, Numbered, PictureTruth
 from drone_sim.shapes.visual import Visual
 
 _LOG = logging.getLogger(__name__)
@@ -61,9 +63,14 @@ class Vision:
         self._fallback = False
         self.pictures, self.seconds = 0, 0.0  # taken by now, and the real time that they took
 
-    def look_at(self, subject: Subject, blades: Collection[TurningBlades]) -> None:
-        """Take the pictures of this subject from now on, in which blades turn when somebody looks."""
-        self._subject, self._blades = subject, blades
+    def look_at(
+        self, subject: Subject, blades: Collection[TurningBlades], identify: Callable[[], list[Identity]] = list
+    ) -> None:
+        """Take the pictures of this subject from now on, in which blades turn when somebody looks.
+
+        `identify` returns whose each of the subject's visuals is, in their order.
+        """
+        self._subject, self._blades, self._identify = subject, blades, identify
         self._shown = -1  # the subject's changes, when its blades were turned
 
     def picture(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
@@ -88,9 +95,30 @@ class Vision:
         render = self._renderer.render if kind == "color" else self._renderer.render_depth
         return render(intrinsics, pose, self._subject.visual_poses())
 
+    def truth(self, intrinsics: Intrinsics, pose: np.ndarray, before: Moment | None) -> PictureTruth | None:
+        """Return what is true of the picture from `pose`, since the one `before`; None where there is no OpenGL."""
+        if self._renderer is None and not self._fallback:
+            self._open()
+        renderer = self._renderer
+        if renderer is None:
+            return None
+        self._turn_blades()
+        visuals, poses = self._subject.visuals(), np.array(self._subject.visual_poses())
+        numbered = Numbered.of(self._identify())
+        renderer.set_visuals(visuals)
+        since = before if before is not None and len(before.poses) == len(poses) else Moment(pose, poses)
+
+        def draw(names: Sequence[str]) -> Mapping[str, np.ndarray]:
+            return renderer.render_outputs(names, intrinsics, pose, poses, instances=numbered.instances, before=since)
+
+        def alone() -> np.ndarray:
+            return renderer.count_alone(intrinsics, pose, poses, numbered.instances)
+
+        return PictureTruth(draw, alone, intrinsics, Moment(pose, poses), visuals, numbered)
+
     def _tiny_picture(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
-        if isinstance(intrinsics, Orthographic):
-            raise ValueError("an orthographic picture needs OpenGL, and there is no EGL here")
+        if isinstance(intrinsics, (Orthographic, Distorted)):
+            raise ValueError("an orthographic picture, or one through a lens, needs OpenGL, and there is no EGL here")
         vertical_fov = 2 * np.arctan(intrinsics.height / 2 / intrinsics.fy)
         color, depth = self._subject.tiny_picture(
             pose, intrinsics.width, intrinsics.height, vertical_fov, intrinsics.near, intrinsics.far
@@ -158,9 +186,9 @@ class Camera(Sensor):
 
     def change(self, parameters: CameraParameters) -> None:
         """Look as often, and see as much, as these parameters say."""
-        own = parameters
-        self.period = own.every
-        self.intrinsics = Intrinsics(own.width, own.height, own.horizontal_fov, own.near, own.far)
+        self.period = parameters.every
+        self.intrinsics = parameters.intrinsics()
+        self._moment: Moment | None = None  # of the last truth
         self._last: dict[str, tuple[int, Matrix, np.ndarray]] = {}  # by kind: the scene's changes, pose, picture
 
     def take(self, kind: str = "") -> np.ndarray:
@@ -182,6 +210,18 @@ class Camera(Sensor):
             last = self._last[kind] = changes, pose, self.take(kind)
         return last[2]
 
+    def truth(self) -> PictureTruth | None:
+        """Return what is true of what it sees now, and of the way since it was asked last; None without OpenGL.
+
+        A silent camera has none.
+        """
+        if self.failure == "silent":
+            return None
+        pose = np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4))
+        found = self._vision.truth(self.intrinsics, pose, self._moment)
+        self._moment = found.moment if found is not None else None
+        return found
+
     def show(self, steps: int, image: np.ndarray | None, age: float = 0.0) -> None:
         """Let those who look see a picture, which has come after so many steps, of some age (s); None is none."""
         self.image, self.age = image, age
@@ -191,7 +231,7 @@ class Camera(Sensor):
 
     def reset(self) -> None:
         """Forget the pictures that were taken."""
-        self.image = self.latest = None
+        self.image = self.latest = self._moment = None
         self._last.clear()
         self.age = 0.0
 

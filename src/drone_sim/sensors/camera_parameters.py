@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from drone_sim.config.types import TOPIC, Checked, Finite, Name, Within
+from drone_sim.config.types import TOPIC, Checked, Finite, Name, Switch, Within
+from drone_sim.render.distortion import Distorted
+from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.sensors.sensor import MountParameters
 
 MAX_CAMERAS = 16
 MAX_PIXELS = 4096 * 4096  # of all cameras together
+
+
+TRUTH = (
+    *("labels", "instances", "categories", "depth", "normals", "points", "flow", "flow_known", "boxes", "box_markers"),
+    *("detections", "detections_3d"),  # where vision_msgs is installed
+)
+_lens = lru_cache(maxsize=MAX_CAMERAS)(Distorted)  # whose rays are found once
+WIDEST, WIDEST_FISHEYE = 3.1, 3.839724  # rad; the latter is 220 degrees
+
+
+class LensParameters(Checked):
+    """A lens that is no pinhole, as sensor_msgs/CameraInfo has it: docs/sensors.md says what the coefficients are."""
+
+    model: Literal["plumb_bob", "rational_polynomial", "equidistant"]
+    coefficients: Annotated[tuple[Finite, ...], Field(max_length=8)] = ()
 
 
 class CameraParameters(Checked):
@@ -25,9 +43,24 @@ class CameraParameters(Checked):
     every: Annotated[int, Within(1, 1_000_000)]
     width: Annotated[int, Within(1, 4096)]
     height: Annotated[int, Within(1, 4096)]
-    horizontal_fov: Annotated[Finite, Within(0.01, 3.1)]
+    horizontal_fov: Annotated[Finite, Within(0.01, WIDEST_FISHEYE)]
+    lens: LensParameters | None = None
     near: Annotated[Finite, Within(1e-4, 1e4)]
     far: Annotated[Finite, Within(1e-3, 1e5)]
+    truth: Switch = False  # whether it publishes what is behind its pictures, too
+
+    @model_validator(mode="after")
+    def _can_be(self) -> CameraParameters:
+        if self.horizontal_fov > WIDEST and not (self.lens and self.lens.model == "equidistant"):
+            raise ValueError(f"horizontal_fov: must be from 0.01 to {WIDEST}, without an equidistant lens")
+        if self.lens is not None:
+            self.intrinsics()
+        return self
+
+    def intrinsics(self) -> Intrinsics:
+        """Return how it makes pixels of the world."""
+        own = self.width, self.height, self.horizontal_fov, self.near, self.far
+        return Intrinsics(*own) if self.lens is None else _lens(*own, self.lens.model, self.lens.coefficients)
 
     def topics(self) -> Iterator[tuple[str, str]]:
         """Yield what it publishes, and what each topic is."""
@@ -36,3 +69,5 @@ class CameraParameters(Checked):
         yield f"{folder}{slash}camera_info", "camera_info"
         for transport in ("compressed", "compressed/parameter_descriptions", "compressed/parameter_updates"):
             yield f"{self.topic}/{transport}", transport
+        if self.truth:
+            yield from ((f"{self.topic}/truth/{name}", name) for name in TRUTH)

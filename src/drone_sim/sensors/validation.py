@@ -11,7 +11,7 @@ from drone_sim.sensors.sensor import SensorParameters
 # What a vehicle publishes and hears in its namespace, beside its sensors.
 RESERVED_TOPICS = (
     *("cmd_vel", "set_pose", "initialpose", "push", "target_pose", "odom", "propellers", "joint_states"),
-    *("set_wind", "weather", "faults", "takeoff", "land", "reset", "home", "goto", "state"),
+    *("set_wind", "weather", "faults", "takeoff", "land", "reset", "home", "goto", "state", "hears_commands"),
     *("parameter_descriptions", "parameter_updates"),
     *("command", "scene", "drawing", "markers/update", "markers/update_full", "markers/feedback"),
     *("objects/update", "objects/update_full", "objects/feedback"),

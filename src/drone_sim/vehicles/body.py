@@ -45,6 +45,7 @@ class Body:
         self.datum, self.magnetic_field = context.datum, context.magnetic_field
         self.jumps = 0  # how often it was put somewhere else
         self.pushes = 0  # how often a script has pushed it
+        self.is_held = False  # in somebody's hand: no part of what snapshots remember, nor of a run
         self._context = context
         self._world = context.world
         self.number = self._world.add_rigid_body(rigid, start)
@@ -62,7 +63,8 @@ class Body:
     # ---- where it is
 
     def reset(self) -> None:
-        """Return to the start, at rest, with nothing that pushes."""
+        """Return to the start, at rest, with nothing that pushes and nobody who holds it."""
+        self.let_go()
         self._world.set_pose(self.number, self._start)
         self._pushed: list[Pushed] = []  # in the next step
         self.refresh()
@@ -92,6 +94,19 @@ class Body:
         self._world.set_pose(self.number, pose)
         self.refresh()
 
+    def hold(self) -> None:
+        """Let it stand still, whatever pulls at it, until it is let go."""
+        if not self.is_held:
+            self.is_held = True
+            self._world.collision_filter.freeze(self.number, still=True)
+            self.refresh()
+
+    def let_go(self) -> None:
+        """Let it fly on, from rest."""
+        if self.is_held:
+            self.is_held = False
+            self._world.collision_filter.freeze(self.number, still=False)
+
     def restored(self) -> None:
         """Follow the world, which was put back to what it had been."""
         self.jumps += 1
@@ -100,7 +115,7 @@ class Body:
 
     def place_visuals(self, places: Mapping[int, Matrix]) -> None:
         """Move some of its visuals, by index, to other places in the root link's frame: looks only."""
-        self._world.place_visuals(self.number, places)
+        self._world.pictures.place(self.number, places)
 
     # ---- what pushes it
 
@@ -131,7 +146,9 @@ class Body:
         return wrench
 
     def apply(self, force: Force) -> None:
-        """Let a force act in the sub-step that comes, as it is at this moment."""
+        """Let a force act in the sub-step that comes, as it is at this moment; none moves what somebody holds."""
+        if self.is_held:
+            return
         self.refresh()
         wrench = Wrench()
         force.add_to(wrench, self)

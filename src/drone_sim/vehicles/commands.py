@@ -50,10 +50,19 @@ class Commands:
 
     def advance(self) -> None:
         """Grow a step older; one that is too old gives way to standing still."""
-        time_step = self._clock.time_step
-        if self.timeout and self.age > self.timeout - time_step / 2 and self.now != Twist():
+        if self._is_over:
             self._obey(Twist())
-        self.age += time_step
+        self.age += self._clock.time_step
+
+    @property
+    def _is_over(self) -> bool:
+        too_old = self.timeout and self.age > self.timeout - self._clock.time_step / 2
+        return bool(too_old and self.now != Twist())
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether no script will hear of it at the beginning of the next step, unless another one is received."""
+        return self.link is None and not self._is_over
 
     def _obey(self, twist: Twist) -> None:
         self.now, self.age = twist, 0.0

@@ -173,14 +173,14 @@ class Vehicle:
         self.commands.advance()
 
     def wrench(self) -> Wrench:
-        """Return what pushes the body through this step, the forces of single sub-steps aside."""
+        """Return what pushes the body through this step, the forces of single sub-steps aside; nothing while held."""
         body = self.body
         wrench = body.take_pushes()
         for force in self._forces:
             force.add_to(wrench, body)
         if self.pushes.lasting:
             self.pushes.add_to(wrench, body)
-        return wrench
+        return Wrench() if body.is_held else wrench
 
     def before_sub_step(self) -> None:
         """Let the forces act that follow the body through the sub-steps."""

@@ -116,6 +116,37 @@ class VrepDummy:
 
 
 @dataclass(frozen=True)
+class VrepControlPoint:
+    """A control point of a path: its pose, its curve, what it carries, and its speed, 0 to 1, of the path's own."""
+
+    pose: Pose
+    before: float
+    after: float
+    count: int
+    speed: float
+    pause: float = 0.0
+    flags: int = 0
+    channels: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class VrepPath:
+    """A path of 3.x: its control points, switches, how its length is counted (0 to 6), and where who follows it is (m).
+
+    `has_surface`: whether a body is drawn along it; `broken`: how many more points there are, which are nowhere.
+    """
+
+    points: tuple[VrepControlPoint, ...]
+    switches: int
+    counts: int
+    metres_per_radian: float
+    metres_per_pause: float
+    along: float
+    has_surface: bool
+    broken: int = 0
+
+
+@dataclass(frozen=True)
 class VrepCamera:
     """What looks along +z, +y up; the angle (rad) spans the larger side, the size (m) of an orthographic one too."""
 
@@ -146,7 +177,7 @@ class Other:
     kind: str
 
 
-Kind = VrepShape | VrepJoint | VrepDummy | VrepCamera | VrepProximitySensor | Other
+Kind = VrepShape | VrepJoint | VrepDummy | VrepPath | VrepCamera | VrepProximitySensor | Other
 
 
 @dataclass(frozen=True)

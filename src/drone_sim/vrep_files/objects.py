@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from drone_sim.vrep_files.chunks import Level, Texts, finite, level, levels, quaternion_first, unpack
+from drone_sim.vrep_files.chunks import Level, finite, level, levels, quaternion_first
 from drone_sim.vrep_files.model import (
     ORIGIN,
     Kind,
@@ -19,43 +19,14 @@ from drone_sim.vrep_files.model import (
     VrepProximitySensor,
     within,
 )
+from drone_sim.vrep_files.paths import read_path, read_path_object
 from drone_sim.vrep_files.scripts import read_parameters
 from drone_sim.vrep_files.shapes import Pools, read_shape
-
-_BLOCK = "Cdt"  # name and content, each after its length
-_PATH = b"PATH"
-_POINT = 7 * 8  # bytes: position and quaternion x, y, z, w, as doubles
-_MOST_POINTS = 10_000
-
-
-def read_path(data: bytes | None) -> tuple[tuple[float, ...], ...]:
-    """Return the points of a path, in its frame, from the blocks of its object; none where it is no path.
-
-    Each is x, y, z (m) and a quaternion x, y, z, w.
-
-    Raises VrepFileError.
-    """
-    content = _block(data, _PATH)
-    count = len(content) // _POINT
-    if count > _MOST_POINTS:
-        raise VrepFileError(f"PATH: {count} points; at most {_MOST_POINTS} are read")
-    numbers = finite(unpack(f"<{7 * count}d", content, "PATH"), "PATH")
-    return tuple(numbers[at : at + 7] for at in range(0, 7 * count, 7))
-
-
-def _block(data: bytes | None, name: bytes) -> bytes:
-    for chunk in () if data is None else level(data).chunks:
-        if chunk.tag == _BLOCK:
-            parts = Texts(chunk.data, _BLOCK)
-            if parts.bytes() == name:
-                return parts.bytes()
-    return b""
-
 
 _JOINTS = {10: "revolute", 11: "prismatic", 12: "spherical"}
 _SENSORS = {30: "pyramid", 31: "cylinder", 32: "disc", 33: "cone", 34: "ray"}
 _OTHERS = {
-    "FSE": "force sensor", "LGT": "light", "SCT": "script", "GRH": "graph", "PAT": "path", "MIL": "mill",
+    "FSE": "force sensor", "LGT": "light", "SCT": "script", "GRH": "graph", "MIL": "mill",
     "MIR": "mirror", "OCT": "octree", "PTC": "point cloud", "MKR": "marker", "CSO": "custom object",
 }  # fmt: skip
 _USED = {"pyramid": (0, 1, 2, 3), "cylinder": (0, 1, 6), "disc": (0, 1, 6, 8), "cone": (0, 1, 6, 8), "ray": (0, 1)}
@@ -173,4 +144,5 @@ _READERS: dict[str, Callable[[Level], Kind]] = {
     "RSN": _vision_sensor,
     "CMA": _camera,
     "SNR": _proximity_sensor,
+    "PAT": read_path_object,
 }

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import Any
+from xml.etree import ElementTree as Xml
 
 import pybullet
 
@@ -56,6 +58,30 @@ def _load(client: int, told: UrdfFile, pose: Pose, moves: bool) -> int:
         moments = told.moments[link.decode()]
         pybullet.changeDynamics(body, number, localInertiaDiagonal=moments, physicsClientId=client)
     return body
+
+
+def load_rigid_body(client: int, files: BulletFiles, xml: str, pose: Pose) -> int:
+    """Add a merged URDF with its root link at a pose; return its body id."""
+    path = files.urdf(Xml.fromstring(xml))
+    # The merged inertia is right; what PyBullet would derive from the collision shapes' bounds is not.
+    flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+    number = pybullet.loadURDF(path, pose.position, pose.orientation, flags=flags, physicsClientId=client)
+    os.unlink(path)  # or there would be one more file for every vehicle that has come
+    return int(number)
+
+
+def set_material(client: int, body: int) -> None:
+    """Let a body be of V-REP's Bullet material: friction 1, no restitution, no damping (PyBullet's default damps)."""
+    pybullet.changeDynamics(
+        body,
+        -1,
+        lateralFriction=1,
+        restitution=0,
+        linearDamping=0,
+        angularDamping=0,
+        activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+        physicsClientId=client,
+    )
 
 
 def _collision(told: Geometry) -> dict[str, Any]:

@@ -14,8 +14,8 @@ import pybullet
 from drone_sim.mechanics.frames import Quaternion, Vector, cross, turned
 
 _SLOW = 1e-8  # (rad/s)²; slower, the term is below the noise of what moves
-_STILL: Vector = (0.0, 0.0, 0.0)
 _ROUND = 1e-9  # of its largest moment of inertia by which others may differ: a cube or a sphere has no such term
+_turn, _ALONG_AXES = pybullet.applyExternalTorque, pybullet.LINK_FRAME
 _ITERATIONS = 6  # each leaves h |ω| / 2 of the error: 1e-10 of it at 9 rad/s and 5 ms
 
 
@@ -27,7 +27,7 @@ class NoGyroscopicTerm:
         self._client = client
         self._roots: dict[int, Vector] = {}  # moments of inertia (kg m², along the principal axes), by body
         self._links: dict[int, dict[int, Vector]] = {}  # the same of all other links, by PyBullet's number
-        self._before: dict[int, Quaternion] = {}  # attitudes of roots a step of PyBullet's ago, in the same `advance`
+        self._before: Mapping[int, Quaternion] = {}  # attitudes a step of PyBullet's ago, in the same `advance`
 
     def add(self, body: int) -> None:
         """Know a body."""
@@ -48,35 +48,42 @@ class NoGyroscopicTerm:
 
     def begin_step(self) -> None:
         """Ask for velocities in the next step of PyBullet's: attitudes of before do not tell them."""
-        self._before.clear()
+        self._before = {}
 
-    def begin_sub_step(self, known: Mapping[int, Quaternion], duration: float) -> None:
+    def begin_sub_step(self, attitudes: Mapping[int, Quaternion], duration: float) -> None:
         """Let torques act in the step of PyBullet's that comes, as long (s) as the last one since `begin_step`.
 
-        `known` are attitudes of roots that need not be asked for.
+        `attitudes` are those of roots that need not be asked for; they are kept until the next step.
         """
-        client, attitudes = self._client, self._before
+        client, past, self._before = self._client, self._before, attitudes
         for body, moments in self._roots.items():
-            now, before = known.get(body), attitudes.get(body)
-            velocity = self._velocity(body, now) if now is None or before is None else _rate(before, now, duration)
-            if now is not None:
-                attitudes[body] = now
-            if velocity is not _STILL:
-                torque = self._torque(moments, velocity, duration)
-                pybullet.applyExternalTorque(body, -1, torque, pybullet.LINK_FRAME, client)
+            now, before = attitudes.get(body), past.get(body)
+            if now and before:
+                torque = _torque_of_turn(moments, before, now, duration)
+            else:
+                torque = self._torque_of_velocity(moments, body, now, duration)
+            if torque is not None:
+                _turn(body, -1, torque, _ALONG_AXES, client)
+        if self._links:
+            self._begin_sub_step_of_links(duration)
+
+    def _begin_sub_step_of_links(self, duration: float) -> None:
         for body, links in self._links.items():
-            states = pybullet.getLinkStates(body, list(links), 1, 1, client)  # with velocities, and attitudes of now
+            states = pybullet.getLinkStates(body, list(links), 1, 1, self._client)  # with velocities, attitudes of now
             for (number, moments), state in zip(links.items(), states):
                 if _turns(state[7]):
                     torque = self._torque(moments, _seen_from(state[1], state[7]), duration)
-                    pybullet.applyExternalTorque(body, number, torque, pybullet.LINK_FRAME, client)
+                    _turn(body, number, torque, _ALONG_AXES, self._client)
 
-    def _velocity(self, body: int, turn: Quaternion | None) -> Vector:
-        """Return the angular velocity of a root along its principal axes (rad/s), _STILL where it hardly turns."""
+    def _torque_of_velocity(
+        self, moments: Vector, body: int, turn: Quaternion | None, duration: float
+    ) -> Vector | None:
+        """Return the torque of a root as PyBullet has it turn, None where it hardly does."""
         velocity = pybullet.getBaseVelocity(body, self._client)[1]
         if not _turns(velocity):
-            return _STILL
-        return _seen_from(turn or pybullet.getBasePositionAndOrientation(body, self._client)[1], velocity)
+            return None
+        turn = turn or pybullet.getBasePositionAndOrientation(body, self._client)[1]
+        return self._torque(moments, _seen_from(turn, velocity), duration)
 
     def end_sub_step(self, duration: float) -> None:
         """Do what is to be done once PyBullet has stepped."""
@@ -103,7 +110,7 @@ class GyroscopicTerm(NoGyroscopicTerm):
     def end_sub_step(self, duration: float) -> None:
         """Turn every root's velocity by the second half of the term."""
         client = self._client
-        self._before.clear()  # attitudes do not tell of this half
+        self._before = {}  # attitudes do not tell of this half
         for body, moments in self._roots.items():
             linear, velocity = pybullet.getBaseVelocity(body, client)
             if _turns(velocity):
@@ -133,10 +140,11 @@ def _seen_from(turn: Quaternion, vector: Vector) -> Vector:
     return turned((-x, -y, -z, w), vector)
 
 
-def _rate(before: Quaternion, now: Quaternion, duration: float) -> Vector:
-    """Return with which angular velocity a body has turned, in its own frame: quicker than to ask for it.
+def _torque_of_turn(moments: Vector, before: Quaternion, now: Quaternion, duration: float) -> Vector | None:
+    """Return ω × Iω of a body by how it has turned, None where it hardly has: quicker than to ask for its velocity.
 
-    Bullet turns it by the whole of that in one go; the axis is the same before and after.
+    Bullet turns it by the whole of that in one go; the axis is the same before and after. All in one function, which
+    runs in every sub-step.
     """
     (x0, y0, z0, w0), (x1, y1, z1, w1) = before, now
     x = w0 * x1 - w1 * x0 - y0 * z1 + z0 * y1
@@ -144,10 +152,11 @@ def _rate(before: Quaternion, now: Quaternion, duration: float) -> Vector:
     z = w0 * z1 - w1 * z0 - x0 * y1 + y0 * x1
     square = x * x + y * y + z * z
     if square < _SLOW * duration * duration / 4 or square >= 1.0:
-        return _STILL
+        return None
     sine = math.sqrt(square)
     scale = 2.0 * math.asin(sine) / (sine * duration)
-    return x * scale, y * scale, z * scale
+    (a, b, c), p, q, r = moments, x * scale, y * scale, z * scale
+    return (c - b) * q * r, (a - c) * r * p, (b - a) * p * q
 
 
 def _momentum(moments: Vector, velocity: Vector) -> Vector:

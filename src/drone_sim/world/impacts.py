@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 import pybullet
 
 from drone_sim.mechanics.frames import Vector
+from drone_sim.mechanics.state import Motion
 
 _REACH = 0.001  # m that a body goes in a part of a sub-step
 _GAIN = 2.0  # m/s that a body may win in a step without being looked after
@@ -44,25 +45,28 @@ class Impacts:
         self._bodies.discard(body)
         self._jointed.discard(body)
 
-    def begin_step(self, sub_steps: int, known: Mapping[int, Vector]) -> bool:
+    def begin_step(self, sub_steps: int, known: Mapping[int, Motion]) -> bool:
         """Look which bodies are fast, and may meet something within so many sub-steps; return whether any may.
 
-        `known` are velocities (m/s) that need not be asked for.
+        `known` is what need not be asked for.
         """
-        duration = sub_steps * self._sub_step
-        self._fast = [
-            body
-            for body in (() if self._jointed else self._bodies)
-            if self._speed(body, known.get(body)) > self._slow
-            and self._may_meet_something(body, duration, _GAIN * duration)
-        ]
+        if self._jointed:
+            return False
+        duration, self._fast = sub_steps * self._sub_step, []
+        for body in self._bodies:
+            velocity = known[body][2] if body in known else pybullet.getBaseVelocity(body, self._client)[0]
+            if math.hypot(*velocity) > self._slow and self._may_meet(body, velocity, duration, _GAIN * duration):
+                self._fast.append(body)
         return bool(self._fast)
 
     def parts(self) -> int:
         """Return in how many parts the sub-step that comes is to be done."""
-        step = self._sub_step
-        ways = (self._speed(body) * step for body in self._fast if self._may_meet_something(body, 2 * step))
-        return min(math.ceil(max(ways, default=0.0) / _REACH), _MOST_PARTS) or 1
+        longest, step = 0.0, self._sub_step
+        for body in self._fast:
+            velocity = pybullet.getBaseVelocity(body, self._client)[0]
+            if self._may_meet(body, velocity, 2 * step):
+                longest = max(longest, math.hypot(*velocity) * step)
+        return min(math.ceil(longest / _REACH), _MOST_PARTS) or 1
 
     @contextlib.contextmanager
     def divided(self, part: float) -> Iterator[None]:
@@ -74,13 +78,11 @@ class Impacts:
         finally:
             pybullet.setPhysicsEngineParameter(self._sub_step, contactERP=_RECOVERY, physicsClientId=client)
 
-    def _speed(self, body: int, velocity: Vector | None = None) -> float:
-        return math.hypot(*(velocity or pybullet.getBaseVelocity(body, self._client)[0]))
-
-    def _may_meet_something(self, body: int, duration: float, margin: float = 0.0) -> bool:
-        way = [one * duration for one in pybullet.getBaseVelocity(body, self._client)[0]]
-        low, high = pybullet.getAABB(body, -1, self._client)
-        from_low = [one + min(step, 0.0) - margin for one, step in zip(low, way)]
-        to_high = [one + max(step, 0.0) + margin for one, step in zip(high, way)]
+    def _may_meet(self, body: int, velocity: Vector, duration: float, margin: float = 0.0) -> bool:
+        """Tell whether anything else is near the way of a body (its velocity, m/s) through so long (s)."""
+        x, y, z = velocity[0] * duration, velocity[1] * duration, velocity[2] * duration
+        (low_x, low_y, low_z), (high_x, high_y, high_z) = pybullet.getAABB(body, -1, self._client)
+        from_low = low_x + min(x, 0.0) - margin, low_y + min(y, 0.0) - margin, low_z + min(z, 0.0) - margin
+        to_high = high_x + max(x, 0.0) + margin, high_y + max(y, 0.0) + margin, high_z + max(z, 0.0) + margin
         near = pybullet.getOverlappingObjects(from_low, to_high, self._client) or ()
         return any(other != body for other, _ in near)

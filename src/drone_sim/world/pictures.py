@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from drone_sim.shapes.visual import Visual
 from drone_sim.world.bullet_files import BulletFiles
 
 _TYPES = {getattr(pybullet, name): shape for name, shape in REPORTED_SHAPES.items()}
+_changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 
 
 class _Placed(NamedTuple):
@@ -26,18 +28,33 @@ class _Placed(NamedTuple):
 
 
 class Pictures:
-    """The visual shapes of one client's bodies, read once for each body."""
+    """The visual shapes of one client's bodies, read once for each body: a subject for cameras (sensors.camera)."""
 
-    def __init__(self, client: int, origin: Callable[[str], str]):
-        """Start with an empty world. `origin` returns the mesh file that one of PyBullet's was made from."""
+    changes: int  # another number than before whenever a picture may look different
+
+    def __init__(self, client: int, files: BulletFiles, *, window: bool):
+        """Start with an empty world. `files` are those that PyBullet reads; `window`: PyBullet shows it in one."""
         self._client = client
-        self._origin = origin
+        self._files, self._window = files, window
         self._floor = -1
+        self._inertial_from_root: dict[int, Pose] = {}
         self._textures: dict[int, str] = {}
+        self._bullet_textures = Textures(client, files)
         self._looks: dict[int, Mapping[int, Sequence[tuple[DrawnShape, str]]]] = {}
         self._hidden: set[tuple[int, int]] = set()
         self._parts: dict[int, list[_Placed]] = {}
         self._standing: dict[int, np.ndarray] = {}  # poses of what the dynamics does not move
+        self._poses: tuple[int, np.ndarray] | None = None  # of all visuals, and the changes that they are of
+        self.look_anew()
+
+    def add(self, body: int, inertial_from_root: Pose) -> None:
+        """Know a body, where PyBullet says where its inertial frame is."""
+        self._inertial_from_root[body] = inertial_from_root
+        self.look_anew()
+
+    def look_anew(self) -> None:
+        """Take new pictures from now on: something may be elsewhere, or look different."""
+        self.changes = next(_changes)
 
     def set_floor(self, body: int, texture: str) -> None:
         """Say which body is the floor, which receives the shadows, and its texture; its second visual is the ground."""
@@ -51,6 +68,12 @@ class Pictures:
         """
         self._looks[body] = looks
 
+    def cover(self, body: int, texture: str, visual: int = -1) -> None:
+        """Cover a visual shape of a body (-1: all of its root link's) with an image, '' for none, as PyBullet draws."""
+        self._bullet_textures.cover(body, texture, visual)
+        if self._window:
+            self._bullet_textures.show()
+
     def hide(self, body: int, link: int) -> None:
         """Leave a link (-1: the root) out of all pictures."""
         self._hidden.add((body, link))
@@ -63,52 +86,65 @@ class Pictures:
     def forget(self, body: int) -> None:
         """Read a body anew: it has changed."""
         self._parts.pop(body, None)
-        self._standing.pop(body, None)
+        self.moved(body)
 
     def moved(self, body: int) -> None:
         """Look anew where a body stands: it has been put somewhere."""
         self._standing.pop(body, None)
+        self.look_anew()
 
     def all_moved(self) -> None:
         """Look anew where everything stands."""
         self._standing.clear()
+        self.look_anew()
 
     def remove(self, body: int) -> None:
         """Forget all about a body: it is gone, and PyBullet may give its number to another."""
         self.forget(body)
+        del self._inertial_from_root[body]
+        self._bullet_textures.forget(body)
         self._looks.pop(body, None)
         self._hidden = {one for one in self._hidden if one[0] != body}
         self._textures.pop(body, None)
         if body == self._floor:
             self._floor = -1
 
-    def place(self, body: int, places: Mapping[int, Matrix]) -> bool:
-        """Move some of a body's visuals, by index, to places in their link's frame; return whether any moves."""
+    def place(self, body: int, places: Mapping[int, Matrix]) -> None:
+        """Move some of a body's visuals, by index, to other places in their link's frame."""
         parts = self._of(body)
         others = {index: place for index, place in places.items() if parts[index].local != place}
         if others:
             self.moved(body)
         for index, place in others.items():
             parts[index] = parts[index]._replace(local=place)
-        return bool(others)
 
-    def visuals(self, bodies: Iterable[int]) -> list[Visual]:
-        """Return all that can be drawn of these bodies."""
-        return [part.visual for body in bodies for part in self._of(body)]
+    def visuals(self, bodies: Iterable[int] | None = None) -> list[Visual]:
+        """Return what can be drawn of these bodies, or of all, in the order of `visual_poses`."""
+        return [part.visual for body in self._chosen(bodies) for part in self._of(body)]
 
-    def places(self, bodies: Iterable[int]) -> list[tuple[int, int]]:
-        """Return body and link (-1: the root) of each of their visuals."""
-        return [(body, part.link) for body in bodies for part in self._of(body)]
+    def places(self, bodies: Iterable[int] | None = None) -> list[tuple[int, int]]:
+        """Return body and link (-1: the root) of each of their visuals, or of all, in the order of `visuals`."""
+        return [(body, part.link) for body in self._chosen(bodies) for part in self._of(body)]
 
-    def poses(self, root_from_inertial: Mapping[int, Pose]) -> np.ndarray:
-        """Return the poses world from visual, (N, 4, 4), of bodies given with the inverse of their inertial frame."""
+    def visual_poses(self, bodies: Iterable[int] | None = None) -> np.ndarray:
+        """Return the poses world from visual, (N, 4, 4), of these bodies, or of all."""
+        if bodies is not None:
+            return self._poses_of(bodies)
+        if self._poses is None or self._poses[0] != self.changes:  # once for all cameras of a step
+            self._poses = self.changes, self._poses_of(self._inertial_from_root)
+        return self._poses[1]
+
+    def _chosen(self, bodies: Iterable[int] | None) -> Iterable[int]:
+        return self._inertial_from_root if bodies is None else bodies
+
+    def _poses_of(self, bodies: Iterable[int]) -> np.ndarray:
         poses: list[np.ndarray] = [np.empty((0, 4, 4))]
-        for body, inverse in root_from_inertial.items():
+        for body in bodies:
             if body in self._standing:
                 poses.append(self._standing[body])
                 continue
             centre = Pose(*pybullet.getBasePositionAndOrientation(body, self._client))
-            root = compose(centre, inverse).matrix
+            root = compose(centre, self._inertial_from_root[body]).matrix
             links = {-1: root}
             for part in self._of(body):
                 if part.link not in links:
@@ -138,7 +174,8 @@ class Pictures:
             left = {link: list(looks) for link, looks in self._looks[body].items()}
             return [left[row[1]].pop(0) for row in rows]
         texture = self._textures.get(body, "")
-        return [(_TYPES[row[2]].from_bullet(row[3], self._origin(row[4].decode())), texture) for row in rows]
+        origin = self._files.origin
+        return [(_TYPES[row[2]].from_bullet(row[3], origin(row[4].decode())), texture) for row in rows]
 
     def _part(self, key: tuple[int, int], row: Sequence[Any], shape: DrawnShape, texture: str) -> _Placed:
         link, position, orientation, rgba = row[1], *row[5:8]
@@ -155,16 +192,15 @@ class Pictures:
         )
         return _Placed(visual, link, from_quaternion(position, orientation))
 
-    def tiny(
-        self, camera: np.ndarray, size: tuple[int, int], vertical_fov: float, depths: tuple[float, float]
+    def tiny_picture(
+        self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return RGB (height, width, 3) and depth (height, width) of PyBullet's software renderer.
 
-        Slow, but always there. `camera` is the (4, 4) pose world from optical frame, `size` (width, height),
-        the field of view in radians, `depths` the near and far plane; depth is in metres along the optical
-        z, NaN where nothing is nearer than the far plane.
+        Slow, but always there. `camera` is the (4, 4) pose world from optical frame, the field of view in radians,
+        `near` and `far` in metres; depth is in metres along the optical z, NaN where nothing is nearer than `far`.
         """
-        (width, height), (near, far) = size, depths
+        self._bullet_textures.show()
         gl_from_optical = np.diag([1.0, -1.0, -1.0, 1.0])
         view = gl_from_optical @ np.linalg.inv(camera)
         projection = pybullet.computeProjectionMatrixFOV(
@@ -184,6 +220,10 @@ class Pictures:
         buffer = np.reshape(picture[3], (height, width))
         depth = np.where(buffer < 1, far * near / (far - (far - near) * buffer), np.nan)
         return color, depth.astype(np.float32)
+
+    def look_from_behind(self, position: Sequence[float], yaw: float) -> None:
+        """Put the camera of PyBullet's window behind and above a place (m), looking along a yaw (rad)."""
+        pybullet.resetDebugVisualizerCamera(1.2, np.degrees(yaw) - 90, -20, position, self._client)
 
 
 class Textures:

@@ -72,6 +72,7 @@ class _FlownWay(NamedTuple):
     times: np.ndarray
     places: np.ndarray
     steps: np.ndarray
+    puts: np.ndarray  # rows in which it has been put elsewhere since the one before
 
     def time(self, here: _Here) -> float:
         following = self.times[min(here.row + 1, len(self.times) - 1)]
@@ -84,8 +85,9 @@ def _way(part: FlightPart) -> _FlownWay:
     steps = np.zeros_like(places)
     steps[:-1] = np.diff(places, axis=0)
     could = _ALWAYS + _FARTHEST * np.maximum(speeds[:-1], speeds[1:]) * np.diff(times)
-    steps[:-1][np.linalg.norm(steps[:-1], axis=1) > could] = 0
-    return _FlownWay(times, places, steps)
+    jumps = np.linalg.norm(steps[:-1], axis=1) > could
+    steps[:-1][jumps] = 0
+    return _FlownWay(times, places, steps, np.flatnonzero(jumps) + 1)
 
 
 def _first_within(way: _FlownWay, here: _Here, place: np.ndarray, radius: float) -> _Here:
@@ -95,6 +97,9 @@ def _first_within(way: _FlownWay, here: _Here, place: np.ndarray, radius: float)
     shares = np.clip((to * steps).sum(axis=1) / np.where(squares > 0, squares, 1), 0, 1)
     shares[0] = max(shares[0], here.share)
     distances = np.linalg.norm(to - shares[:, None] * steps, axis=1)
+    for row in way.puts[way.puts >= here.row] - here.row:  # who was put there has not arrived: it has to come back
+        away = np.flatnonzero(distances[row:] > radius)
+        distances[row : row + away[0] if len(away) else None] = np.inf
     near = np.flatnonzero(distances <= radius)
     index = int(near[0]) if len(near) else int(distances.argmin())
     return _Here(here.row + index, float(shares[index]), float(distances[index]))

@@ -155,7 +155,7 @@ def _followed(path: Path, folder: Path, others: set[Path], is_handed_in: bool = 
     waiting = [path]
     while waiting and len(found) < _MOST:
         for one in _named_in(waiting.pop(), folder, is_handed_in):
-            if one in found or one in others or (is_handed_in and _is_child_script(one)):
+            if one in found or one in others or (is_handed_in and is_child_script(one)):
                 continue
             found[one] = None
             waiting.append(one)
@@ -185,7 +185,7 @@ def _inside(path: Path, folder: Path, is_handed_in: bool) -> Iterator[Path]:
             return
         if is_handed_in and real.is_dir():
             files = list(_regular(real.rglob("*")))
-            yield from () if any(map(_is_child_script, files)) else files
+            yield from () if any(map(is_child_script, files)) else files
         else:
             yield from _regular([real])
     except (OSError, ValueError, RuntimeError):  # a link in a circle; a name that is too long
@@ -199,7 +199,8 @@ def _regular(paths: Iterable[Path]) -> Iterator[Path]:
             yield path
 
 
-def _is_child_script(path: Path) -> bool:
+def is_child_script(path: Path) -> bool:
+    """Tell whether a file has a function that a simulation calls. Raises Unreadable."""
     return path.suffix in _SCRIPTS and _CHILD_SCRIPT.search(_text(path)) is not None
 
 

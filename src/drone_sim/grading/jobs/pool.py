@@ -1,6 +1,6 @@
 """Many flights at a time: on threads of this process, or by any scheduler of Dask.
 
-A worker's thread flies one job after the other, each in a process of its own (see `fork_server_client`): that a worker
+A worker's thread flies one job after the other, each in a process of its own (see `flyer`): that a worker
 is only a thread here costs nothing, and it starts in no time. What a lost worker was flying, Dask gives to another.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 
 from drone_sim.command_line import format_error
 from drone_sim.grading import plan as plans
-from drone_sim.grading.jobs.fork_server_client import Cancelled, ForkServerClient
+from drone_sim.grading.jobs.flyer import Cancelled, Flyer
 from drone_sim.grading.jobs.job import Job, JobResult, contents_of, key_of, lost
 from drone_sim.grading.jobs.settings import BatchSettings, FlightLimits
 from drone_sim.message_text import shown
@@ -48,13 +48,13 @@ def opened(options: FlightOptions, workers: int = 1, scheduler: str = "") -> Ite
     """Give a function that flies: it gives the flights as they come, in any order, each job's once.
 
     On `workers` threads here, or by the scheduler at an address. At the end what is still flown is ended. Raises
-    PoolError; the function that, too, and what ForkServerClient.fly raises.
+    PoolError; the function that, too, and what Flyer.fly raises.
     """
     if scheduler:
         with _connected(scheduler, options.patience) as client:
             yield lambda jobs: _flown_by_dask(jobs, options, client)
     elif workers == 1:
-        with contextlib.closing(ForkServerClient(options.limits, options.sandboxed)) as server:
+        with contextlib.closing(Flyer(options.limits, options.sandboxed)) as server:
             yield lambda jobs: (server.fly(job, options.tables) for job in jobs)
     else:
         with _CLIENTS, ThreadPoolExecutor(workers) as executor:
@@ -132,14 +132,14 @@ class _Clients:
     """The fork servers of this process's threads, as their clients."""
 
     own: threading.local = field(default_factory=threading.local)
-    all: list[ForkServerClient] = field(default_factory=list)
+    all: list[Flyer] = field(default_factory=list)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def of_thread(self, options: FlightOptions) -> ForkServerClient:
+    def of_thread(self, options: FlightOptions) -> Flyer:
         """Return that of this thread."""
         wanted = (options.limits, options.sandboxed)
         if getattr(self.own, "wanted", None) != wanted or self.own.client not in self.all:
-            self.own.wanted, self.own.client = wanted, ForkServerClient(*wanted)
+            self.own.wanted, self.own.client = wanted, Flyer(*wanted)
             with self.lock:
                 self.all.append(self.own.client)
         return self.own.client

@@ -9,14 +9,14 @@ import site
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from drone_sim.files.resources import package_path
 from drone_sim.grading.jobs.files import LARGEST
+from drone_sim.grading.jobs.server import HANDED_IN
 
 TEMPORARY = "/dev/shm"  # the one folder to write to, in memory
-HANDED_IN = "/handed_in"  # below which the files of a script are laid, each under its whole path; in memory, too
 _TRIED = 20.0  # s, on a busy machine; it takes some 10 ms
 _DEVICES = Path("/dev/dri")  # of the graphics card, which cameras may draw with
 _ABOUT_DEVICES = ("/sys/dev/char", "/sys/devices")
@@ -37,15 +37,15 @@ class NoSandbox(OSError):
     """bubblewrap is not there, or does not work here; one line says why."""
 
 
-def command(files: int, paths: Iterable[Path] = ()) -> list[str]:
+def command(files: int) -> list[str]:
     """Return what to put before a command so that it runs in the sandbox, with so many MiB in TEMPORARY.
 
-    It reads Python, what Python imports, this package, and the files `paths`. Raises NoSandbox.
+    It reads Python, what Python imports, and this package. Raises NoSandbox.
     """
     program, why = _found()
     if why:
         raise NoSandbox(why)
-    return _wrapped(program, files, paths)
+    return _wrapped(program, files)
 
 
 @functools.cache
@@ -70,7 +70,7 @@ def _found() -> tuple[str, str]:
     return program, ""
 
 
-def _wrapped(program: str, files: int, paths: Iterable[Path] = ()) -> list[str]:
+def _wrapped(program: str, files: int) -> list[str]:
     devices = ("--dev-bind", str(_DEVICES), str(_DEVICES)) if _DEVICES.exists() else ()
     here = os.getcwd()
     return [
@@ -81,7 +81,6 @@ def _wrapped(program: str, files: int, paths: Iterable[Path] = ()) -> list[str]:
         *_shown_system(),
         *("--proc", "/proc", "--dev", "/dev", *devices),
         *("--size", str(files * _MIB), "--tmpfs", TEMPORARY, "--size", str(2 * LARGEST), "--tmpfs", HANDED_IN),
-        *(word for path in paths for word in ("--ro-bind", str(path), str(path))),
         *(word for name in ("/tmp", "/run", here) for word in ("--dir", name)),  # which are empty
         *(word for name in ("/dev", package_path() / _TASKS, "/") for word in ("--remount-ro", str(name))),
         *("--chdir", here, "--"),

@@ -5,21 +5,24 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from drone_sim.files import writing
+from drone_sim.grading import evidence
 from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 
+FORMAT = "drone_sim grades"
 VERSION = 1  # of the format: another one where a key is renamed or means something else, not where one comes
 
 
-def write(plan: Plan, results: Sequence[Result], path: str | Path) -> None:
-    """Write the file. Raises OSError, in one line that names it."""
-    writing.write(path, json.dumps(content(plan, results), indent=1, allow_nan=False) + "\n")
+def write(plan: Plan, results: Sequence[Result], path: str | Path, key: bytes | None = None) -> None:
+    """Write the file, signed by a key if there is one. Raises OSError, in one line that names it."""
+    said = content(plan, results)
+    said = said if key is None else evidence.signed(said, key)
+    writing.write(path, json.dumps(said, indent=1, allow_nan=False) + "\n")
 
 
 def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
@@ -33,24 +36,25 @@ def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
             "of": one.of,
             "worst": {"seed": one.worst.seed, "points": one.worst.points},
             "failed": dict(one.failures),
+            "hashes": evidence.hashes_of(plan, one.script),
         }
         for one in by_script(results)
     ]
-    return _finite(
+    return finite(
         {
-            "format": "drone_sim grades",
+            "format": FORMAT,
             "version": VERSION,
-            "plan": {"name": plan.name, "title": plan.title},
+            "plan": {"name": plan.name, "title": plan.title, "path": str(plan.path)},
             "scripts": scripts,
-            "results": [asdict(one) for one in results],
+            "results": [one.to_json() for one in results],
         }
     )
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """Return a value as JSON can hold it."""
     if isinstance(value, Mapping):
-        return {str(key): _finite(one) for key, one in value.items()}
+        return {str(key): finite(one) for key, one in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(one) for one in value]
+        return [finite(one) for one in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

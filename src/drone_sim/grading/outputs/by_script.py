@@ -54,8 +54,8 @@ class ScriptResults:
 
     @property
     def errors(self) -> list[str]:
-        """The flights' errors, each once, with the script's name in place of its whole path."""
-        errors = (one.error for one in self.flights if one.error)
+        """What went wrong in the flights beside criteria, each once, with the script's name instead of its path."""
+        errors = (trouble for one in self.flights for trouble in one.troubles)
         return list(dict.fromkeys(one.replace(self.script, self.label) if self.script else one for one in errors))
 
 

@@ -50,7 +50,7 @@ def _overview(plan: Plan, script: ScriptResults) -> str:
     ]
     if len(script.flights) > 1:
         lines.append(f"worst: {flight_label(script.worst)}, {points(script.worst.points)} points")
-    lines += [f"{flight_label(one)}: error: {one.error}" for one in script.flights if one.error]
+    lines += [f"{flight_label(one)}: error: {trouble}" for one in script.flights for trouble in one.troubles]
     return "\n".join(lines)
 
 

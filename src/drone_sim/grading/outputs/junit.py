@@ -44,6 +44,9 @@ def _add_flight(suite: Element, group: str, result: Result) -> None:
     case = SubElement(suite, "testcase", classname=group, name=f"{flight}: flight", time=f"{result.flown:.3f}")
     if result.error:
         SubElement(case, "error", type="flight", message=_xml(result.error)).text = _xml(result.error)
+    elif result.tried:
+        said = _xml("; ".join(result.troubles))
+        SubElement(case, "failure", type="rules", message=said).text = said
     for name, outcome in named_outcomes(result):
         case = SubElement(suite, "testcase", classname=group, name=f"{flight}: {_xml(name)}", time="0.000")
         if not outcome.passed:

@@ -98,8 +98,8 @@ def _trouble(one: ScriptResults) -> str:
 def _flight_lines(result: Result, flights: int, width: int, paint: _Paint) -> list[str]:
     worst = f", the worst of {flights}" if flights > 1 else ""
     lines = [_cut(f"{by_script([result])[0].label}, {flight_label(result)}{worst}", width)]
-    if result.error:
-        wrapped = textwrap.wrap(printable(f"error: {result.error}"), width)
+    for trouble in result.troubles:
+        wrapped = textwrap.wrap(printable(f"error: {trouble}"), width)
         lines += [paint.verdict(line, False) for line in wrapped]
     named = named_outcomes(result)
     widest = min(_SCRIPT, max((len(printable(name)) for name, _ in named), default=0))

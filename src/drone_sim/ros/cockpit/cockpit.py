@@ -6,34 +6,33 @@ import logging
 import threading
 import time
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rospy
 
 from drone_sim.ros.cockpit.editor.backend import EditorBackend
+from drone_sim.ros.cockpit.editor.inspection import ScriptInspector
 from drone_sim.ros.cockpit.editor.lessons import Lessons
 from drone_sim.ros.cockpit.editor.scene_files import SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
-from drone_sim.ros.cockpit.panel.cameras import ScriptWindows
+from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows
 from drone_sim.ros.cockpit.panel.panel import Panel, SimulatorListener
-from drone_sim.ros.cockpit.scene.frames import Viewpoint
-from drone_sim.ros.cockpit.scene.handles import Selection
-from drone_sim.ros.cockpit.scene.scene_view import SceneView, Sunlight
+from drone_sim.ros.cockpit.scene.meshes import MeshStore
+from drone_sim.ros.cockpit.scene.scene_state import SceneState
+from drone_sim.ros.cockpit.scene.scene_view import SceneView
+from drone_sim.ros.cockpit.server.access_control import Content
 from drone_sim.ros.cockpit.server.page_server import PageServer
 from drone_sim.ros.cockpit.server.page_socket import PageSocket
 from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
 from drone_sim.ros.cockpit.topics import FoundTopics, find_topics
 from drone_sim.ros.core.master_watch import MasterWatch
 from drone_sim.ros.core.simulator import FAILURES, Simulator
-from drone_sim.vehicles.parameters import UNPREFIXED
 
-_WIDTH = 270  # pixels of the panel
-_HORIZON, _ZENITH = (209, 217, 224), (118, 160, 205)
 _PERIOD = 0.05  # s between two looks: 20 a second
+_TOGETHER = 0.008  # s, within which the markers of a step come after its frames
+_HOLDING = 0.1  # s between two looks at what is dragged
 _ASKING = 2.0  # s between two questions to the master
 
 
@@ -46,29 +45,24 @@ class Cockpit:
         self._topics = FoundTopics()
         self._view: SceneView | None = None
         self._listener: SimulatorListener | None = None
-        self._asked, self._has_master = 0.0, True
+        self._asked = 0.0
         self._commands = CommandPublisher()
-        self._viewpoint, self._selection = Viewpoint(), Selection()
+        self._state, self._meshes = SceneState(), MeshStore()
         held = HeldCommands(self._commands.send)
-        store, lessons = ScriptStore(scripts), Lessons()
-        editor = EditorBackend(store, lessons, self._simulator, TimelinePlayer(self._simulator.node))
-        windows = {name: partial(self._ask_windows, name) for name in ("windows", "answer", "camera")}
-        self._socket = PageSocket(held, {**editor.answers, **windows, "let go": self._let_go, "spare": self._spare})
-        self._server = server.server
-        self._server.gui.configure_theme(show_logo=False, show_share_button=False)
-        self._server.scene.set_up_direction("+z")
-        self._server.scene.set_background_image(_sky())
-        self._sun = Sunlight(self._server.scene)
-        panel = self._server.gui.main_panel
-        panel.dock_right()
-        panel.set_width(_WIDTH)
-        scenes = SceneList(scripts)
-        self._panel = Panel(
-            self._server.gui, self._simulator, self._commands, scenes, self._viewpoint, self._selection, self._socket
-        )
-        self._windows = ScriptWindows(self._simulator.node, self._panel.cameras, self._socket)
-        server.begin(self._socket.serve, lessons.picture)
-        threading.Thread(target=held.run, args=(lambda: not rospy.is_shutdown(),), daemon=True).start()
+        store, self._lessons = ScriptStore(scripts), Lessons()
+        editor = EditorBackend(store, self._lessons, self._simulator, TimelinePlayer(self._simulator.node))
+        self._server = server
+        self._inspector = ScriptInspector(self._simulator.node, store, lambda message: self._socket.tell(message))
+        answers = {**editor.answers, **self._inspector.answers}
+        takes = {"drag": self._drag, "push": self._push}
+        self._socket = PageSocket(held, answers, takes, scene=self._state.since)
+        self._panel = Panel(self._simulator, self._commands, SceneList(scripts), self._socket.tell)
+        self._cameras = CameraSwitches(self._panel.board, self._socket)
+        self._windows = ScriptWindows(self._simulator.node, self._cameras, self._socket)
+        answers.update({**self._panel.answers, **self._windows.answers})
+        server.begin(self._socket.serve, self._find)
+        for hold in (lambda: held.run(lambda: not rospy.is_shutdown()), self._hold):
+            threading.Thread(target=hold, daemon=True).start()
 
     def run(self) -> None:
         """Show what is new, again and again."""
@@ -77,95 +71,81 @@ class Cockpit:
         while not rospy.is_shutdown():
             began = time.monotonic()
             self._look(began)
-            time.sleep(max(0.0, _PERIOD - (time.monotonic() - began)))
+            self._wait(began)
         self._server.stop()
 
+    def _hold(self) -> None:
+        """Keep what browsers drag held, however long the master takes to answer meanwhile."""
+        while not rospy.is_shutdown():
+            time.sleep(_HOLDING)
+            view = self._view
+            if view is not None:
+                view.keep(self._socket.browsers)
+
+    def _wait(self, began: float) -> None:
+        """Wait for the next step of the simulation, and until its markers have come, too."""
+        rest = max(0.0, 0.8 * _PERIOD - (time.monotonic() - began))
+        time.sleep(rest)
+        if self._view is not None:
+            self._view.wait(_PERIOD)
+            time.sleep(_TOGETHER)
+
     def _look(self, now: float) -> None:
-        clients = self._server.get_clients()
+        browsers = self._socket.browsers
         if now - self._asked > _ASKING:
             self._asked = now
             self._ask_master()
-        self._panel.clear_old_message()
-        wanted = self._topics.namespace if clients else ""
+        self._inspector.look(bool(self._topics.namespace))
+        wanted = self._topics.namespace if browsers else ""
         if (self._view.namespace if self._view else "") != wanted:
             self._open(wanted)
-        if self._view is None:
-            return
-        with self._server.atomic():
-            self._view.frames.show_axes(self._panel.axes.value)
-            self._view.handles.show_all(self._panel.handles.value)
-            self._view.strength = self._panel.strength.value
-            self._sun.cast(self._panel.shadows.value)
-            self._view.show(clients.keys())
-        self._panel.offer_objects(self._view.objects.names)
-        vehicle = self._commands.vehicle
-        prefix = _frame_prefix(vehicle, is_alone=self._topics.namespace.strip("/") == vehicle)
-        self._panel.offer_viewpoints(self._viewpoint.choices(self._view.frames, prefix))
-        if not (self._view.handles.held or self._view.objects.held):  # or the eyes would run after the mouse
-            self._viewpoint.follow(clients.values(), self._view.frames, prefix)
-        for one in (self._panel.plots, self._panel.tuning):
-            one.follow(vehicle)
-            one.show()
-        self._panel.sensor.show()
-        self._panel.cameras.show()
+        if self._view is not None:
+            self._view.meet(self._topics.vehicles)
+            self._view.collect()
+            self._panel.follow(self._commands.vehicle)
+            self._panel.plots.rest()
+            self._cameras.show()
+        self._socket.show_scene()
 
     def _open(self, namespace: str) -> None:
         """Show another simulation, '' for none."""
         for one in (self._view, self._listener):
             if one is not None:
                 one.close()
-        self._view = SceneView(self._server.scene, namespace, self._sun, self._selection) if namespace else None
+        self._view = SceneView(self._state, self._meshes, namespace) if namespace else None
         self._listener = SimulatorListener(self._simulator.node, self._panel, self._socket) if namespace else None
-        self._panel.cameras.rest(not namespace)
+        self._cameras.rest(not namespace)
         self._windows.listen(bool(namespace))
         if not namespace:
-            self._panel.plots.follow("")
-            self._panel.sensor.show(listening=False)
-            self._panel.tuning.follow("")
+            self._panel.follow("")
+            self._panel.plots.rest()
 
-    def _ask_windows(self, what: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        return self._windows.answers[what](message)
+    def _find(self, path: str) -> Content:
+        return self._meshes.find(path) or self._lessons.picture(path)
 
-    def _let_go(self, _message: Mapping[str, Any]) -> Mapping[str, Any]:
-        self._selection.name = ""
-        return {}
+    def _drag(self, browser: int, message: Mapping[str, Any]) -> None:
+        if self._view is not None:
+            self._view.drag(browser, message)
 
-    def _spare(self, _message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Do without what is too much for a browser that paints without a GPU."""
-        self._panel.shadows.value = False
-        return {}
+    def _push(self, _browser: int, message: Mapping[str, Any]) -> None:
+        if self._view is not None:
+            self._view.push(message)
 
     def _ask_master(self) -> None:
         try:
             below = rospy.get_namespace()  # another simulator may fly in another one
             self._topics = find_topics([one for one in rospy.get_published_topics() if one[0].startswith(below)])
-            scene = str(self._simulator.parameter("scene_file", ""))
-            self._tell_of_master(True)
+            scene, script = (str(self._simulator.parameter(name, "")) for name in ("scene_file", "script"))
+            self._panel.board.show("master", True)
         except FAILURES:  # another master may come
-            self._topics, scene = FoundTopics(), ""
-            self._tell_of_master(False)
+            self._topics, scene, script = FoundTopics(), "", ""
+            self._panel.board.show("master", False)
         if not self._topics.namespace:
             self._panel.show_status("no simulation")
-        self._panel.offer(self._topics, scene)
-
-    def _tell_of_master(self, answers: bool) -> None:
-        if answers != self._has_master:
-            self._has_master = answers
-            self._panel.say("the ROS master is there again" if answers else "no ROS master answers: waiting for one")
-
-
-def _frame_prefix(vehicle: str, is_alone: bool) -> str:
-    """Return what the names of a vehicle's frames begin with, by the namespace of its topics, such as `a/drone`."""
-    above, slash, name = vehicle.rpartition("/")
-    return f"{above}{slash}" if is_alone and name == UNPREFIXED else f"{vehicle}/"
+        self._panel.offer(self._topics, scene, script)
+        self._cameras.offer(self._topics.cameras, self._topics.vehicles)
 
 
 def _is_not_repeated(record: logging.LogRecord) -> bool:
     """Leave out what rospy says of each single topic when there is no master: `MasterWatch` says it once."""
     return "registrations are now out of sync" not in str(record.msg)
-
-
-def _sky() -> np.ndarray:
-    """Return a column of the sky, paler towards the horizon."""
-    height = np.linspace(1.0, 0.0, 64)[:, None, None]
-    return np.asarray(_HORIZON + height * (np.array(_ZENITH) - _HORIZON), dtype=np.uint8)

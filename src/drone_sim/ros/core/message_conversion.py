@@ -73,10 +73,10 @@ def pose(matrix: Matrix) -> Pose:
 
 
 def camera_info(intrinsics: Intrinsics, frame: str) -> CameraInfo:
-    """Return the camera's model, without a stamp: an ideal pinhole."""
+    """Return the camera's model, without a stamp."""
     size = {"width": intrinsics.width, "height": intrinsics.height}
-    message = CameraInfo(header=Header(frame_id=frame), distortion_model="plumb_bob", **size)
-    message.D = [0.0] * 5
+    message = CameraInfo(header=Header(frame_id=frame), **size)
+    message.distortion_model, message.D = intrinsics.distortion
     message.K, message.P = intrinsics.K, intrinsics.P
     message.R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     return message

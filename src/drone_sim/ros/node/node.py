@@ -26,7 +26,9 @@ from drone_sim.ros.core.shutdown import Shutdown
 from drone_sim.ros.core.startup import init_node, release_name, reported
 from drone_sim.ros.core.validation import parameters_of, use_sim_time
 from drone_sim.ros.node.diagnostics import Diagnostics
+from drone_sim.ros.node.inspection import InspectionTopics
 from drone_sim.ros.node.services import Services
+from drone_sim.ros.node.signals import SignalTopic
 from drone_sim.ros.node.start_checks import check_launch_arguments, check_others
 from drone_sim.ros.node.windows import WindowTopics
 from drone_sim.ros.rviz.drawing_markers import DrawingMarkers
@@ -84,6 +86,8 @@ class Node:
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
         self._windows = WindowTopics(self.simulation, self._inbox)
+        self._signals = SignalTopic(self.simulation)
+        self._inspection = InspectionTopics(self.player, self._inbox)
         self._meshes = RvizMeshes()
         self._rviz = (  # each is made only while somebody listens to it
             VehicleHandles(self.simulation, self._inbox),
@@ -203,7 +207,7 @@ class Node:
             self._show()
 
     def _until_shown(self) -> float:
-        return self._beat.left(self.simulation.world.changes != self._shown)
+        return self._beat.left(self.simulation.world.pictures.changes != self._shown)
 
     def _is_of_a_camera(self, topic: str) -> bool:
         """Tell whether a resolved topic is that of a camera's images."""
@@ -226,23 +230,25 @@ class Node:
         self._topics.follow()
         self._time.end(at_once=True)
         self._time.tell_new_subscribers()
-        if self._topics.tell_new_subscribers() or self.simulation.world.changes != self._shown:
+        if self._topics.tell_new_subscribers() or self.simulation.world.pictures.changes != self._shown:
             self.simulation.look()
             self._show_state()
         self._show_to_eyes()
 
     def _show_state(self) -> None:
         self._topics.publish_state()
-        self._shown = self.simulation.world.changes
+        self._shown = self.simulation.world.pictures.changes
 
     def _show_to_eyes(self) -> None:
         self._topics.publish_command()
         for one in self._rviz:
             one.update()
         self._windows.update(self._time.stamp)
+        self._signals.update()
+        self._inspection.update()
         if self._parameters.gui:
             for track in [vehicle.track.matrix() for vehicle in self._first()]:
-                self.simulation.world.look_from_behind(position(track), to_euler(track)[2])
+                self.simulation.world.pictures.look_from_behind(position(track), to_euler(track)[2])
         self._beat.restart()
 
     def descriptions(self) -> Iterable[str]:

@@ -18,7 +18,7 @@ from drone_sim.ros.rviz.marker_topics import WORDS, FleetMarkers, band, beside, 
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
-from drone_sim.vehicles.commands import UNKNOWN
+from drone_sim.vehicles import situation
 from drone_sim.vehicles.vehicle import Vehicle
 
 _ABOVE_FLOOR = 0.004  # m, so that the shadow is not hidden by it
@@ -103,8 +103,7 @@ class StateText(FleetMarkers):
         simulation, state = self._simulation, vehicle.body.state
         if not simulation.running:
             return "stopped"
-        said = str(vehicle.flight_state)
-        doing = "flying" if said.startswith(UNKNOWN) else said
+        doing = situation.doing(vehicle)
         doing = f"paused, {doing}" if self._player.paused else doing
         speed = math.hypot(*state.linear_velocity)
         who = "" if vehicle.parameters.is_alone else f"{vehicle.name}  "

@@ -36,6 +36,13 @@ class MarkerServer(InteractiveMarkerServer):
             if not rospy.is_shutdown():
                 raise
 
+    def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
+        """Hear whoever comes first to a new handle: interactive_markers hears nobody in its first second."""
+        context = self.marker_contexts.get(feedback.marker_name)
+        if context is not None and not context.last_client_id:
+            context.last_client_id = feedback.client_id
+        super().processFeedback(feedback)
+
 
 def new_handle(name: str, looks: Sequence[Marker], scale: float = 0.5, arrows: bool = True) -> InteractiveMarker:
     """Return a handle that slides level when its looks are dragged; with `arrows`, of `scale` m, it rises and turns."""

@@ -107,7 +107,7 @@ class VehicleMarkers:
     def _looks(self, vehicle: Vehicle) -> list[Marker]:
         markers = []
         for visual, (link, matrix) in zip(
-            self._simulation.world.visuals([vehicle.body.number]), vehicle.body.visual_places
+            self._simulation.world.pictures.visuals([vehicle.body.number]), vehicle.body.visual_places
         ):
             for marker in markers_of(visual, matrix, self._files):
                 marker.header.frame_id = message_conversion.frame(vehicle.parameters, link)

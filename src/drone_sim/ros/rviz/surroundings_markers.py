@@ -52,7 +52,7 @@ class SurroundingsMarkers:
         self._shown = scene
         dome: Any = sky.dome().reshape(-1, 6).tolist()
         markers = [_painted("sky", _SKY, dome), _ground(self._simulation.parameters.scene.floor.size / 2)]
-        markers += [self._floor(visual) for visual in self._simulation.world.visuals() if visual.floor]
+        markers += [self._floor(visual) for visual in self._simulation.world.pictures.visuals() if visual.floor]
         self._topic.show(markers)
 
     def _floor(self, visual: Visual) -> Marker:

@@ -1,4 +1,8 @@
-"""Handles in rviz: the green target spheres, and the vehicles themselves, to be dragged with the mouse in flight."""
+"""Handles in rviz: the green target spheres, and the vehicles themselves, to be dragged with the mouse in flight.
+
+A vehicle stands still while somebody holds its handle: its propellers do not pull against the hand. Let go, it flies on
+from there, at rest.
+"""
 
 from __future__ import annotations
 
@@ -43,11 +47,14 @@ class VehicleHandles:
         self._server = MarkerServer(f"{namespace(simulation)}/markers")
         self._looks = {True: new_marker(Marker.SPHERE, (0.0, 0.8, 0.0, 0.9), [0.12] * 3), False: _ring()}
         self._shown: dict[str, _Handle] = {}
+        self._holding: set[str] = set()  # the handles whose vehicles stand still
         self._show(self._wanted())
         self._server.applyChanges()
 
     def update(self) -> None:
-        """Let the handles follow what they stand for, unless they are being dragged."""
+        """Let go of the vehicles that nobody holds any more; let the handles follow what they stand for."""
+        for name in self._holding - self._held.names():
+            self._let_go(name)
         if not self._server.watched or not self._throttle.passes():
             return
         self._show(self._wanted())
@@ -79,18 +86,36 @@ class VehicleHandles:
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
         self._held.on_feedback(feedback)
         handle = self._shown.get(feedback.marker_name)
-        if handle is None or feedback.event_type != InteractiveMarkerFeedback.POSE_UPDATE:  # it may have gone meanwhile
+        if handle is None:  # it has gone meanwhile
+            return
+        if feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN:
+            self._inbox.put(lambda: self._hold(feedback.marker_name, handle))
+        if feedback.event_type != InteractiveMarkerFeedback.POSE_UPDATE:
             return
         try:
             pose = checked_pose(feedback.header.frame_id, feedback.pose, handle.limits)
         except checks.Refused:
             return  # dragged below the floor, or to the horizon: it stays where it was
-        self._inbox.put(lambda: self._carry_out(handle, pose))
+        self._inbox.put(lambda: self._carry_out(feedback.marker_name, handle, pose))
 
-    def _carry_out(self, handle: _Handle, pose: Pose) -> None:
+    def _carry_out(self, name: str, handle: _Handle, pose: Pose) -> None:
+        self._hold(name, handle)  # after a restart it would be free
         vehicle = self._simulation.vehicles.get(handle.vehicle)  # it may have gone, or be another one, meanwhile
         if vehicle is not None:
             vehicle.target.put(pose.matrix) if handle.is_target else vehicle.body.move(pose)
+
+    def _hold(self, name: str, handle: _Handle) -> None:
+        """Let a vehicle stand still whose handle somebody still holds."""
+        vehicle = self._simulation.vehicles.get(handle.vehicle)
+        if vehicle is not None and not handle.is_target and name in self._held.names():
+            self._holding.add(name)
+            vehicle.body.hold()
+
+    def _let_go(self, name: str) -> None:
+        self._holding.discard(name)
+        vehicle = self._simulation.vehicles.get(self._shown[name].vehicle) if name in self._shown else None
+        if vehicle is not None:
+            vehicle.body.let_go()
 
 
 def _ring() -> Marker:

@@ -7,7 +7,7 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -23,7 +23,7 @@ from drone_sim.vehicles.checks import Refused
 from drone_sim.vehicles.commands import EMPTY, POSE, REQUESTS
 
 _NAME = "bag_commands"
-_NEAR = 2  # steps, by which the recorder may have heard of a command earlier or later than the simulator
+_EARLY, _LATE = 2, 20  # steps, by which the recorder may have heard of a command earlier or later than the simulator
 _LEADS_TO = {"takeoff": "taking off", "land": "landing"}  # states, which are said in the step that obeys
 _Action = dict[str, Any]
 
@@ -63,23 +63,89 @@ def _entries(bag: Bag, flight: BagFlight) -> Iterator[_Action]:
         rows = [row for row, state in states if state == _LEADS_TO.get(topic)]
         for heard in bag.read(f"{flight.namespace}/{topic}", kind):
             action, row = read(heard.message), steps.row_after(heard.at)
-            row = next((one for one in rows if abs(one - row) <= _NEAR), row)
+            near = [one for one in rows if row - _LATE <= one <= row + _EARLY]
+            row = min(near, key=lambda one: abs(one - row), default=row)
             if action is not None:
                 yield {"at": steps.time(row), **action}
 
 
+class _Heard(NamedTuple):
+    """A twist: when the recorder heard of it, as a row, and what it says."""
+
+    row: int
+    linear: tuple[float, ...]
+    angular: tuple[float, ...]
+
+    @property
+    def command(self) -> tuple[float, ...]:
+        """What is in force from it on: three velocities, and that of yaw."""
+        return *self.linear, self.angular[2]
+
+
 def _twists(messages: Iterator[RecordedMessage], steps: BagSteps) -> Iterator[_Action]:
     """Yield twists at the step that obeyed them, as far as the commands in force tell it."""
-    before: tuple[float, ...] = ()
-    for heard in messages:
-        linear, angular = xyz(heard.message.linear), xyz(heard.message.angular)
-        if _finite(*linear, *angular):
-            now, row = (*linear, angular[2]), steps.row_after(heard.at)
-            if now != before:
-                around = sorted(range(row - _NEAR, row + _NEAR + 1), key=lambda one: abs(one - row))
-                row = next((one for one in around if steps.begins(one, now)), row)
-            before = now
-            yield {"at": steps.time(row), "twist": {"linear": [*linear], "angular": [*angular]}}
+    told = [
+        _Heard(steps.row_after(one.at), xyz(one.message.linear), xyz(one.message.angular))
+        for one in messages
+        if _finite(*xyz(one.message.linear), *xyz(one.message.angular))
+    ]
+    for one, row in zip(told, _rows(told, _obeyed(told, steps))):
+        yield {"at": steps.time(row), "twist": {"linear": [*one.linear], "angular": [*one.angular]}}
+
+
+class _Match(NamedTuple):
+    """The best that can be said of the twists up to one that came into force in a row."""
+
+    row: int
+    found: int
+    off: int  # rows between when they were heard and when they came into force, summed
+    rows: tuple[Any, ...] = ()  # the last twist's number and its row, and the same of those before
+
+
+def _obeyed(told: Sequence[_Heard], steps: BagSteps) -> dict[int, int]:
+    """Return the row in which each twist came into force that did, by its number, one after the other in their order.
+
+    As many as can be; of several ways that in which the recorder was least off. One that gave way to another within
+    the same step never came into force, and one that says what the last one said changed nothing.
+    """
+    best = [_Match(-1, 0, 0)]  # by rows, each better than those before
+    for number, one in enumerate(told):
+        if number and one.command == told[number - 1].command:
+            continue
+        found = []
+        for row in range(one.row - _LATE, one.row + _EARLY + 1):
+            before = [match for match in best if match.row < row]
+            if before and steps.begins(row, one.command):
+                last = before[-1]
+                found.append(_Match(row, last.found + 1, last.off + abs(one.row - row), (number, row, last.rows)))
+        best = _better(sorted([*best, *found]))
+    obeyed, rows = {}, best[-1].rows
+    while rows:
+        number, row, rows = rows
+        obeyed[number] = row
+    return obeyed
+
+
+def _better(matches: Sequence[_Match]) -> list[_Match]:
+    """Return those, by rows, than which no earlier one is as good."""
+    kept: list[_Match] = []
+    for one in matches:
+        if not kept or (one.found, -one.off) > (kept[-1].found, -kept[-1].off):
+            kept = [*(other for other in kept[-2 * _LATE :] if other.row < one.row), one]
+    return kept
+
+
+def _rows(told: Sequence[_Heard], obeyed: dict[int, int]) -> Iterator[int]:
+    """Yield the row of each twist: those of others as late as the last one before that is known, in order."""
+    late = last = 0
+    following = sorted(obeyed.items())
+    for number, one in enumerate(told):
+        if number in obeyed:
+            last, late = obeyed[number], one.row - obeyed[number]
+            following.pop(0)
+            yield last
+        else:
+            yield min([max(one.row - late, last), *(row for _, row in following[:1])])
 
 
 # ---- messages as actions of a timeline; None for one that the simulator refused

@@ -8,10 +8,11 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-UP, DOWN, LEFT, RIGHT, BACKSPACE, ESCAPE, UNKNOWN = "up", "down", "left", "right", "backspace", "escape", "unknown"
+UP, DOWN, LEFT, RIGHT, ENTER, BACKSPACE = "up", "down", "left", "right", "enter", "backspace"
+ESCAPE, UNKNOWN = "escape", "unknown"
 KEY_PATIENCE = 0.5  # s, for what may follow an ESC; a slow line sends a sequence in pieces
 
 # ECMA-48: ESC [ parameters final, or ESC O final. The Linux console adds ESC [ [ final, and Alt an ESC before a key.
@@ -20,9 +21,10 @@ _BEGINNING = re.compile(rb"\x1b+(?:\[\[?|\[[0-?]*[ -/]*|O[0-9;]*)?")
 _ARROW = re.compile(rb"\x1b+[\[O][0-9;]*([ABCD])")
 _ARROWS = {b"A": UP, b"B": DOWN, b"C": RIGHT, b"D": LEFT}
 _CHARACTER = re.compile(rb"[\xc0-\xff][\x80-\xbf]*|.", re.DOTALL)  # UTF-8
-_PLAIN = {b"\x7f": BACKSPACE, b"\x08": BACKSPACE}
+_PLAIN = {b"\x7f": BACKSPACE, b"\x08": BACKSPACE, b"\r": ENTER, b"\n": ENTER}
 _STEP = 0.1  # m/s, per key press
 _TURN_STEP = 0.2  # rad/s, per key press
+_FAST = 2.5  # times, of a capital letter
 _PATIENCE = 0.5  # s, until what was sent should be in force
 
 
@@ -75,13 +77,18 @@ class Command(NamedTuple):
     vz: float = 0.0
     wz: float = 0.0
 
-    def after(self, key: str) -> Command | None:
-        """Return the command after a key press, or None for a key that commands nothing."""
+    def after(self, key: str, keys: Mapping[str, Command]) -> Command | None:
+        """Return the command after a key press of a map, or None for a key that commands nothing.
+
+        A capital letter, as with Shift, changes it by more.
+        """
         if key == " ":
             return Command()
-        if key not in _KEYS:
+        change = keys.get(key) or keys.get(key.lower())
+        if change is None:
             return None
-        return Command(*(old + change for old, change in zip(self, _KEYS[key]))).rounded()
+        times = 1.0 if key in keys else _FAST
+        return Command(*(old + times * more for old, more in zip(self, change))).rounded()
 
     def rounded(self) -> Command:
         """Return it without the last digits, that sums of steps have wrong."""
@@ -92,15 +99,33 @@ class Command(NamedTuple):
         return "vx {:+.2f}  vy {:+.2f}  vz {:+.2f} m/s   wz {:+.2f} rad/s".format(*self)
 
 
-_KEYS = {
-    UP: (_STEP, 0, 0, 0),
-    DOWN: (-_STEP, 0, 0, 0),
-    LEFT: (0, _STEP, 0, 0),
-    RIGHT: (0, -_STEP, 0, 0),
-    "u": (0, 0, _STEP, 0),
-    "d": (0, 0, -_STEP, 0),
-    "e": (0, 0, 0, _TURN_STEP),
-    "r": (0, 0, 0, -_TURN_STEP),
+_ARROW_KEYS = {
+    UP: Command(vx=_STEP),
+    DOWN: Command(vx=-_STEP),
+    LEFT: Command(vy=_STEP),
+    RIGHT: Command(vy=-_STEP),
+}
+# What each key changes, by the name of the map: the cockpit's keys, and those of demo_teleop, the course's own node,
+# with two more for the height. web/src/teleop.js has the first map once more.
+KEY_MAPS: Mapping[str, Mapping[str, Command]] = {
+    "cockpit": {
+        **_ARROW_KEYS,
+        "w": _ARROW_KEYS[UP],
+        "s": _ARROW_KEYS[DOWN],
+        "a": _ARROW_KEYS[LEFT],
+        "d": _ARROW_KEYS[RIGHT],
+        "q": Command(wz=_TURN_STEP),
+        "e": Command(wz=-_TURN_STEP),
+        "r": Command(vz=_STEP),
+        "f": Command(vz=-_STEP),
+    },
+    "course": {
+        **_ARROW_KEYS,
+        "e": Command(wz=_TURN_STEP),
+        "r": Command(wz=-_TURN_STEP),
+        "u": Command(vz=_STEP),
+        "d": Command(vz=-_STEP),
+    },
 }
 
 

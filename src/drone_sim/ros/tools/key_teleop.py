@@ -1,6 +1,7 @@
-"""Fly from the keyboard: the keys of the tutorial's teleop node, and height, the simulation's toolbar, a read-out.
+"""Fly from the keyboard: the cockpit's keys, or those of the course's own node, the simulation's toolbar, a read-out.
 
-A command holds until the next key, as on the topic. Leaving in any way sends a stop.
+A command holds until the next key, as on the topic. A key that means nothing stops the drone, and so does leaving in
+any way.
 """
 
 from __future__ import annotations
@@ -23,18 +24,34 @@ from drone_sim.ros.tools.teleop import Teleop
 _NAME = "key_teleop"
 _PERIOD = 0.1  # s between read-outs
 _CONNECTING = 1.0  # s at most, before the first key counts
-_LEAVE = (ESCAPE, "q")
 # Ctrl-C, Ctrl-\ and Ctrl-Z among them: a command would hold while nobody is at the keys.
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 _INPUT_FLAGS = 0  # where they stand in what termios tells
 
-HELP = (
-    "UP / DOWN     forward / backward      s          start / stop the simulation",
-    "LEFT / RIGHT  left / right            p          pause / resume",
-    "e / r         turn left / right       backspace  restart",
-    "u / d         up / down               t / l / x  take off / land / reset the drone",
-    "space         stop the drone          q, ESC     stop the drone and leave",
+_TOOLBAR = (
+    "Enter      start / stop the simulation",
+    "p          pause / resume",
+    "backspace  restart",
+    "t / l / x  take off / land / reset the drone",
+    "ESC        stop the drone and leave",
 )
+_FLYING = {
+    "cockpit": (
+        "W S, or UP DOWN     forward, back",
+        "A D, or LEFT RIGHT  left, right",
+        "Q E                 turn left, right",
+        "R F                 up, down; Shift: larger steps",
+        "space, any other    stop the drone",
+    ),
+    "course": (
+        "UP DOWN             forward, back",
+        "LEFT RIGHT          left, right",
+        "e r                 turn left, right",
+        "u d                 up, down; Shift: larger steps",
+        "space, any other    stop the drone",
+    ),
+}
+HELP = {name: [f"{one:<52}{other}" for one, other in zip(keys, _TOOLBAR)] for name, keys in _FLYING.items()}
 
 
 class Screen:
@@ -46,6 +63,7 @@ class Screen:
         self._decoder = KeyDecoder()
         self._terminal = sys.stdin.fileno()
         self._unknown = False  # whether the last key was
+        self._help = HELP[teleop.map]
 
     def run(self, screen: Any) -> None:
         """Run in a curses screen."""
@@ -59,7 +77,7 @@ class Screen:
         while not self._over():
             self._draw()
             for key in self._read():
-                if key in _LEAVE:
+                if key == ESCAPE:
                     return
                 self._unknown = not self._teleop.press(key)
 
@@ -88,15 +106,16 @@ class Screen:
             curses.resizeterm(size.lines, size.columns)
         height, width = self._screen.getmaxyx()
         lines = self._teleop.lines()
-        room = height > len(HELP) + len(lines)
+        room = height > len(self._help) + len(lines)
         if self._unknown:
-            lines[-1] = "no such key; the keys are above" if room else "no such key; a larger window shows the keys"
+            where = "the keys are above" if room else "a larger window shows the keys"
+            lines[-1] = f"no such key: the drone is stopped; {where}"
         if not room:
             lines = [line for line in (lines[-1], *lines[:-1]) if line]  # what there is to say comes first
         self._screen.erase()
         if room:
-            self._write(0, list(HELP), width, curses.A_BOLD if self._unknown else curses.A_NORMAL)
-        self._write(len(HELP) + 1 if room else 0, lines[:height], width, curses.A_NORMAL)
+            self._write(0, self._help, width, curses.A_BOLD if self._unknown else curses.A_NORMAL)
+        self._write(len(self._help) + 1 if room else 0, lines[:height], width, curses.A_NORMAL)
         self._screen.refresh()
 
     def _write(self, first: int, lines: list[str], width: int, look: int) -> None:
@@ -125,7 +144,7 @@ def _fly(over: Callable[[], bool]) -> None:
 
 
 def main() -> int:
-    """Run the node until ESC, q, a signal, or the terminal closes; return its exit status."""
+    """Run the node until ESC, a signal, or the terminal closes; return its exit status."""
     if not sys.stdin.isatty() or not sys.stdout.isatty():
         print(f"{_NAME}: needs a terminal to read keys from", file=sys.stderr)
         return 1

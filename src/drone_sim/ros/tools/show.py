@@ -31,6 +31,7 @@ from drone_sim.ros.core.startup import ask_master, from_shell
 _NAME = "show"
 INSTEAD = "`roslaunch drone_sim drone.launch web:=true` shows the simulation in a browser"
 _RVIZ = "rviz"  # which need not be there: Debian testing has none
+_PATHS = "ROS_PACKAGE_PATH"
 _PATIENCE = 5.0  # s, for the frame that rviz follows
 _TOPIC = "/view/state"  # that the simulator advertises for rviz: the last one
 _ALONE, _FIRST, _SIMULATOR = "drone", "drone1", "drone_sim"  # as the files of the package name them
@@ -63,7 +64,16 @@ def _show(rviz: str, options: argparse.Namespace, remappings: Sequence[str]) -> 
         raise OSError(f"--config {config}: no such file")
     simulator = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), options.simulator)
     config = config or str(_fitting(simulator.strip("/")))
-    os.execv(rviz, [rviz, "-d", config, *remappings])
+    os.execve(rviz, [rviz, "-d", config, *remappings], with_media_export(os.environ))
+
+
+def with_media_export(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment in which rviz finds the package media_export, the installed one before ours.
+
+    It holds nothing, but without it, as on Debian, rviz begins with an error.
+    """
+    paths = filter(None, [environment.get(_PATHS), str(package_path() / "rviz" / "packages")])
+    return {**environment, _PATHS: os.pathsep.join(paths)}
 
 
 def _fitting(simulator: str) -> Path:

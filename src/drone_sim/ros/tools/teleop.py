@@ -13,24 +13,30 @@ from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Empty, String
 
+from drone_sim.config.types import ParameterError
+from drone_sim.message_text import shown
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.simulator import Simulator
-from drone_sim.ros.tools.commands import BACKSPACE, Command, CommandInForce
+from drone_sim.ros.tools.commands import BACKSPACE, ENTER, KEY_MAPS, Command, CommandInForce
 
 _SILENCE = 1.0  # s of real time; a simulator says something in every step, and while it stands, too
 _REQUESTS = {"t": "takeoff", "l": "land", "x": "reset"}  # topics, by key
-_STANDING = {"stopped": ", in vain: s starts the simulation", "paused": ": done once p resumes the simulation"}
+_STANDING = {"stopped": ", in vain: Enter starts the simulation", "paused": ": done once p resumes the simulation"}
 _FAREWELL = 0.2  # s; a message leaves in rospy's own time, and a node that is gone delivers nothing
 
 
 class Teleop:
     """Commands one drone, and starts, stops and pauses its simulation.
 
-    The private parameters `drone` and `simulator` name the drone's namespace and the simulator's node.
+    The private parameters `drone` and `simulator` name the drone's namespace and the simulator's node, `keys` one of
+    KEY_MAPS.
     """
 
     def __init__(self) -> None:
-        """Advertise and subscribe; init_node must have been called."""
+        """Advertise and subscribe; init_node must have been called. Raises ParameterError."""
+        self.map: str = rospy.get_param("~keys", "cockpit")
+        if self.map not in KEY_MAPS:
+            raise ParameterError(f"must be {' or '.join(KEY_MAPS)}", ("keys",), shown(self.map))
         self.drone = drone = rospy.get_param("~drone", "drone")  # its namespace
         self._simulator = Simulator(rospy.get_param("~simulator", "drone_sim"))
         self.said = ""  # one line for the user
@@ -72,9 +78,9 @@ class Teleop:
         return self._publisher.get_num_connections() > 0
 
     def press(self, key: str) -> bool:
-        """Do what a key means; return False for one that means nothing."""
+        """Do what a key means; one that means nothing stops the drone, as in the course's own node: return False."""
         self.said = ""
-        if key == "s":
+        if key == ENTER:
             self._call("start" if self._node_state == "stopped" else "stop")
         elif key == "p":
             self._call("pause", self._node_state != "paused")
@@ -83,10 +89,9 @@ class Teleop:
         elif key in _REQUESTS:
             self.ask_for(_REQUESTS[key])
         else:
-            command = self._in_force.next.after(key)
-            if command is None:
-                return False
-            self.send(command)
+            command = self._in_force.next.after(key, KEY_MAPS[self.map])
+            self.send(command or Command())
+            return command is not None
         return True
 
     def ask_for(self, name: str) -> bool:

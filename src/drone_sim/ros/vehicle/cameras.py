@@ -17,6 +17,7 @@ from std_msgs.msg import Header
 from drone_sim.config.fields import ParameterField
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
+from drone_sim.ros.vehicle.camera_truth import TruthOutput
 from drone_sim.ros.vehicle.tuning_server import described
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.camera_parameters import CameraParameters
@@ -48,6 +49,7 @@ class CameraOutput:
         self._image = rospy.Publisher(topic, Image, subscriber_listener=new_subscribers, queue_size=1)
         self._compressed = CompressedPublisher(topic, new_subscribers) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
+        self._truth = TruthOutput(topic, self._frame, new_subscribers) if parameters.truth else None
         self.follow(camera)
 
     def follow(self, camera: Camera) -> None:
@@ -65,6 +67,8 @@ class CameraOutput:
         for publisher in (self._image, self._compressed, self._info_publisher):
             if publisher is not None:
                 publisher.unregister()
+        if self._truth is not None:
+            self._truth.close()
 
     def _watched(self) -> bool:
         compressed = self._compressed
@@ -77,6 +81,8 @@ class CameraOutput:
         Over a link both come together, or neither; of a silent camera nothing comes.
         """
         camera = self._camera
+        if self._truth is not None:
+            self._truth.publish(camera, stamp)
         is_there = camera.image is not None or (not camera.is_linked and camera.failure != "silent")
         if is_there and self._info_publisher.get_num_connections():
             if self._intrinsics is not camera.intrinsics:

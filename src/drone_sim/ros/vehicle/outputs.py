@@ -8,7 +8,7 @@ import rospy
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float32MultiArray, String
+from std_msgs.msg import Bool, Float32MultiArray, String
 
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.message_conversion import BASE_LINK, TRACK_BASE, fill, frame, message_class
@@ -16,9 +16,11 @@ from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.run.pacing import Throttle
 from drone_sim.sensors.sensor import Instrument, SensorParameters
 from drone_sim.vehicles.parameters import VehicleParameters
+from drone_sim.vehicles.situation import doing, hears_commands
 from drone_sim.vehicles.vehicle import Vehicle
 
 _EYES = 1 / 30  # s of real time, between two messages that are for eyes
+_LOOK = 0.2  # s of real time, between two looks at what the body touches
 _READINGS_QUEUE = 100  # messages: half a second at 200 Hz, which come ten at a time
 
 
@@ -37,12 +39,15 @@ class VehicleOutputs:
         self._propellers = rospy.Publisher(f"{name}/propellers", Float32MultiArray, queue_size=10)
         self._joints = rospy.Publisher(f"{name}/joint_states", JointState, queue_size=10)
         self._flight_state = rospy.Publisher(f"{name}/state", String, queue_size=10, latch=True)
-        self._published_state = ""
-        self._eyes = Throttle(_EYES)
+        self._hears = rospy.Publisher(f"{name}/hears_commands", Bool, queue_size=10, latch=True)
+        self._said = ""  # the script's own state
+        self._published: tuple[str, bool] = ("", False)
+        self._eyes, self._looks = Throttle(_EYES), Throttle(_LOOK)
 
     def close(self) -> None:
         """Advertise no more."""
-        for publisher in (self._odometry, self._command, self._propellers, self._joints, self._flight_state):
+        state = self._odometry, self._command, self._propellers, self._joints, self._flight_state, self._hears
+        for publisher in state:
             publisher.unregister()
 
     def publish_state(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
@@ -52,10 +57,18 @@ class VehicleOutputs:
         if self._propellers.get_num_connections():
             stamp()  # /clock before the message
             self._propellers.publish(message_conversion.propellers(vehicle.propulsion.particle_velocities))
-        state = str(vehicle.flight_state)
-        if state != self._published_state:
-            self._published_state = state
+        said = str(vehicle.flight_state)
+        if said != self._said or self._looks.passes():
+            self._said = said
+            self._tell(doing(vehicle), hears_commands(vehicle))
+
+    def _tell(self, state: str, hears: bool) -> None:
+        """Publish what the vehicle does, and whether its script listens to commands, where that is news."""
+        before, self._published = self._published, (state, hears)
+        if state != before[0]:
             self._flight_state.publish(state)
+        if hears != before[1] or not before[0]:
+            self._hears.publish(hears)
 
     def publish_joints(self, vehicle: Vehicle, stamp: Callable[[], rospy.Time]) -> None:
         """Publish the blades' angles, as often as eyes need them."""

@@ -82,19 +82,22 @@ class FleetTopics:
         self._stamp = stamp
         self._topics: dict[str, VehicleTopics] = {}
         self._transforms = Transforms()
-        self._era = self._tunings = -1
+        self._era = -1
+        self._tuned: tuple[int, int, bool] | None = None
         self.descriptions: tuple[str, ...] = ()  # names of the parameters that hold the URDFs; any thread may read it
         self.follow()
 
     def follow(self) -> None:
         """Advertise for vehicles that have come, and no more for those that have gone; say what has been tuned."""
         simulation = self._simulation
+        context = simulation.context
+        tuned = context.tunings, context.scripts.asked, simulation.steps > 0  # after a step it is known what is read
         if self._era != simulation.era:
             self._follow_vehicles()
-        elif self._tunings != simulation.context.tunings:
+        elif self._tuned != tuned:
             for topics in self._topics.values():
                 topics.show_tuning()
-        self._tunings = simulation.context.tunings
+        self._tuned = tuned
 
     def _follow_vehicles(self) -> None:
         self._era = self._simulation.era

@@ -12,6 +12,7 @@ from drone_sim.run.player import Player
 from drone_sim.scripting import load
 from drone_sim.sensors.sensor import Contact
 from drone_sim.vehicles.commands import CRASHED, LANDED
+from drone_sim.vehicles.situation import FLYING, HELD, UPSIDE_DOWN, doing, hears_commands, situation, tilt
 from drone_sim.vehicles.vehicle import Vehicle
 
 COMMAND = "cmd_vel"
@@ -20,6 +21,7 @@ _LEANING = math.radians(60)  # no flight of the tutorial's needs half as much
 _SHARE = 0.5  # of the steps with a propeller at its limit, after which it is a problem
 _SLOW = 0.1  # of the speed that is commanded
 _MOVES = 0.1  # m/s, of a command that means to
+_DEAF = "this script does not listen to commands: the tutorial's do from stage 6 on, and `pilot` does"
 
 
 class VehicleDiagnosis:
@@ -33,7 +35,8 @@ class VehicleDiagnosis:
         self._frames_below = frames_below
         self._vehicle, self._player, self._log, self._since = vehicle, player, log, since
         self._now = log.clock()
-        self._tilt = tilt(vehicle)
+        self._tilt = tilt(vehicle.body)
+        self._doing = doing(vehicle)
         self._contacts = vehicle.body.contacts()
 
     def finding(self) -> Finding:
@@ -43,6 +46,7 @@ class VehicleDiagnosis:
             *self._rests(),
             *self._refuses(),
             *self._leans(),
+            *self._lies(),
             *self._cannot(),
             *self._is_on_its_own(),
         ]
@@ -84,6 +88,14 @@ class VehicleDiagnosis:
         how = "lies on its back" if self._tilt > math.pi / 2 and self._contacts else "leans"
         return [Problem(WARN, f"{how} ({math.degrees(self._tilt):.0f} degrees): `restart` puts it upright")]
 
+    def _lies(self) -> list[Problem]:
+        """Tell that it lies, slides or hangs somewhere, where its script has not said so itself."""
+        said = self._doing
+        if not self._player.playing or said in (FLYING, HELD, UPSIDE_DOWN) or said != situation(self._vehicle.body):
+            return []
+        is_touched = said.startswith("touches")
+        return [Problem(WARN, said if is_touched else f"{said}: nothing carries it; `restart` begins anew")]
+
     def _cannot(self) -> list[Problem]:
         problems = []
         since, command = self._since, self._vehicle.commands.now
@@ -100,8 +112,8 @@ class VehicleDiagnosis:
         vehicle, taken = self._vehicle, self._log.taken.get(COMMAND)
         if taken is None or not self._player.playing or str(vehicle.flight_state) in (LANDED, CRASHED):
             return []
-        if not any(bus.hears(COMMAND) for bus in vehicle.commands.buses):
-            return [Problem(WARN, f"commands come in, but the child script does not subscribe to {COMMAND}")]
+        if not hears_commands(vehicle):
+            return [Problem(WARN, _DEAF)]
         gone = taken.sender not in self._log.senders()
         if gone and vehicle.commands.now != Twist() and not vehicle.parameters.cmd_vel_timeout:
             said = f"flies on by the last command of {taken.sender}, which has gone"
@@ -115,8 +127,10 @@ class VehicleDiagnosis:
         state = self._player.state
         if not self._player.playing:
             return state
+        if self._doing != FLYING:
+            return self._doing
         if taken is None:
-            return f"{state}; no command has come yet"
+            return f"{state}; no command has come yet" if hears_commands(self._vehicle) else f"{state}; {_DEAF}"
         return f"{state} as {taken.sender} commands"
 
     def _values(self) -> dict[str, str]:
@@ -126,6 +140,8 @@ class VehicleDiagnosis:
         return {
             "state": self._player.state,
             "flight state": str(vehicle.flight_state),
+            "does": self._doing,
+            "listens to commands": "yes" if hears_commands(vehicle) else "no",
             "command": _shown(vehicle.commands.now),
             "command came": self._ago(taken.at) if taken else "never",
             "command sender": taken.sender if taken else "nobody",
@@ -155,11 +171,6 @@ class VehicleDiagnosis:
     def _clipped(self) -> str:
         since = self._since
         return f"{since.clipped[self._vehicle.name]} of the last {since.steps} steps" if since else "not known"
-
-
-def tilt(vehicle: Vehicle) -> float:
-    """Return the angle (rad) between a vehicle's z axis and the vertical."""
-    return math.acos(max(-1.0, min(1.0, vehicle.body.matrix[10])))
 
 
 def _names(contacts: list[Contact]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drone_sim.scene.kinds.curved_path import CurvedPathParameters
 from drone_sim.scene.kinds.dummy import DummyParameters
 from drone_sim.scene.kinds.force_sensor import ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
@@ -16,6 +17,7 @@ KINDS = (
     ProximitySensorParameters,
     VisionSensorParameters,
     PathParameters,
+    CurvedPathParameters,
     ForceSensorParameters,
     ScriptParameters,
 )

@@ -145,6 +145,8 @@ def mistake(error: BaseException, apis: Iterable[Api]) -> str | None:
     """
     if not isinstance(error, _MISTAKES):
         return None
+    if (line := getattr(error, "explained", None)) is not None:  # where the function was called, in another process
+        return str(line)
     functions = [(f"{contents(api)[0]}.{known}", one) for api in apis for known, one in contents(api)[1].items()]
     by_code = {one.__code__: (name, one) for name, one in reversed(functions)}
     for frame, _ in traceback.walk_tb(error.__traceback__):

@@ -69,6 +69,10 @@ modelproperty not_collidable=1 not_measurable not_renderable=4 not_detectable=8 
     not_model=0xf000
 # parts of a colour
 colorcomponent ambient ambient_diffuse=0 diffuse specular emission transparency auxiliary
+# what the mouse does
+navigation passive camerashift camerarotate camerazoom cameratilt cameraangle camerafly objectshift objectrotate
+    createpathpoint=0x100 clickselection=0x200 ctrlselection=0x400 shiftselection=0x800 camerazoomwheel=0x1000
+    camerarotaterightbutton=0x2000 camerarotatemiddlebutton=0x2000
 # how things are drawn
 displayattribute renderpass=1 depthpass pickpass=4 selected=8 mainselection=0x20 forcewireframe=0x40
     forbidwireframe=0x80 forbidedges=0x100 originalcolors=0x200 ignorelayer=0x400 forvisionsensor=0x800
@@ -132,6 +136,9 @@ arrayparam gravity fog fog_color background_color1 background_color2 ambient_lig
 # how degrees of freedom of a trajectory go together, and what 3.x calls the distance of two poses
 ruckig phasesync timesync nosync=3 minvel=0x100 minaccel=0x200
 rml phase_sync_if_possible only_time_sync only_phase_sync no_sync
+pathproperty show_line=1 show_orientation closed_path=4 automatic_orientation=8 invert_velocity=16
+    infinite_acceleration=0x20 flat_path=0x40 show_position=0x80 auto_velocity_profile_translation=0x100
+    auto_velocity_profile_rotation=0x200 endpoints_at_zero=0x400 keep_x_up=0x800
 distcalcmethod dl dac max_dl_dac dl_and_dac sqrt_dl2_and_dac2 dl_if_nonzero dac_if_nonzero
 # what a buffer holds
 buffer uint8 int8 uint16 int16 uint32 int32 float double uint8rgb uint8bgr uint8rgba uint8argb base64 split

@@ -13,7 +13,7 @@ from drone_sim.message_text import near_names
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.script_values import MOST_BYTES, refuse_if_too_large
-from drone_sim.scripting.api.types import Handle, Name, WrongValue
+from drone_sim.scripting.api.types import Handle, Name, WrongValue, written
 
 _MOST = 10_000  # values of all objects
 _LONGEST_NAME = 200  # characters
@@ -77,7 +77,8 @@ class CustomDataFunctions:
 
     @sim("345", writeCustomBufferData="5", writeCustomStringData="5")
     def writeCustomDataBlock(self, handle: Handle, tag: Name, data: Any) -> None:
-        """Leave a string under a tag on an object, or on sim.handle_scene; '' forgets it."""
+        """Leave a string, or a number written out, under a tag on an object, or sim.handle_scene; '' forgets it."""
+        data = written(data)
         if not isinstance(data, (str, bytes, type(None))):
             raise WrongValue("a string is expected")
         self._data.set(self._target(handle), _CUSTOM + tag, data)

@@ -128,7 +128,7 @@ class Dynamics(Functions):
         tensor = list(map(float, turned(inertia, place).ravel()))
         return self.getShapeMass(handle), tensor, list(frames.position(place))
 
-    @sim("")
+    @sim("45")
     def getShapeInertia(self, handle: Handle) -> tuple[Numbers, TwelveNumbers]:
         """Return the inertia of a shape about its centre of mass (kg m², 9 numbers), and in which frame that is (4.x).
 

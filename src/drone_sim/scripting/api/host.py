@@ -19,11 +19,14 @@ from drone_sim.scripting.api.control import Control, Turns
 from drone_sim.scripting.api.custom_data import CustomData
 from drone_sim.scripting.api.distances import MeasureWay
 from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.graphs import Graphs
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.registry import Scripts
+from drone_sim.scripting.api.remote_ports import RemotePorts
 from drone_sim.scripting.api.signals import Signals, Tubes
 from drone_sim.scripting.api.types import WrongValue
 from drone_sim.scripting.api.windows import Windows
+from drone_sim.scripting.breakpoints import Breakpoints
 
 _Kind = TypeVar("_Kind")
 _MOST_NAMES = 20  # in a message
@@ -49,16 +52,19 @@ class ScriptContext:
     velocities: VelocityMeter  # of the objects
     scripts: Scripts = field(default_factory=Scripts)
     signals: Signals = field(default_factory=Signals)
+    graphs: Graphs = field(default_factory=Graphs)
     control: Control = field(default_factory=Control)
     data: CustomData = field(default_factory=CustomData)
     tubes: Tubes = field(default_factory=Tubes)
     collections: Collections = field(default_factory=Collections)
     broadcasts: Broadcasts = field(default_factory=Broadcasts)
+    breakpoints: Breakpoints = field(default_factory=Breakpoints)  # which last longer than a run
+    remote_ports: RemotePorts = field(default_factory=RemotePorts)
 
     def clear(self) -> None:
         """Leave nothing there, as before a run; whoever holds one of them may go on to do so."""
         parts = self.objects, self.velocities, self.scripts, self.signals, self.control, self.data, self.tubes
-        for one in (*parts, self.collections, self.broadcasts):
+        for one in (*parts, self.graphs, self.collections, self.broadcasts, self.remote_ports):
             one.clear()
 
 
@@ -143,6 +149,9 @@ class Operations(Protocol):
 
     def box(self, handle: int) -> tuple[Vector, Vector]:
         """Return size and centre (m) of the box around a shape, along its own axes."""
+
+    def forms(self, handle: int) -> list[tuple[str, tuple[float, ...]]]:
+        """Return of which forms an object is, each with its size, as a scene file says; none for no shape of it."""
 
     def group(self, handles: Sequence[int]) -> int:
         """Make one rigid shape of several; return its handle."""

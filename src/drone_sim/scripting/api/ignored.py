@@ -31,11 +31,9 @@ _TABLE = {
             345 setShapeTexture setLightParameters getShapeTextureId=-1
             5 setObjectColor getObjectColor=(0,[0.0,0.0,0.0])
         """,
-        "there are no graphs; rqt_plot and rosrun drone_sim fly draw them": """
-            45 setGraphStreamValue setGraphStreamTransformation destroyGraphCurve addGraphStream=handle
-                addGraphCurve=handle
-            - addGraphDataStream=handle
-            345 setGraphUserData handleGraph resetGraph
+        "the cockpit draws the streams of graphs as they are": """
+            45 setGraphStreamTransformation addGraphCurve=handle
+            345 handleGraph
         """,
         "there are no user interfaces of V-REP 3.x": """
             3 setUIButtonLabel setUIButtonColor setUIButtonProperty setUIProperty setUISlider setUIPosition removeUI
@@ -58,7 +56,8 @@ _TABLE = {
                 launchThreadedChildScripts handleSimulationStart handleSensingStart handleMechanism handleCollision
                 handleDistance handleMill resetCollision resetDistance resetMill resetMilling handleChildScripts=0
                 handleDynamics=0 getRealTimeSimulation=1 getScriptAttribute=0 handleCustomizationScripts=0
-                handleAddOnScripts=0 handleSandboxScript=0 openModule=0 handleModule=0 closeModule=0
+                handleAddOnScripts=0 handleEmbeddedScripts=0 handleSimulationScripts=0 handleJointMotion=0
+                handleSandboxScript=0 openModule=0 handleModule=0 closeModule=0
             3 handleVarious handleJoint handlePath handleChildScript=0 handleSensingChildScripts=0
             - adjustRealTimeTimer handleIkGroup isRealTimeSimulationStepNeeded=1
         """,
@@ -73,9 +72,6 @@ _TABLE = {
             345 setVisionSensorCharImage setVisionSensorImage resetVisionSensor
             5 setVisionSensorImg
         """,
-        "the legacy remote API is not served; remote_api:=true serves the ZeroMQ one": """
-            3 extRemoteApiStart
-        """,
     },
     "simUI": {
         "there are no windows of scripts; rqt and rviz have what one needs": """
@@ -88,11 +84,6 @@ _TABLE = {
                 setItemEditable clearTable create=handle getPosition=(0,0) getSize=(0,0) getSliderValue=0
                 getSpinboxValue=0 getCheckboxValue=0 getRadiobuttonValue=0 getComboboxSelectedIndex=0 getEditValue=''
                 getCurrentTab=0 getCurrentEditWidget='' getTitle='' isVisible=False fileDialog=[] msgBox=0
-        """,
-    },
-    "simRemoteApi": {
-        "the legacy remote API is not served; remote_api:=true serves the ZeroMQ one": """
-            45 start stop reset status=-1
         """,
     },
 }

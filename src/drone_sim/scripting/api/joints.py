@@ -14,6 +14,7 @@ from drone_sim.mechanics.frames import IDENTITY
 from drone_sim.mechanics.joint import FORCE, KINEMATIC, PRISMATIC, REVOLUTE, SPHERICAL, Joint
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.host import Functions
+from drone_sim.scripting.api.matrices import to_pose
 from drone_sim.scripting.api.types import Handle, Number, Numbers, TwelveNumbers, WrongValue, numbers
 
 _TYPES = {REVOLUTE: 10, PRISMATIC: 11, SPHERICAL: 12}  # sim.joint_revolute_subtype and so on
@@ -52,6 +53,12 @@ class JointFunctions(Functions):
     def getJointMatrix(self, handle: Handle) -> list[float]:
         """Return the transform between a joint's own frame and what hangs on it."""
         return list(self._joint(handle).motion_matrix())
+
+    @sim("5")
+    def getObjectChildPose(self, handle: Handle) -> list[float]:
+        """Return the pose that a joint gives to what hangs on it, in its own frame; of another object none."""
+        found = self._objects[handle]
+        return to_pose(found.motion_matrix() if isinstance(found, Joint) else IDENTITY)
 
     @sim("345")
     def setSphericalJointMatrix(self, handle: Handle, matrix: TwelveNumbers) -> None:
@@ -129,7 +136,7 @@ class JointFunctions(Functions):
         if not self._is_propellers(handle, "setJointTargetVelocity"):
             self._moving(handle).change(velocity=value)
 
-    @sim("345")
+    @sim("345", jointGetForce="3")
     def getJointForce(self, handle: Handle) -> float:
         """Return what a joint's motor gave in the last sub-step."""
         drive = self._joint(handle).drive

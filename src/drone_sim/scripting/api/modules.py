@@ -16,6 +16,7 @@ from drone_sim.scripting.api.custom_data import CustomDataFunctions
 from drone_sim.scripting.api.distances import DistanceFunctions
 from drone_sim.scripting.api.drawings import DrawingFunctions
 from drone_sim.scripting.api.dynamics import Dynamics
+from drone_sim.scripting.api.graphs import GraphFunctions
 from drone_sim.scripting.api.host import Host, Surroundings
 from drone_sim.scripting.api.ignored import PLUGINS, Ignored
 from drone_sim.scripting.api.image_filters import ImageFilters
@@ -29,10 +30,12 @@ from drone_sim.scripting.api.objects import ObjectKinds, Objects
 from drone_sim.scripting.api.older_motions import OlderMotions
 from drone_sim.scripting.api.packing import Bits, Packing, Tables
 from drone_sim.scripting.api.paths import Paths
+from drone_sim.scripting.api.remote_ports import OlderRemotePortFunctions, RemotePortFunctions
 from drone_sim.scripting.api.ros_functions import RosFunctions, ServiceFunctions, TopicFunctions
 from drone_sim.scripting.api.scene_objects import SceneObjects, Shapes
 from drone_sim.scripting.api.scripts import ScriptCalls, ScriptFunctions
 from drone_sim.scripting.api.sensors import ProximitySensors, Sensors
+from drone_sim.scripting.api.shape_masses import ShapeMasses
 from drone_sim.scripting.api.signals import SignalFunctions, TubeFunctions
 from drone_sim.scripting.api.simulation import SimulationFunctions
 from drone_sim.scripting.api.threads import Threads
@@ -40,6 +43,46 @@ from drone_sim.scripting.api.trajectories import TrajectoryFunctions
 from drone_sim.scripting.api.vision import VisionSensors
 from drone_sim.scripting.api.windows import Dialogs, Views
 from drone_sim.scripting.api.wireless import Wireless
+
+SIM: tuple[type, ...] = (
+    Sensors,
+    Objects,
+    JointFunctions,
+    ProximitySensors,
+    DistanceFunctions,
+    CollectionFunctions,
+    Paths,
+    ObjectKinds,
+    SceneObjects,
+    Shapes,
+    Dynamics,
+    ShapeMasses,
+    Matrices,
+    Poses,
+    Bits,
+    ScriptFunctions,
+    ScriptCalls,
+    SimulationFunctions,
+    Dialogs,
+    Views,
+    VisionSensors,
+    NameFunctions,
+    SignalFunctions,
+    GraphFunctions,
+    TubeFunctions,
+    Wireless,
+    CustomDataFunctions,
+    Packing,
+    Tables,
+    Threads,
+    TrajectoryFunctions,
+    MotionFunctions,
+    OlderMotions,
+    DrawingFunctions,
+    OlderRemotePortFunctions,
+)  # whose functions `sim` has, beside those that are ignored
+SIM_REMOTE_API: tuple[type, ...] = (RemotePortFunctions,)
+SIM_ROS: tuple[type, ...] = (TopicFunctions, ServiceFunctions, RosFunctions)
 
 
 def make_sim(host: Host, surroundings: Surroundings) -> Api:
@@ -60,6 +103,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         SceneObjects(surroundings),
         Shapes(surroundings),
         Dynamics(*seen),
+        ShapeMasses(*seen),
         Matrices(),
         Poses(),
         Bits(),
@@ -71,6 +115,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         VisionSensors(*seen),
         names,
         SignalFunctions(context.signals),
+        GraphFunctions(context.graphs, context.drawings.new_handle),
         TubeFunctions(context.tubes),
         Wireless(*seen),
         CustomDataFunctions(context.objects, context.data),
@@ -81,6 +126,7 @@ def make_sim(host: Host, surroundings: Surroundings) -> Api:
         motions,
         OlderMotions(motions, *seen),
         DrawingFunctions(context.drawings, context.objects, ignored),
+        OlderRemotePortFunctions(RemotePortFunctions(context.remote_ports, ignored)),
     )
     return Api(
         "sim", {**ignored.functions("sim"), **functions_of(*parts)}, CONSTANTS, lambda: _both(names, trajectories)
@@ -104,9 +150,13 @@ def make_sim_vision(host: Host, surroundings: Surroundings) -> Api:
 
 
 def make_plugins(host: Host) -> dict[str, Api]:
-    """Return the plugins of CoppeliaSim's that are accepted and do nothing, by name."""
+    """Return `simRemoteApi`, and the plugins of CoppeliaSim's that are accepted and do nothing, by name."""
     ignored = _ignored(host)
-    return {name: Api(name, ignored.functions(name), {}) for name in PLUGINS}
+    ports = functions_of(RemotePortFunctions(host.context.remote_ports, ignored))
+    return {
+        **{name: Api(name, ignored.functions(name), {}) for name in PLUGINS},
+        "simRemoteApi": Api("simRemoteApi", ports, {}),
+    }
 
 
 def _ignored(host: Host) -> Ignored:

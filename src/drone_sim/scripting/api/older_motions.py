@@ -150,17 +150,17 @@ class OlderMotions(Functions):
     ) -> Wait:
         """Move an object along a path (m/s, m/s²) from a share of it to its end; return the time left in s.
 
-        `positionAndOrOrientation`: 1, 2, or 3 both.
+        With a velocity below 0 it moves to its beginning. `positionAndOrOrientation`: 1, 2, or 3 both.
         """
-        line, (share,) = self._found(path, Path, "a path"), numbers((relativeDistance,), 1)
+        line, (share, speed) = self._found(path, Path, "a path"), numbers((relativeDistance, velocity), 2)
         begin = min(max(share, 0.0), 1.0) * line.length
-        whole = line.length - begin
+        whole = line.length - begin if speed >= 0 else -begin
 
         def place(share: float) -> Matrix:
             along = begin + share * whole
             return frames.multiply(line.matrix(), line.at(min(along, math.nextafter(line.length, 0.0))))
 
-        return self._along(whole, velocity, accel, self._mover(handle, -1, positionAndOrOrientation or 3, place))
+        return self._along(abs(whole), speed, accel, self._mover(handle, -1, positionAndOrOrientation or 3, place))
 
     @sim("345")
     def moveToJointPositions(

@@ -9,15 +9,24 @@ from collections.abc import Sequence
 from typing import Any
 
 from drone_sim.mechanics import frames
+from drone_sim.mechanics.controlled_path import AUTOMATIC, COUNTS, OWN, X_UP, ControlledPath
 from drone_sim.mechanics.frames import Matrix
-from drone_sim.mechanics.path import Path
+from drone_sim.mechanics.path import Path, nearest
 from drone_sim.scripting.api.calls import sim
-from drone_sim.scripting.api.host import Functions
-from drone_sim.scripting.api.types import Handle, Number, Numbers, WrongValue, numbers
+from drone_sim.scripting.api.constants import CONSTANTS
+from drone_sim.scripting.api.host import Functions, Operations
+from drone_sim.scripting.api.types import Handle, Number, Numbers, ThreeNumbers, WrongValue, numbers
 
 _MOST = 1_000_000  # numbers of a table
 _MOST_POINTS = 10_000  # of a path that is made
 _CLOSED, _LOOKS_ALONG = 2, 16  # options of createPath
+_DEFAULT = -1
+_PROPERTY = {
+    word: CONSTANTS[f"pathproperty_{name}"]
+    for word, name in (("closed", "closed_path"), ("flat", "flat_path"), ("automatic", "automatic_orientation"))
+}
+_USUAL, _X_UP = _PROPERTY["automatic"], CONSTANTS["pathproperty_keep_x_up"]
+_WITHOUT_DATA, _WITH_DATA = 11, 16  # numbers of a control point
 
 
 class Paths(Functions):
@@ -27,7 +36,7 @@ class Paths(Functions):
 
     @sim("345")
     def getPathLength(self, handle: Handle) -> float:
-        """Return the length of a path in m."""
+        """Return the length of a path in m, as it counts: of a curved one turns may count, too (docs/scenes.md)."""
         return self._path(handle).length
 
     @sim("345")
@@ -37,14 +46,17 @@ class Paths(Functions):
 
     @sim("345")
     def getOrientationOnPath(self, handle: Handle, relativeDistance: Number) -> list[float]:
-        """Return the Euler angles, in the world, of the frame at a share of a path: x ahead, z up."""
+        """Return the Euler angles, in the world, of the frame at a share of a path: x ahead, z up.
+
+        Of a curved path it is its own: z ahead, y outwards, or as its control points have it.
+        """
         return list(frames.to_euler(self._on_path(handle, relativeDistance)))
 
     @sim("34")
     def getDataOnPath(self, handle: Handle, relativeDistance: Number) -> tuple[int, list[float]]:
-        """Return flags and four numbers that a path may carry along: all 0 here, where paths carry none."""
-        self._on_path(handle, relativeDistance)
-        return 0, [0.0] * 4
+        """Return flags and four numbers that the control points of a curved path carry; 0 of any other."""
+        path = self._path(handle)
+        return path.carried(numbers((relativeDistance,), 1)[0] * path.length)
 
     @sim("34")
     def getClosestPositionOnPath(self, handle: Handle, position: Sequence[float]) -> float:
@@ -55,18 +67,18 @@ class Paths(Functions):
 
     @sim("345")
     def createPath(
-        self, ctrlPts: Numbers, options: int = 0, subdiv: int = 100, smoothness: Number = 1.0, *_: Any
+        self, ctrlPts: Numbers | int = -1, options: Any = 0, subdiv: Any = 100, smoothness: Any = 1.0, *_: Any
     ) -> int:
         """Make a path through poses of 7 numbers each, one after the other; return its handle.
 
         `options`: 2 closed, 16 it looks along itself, not as the poses do. It has `subdiv` points, and its corners are
-        rounded off over `smoothness` (0 to 1) of each piece.
+        rounded off over `smoothness` (0 to 1) of each piece. In 3.x: (sim.pathproperty_..., intParams, floatParams),
+        -1 for V-REP's own, makes a curved path without points; of these 1 and 2 (from 0) are how its length counts
+        (sim.distcalcmethod_...), what a turn (m/rad) and what a pause counts for.
         """
-        operations = self._surroundings.operations
+        operations = self._operations()
         if not isinstance(ctrlPts, Sequence):
-            raise WrongValue("poses of control points are expected: paths without points are not made here")
-        if operations is None:
-            raise ValueError("there is no scene here")
+            return self._empty_path(ctrlPts, options or None, subdiv if isinstance(subdiv, Sequence) else None)
         (smooth,), count = numbers((smoothness,), 1), int(subdiv)
         if not 2 <= count <= _MOST_POINTS:
             raise WrongValue(f"a subdiv of 2 to {_MOST_POINTS} points is expected, not {count}")
@@ -75,8 +87,68 @@ class Paths(Functions):
         said: dict[str, Any] = {"points": [pose[:3] for pose in poses], "closed": closed}
         if not int(options) & _LOOKS_ALONG:
             said["turns"] = [pose[3:] for pose in poses]
-        entry = {"name": operations.free_name("Path"), "alias": "Path", "kind": "path", **said}
-        return self._surroundings.outside(lambda: operations.add([entry])[0])
+        return self._add(operations, kind="path", **said)
+
+    def _empty_path(self, attributes: int, whole: Sequence[float] | None, real: Sequence[float] | None) -> int:
+        bits = int(attributes) if attributes != _DEFAULT else _USUAL
+        said: dict[str, Any] = {"closed": bool(bits & _PROPERTY["closed"]), "flat": bool(bits & _PROPERTY["flat"])}
+        said["orientation"] = _orientation(bits)
+        if whole is not None:
+            method = int(numbers(whole, 3)[1])
+            if method not in range(len(COUNTS)):
+                raise WrongValue("one of sim.distcalcmethod_... is expected among intParams")
+            said["counts"] = [*COUNTS][method]
+        if real is not None:
+            _, said["metres_per_radian"], said["metres_per_pause"] = numbers(real, 3)
+        return self._add(self._operations(), kind="curved_path", control_points=[], **said)
+
+    def _operations(self) -> Operations:
+        if self._surroundings.operations is None:
+            raise ValueError("there is no scene here")
+        return self._surroundings.operations
+
+    def _add(self, operations: Operations, **said: Any) -> int:
+        entry = {"name": operations.free_name("Path"), "alias": "Path", **said}
+        made: int = self._surroundings.outside(lambda: operations.add([entry])[0])
+        return made
+
+    @sim("34")
+    def insertPathCtrlPoints(self, handle: Handle, options: int, startIndex: int, ptCnt: int, ptData: Numbers) -> int:
+        """Add control points to a curved path before one, counted from 0. Return 1.
+
+        `options`: 1 it is closed from now on, otherwise it is open; 2 (3.3) 16 numbers a point, otherwise 11: position
+        (m) and Euler angles, in the path's frame, a speed (ignored), pause, points of the curve, its two factors; and
+        flags and four numbers that are carried.
+        """
+        path, count = self._curved(handle), int(ptCnt)
+        size = _WITH_DATA if int(options) & 2 else _WITHOUT_DATA
+        given = _points(ptData, size) if count else []
+        if len(given) != count:
+            raise WrongValue(f"{size} numbers for each of {count} points are expected, not {len(ptData)}")
+        there = [one.said for one in path.control_points]
+        at = min(max(int(startIndex), 0), len(there))
+        there[at:at] = [_control_point(one, path.is_flat) for one in given]
+        self._change(handle, control_points=there, closed=bool(int(options) & 1) and len(there) > 2)
+        return 1
+
+    @sim("34")
+    def cutPathCtrlPoints(self, handle: Handle, startIndex: int, ptCnt: int) -> int:
+        """Take so many control points from a curved path, from one on, counted from 0; all for -1. Return 1."""
+        there = [one.said for one in self._curved(handle).control_points]
+        first, count = int(startIndex), int(ptCnt)
+        if first < 0 or count < 0:
+            there = []
+        else:
+            del there[first : first + count]
+        self._change(handle, control_points=there)
+        return 1
+
+    def _change(self, handle: int, **values: Any) -> None:
+        operations, along = self._operations(), self._path(handle).position_along
+        self._surroundings.outside(lambda: operations.change(int(handle), along=along, **values))
+
+    def _curved(self, handle: int) -> ControlledPath:
+        return self._found(handle, ControlledPath, "a curved path")
 
     @sim("345")
     def getPathPosition(self, handle: Handle) -> float:
@@ -120,6 +192,27 @@ class Paths(Functions):
         between = [a + share * (b - a) for a, b in zip(points[index], points[index + 1])]
         return _with_unit_quaternion(between, points[index], points[index + 1], share)
 
+    @sim("45")
+    def getClosestPosOnPath(self, path: Numbers, lengths: Numbers, absPt: ThreeNumbers) -> float:
+        """Return how far along a table, as getPathLengths counts, it comes nearest to a place."""
+        ends = numbers(lengths, len(lengths))
+        if len(ends) < 2 or len(path) % len(ends) or len(path) < 3 * len(ends):
+            raise WrongValue(f"3 numbers or more for each of {len(ends)} points are expected, not {len(path)} in all")
+        x, y, z = numbers(absPt, 3)
+        points = [one[:3] for one in _points(path, len(path) // len(ends))]
+        return nearest(points, ends, (x, y, z))
+
+    @sim("5")
+    def resamplePath(
+        self, path: Numbers, lengths: Numbers, finalConfigCnt: int, method: Any = None, types: Any = None
+    ) -> list[float]:
+        """Return a table of so many points, at equal distances along another one."""
+        count = int(finalConfigCnt)
+        if not 2 <= count <= _MOST_POINTS:
+            raise WrongValue(f"2 to {_MOST_POINTS} points are expected, not {count}")
+        shares = (index / (count - 1) * lengths[-1] for index in range(count))
+        return [one for at in shares for one in self.getPathInterpolatedConfig(path, lengths, at, method, types)]
+
 
 def _points(path: Sequence[float], dof: int) -> list[tuple[float, ...]]:
     count = int(dof)
@@ -127,6 +220,28 @@ def _points(path: Sequence[float], dof: int) -> list[tuple[float, ...]]:
         raise WrongValue(f"a table with {count} numbers for each point is expected, not {len(path)} in all")
     flat = numbers(path, len(path))
     return [flat[first : first + count] for first in range(0, len(flat), count)]
+
+
+def _orientation(bits: int) -> str:
+    if not bits & _PROPERTY["automatic"]:
+        return OWN
+    return X_UP if bits & _X_UP else AUTOMATIC
+
+
+def _control_point(given: Sequence[float], is_flat: bool) -> dict[str, Any]:
+    """Return a control point in the words of a scene file, of V-REP's 11 or 16 numbers."""
+    x, y, z = given[:3]
+    turn = frames.to_quaternion(frames.from_euler((0.0, 0.0, 0.0), given[3:6]))
+    count = min(max(round(given[8]), 1), 100)
+    said = {
+        "position": [x, y, 0.0 if is_flat else z],
+        "turn": list(turn),
+        "pause": min(max(given[7], 0.0), 1000.0),
+        "count": count,
+        "factors": [min(max(one, 0.1), 0.99) for one in given[9:11]],
+    }
+    data = {"flags": round(given[11]), "channels": list(given[12:])} if len(given) == _WITH_DATA else {}
+    return {**said, **data}
 
 
 def smoothed(points: Sequence[Sequence[float]], closed: bool, smoothness: float, count: int) -> list[list[float]]:

@@ -21,10 +21,18 @@ DEEPEST = 8  # scripts that wait for each other
 class Callee(Protocol):
     """A script whose functions others may call."""
 
+    language: str  # lua or python
+
     def call_function(self, name: str, arguments: list[Any]) -> Any:
         """Return what a global function returns: None, a value, or a tuple of several. Raises ScriptError."""
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
+        """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
+
+    def execute(self, text: str) -> Any:
+        """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
+
+    def execute_own(self, text: str) -> Any:
         """Do so for the script itself, which runs now: on its time. Raises ScriptError."""
 
 
@@ -40,6 +48,7 @@ class Attachment:
         self.name = name
         self.parameters = parameters
         self.read: frozenset[str] = frozenset(parameters)
+        self.asked: set[str] = set()  # names that scripts have asked for since it was attached
         self.is_law = is_law
         self.is_embedded = False  # whether `..` in its paths is the parent of its object, as up to CoppeliaSim 4.8
         self.began = 0.0  # s, simulated, when it was loaded
@@ -67,6 +76,7 @@ class Scripts:
         self._by_handle: dict[int, Attachment] = {}
         self._by_name: dict[str, Attachment] = {}
         self._numbers = itertools.count(FIRST)
+        self.asked = 0  # parameters that somebody has asked for
         self._waiting: list[Attachment] = []  # callers, and what they called
 
     def add(self, name: str, parameters: ScriptParameters, *, is_law: bool = False) -> Attachment:
@@ -115,6 +125,12 @@ class Scripts:
     def law_parameters(self) -> Mapping[str, Any]:
         """Return the parameters that built-in laws read, by name."""
         return {name: None for one in self if one.is_law for name in one.read}
+
+    def ask(self, attachment: Attachment, name: str) -> None:
+        """Note that a script reads a parameter: what nobody reads need not be offered to whoever tunes."""
+        if name not in attachment.asked:
+            attachment.asked.add(name)
+            self.asked += 1
 
     def is_own(self, caller: Attachment, callee: Attachment) -> bool:
         """Tell whether a script calls itself."""

@@ -22,7 +22,7 @@ from drone_sim.scripting.api.constants import CONSTANTS
 from drone_sim.scripting.api.host import Functions, Host, Surroundings
 from drone_sim.scripting.api.ignored import Ignored
 from drone_sim.scripting.api.names import NameFunctions
-from drone_sim.scripting.api.registry import Attachment, ScriptParameters
+from drone_sim.scripting.api.registry import Attachment, Callee, ScriptParameters
 from drone_sim.scripting.api.script_values import refuse_if_too_large
 from drone_sim.scripting.api.types import Handle, Name, WrongValue
 from drone_sim.scripting.errors import ScriptError
@@ -40,6 +40,8 @@ _LEVELS = {
 _SELF, _TREE, _CHAIN, _ALL, _MAIN = (
     CONSTANTS[f"handle_{one}"] for one in ("self", "tree", "chain", "all", "main_script")
 )
+_TYPES = tuple(CONSTANTS[f"scripttype_{one}"] for one in ("childscript", "customizationscript"))
+_TYPES_OF_NONE = tuple(CONSTANTS[f"scripttype_{one}"] for one in ("mainscript", "addonscript", "sandboxscript"))
 _CHILD, _CUSTOMIZATION, _NONE = CONSTANTS["scripttype_childscript"], CONSTANTS["scripttype_customizationscript"], -1
 
 
@@ -106,11 +108,12 @@ class ScriptFunctions(_OnScripts):
     def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
         """Return a simulation parameter of a script; for sim.handle_tree, _chain or _all, of the first that has it."""
         several = self._several(script)
-        parameters = next((one.parameters for one in several if name in one.parameters), None)
-        parameters = parameters or (several or [self._script(script)])[0].parameters
-        if name not in parameters:
-            raise ValueError(f"no script parameter '{name}'; {near_names(name, parameters)}")
-        value = parameters[name]
+        found = next((one for one in several if name in one.parameters), None)
+        found = found or (several or [self._script(script)])[0]
+        if name not in found.parameters:
+            raise ValueError(f"no script parameter '{name}'; {near_names(name, found.parameters)}")
+        self._scripts.ask(found, name)
+        value = found.parameters[name]
         return list(value) if isinstance(value, (list, tuple)) else value
 
     @sim("345")
@@ -122,8 +125,8 @@ class ScriptFunctions(_OnScripts):
         near to one that it has; of any other the log says once that nothing reads it.
         """
         found = self._scripts.get(script)
-        if found and name in found.parameters and type(value) is float and isfinite(value):  # often, so at once
-            found.parameters[name] = value
+        if found and found is not self._own and name in found.parameters and type(value) is float and isfinite(value):
+            found.parameters[name] = value  # of a propeller: often, so at once
             return
         several = self._several(script)
         scripts = several or [self._script(script)]
@@ -131,6 +134,8 @@ class ScriptFunctions(_OnScripts):
             self._check_name(scripts, name)
         for one in scripts:
             _set(one.parameters, name, value)
+            if one is self._own:  # a default
+                self._scripts.ask(one, name)
 
     @sim("45")
     def getUserParameter(self, handle: Handle, name: Name, _options: Any = None) -> Any:
@@ -266,12 +271,59 @@ class ScriptCalls(_OnScripts):
         callee = self._of_type(self._find(of), script) if at else self._script(script)
         values = list(arguments)
         refuse_if_too_large(values)
+        return self._call(callee, lambda one: one.call_function(name, values), lambda one: one.call_own(name, values))
+
+    @sim("345")
+    def executeScriptString(self, stringToExecute: Any, scriptHandle: Any = _SELF) -> tuple[Any, ...]:
+        """Run a text in another script, in its language, within its globals; return 0 and what it returns.
+
+        That is its value where it is an expression, and an empty table where nothing is returned. In 3.x and 4.2 it is
+        'text@object' and a sim.scripttype_...; since 4.9 the script's handle comes first. A text is run in a Python
+        script for Python scripts alone.
+        """
+        text, script = (stringToExecute, scriptHandle)
+        if not isinstance(text, str):
+            text, script = script, text
+        if not isinstance(text, str):
+            raise WrongValue("a text and the handle of a script are expected")
+        refuse_if_too_large([text])
+        callee, text = self._executing(text, script)
+        found = self._call(callee, lambda one: one.execute(text), lambda one: one.execute_own(text))
+        if found is None:
+            return 0, []
+        return (0, *found) if isinstance(found, tuple) else (0, found)
+
+    def _executing(self, text: str, script: Any) -> tuple[Attachment, str]:
+        """Return the script in which a text is to be run, and the text alone."""
+        code, at, of = text.rpartition("@")
+        language = of if at and of in ("lua", "python") else ""
+        if language:
+            callee, text = self._script(script), code
+        elif at and script in _TYPES:
+            callee, text = self._of_type(self._find(of), script), code
+        elif script in _TYPES_OF_NONE:
+            raise ValueError("there are no scripts but those of objects: name one, as 'text@object', or by its handle")
+        else:
+            callee, text = self._script(script), text if of else code or text
+        known = callee.script.language if callee.script is not None else ""
+        if language and known and language != known:
+            raise ValueError(f"the script of '{callee.name}' is in {known.capitalize()}, not {language.capitalize()}")
+        if known == "python" and not self._is_python:
+            raise ValueError(f"the script of '{callee.name}' is in Python: only Python scripts run a text in it")
+        return callee, text
+
+    @property
+    def _is_python(self) -> bool:
+        """Whether who asks is a Python script, which may do in Python what it likes anyhow."""
+        own = self._own.script if self._scripts.are_own else None
+        return own is not None and own.language == "python"
+
+    def _call(self, callee: Attachment, call: Callable[[Callee], Any], call_own: Callable[[Callee], Any]) -> Any:
+        """Call another script, or on its own time this one. Raises ValueError."""
         try:
             if self._scripts.is_own(self._own, callee):
-                return self._scripts.call(self._own, callee, lambda one: one.call_own(name, values))
-            return self._surroundings.inside(
-                lambda: self._scripts.call(self._own, callee, lambda one: one.call_function(name, values))
-            )
+                return self._scripts.call(self._own, callee, call_own)
+            return self._surroundings.inside(lambda: self._scripts.call(self._own, callee, call))
         except ScriptError as error:
             raise ValueError(str(error)) from None
 
@@ -285,7 +337,7 @@ class ScriptCalls(_OnScripts):
     @sim("5")
     def getScriptFunctions(self, script: Handle) -> Any:
         """Return what calls a script's functions as its own: `functions:name(...)` in Lua, `functions.name(...)`."""
-        return _Functions(self, self._script(script).handle)
+        return FunctionsOfScript(self.callScriptFunction, self._script(script).handle)
 
     def _attached(self, object: Handle | Name) -> Attachment | None:
         if object == _SELF:
@@ -293,13 +345,21 @@ class ScriptCalls(_OnScripts):
         return self._on_object(self._find(object) if isinstance(object, str) else object)
 
 
-class _Functions:
+class FunctionsOfScript:
     """The functions of a script, as attributes."""
 
-    def __init__(self, calls: ScriptCalls, script: int):
-        self._calls, self._script = calls, script
+    def __init__(self, call: Callable[..., Any], script: int):
+        """`call` is callScriptFunction, `script` a handle."""
+        self._call, self._script = call, script
 
     def __getattr__(self, name: str) -> Any:
+        """Return what calls a function of the script."""
         if name.startswith("__"):
             raise AttributeError(name)
-        return lambda *arguments: self._calls.callScriptFunction(name, self._script, *arguments)
+        return lambda *arguments: self._call(name, self._script, *arguments)
+
+
+def handle_of(functions: FunctionsOfScript) -> int:
+    """Return the handle of the script whose functions they are, among which any name may be."""
+    handle: int = vars(functions)["_script"]
+    return handle

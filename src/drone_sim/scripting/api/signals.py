@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.script_values import MOST_BYTES, refuse_if_too_large
-from drone_sim.scripting.api.types import Handle, Name, Number, Text, WrongValue, numbers
+from drone_sim.scripting.api.types import Handle, Name, Number, Text, WrongValue, numbers, written
 
 _MOST = 10_000  # signals of a kind
 _LONGEST_NAME = 200  # characters
@@ -37,6 +37,10 @@ class Signals:
         """Return the value of a signal of any kind, None where it is not set."""
         return next((values[name] for kind in (int, float, str) if name in (values := self._values[kind])), None)
 
+    def numbers(self) -> dict[str, float]:
+        """Return the values of all float and integer signals, by name; of two of a name the float."""
+        return {**self._values[int], **self._values[float]}
+
     def set(self, kind: type[Any], name: str, value: Any) -> None:
         """Set a signal; raises WrongValue and ValueError, also for more than signals may hold."""
         if not isinstance(name, str):
@@ -58,6 +62,11 @@ class Signals:
             self._values[kind].clear()
         else:
             self._values[kind].pop(name, None)
+
+    def add_those_of(self, others: Signals) -> None:
+        """Set what others are set to, where nothing is set yet."""
+        for kind, values in others._values.items():
+            self._values[kind] = {**values, **self._values[kind]}
 
     def save_state(self) -> Callable[[], None]:
         """Return a function that brings the present signals back."""
@@ -88,18 +97,17 @@ class SignalFunctions:
             raise WrongValue(f"a whole number within +-{_LARGEST} is expected")
         self._signals.set(int, name, int(value))
 
-    @sim("345")
+    @sim("345", setBufferSignal="5")
     def setStringSignal(self, name: Name, value: Text) -> None:
         """Set a string; a number is written out, with up to 14 digits."""
-        if type(value) in (int, float):
-            value = str(value) if type(value) is int else f"{value:.14g}"
+        value = written(value)
         if not isinstance(value, (str, bytes)):
             raise WrongValue("a string is expected")
         self._signals.set(str, name, value)
 
 
-def _add_kind(word: str, kind: type[Any], what: str, generations: str = "345", older: str = "") -> None:
-    """Add what reads and forgets signals of a kind; `older`: what 3.x calls it besides."""
+def _add_kind(word: str, kind: type[Any], what: str, generations: str = "345", **others: str) -> None:
+    """Add what reads and forgets signals of a kind; `others`: what it is called besides, and by which generations."""
 
     def get(self: SignalFunctions, name: Name) -> Any:
         return self._signals.get(kind, name)
@@ -110,13 +118,13 @@ def _add_kind(word: str, kind: type[Any], what: str, generations: str = "345", o
     docs = {get: f"Return {what}, or nothing where it is not set.", clear: f"Forget {what}, or all of them."}
     for function, doc in docs.items():
         verb = function.__name__
-        others = {f"{verb}{older}Signal": "345"} if older else {}
-        sim.add(SignalFunctions, function, f"{verb}{word}Signal", doc, generations, **others)
+        names = {f"{verb}{other}Signal": since for other, since in others.items()}
+        sim.add(SignalFunctions, function, f"{verb}{word}Signal", doc, generations, **names)
 
 
-_add_kind("Float", float, "a number", older="Double")
-_add_kind("Int32", int, "a whole number", "5", older="Integer")
-_add_kind("String", str, "a string")
+_add_kind("Float", float, "a number", Double="345")
+_add_kind("Int32", int, "a whole number", "5", Integer="345")
+_add_kind("String", str, "a string", Buffer="5")
 
 
 class _End(NamedTuple):

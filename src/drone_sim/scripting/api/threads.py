@@ -62,7 +62,7 @@ class Threads(Functions):
         """Switch by itself after so many "milliseconds", 2 to 200: 100 calls of the API stand for one."""
         self._surroundings.turns.set_timing(numbers((milliseconds,), 1)[0])
 
-    @sim("345", setAutoYield="")
+    @sim("345", setAutoYield="", setThreadSwitchAllowed="4")
     def setThreadAutomaticSwitch(self, allowed: bool | int) -> int:
         """Forbid (false) or allow again (true) that the thread is switched by itself.
 
@@ -70,7 +70,7 @@ class Threads(Functions):
         """
         return self._surroundings.turns.set_automatic(allowed)
 
-    @sim("345", getAutoYield="")
+    @sim("345", getAutoYield="", getThreadSwitchAllowed="4")
     def getThreadAutomaticSwitch(self) -> bool:
         """Tell whether the thread is switched by itself."""
         return self._surroundings.turns.is_automatic

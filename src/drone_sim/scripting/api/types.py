@@ -25,6 +25,13 @@ class WrongValue(TypeError):
     """A value is of the wrong kind; the message says what is expected instead."""
 
 
+def written(value: Any) -> Any:
+    """Return a number written out, with up to 14 digits, as Lua takes it where a string is expected; else the value."""
+    if type(value) in (int, float):
+        return str(value) if type(value) is int else f"{value:.14g}"
+    return value
+
+
 def numbers(values: Sequence[float], count: int) -> tuple[float, ...]:
     """Return `count` finite numbers; raises WrongValue."""
     if type(values) is list and len(values) == count:  # most often what another call returned

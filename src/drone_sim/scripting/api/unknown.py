@@ -48,7 +48,11 @@ ABSENT: dict[str, str] = {
     r"sim\.(?:create|copyPaste|remove|group|ungroup|convert|scale)(?!DrawingObject|Particle|Dialog)\w*": (
         "such objects come from the scene file"
     ),
-    r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "setShapeMass says what a shape weighs",
+    r"sim\.(?:set|compute)Shape(?:Mass|Inertia|Material|BB)\w*": "setShapeMassAndInertia says what a shape weighs",
+    r"sim\.(?:generateShapeFromPath|convexDecompose)": "such objects come from the scene file",
+    r"sim\.(?:\w*PathSearch\w*|getPathPlanningHandle|searchPath|(?:find|get|simplify)Mp\w+)": PLUGINS["simOMPL"],
+    r"sim\.setScriptVariable": "executeScriptString('name = 1', script) sets a variable of another script",
+    r"sim\.\w+JointDependency": "joints do not depend on each other: set each",
     r"sim\.\w*(?:Collision|Distance)\w*": (
         "there are no collision and distance objects; checkCollision and checkDistance measure between two objects"
     ),
@@ -57,7 +61,7 @@ ABSENT: dict[str, str] = {
     r"simROS\.imageTransport(?:Subscribe|ShutdownSubscriber)": "subscribe to sensor_msgs/Image",
     r"sim\.\w*PathTarget\w*": "a path has no target of its own: followPath moves an object along it",
     r"sim\.\w+ObjectCustomData": "use writeCustomDataBlock and readCustomDataBlock",
-    r"sim\.execute(?:ScriptString|LuaCode)": "text is not run as code: callScriptFunction calls a script's function",
+    r"sim\.executeLuaCode": "executeScriptString runs a text in a script",
     r"sim\.launchExecutable": "a child script starts no programs: use a launch file",
 }
 _FLAT = re.compile(r"sim([A-Z]\w*)")

@@ -53,6 +53,8 @@ local WHOLE = { -- the forms of a script that is run as a whole
   thread = THREAD,
 }
 
+sandbox.run = run
+
 -- Compile the script; run it, unless it has a form that is run as a whole later.
 function sandbox.open(text, form)
   return run(function()
@@ -81,6 +83,22 @@ function sandbox.called_own(name, ...)
   local f = rawget(env, name)
   if type(f) ~= 'function' then return MISSING end
   return protected(function(...) return hand_back(name, f(...)) end, ...)
+end
+
+-- Run a text in the script, and hand over what it returns.
+local function execute(text)
+  local f, message = sandbox.compile_once(text, '=(text)')
+  if not f then error(message, 0) end
+  return hand_back('executeScriptString', f())
+end
+
+function sandbox.executed(text)
+  return run(execute, text)
+end
+
+-- Do so for the script itself, which runs now: within its limits.
+function sandbox.executed_own(text)
+  return protected(execute, text)
 end
 
 -- Call a function back with a message; `answered`: what it returns is handed over.

@@ -30,6 +30,22 @@ local function compile(text, name)
 end
 sandbox.compile = compile
 
+-- Return a function of a text that comes while the script runs: of its value, where it is an expression.
+function sandbox.compile_once(text, name)
+  if byte(text) == 27 then return nil, 'precompiled code' end
+  local read, message
+  for _, tried in next, {'return ' .. text, text} do
+    if newer then
+      read, message = load(tried, name, 't', env)
+    else
+      read, message = loadstring(tried, name)
+      if read then setfenv(read, env) end
+    end
+    if read then return read end
+  end
+  return nil, message
+end
+
 local function load_module(name)
   if type(name) ~= 'string' then error("no module '" .. tostring(name) .. "'", 3) end
   local found, text, chunk_name = bridge.module(name)

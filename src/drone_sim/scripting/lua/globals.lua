@@ -18,7 +18,7 @@ local check, checked, tonumber = sandbox.check, sandbox.checked, tonumber
 local env, modules = sandbox.globals, sandbox.modules
 local texts, place_in_script = sandbox.texts, sandbox.place_in_script
 local newer = _VERSION ~= 'Lua 5.1'
-sandbox.find, sandbox.match = find, string.match -- for patterns that end: a script may have neither
+sandbox.find, sandbox.match, sandbox.gsub = find, string.match, string.gsub -- for patterns that end: a script may have none of them
 
 local function pack(...)
   return {n = select('#', ...), ...}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,14 @@ class LuaHelpers:
         self.chunk = self._chunk(Path(script).name)
         self._paths = {self.chunk: script}
         self._folder = Path(script).parent
+
+    def chunk_of(self, path: str) -> str:
+        """Return the name of the chunk that a file is, or would be if it were required; '' for one elsewhere."""
+        own = os.path.realpath(self._paths[self.chunk])
+        if path == own:
+            return self.chunk
+        folder = os.path.dirname(own)
+        return self._chunk(os.path.relpath(path, folder)) if path.startswith(f"{folder}{os.sep}") else ""
 
     def path(self, chunk: str) -> str:
         """Return the file behind a chunk's name, the script's for any other name."""

@@ -2,7 +2,8 @@
 local bridge, sandbox, source = ...
 
 local pcall, error, type, tostring, setmetatable = pcall, error, type, tostring, setmetatable
-local current, resume = coroutine.running, coroutine.resume
+local current, resume, status = coroutine.running, coroutine.resume, coroutine.status
+local next = next
 local sub = string.sub
 local getinfo, sethook = debug.getinfo, debug.sethook
 local look = bridge.look
@@ -50,6 +51,8 @@ sandbox.check = check
 
 local counts = setmetatable({}, {__mode = 'k'}) -- after how many instructions a hook comes, unless INSTRUCTIONS
 local is_careful = false -- whether there are any in it
+local limited = setmetatable({}, {__mode = 'k'}) -- coroutines with a hook of their own
+local mask = '' -- or 'l', while there are breakpoints: the hook comes for every line, too
 local hook
 
 -- Let the hook of the coroutine that runs come after so many instructions; to set one looks at the whole stack.
@@ -57,22 +60,37 @@ local function come_after(count)
   local here = current() or hook -- 5.1 has none for the first one
   if (counts[here] or INSTRUCTIONS) ~= count then
     is_careful, counts[here] = true, count
-    sethook(hook, '', count)
+    sethook(hook, mask, count)
   end
 end
 
-function hook()
+function hook(event, line)
+  if event == 'line' then
+    if running and not stopped then sandbox.at_line(line) end
+    return
+  end
   if not running or (stopped and getinfo(2, 'f').func == sandbox.within_limits) then return end
   if stopped then come_after(1) end -- or what closes its variables on the way out begins anew, again and again
   local much = check()
   if much or is_careful then come_after(much and FEW or INSTRUCTIONS) end
 end
-sethook(hook, '', INSTRUCTIONS)
+sethook(hook, mask, INSTRUCTIONS)
+
+-- Let the hook come for every line, or for none.
+function sandbox.watch_lines(on)
+  mask = on and 'l' or ''
+  counts = setmetatable({}, {__mode = 'k'})
+  sethook(hook, mask, INSTRUCTIONS)
+  for thread in next, limited do
+    if status(thread) ~= 'dead' then sethook(thread, hook, mask, INSTRUCTIONS) end
+  end
+end
 
 -- Every coroutine has a hook of its own, which many short ones never come to: to make one counts, too.
 function sandbox.limit(thread)
   check()
-  sethook(thread, hook, '', INSTRUCTIONS)
+  limited[thread] = true
+  sethook(thread, hook, mask, INSTRUCTIONS)
 end
 
 -- Look at the clock and the memory before and after a function of Lua's on a string that is long.

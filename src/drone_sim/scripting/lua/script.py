@@ -21,11 +21,13 @@ from drone_sim.scripting.api.calls import Api, save_state
 from drone_sim.scripting.api.constants import CONSTANTS, PHASES
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
+from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.lua import functions, state
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.source import LuaSource
 from drone_sim.scripting.lua.thread import MOST_LEFT, Executor, LeftBehind, LuaThread, SameThread, left_behind
+from drone_sim.scripting.lua.variables import read_rows
 from drone_sim.scripting.time_limit import Labels, TimeLimit
 
 _LOG = logging.getLogger(__name__)  # not the script's own words
@@ -34,17 +36,32 @@ _NUMBERS = {phase: number for number, phase in enumerate((*PHASES, "thread"), st
 _NEAR = 0.8  # of difflib's ratio
 _THREAD = 1 << _NUMBERS["thread"] - 1
 # In calls.lua.
-_CALLS = ("open", "phase", "called", "called_own", "called_back", "has", "functions", "save_state", "restore")
+_CALLS = (
+    *("open", "phase", "called", "called_own", "executed", "executed_own", "called_back", "has", "functions"),
+    *("save_state", "restore", "variables", "break_at"),
+)
+_EXECUTE = "executeScriptString"
+_MOST_PLACES = 4000  # values of breakpoints, two for each, that one call hands over
 _ABOUT_MEMORY = f"not enough memory: the script uses more than {state.MEMORY // state.MIB} MiB"
 
 
 class LuaScript:
     """A file that defines sysCall_init, ... as it needs them, or looks at sim_call_type."""
 
-    def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit):
+    language = "lua"
+
+    def __init__(
+        self,
+        path: str,
+        source: bytes,
+        modules: Mapping[str, Api],
+        limit: TimeLimit,
+        breakpoints: Breakpoints | None = None,
+    ):
         """Compile a `source`; run its top level unless it is to run in every phase. Raises ScriptError.
 
-        `path` is its file, `modules` are the API, `limit` is how long it may run.
+        `path` is its file, `modules` are the API, `limit` is how long it may run; `breakpoints` are those of all
+        scripts.
         """
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
@@ -55,6 +72,7 @@ class LuaScript:
         self._phases = 0
         self.idle = ""  # why nothing of it is ever called
         self._helpers = LuaHelpers(path)
+        self._breakpoints = breakpoints if breakpoints is not None else Breakpoints()
         self._check_call_types(text)
         if text.loops_in_c and left_behind() >= MOST_LEFT:
             raise self._error("load", f"{MOST_LEFT} Lua scripts hang in this process: restart the simulator")
@@ -63,6 +81,8 @@ class LuaScript:
             dialect = state.dialect_for(text.text, text.flat or "phases" in text.form)
             self._has_coroutines = text.coroutines
             self._lua = self._thread.run(self._build, dialect, text.threads)
+            if self._breakpoints:
+                self.follow_breakpoints()
             self._run("load", self._lua["open"], text.text, text.form.encode())
             if text.form == "functions":
                 self._check_names()
@@ -72,9 +92,9 @@ class LuaScript:
 
     def _build(self, dialect: str, threads: bool) -> dict[str, Any]:
         """Return what can be called of a new Lua state, with the API in it; `threads`: the script may have some."""
-        self._state = state.LuaState(dialect, self._thread, self._limit, self._helpers, threads)
+        self._state = state.LuaState(dialect, self._thread, self._limit, self._helpers, threads, self._breakpoints)
         self._finalizer = weakref.finalize(self, _free, self._state)
-        self._known = functions.define(self._state, self._modules)
+        self._known = self._state.known = functions.define(self._state, self._modules)
         _LOG.debug("%s runs in %s", self._path, dialect)
         return {name: self._state.sandbox[name.encode()] for name in _CALLS}
 
@@ -134,11 +154,24 @@ class LuaScript:
 
     def call_own(self, name: str, arguments: list[Any]) -> Any:
         """Do what `call_function` does, for the script itself, which runs now: on its time. Raises ScriptError."""
-        outcome = self._lua["called_own"](name.encode(), *self._state.values.to_lua(arguments, unpacked=True))
+        arguments = self._state.values.to_lua(arguments, unpacked=True)
+        self._check_own(name, self._lua["called_own"](name.encode(), *arguments))
+        return self._state.values.handed_back()
+
+    def execute(self, text: str) -> Any:
+        """Run a text in the script; return None, a value or a tuple of several. Raises ScriptError."""
+        self._run(_EXECUTE, self._lua.get("executed"), text.encode("utf-8", "replace"))
+        return self._state.values.handed_back()
+
+    def execute_own(self, text: str) -> Any:
+        """Do what `execute` does, for the script itself, which runs now: on its time. Raises ScriptError."""
+        self._check_own(_EXECUTE, self._lua["executed_own"](text.encode("utf-8", "replace")))
+        return self._state.values.handed_back()
+
+    def _check_own(self, name: str, outcome: Any) -> None:
         how, *found = outcome if isinstance(outcome, tuple) else (outcome,)
         if how is not True:
             raise self._failure(name, how, found)
-        return self._state.values.handed_back()
 
     def _call_function(self, name: str, arguments: list[Any]) -> Any:
         return self._lua["called"](name.encode(), *self._state.values.to_lua(arguments, unpacked=True))
@@ -156,6 +189,20 @@ class LuaScript:
         name, called = (callback, callback.encode()) if isinstance(callback, str) else ("callback", callback)
         to_lua = self._state.values.to_lua
         self._run(name, lambda: self._lua["called_back"](called, to_lua(message), answered))
+
+    def follow_breakpoints(self) -> None:
+        """Let the hook come for every line while there are breakpoints in it, or in a file beside it."""
+        places: list[bytes | int] = []
+        for path, lines in self._breakpoints.all().items():
+            chunk = self._helpers.chunk_of(path).encode("utf-8", "replace")
+            if chunk:
+                places += [part for line in sorted(lines) for part in (chunk, line)]
+        if not self._end:
+            self._run("breakpoints", self._lua["break_at"], *places[:_MOST_PLACES])
+
+    def variables(self) -> list[Scope]:
+        """Return its variables, as a person reads them; nothing of the script is called for that."""
+        return [] if self._end else read_rows(self._run("variables", self._lua["variables"]))
 
     def save_state(self) -> Callable[[], None]:
         """Return a function that gives the script's variables the values that they have now. Raises ScriptError."""

@@ -16,7 +16,9 @@ from typing import Any
 from drone_sim.scripting import script_log
 from drone_sim.scripting.api.constants import CALL_TYPES
 from drone_sim.scripting.api.control import CALLS_PER_MS, DEFAULT_MS, LONGEST_MS, NO_THREAD, SHORTEST_MS
+from drone_sim.scripting.breakpoints import Breakpoints
 from drone_sim.scripting.errors import LONGEST_MESSAGE
+from drone_sim.scripting.lua import variables
 from drone_sim.scripting.lua.helpers import LuaHelpers
 from drone_sim.scripting.lua.thread import Executor, SameThread
 from drone_sim.scripting.lua.values import Values
@@ -36,6 +38,7 @@ _FILES = (
     "globals",
     "matrix",
     "files",
+    "variables",
 )  # each uses those before it
 MIB = 1024 * 1024
 MEMORY = 256 * MIB  # bytes that a script may use
@@ -46,22 +49,28 @@ Reader = Callable[[bytes], tuple[bool, bytes, bytes]]  # of a name: whether ther
 TIME, OVER_MEMORY, MUCH_MEMORY = 1, 2, -1  # why Lua stops a script, or looks at it more often (limits.lua)
 
 
+@functools.cache
+def _newest_first() -> list[str]:
+    """Return every Lua that lupa has; raises ImportError."""
+    found = [dialect for dialect in _NEWEST_FIRST if importlib.util.find_spec(f"lupa.{dialect}")]
+    if not found:
+        raise ImportError("lupa has no Lua")
+    return found
+
+
 def newest() -> str:
     """Return the newest Lua that lupa has; raises ImportError."""
-    for dialect in _NEWEST_FIRST:
-        if importlib.util.find_spec(f"lupa.{dialect}"):
-            return dialect
-    raise ImportError("lupa has no Lua")
+    return _newest_first()[0]
 
 
 def dialect_for(text: bytes, flat: bool) -> str:
-    """Return the Lua that a script is for: V-REP 3.x's for `flat` names, unless it is written in a newer one.
+    """Return the Lua that a script is for: V-REP 3.x's for `flat` names, the newest otherwise, or that which it is in.
 
-    Raises ImportError.
+    Any other is for the newest one, unless it is written in an older one: as of Lua 5.5, what counts in a `for` cannot
+    be set. Raises ImportError.
     """
-    if not flat or (not _parses(OLDEST, text) and _parses(newest(), text)):  # such as with | and &, as of Lua 5.3
-        return newest()
-    return OLDEST
+    likely = [OLDEST, *_newest_first()] if flat else _newest_first()
+    return next((one for one in likely if _parses(one, text)), likely[0])
 
 
 def _parses(dialect: str, text: bytes) -> bool:
@@ -75,17 +84,40 @@ def _parses(dialect: str, text: bytes) -> bool:
     return True
 
 
+def syntax_error(text: bytes, flat: bool) -> str:
+    """Return what Lua says of a text that it cannot compile, '' for any other: nothing of it is run.
+
+    `flat`: it has names of V-REP 3.x. Raises ImportError.
+    """
+    lupa = importlib.import_module(f"lupa.{dialect_for(text, flat)}")
+    try:
+        lua = lupa.LuaRuntime(encoding=None, register_eval=False, register_builtins=False, max_memory=_CAP)
+        lua.compile(text, name=b"=script")
+    except lupa.LuaError as error:
+        said = error.args[0]
+        return said.decode("utf-8", "replace") if isinstance(said, bytes) else str(said)
+    return ""
+
+
 class LuaState:
     """Lua for one script. `close` lets go of it: Python cannot see a cycle that leads through Lua.
 
     What Lua gets of Python must not lead back to the script's object, or neither is ever freed.
     """
 
-    def __init__(self, dialect: str, executor: Executor, limit: TimeLimit, helpers: LuaHelpers, threads: bool):
+    def __init__(
+        self,
+        dialect: str,
+        executor: Executor,
+        limit: TimeLimit,
+        helpers: LuaHelpers,
+        threads: bool,
+        breakpoints: Breakpoints,
+    ):
         """Make a state, out of which nothing leads to Python. Raises ImportError.
 
         `executor` runs what enters it, `limit` is how long the script may run, `helpers` reads the files that it
-        requires; `threads`: the script may have some.
+        requires; `threads`: the script may have some; `breakpoints` are those of all scripts.
         """
         self.executor = executor
         self.runtime: Any = importlib.import_module(f"lupa.{dialect}").LuaRuntime(
@@ -98,6 +130,7 @@ class LuaState:
         )
         self.used: Callable[[], int] = self.runtime.get_memory_used  # Lua's own count leaves out 5.5's long strings
         self.waits = 0  # of functions, in coroutines
+        self.known: set[str] = set()  # names of the API
         self.lavish: set[str] = set()  # functions that have been given more values than they take
         self.values = Values(self.runtime.table_from)
         bridge = {
@@ -118,6 +151,7 @@ class LuaState:
             "module": self._reader(helpers.read),
             "file": self._reader(helpers.read_file),
             "data": self._reader(helpers.read_data),
+            **variables.bridge(breakpoints, helpers.path, self._known_names),
         }
         table = self.runtime.table_from({key.encode(): value for key, value in bridge.items()})
         self.sandbox: Any = self.runtime.table()
@@ -150,6 +184,9 @@ class LuaState:
     def _log(self, line: bytes) -> None:
         if not self.executor.closed:
             script_log.say(line)
+
+    def _known_names(self) -> Any:
+        return self.runtime.table_from({name.encode(): True for name in self.known})
 
     def _reader(self, read: Reader) -> Reader:
         return lambda name: (False, b"stopped", b"") if self.executor.closed else read(name)

@@ -19,10 +19,13 @@ from drone_sim.scripting.api.calls import Api, Function, UnknownName, contents, 
 from drone_sim.scripting.api.control import Call, NoThread, Turns, waits
 from drone_sim.scripting.api.types import Callback
 from drone_sim.scripting.api.unknown import PLUGINS, not_there
+from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError, no_function
 from drone_sim.scripting.phase_names import FUNCTIONS, THREADS
 from drone_sim.scripting.python.helpers import Helpers
+from drone_sim.scripting.python.inspection import variables as variables_of
 from drone_sim.scripting.python.process import Forks, end_copy, process_kept
+from drone_sim.scripting.python.tracing import LineTracer
 from drone_sim.scripting.script_log import THREAD_GOES_ON, say, shown
 from drone_sim.scripting.time_limit import Labels, ScriptStopped, TimeLimit
 
@@ -51,10 +54,21 @@ class PythonScript:
     CoppeliaSim's Python scripts do; so do the modules beside it that it imports. What it prints goes to the log.
     """
 
-    def __init__(self, path: str, source: bytes, modules: Mapping[str, Api], limit: TimeLimit, turns: Turns):
+    language = "python"
+
+    def __init__(
+        self,
+        path: str,
+        source: bytes,
+        modules: Mapping[str, Api],
+        limit: TimeLimit,
+        turns: Turns,
+        breakpoints: Breakpoints | None = None,
+    ):
         """Run the top level of a `source`. Raises ScriptError.
 
-        `path` is its file, `modules` are the API, `limit` is how long it may run, `turns` are its thread's.
+        `path` is its file, `modules` are the API, `limit` is how long it may run, `turns` are its thread's;
+        `breakpoints` are those of all scripts.
         """
         self._path = path
         self._limit, self._labels = limit, Labels(path, limit)
@@ -72,6 +86,8 @@ class PythonScript:
             "__builtins__": self._helpers.builtins,
             **found,
         }
+        self._breakpoints = breakpoints if breakpoints is not None else Breakpoints()
+        self.follow_breakpoints()
         try:
             with process_kept():
                 self._run("load", lambda: exec(_compiled(source, path), self._globals))
@@ -143,6 +159,18 @@ class PythonScript:
         self.check(name)
         return self._globals[name](*arguments)
 
+    def execute(self, text: str) -> Any:
+        """Run a text in the script; return its value where it is an expression, else None. Raises ScriptError."""
+        return self._run("executeScriptString", self.execute_own, text)
+
+    def execute_own(self, text: str) -> Any:
+        """Do what `execute` does, for the script itself, which runs now: on its time."""
+        try:
+            code = _compiled_text(text, "eval")
+        except SyntaxError:
+            code = _compiled_text(text, "exec")
+        return eval(code, self._globals)
+
     def callback(self, callback: Callback, message: Any) -> Any:
         """Call the script's function (or that of this name) with a message, or a request; return its value.
 
@@ -166,6 +194,20 @@ class PythonScript:
         if not callable(callback) and not callable(self._globals.get(callback)):
             known = [name for name, one in self._named() if inspect.isfunction(one)]
             raise ScriptError(str(callback), self._path, 0, no_function(callback, known))
+
+    def follow_breakpoints(self) -> None:
+        """Look at every line while there are breakpoints: another `_run` takes the place of the one that does not."""
+        tracer = LineTracer(self._breakpoints) if self._breakpoints else None
+        if self._thread is not None:
+            self._thread.tracer = tracer
+        if tracer is not None:
+            self.__dict__["_run"] = functools.partial(tracer.call, self._run_plainly)
+        else:
+            self.__dict__.pop("_run", None)
+
+    def variables(self) -> list[Scope]:
+        """Return its variables, as a person reads them; nothing of the script is called for that."""
+        return variables_of(self._globals)
 
     def save_state(self) -> Callable[[], None]:
         """Return a function that gives `self` and the global variables the values that they have now.
@@ -210,6 +252,7 @@ class PythonScript:
         if self.threaded and self._thread is not None:
             with contextlib.suppress(ScriptError):
                 self._run("cleanup", self._thread.end)
+        self.__dict__.pop("_run", None)
         self._globals.clear()
         self._helpers.close()
 
@@ -228,6 +271,8 @@ class PythonScript:
         if failed is not None:  # not chained: nobody wants the simulator's own frames, nor keeps the script's alive
             raise failed
         return result
+
+    _run_plainly = _run
 
     def _require(self, name: str) -> Api:
         if name in PLUGINS:
@@ -269,6 +314,11 @@ class PythonScript:
 @functools.lru_cache(maxsize=32)  # the same few scripts fly again and again, in forks of this process, too
 def _compiled(source: bytes, path: str) -> CodeType:
     return compile(_let_stopped_pass(ast.parse(source, path)), path, "exec", dont_inherit=True)
+
+
+def _compiled_text(text: str, mode: str) -> CodeType:
+    tree = ast.parse(text, "(text)", mode)
+    return compile(_let_stopped_pass(tree), "(text)", mode, dont_inherit=True)
 
 
 def _copied(*namespaces: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -319,7 +369,7 @@ def _print(*values: Any, sep: str = " ", file: Any = None, **options: Any) -> No
         say((sep if sep is not None else " ").join(map(shown, values)))
 
 
-def _let_stopped_pass(tree: ast.Module) -> ast.Module:
+def _let_stopped_pass(tree: ast.AST) -> Any:
     """Let no handler of the script catch ScriptStopped: `while True: try: ... except: pass` has to end, too."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Try) and node.handlers:

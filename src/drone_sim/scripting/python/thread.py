@@ -13,6 +13,7 @@ import greenlet
 
 from drone_sim.scripting.api.calls import Api, contents
 from drone_sim.scripting.api.control import Turns
+from drone_sim.scripting.python.tracing import LineTracer
 from drone_sim.scripting.time_limit import ScriptStopped
 
 _abandoned: list[greenlet.greenlet] = []  # that would not end: kept, or Python would run them once more to free them
@@ -26,6 +27,7 @@ class PythonThread:
         self._turns = turns
         self._greenlet: greenlet.greenlet | None = None
         self.has_ended = False
+        self.tracer: LineTracer | None = None  # while there are breakpoints
         turns.leave = self._leave
 
     def counted(self, api: Api) -> Api:
@@ -45,7 +47,7 @@ class PythonThread:
     def take_turn(self, function: Callable[[], Any]) -> None:
         """Begin a function, or go on with it, until it is left or has ended. Raises what it raises."""
         if self._greenlet is None:
-            self._greenlet = greenlet.greenlet(function)
+            self._greenlet = greenlet.greenlet(lambda: self._begin(function))
         self._turns.begin()
         self._greenlet.parent = greenlet.getcurrent()
         try:
@@ -53,10 +55,17 @@ class PythonThread:
         finally:
             self.has_ended = self._greenlet.dead
 
+    def _begin(self, function: Callable[[], Any]) -> Any:
+        if self.tracer is not None:
+            self.tracer.resume()
+        return function()
+
     def _leave(self) -> bool:
         if greenlet.getcurrent() is not self._greenlet or self._greenlet.parent is None:
             return False
         self._greenlet.parent.switch()
+        if self.tracer is not None:  # Python keeps for each greenlet whether it is traced
+            self.tracer.resume()
         return True
 
     def end(self) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
+from drone_sim.ros.cockpit.editor.checks import TextChecker
 from drone_sim.ros.cockpit.editor.lessons import Lesson, Lessons
 from drone_sim.ros.cockpit.editor.scene_files import SceneSwitcher, plan_of
 from drone_sim.ros.cockpit.editor.script_store import OWN, ScriptFile, ScriptStore, ScriptStoreError
 from drone_sim.ros.cockpit.editor.task_flights import Grader, TimelinePlayer
 from drone_sim.ros.cockpit.server.page_socket import Answer
 from drone_sim.ros.core.simulator import FAILURES, Simulator, script_failure
+from drone_sim.scripting.api.listing import for_editors
 
 _Message = Mapping[str, Any]
 
@@ -26,17 +29,25 @@ class EditorBackend:
         self._switcher = SceneSwitcher(simulator)
         self._player = player
         self._grader = Grader()
+        self._checker = TextChecker()
 
     @property
     def answers(self) -> dict[str, Answer]:
         """What answers each question."""
         asked = {
+            "api": lambda _: for_editors(),
+            "check": lambda message: self._checker.check(_text(message), message.get("lua") is True),
             "scripts": lambda _: self._scripts(),
             "open": lambda message: self._opened(self._script(message)),
             "look": self._look,
             "save": self._save,
             "save_as": lambda one: self._described(*self._store.save_as(one.get("name"), _text(one))),
             "keep": self._keep,
+            "rename": self._rename,
+            "duplicate": lambda one: self._described(*self._store.duplicate(self._script(one), _text(one))),
+            "delete": self._delete,
+            "bring back": lambda one: self._described(*self._store.bring_back(one.get("script"))),
+            "locate": self._locate,
             "revert": lambda message: {"text": self._store.original(self._script(message))},
             "lesson": self._lesson,
             "run": self._run,
@@ -65,7 +76,9 @@ class EditorBackend:
     def _flown(self) -> str:
         flown = str(self._simulator.parameter("script", "") or "pilot")
         script = self._store.of_file(flown)
-        return script.name if script else f"built-in/{flown}.py"
+        if script is not None:
+            return script.name
+        return Path(flown).name if "/" in flown else f"built-in/{flown}.py"
 
     def _script(self, message: _Message) -> ScriptFile:
         return self._store.find(message.get("script"))
@@ -107,6 +120,26 @@ class EditorBackend:
         script, _, other = self._store.keep_both(message.get("script"), _text(message), mine)
         return {**self._opened(script), "other": other}
 
+    def _rename(self, message: _Message) -> dict[str, Any]:
+        """Give a script of the user's another name, by which the simulation knows it, too, where it flies."""
+        before = self._script(message)
+        renamed, version = self._store.rename(before, message.get("name"))
+        try:
+            if self._simulator.parameter("script", "") == str(before.path):
+                self._simulator.set_parameter("script", str(renamed.path))
+        except FAILURES:  # the disk is there without a master, too
+            pass
+        return self._described(renamed, version)
+
+    def _delete(self, message: _Message) -> dict[str, Any]:
+        self._store.remove(self._script(message))
+        return {}
+
+    def _locate(self, message: _Message) -> dict[str, Any]:
+        """Return the name of the script that a file is, '' for none of those on the lists."""
+        found = self._store.of_file(str(message.get("file")))
+        return {"script": found.name if found else ""}
+
     # ---- texts, and flights
 
     def _lesson(self, message: _Message) -> dict[str, Any]:
@@ -114,7 +147,11 @@ class EditorBackend:
         lesson = self._find_lesson(message)
         if lesson is None:
             raise ScriptStoreError(f"{str(message.get('lesson'))[:80]!r}: no such text")
-        own = [one for one in self._store.scripts() if one.is_own and self._lessons.of_script(one) == lesson]
+        own = [
+            one
+            for one in self._store.scripts()
+            if one.is_own and self._lessons.of_script(one) == lesson and lesson.is_begun_by(one.path.stem)
+        ]
         return {
             "lesson": lesson.name,
             "text": lesson.text,

@@ -1,4 +1,15 @@
-"""The texts beside the editor: the tutorial's sections and the tasks, read from where they are for readers on paper."""
+"""The texts beside the editor: the tutorial's sections and the tasks, read from where they are for readers on paper.
+
+What is said otherwise to readers in the browser stands there in a comment, which those on paper do not see:
+
+    <!-- browser:
+    Press **Run**.
+    -->
+    Start the launch file in a terminal.
+    <!-- end -->
+
+Both may also stand within a line. Controls and keys of the page are in bold there, and nothing else is.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +20,20 @@ from pathlib import Path
 
 from drone_sim.files.resources import package_path, read_bytes
 from drone_sim.grading import tasks
-from drone_sim.ros.cockpit.editor.script_store import ScriptFile
+from drone_sim.ros.cockpit.editor.script_store import SOLUTIONS, ScriptFile
 
 _LARGEST = 1 << 20  # bytes of a text
 _TUTORIAL = "docs/tutorial.md"
 _HEADING = re.compile(r"^## (.+)$")
 _FENCE = re.compile(r"^\s*(```|~~~)")
 _SCRIPT = re.compile(r"^\*Script: \[[^\]]+\]\(tutorial/([^)]+)\)\*$", re.MULTILINE)
+_NUMBER = re.compile(r"\d_")  # with which the name of a stage's script begins
 _FLOWN = re.compile(r"drone\.launch script:=docs/tutorial/\S+ scene:=(\S+)")
+# What the text says to who reads it in the browser, hidden from other readers, and what it says to those.
+_ALTERNATIVE = re.compile(r"<!-- browser:\n?(.*?)\n?-->(.*?)<!-- end -->", re.DOTALL)
+_CONSOLE = re.compile(r"^( *)```console\n(.*?)^ *```\n", re.MULTILINE | re.DOTALL)
+_COMMAND = re.compile(r"^ *[12]\$ ")
+_FLEW = re.compile(r"^flew ([\d.]+ s) in .*?; ended at")
 _PICTURE = re.compile(r"/(docs/pictures/tutorial_\w+\.png|tasks/\w+/\w+\.png)")
 
 
@@ -30,6 +47,15 @@ class Lesson:
     folder: str  # in the package, from which its links and pictures are seen
     script: str = ""  # what it begins with, as the script store names it
     scene: str = ""  # of a section: the scene file that its command flies in, in the package; '' is any
+
+    @property
+    def stem(self) -> str:
+        """The name of its script, without kind and ending; '' without one."""
+        return Path(self.script).stem
+
+    def is_begun_by(self, stem: str) -> bool:
+        """Tell whether a script of the user's with this name goes on with its script."""
+        return bool(self.stem) and f"{stem}_".startswith(f"{self.stem}_")
 
     @property
     def task(self) -> str:
@@ -53,12 +79,19 @@ class Lessons:
         return next((one for one in self.all() if one.name == name), None)
 
     def of_script(self, script: ScriptFile) -> Lesson | None:
-        """Return the text that a script belongs to: one of the user's by its name, such as 2_elevation_mine.py."""
-        if not script.is_own:
-            return next((one for one in self.all() if one.script == script.name), None)
+        """Return the text that a script belongs to: one of the user's by its name, such as 2_elevation_mine.py.
+
+        A solution, or a copy of one, belongs to the stage of its number.
+        """
+        texts = [one for one in self.all() if one.script]
+        shipped = next((one for one in texts if one.script == script.name), None)
+        if shipped or not (script.is_own or script.group == SOLUTIONS):
+            return shipped
         stem = Path(script.file_name).stem
-        begun = [one for one in self.all() if one.script and f"{stem}_".startswith(f"{Path(one.script).stem}_")]
-        return max(begun, key=lambda one: len(one.script), default=None)
+        stages = [one for one in texts if _NUMBER.match(one.stem) and _NUMBER.match(stem)]
+        of_number = next((one for one in stages if one.stem[0] == stem[0]), None)
+        begun = [one for one in texts if one.is_begun_by(stem)]
+        return max(begun, key=lambda one: len(one.script), default=of_number)
 
     def picture(self, path: str) -> tuple[str, bytes] | None:
         """Return content type and content of a picture that a text shows, by its path in the package."""
@@ -75,7 +108,7 @@ class Lessons:
             yield Lesson(
                 name=_anchor(title),
                 title=title,
-                text=text,
+                text=_for_the_browser(text),
                 folder="docs",
                 script=f"tutorial/{script[1]}" if script else "",
                 scene=str(self._package / scene[1]) if script and scene else "",
@@ -102,6 +135,17 @@ def _parted(text: str) -> Iterator[tuple[str, str]]:
         lines.append(line)
     if title:
         yield title, "\n".join(lines)
+
+
+def _for_the_browser(text: str) -> str:
+    """Return what a text says to who reads it beside the scene: no commands, but what they print."""
+    return _CONSOLE.sub(_printed, _ALTERNATIVE.sub(lambda found: found[1], text))
+
+
+def _printed(block: re.Match[str]) -> str:
+    """Return a block of what its commands print, '' where they print nothing."""
+    lines = [_FLEW.sub(r"after \1:", line) for line in block[2].splitlines() if not _COMMAND.match(line)]
+    return "\n".join([f"{block[1]}```text", *lines, f"{block[1]}```", ""]) if lines else ""
 
 
 def _anchor(title: str) -> str:

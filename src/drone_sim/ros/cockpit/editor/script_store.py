@@ -16,10 +16,11 @@ from drone_sim.files.resources import package_path, read_bytes
 from drone_sim.grading import tasks
 from drone_sim.scripting.python.helpers import BUILT_IN
 
-OWN = "mine"
+OWN, SOLUTIONS = "mine", "solutions"
 _ENDINGS = (".py", ".lua")
 _LONGEST = 100  # characters of a name
 _MOST = 1000  # scripts of one kind
+_MOST_REMOVED = 20  # deleted scripts that are kept, in memory
 _START = "start.py"  # what a task begins with
 _LAST_STAGE = "6_ros.py"  # the tutorial's whole controller
 LARGEST = 1 << 20  # bytes
@@ -44,7 +45,7 @@ class ScriptFile:
 
     @property
     def group(self) -> str:
-        """Which kind it is of: built-in, tutorial, tasks or mine."""
+        """Which kind it is of: built-in, tutorial, solutions, tasks or mine."""
         return self.name.partition("/")[0]
 
     @property
@@ -61,6 +62,7 @@ class ScriptStore:
         self.folder = folder
         self._shipped = shipped_with_the_package() if shipped is None else shipped
         self._originals: dict[str, str] = {}  # of the user's own, as they were before the first change
+        self._removed: dict[str, bytes] = {}  # what the last ones held that were deleted, by name
         self._writing = threading.Lock()  # two browsers may save at once
 
     # ---- what there is
@@ -162,6 +164,67 @@ class ScriptStore:
             _write_text(second.name, second.path, text, is_new=True)
             return script, _version_of(script.path), second.name
 
+    # ---- files
+
+    def rename(self, script: ScriptFile, name: Any) -> tuple[ScriptFile, str]:
+        """Give a script of the user's another name; return it, and its version. Raises ScriptStoreError."""
+        new = self._own(_checked(name))
+        with self._writing:
+            place = self._own_place(script)
+            with _naming_errors(script.name):
+                try:
+                    os.link(place, new.path, follow_symlinks=False)  # which takes the place of nothing
+                except FileExistsError:
+                    raise ScriptStoreError(f"{new.name}: is there already; take another name") from None
+                os.unlink(place)
+            if script.name in self._originals:
+                self._originals[new.name] = self._originals.pop(script.name)
+            return new, _version_of(new.path)
+
+    def duplicate(self, script: ScriptFile, text: str) -> tuple[ScriptFile, str]:
+        """Write `text`, what a browser shows of a script, into a new one beside it; return that, and its version.
+
+        Raises ScriptStoreError.
+        """
+        with self._writing:
+            copy = self._copy_of(script)
+            return copy, _write_text(copy.name, copy.path, text, is_new=True)
+
+    def remove(self, script: ScriptFile) -> None:
+        """Delete a script of the user's, of which `bring_back` knows. Raises ScriptStoreError."""
+        with self._writing:
+            place = self._own_place(script)
+            with _naming_errors(script.name):
+                content = read_bytes(place, LARGEST)
+                os.unlink(place)
+            self._removed.pop(script.name, None)
+            self._removed[script.name] = content
+            for oldest in list(self._removed)[:-_MOST_REMOVED]:
+                del self._removed[oldest]
+
+    def bring_back(self, name: Any) -> tuple[ScriptFile, str]:
+        """Write a script again that was deleted, under its name or, where that is taken, beside it; return it.
+
+        Raises ScriptStoreError.
+        """
+        with self._writing:
+            if name not in self._removed:
+                raise ScriptStoreError(f"{str(name)[:80]!r}: was not deleted here, or too long ago")
+            script = self._own(str(name).removeprefix(f"{OWN}/"))
+            if os.path.lexists(script.path):
+                script = self._copy_of(script)
+            with _naming_errors(script.name):
+                self.folder.mkdir(parents=True, exist_ok=True)
+                writing.write_new(script.path, self._removed.pop(name))
+            return script, _version_of(script.path)
+
+    def _own_place(self, script: ScriptFile) -> Path:
+        """Return the file of a script of the user's, or the link that it is. Raises ScriptStoreError."""
+        if not script.is_own:
+            raise ScriptStoreError(f"{script.name}: belongs to the package, and stays as it is; duplicate it")
+        self._place(script)
+        return script.path
+
     def original(self, script: ScriptFile) -> str:
         """Return what a script was before the first change, to go back to. Raises ScriptStoreError."""
         known = self._originals.get(script.name)
@@ -186,6 +249,7 @@ def shipped_with_the_package() -> dict[str, Callable[[], dict[str, Path]]]:
     return {
         "built-in": lambda: scripts_in(BUILT_IN),
         "tutorial": lambda: _stages(package / "docs" / "tutorial"),
+        SOLUTIONS: lambda: scripts_in(package / "docs" / "tutorial" / "solutions"),
         "tasks": lambda: _starts(package / "docs" / "tutorial" / _LAST_STAGE),
     }
 

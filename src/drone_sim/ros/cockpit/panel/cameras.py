@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import threading
+import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -16,6 +17,8 @@ from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
+from drone_sim.message_text import shown
+from drone_sim.ros.cockpit.panel.board import Board, one_of
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.topics import ImageTopic
 
@@ -25,20 +28,21 @@ _COLORS = cv2.COLORMAP_TURBO  # near is blue, far is red
 _JPEG = (cv2.IMWRITE_JPEG_QUALITY, 80)
 _MILLIMETRES = "16UC1"  # REP-118
 _KINDS = ("views", "dialogs", "consoles")
+_CONNECTING = 3.0  # s, for the simulation to hear of who answers
 _LONGEST = 1 << 21  # characters of a message; the simulation's own have less
+_KNOWN = {"track": "tracking"}  # what people call it in place of the topic
 _bridge = CvBridge()
 
 
 class CameraSwitches:
-    """A switch for each topic of pictures; who is switched on is listened to, and shown beside the scene."""
+    """A switch for each topic of pictures; who is switched on is listened to, and shown over the scene."""
 
-    def __init__(self, gui: Any, socket: PageSocket):
-        """Draw into `gui`; pictures go through `socket`."""
-        self._gui, self._socket = gui, socket
-        self._folder = gui.add_folder("Cameras")
-        self._lock = threading.RLock()  # switches are also turned by browsers
+    def __init__(self, board: Board, socket: PageSocket):
+        """Show on `board` which there are; pictures go through `socket`."""
+        self._board, self._socket = board, socket
+        self._lock = threading.RLock()  # browsers turn switches, too
         self._sources: dict[str, ImageTopic] = {}
-        self._switches: dict[str, Any] = {}
+        self._names: dict[str, str] = {}
         self._shown: dict[str, _CameraListener] = {}
         self._views: frozenset[str] = frozenset()
         self._resting = True
@@ -48,30 +52,24 @@ class CameraSwitches:
         """The topics that are shown."""
         return list(self._shown)
 
-    def offer(self, sources: tuple[ImageTopic, ...]) -> None:
-        """Offer these."""
+    def offer(self, sources: tuple[ImageTopic, ...], vehicles: Sequence[str] = ()) -> None:
+        """Offer these, of those vehicles and of others."""
         with self._lock:
-            self._sources = {one.topic: one for one in sources}
-            for topic in self._switches.keys() - self._sources.keys():
-                self._switches.pop(topic).remove()
-                self._switch(topic, False)
-            with self._folder:
-                for topic in self._sources:
-                    if topic not in self._switches:
-                        self._add(topic)
+            before, self._sources = self._sources.keys(), {one.topic: one for one in sources}
+            self._names = {topic: camera_name(topic, vehicles) for topic in self._sources}
+            self._board.show("cameras", [{"topic": topic, "name": name} for topic, name in self._names.items()])
+            for topic in before - self._sources.keys():
+                self.turn(topic, False)
+            for topic in self._views & (self._sources.keys() - before):
+                self.turn(topic, True)
 
-    def _add(self, topic: str) -> None:
-        on = topic in self._views
-        switch = self._switches[topic] = self._gui.add_checkbox(label(topic), on)
-        switch.on_update(lambda event: self._switch(topic, event.target.value))
-        self._switch(topic, on)
-
-    def turn(self, topic: str, on: bool) -> None:
-        """Turn a switch, as a browser does; a topic that there is not has none."""
-        with self._lock:
-            switch = self._switches.get(topic)
-            if switch is not None and switch.value != on:
-                switch.value = on  # which turns it
+    def turn_asked(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Turn a switch, as a browser asks. Raises ValueError for a topic that there is not."""
+        topic = one_of(message, "topic", [*self._sources, *self._shown])
+        if not isinstance(message.get("on"), bool):
+            raise ValueError(f"on = {shown(message.get('on'))}: must be true or false")
+        self.turn(topic, message["on"])
+        return {}
 
     def follow_views(self, topics: frozenset[str]) -> None:
         """Show what scripts have opened a view of since, and no more what they have closed."""
@@ -80,9 +78,10 @@ class CameraSwitches:
             for topic in before ^ topics:
                 self.turn(topic, topic in topics)
 
-    def _switch(self, topic: str, on: bool) -> None:
+    def turn(self, topic: str, on: bool) -> None:
+        """Turn a switch; a topic that there is not has none to turn on."""
         with self._lock:
-            if on and topic not in self._shown:
+            if on and topic in self._sources and topic not in self._shown:
                 self._shown[topic] = camera = _CameraListener(self._sources[topic])
                 camera.listen(not self._resting)
             elif not on and topic in self._shown:
@@ -105,7 +104,8 @@ class CameraSwitches:
             except ValueError as error:
                 rospy.logwarn_throttle(10, f"{topic} is not shown: {error}")
                 continue
-            self._socket.show_picture({"picture": topic, "name": label(topic), "note": caption}, picture)
+            name = self._names.get(topic, topic)
+            self._socket.show_picture({"picture": topic, "name": name, "note": caption}, picture)
 
     def rest(self, resting: bool) -> None:
         """Listen to nobody while no browser is open, and to those that were switched on again afterwards."""
@@ -153,7 +153,7 @@ class ScriptWindows:
         return {
             "windows": lambda _: {"windows": self._state, "pictures": self._cameras.shown},
             "answer": self._answer,
-            "camera": self._turn,
+            "camera": self._cameras.turn_asked,
         }
 
     def listen(self, on: bool) -> None:
@@ -184,17 +184,20 @@ class ScriptWindows:
         """Hand on which button was pressed; the simulation checks it."""
         if self._answering is None:
             raise ValueError("there is no simulation that hears the answer")
+        until = time.monotonic() + _CONNECTING
+        while not self._answering.get_num_connections() and time.monotonic() < until:
+            time.sleep(0.05)  # the first message of a new publisher is heard by nobody
         self._answering.publish(json.dumps({key: message.get(key) for key in ("handle", "button", "typed")}))
         return {}
 
-    def _turn(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        self._cameras.turn(str(message.get("topic")), bool(message.get("on")))
-        return {}
 
-
-def label(topic: str) -> str:
-    """Return what a person calls a topic of pictures."""
-    return topic.strip("/").removesuffix("/image")
+def camera_name(topic: str, vehicles: Sequence[str] = ()) -> str:
+    """Return what a person calls a topic of pictures: front, tracking; with several vehicles: wing, front."""
+    plain = topic.strip("/").removesuffix("/image")
+    vehicle = next((one for one in vehicles if plain.startswith(f"{one}/")), "")
+    own = plain.removeprefix(f"{vehicle}/") if vehicle else plain.partition("/views/")[2] or plain
+    known = _KNOWN.get(own, own)
+    return f"{vehicle}, {known}" if vehicle and len(vehicles) > 1 else known
 
 
 def packed(message: CompressedImage | Image) -> tuple[bytes, str]:

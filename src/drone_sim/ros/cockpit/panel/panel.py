@@ -1,202 +1,137 @@
-"""The panel beside the scene: toolbar, view, cameras, what is said. viser draws it, the same in every browser."""
+"""What the page's buttons and lists do, and what the simulation says to them. The page draws all of it."""
 
 from __future__ import annotations
 
-import html
-import time
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from dynamic_reconfigure.msg import Config
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
 
 from drone_sim.ros.cockpit.editor.scene_files import SceneList
-from drone_sim.ros.cockpit.panel.cameras import CameraSwitches
-from drone_sim.ros.cockpit.panel.plots import SensorPlot, VehiclePlots, set_options
+from drone_sim.ros.cockpit.panel.board import Board, one_of
+from drone_sim.ros.cockpit.panel.flown import FlownScript
+from drone_sim.ros.cockpit.panel.plots import Plots
 from drone_sim.ros.cockpit.panel.tuning import SpeedControl, VehicleTuning
-from drone_sim.ros.cockpit.scene.frames import BEHIND, FREE, Viewpoint
-from drone_sim.ros.cockpit.scene.handles import Selection
-from drone_sim.ros.cockpit.server.page_socket import PageSocket
+from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.teleop import REQUESTS, CommandPublisher
 from drone_sim.ros.cockpit.topics import FoundTopics
 from drone_sim.ros.core.simulator import FAILURES, Simulator, script_failure
 
-_READ = 30.0  # s for which a message is shown
-# As high with a message as without: the tabs stay where they are.
-_MESSAGE = (
-    # All tabs stand in one line, and what is dimmed can be read.
-    "<style>[role=tab] {{padding: 0 7px !important; opacity: 1 !important}} "
-    ":root {{--mantine-color-dimmed: #495057}}</style>"
-    '<div role="status" style="height:34px;overflow:auto;margin:2px 10px;'
-    'font-size:12px;line-height:17px;overflow-wrap:anywhere">{}</div>'
-)
-_LINES = 50  # that a log has
-_LONGEST = 600  # characters of a line
-_STYLE = "font:11px/1.45 ui-monospace,monospace;white-space:pre-wrap;overflow-wrap:anywhere;margin:4px 10px"
-_AT_THE_END = "display:flex;flex-direction:column-reverse;max-height:300px;overflow:auto"  # until somebody scrolls
 _LEVELS = {Log.WARN: "warning: ", Log.ERROR: "error: ", Log.FATAL: "error: "}
+_PLAIN = ("start", "stop", "restart", "step", "snapshot", "restore")
+_CALLS: dict[str, tuple[Any, ...]] = {
+    **{one: (one,) for one in _PLAIN},
+    "pause": ("pause", True),
+    "resume": ("pause", False),
+}
 
 
 class Panel:
-    """Buttons that call the simulation's services, and what it says."""
+    """Answers what a browser asks for, and shows what there is on the board."""
 
     def __init__(
-        self,
-        gui: Any,
-        simulator: Simulator,
-        commands: CommandPublisher,
-        scenes: SceneList,
-        viewpoint: Viewpoint,
-        selection: Selection,
-        socket: PageSocket,
+        self, simulator: Simulator, commands: CommandPublisher, scenes: SceneList, tell: Callable[[Any], None]
     ):
-        """Draw it into `gui`.
+        """Call `simulator`, send `commands`, offer `scenes`; `tell` sends a message to all browsers."""
+        self._simulator, self._commands, self._scenes = simulator, commands, scenes
+        self.board = Board(tell)
+        self.flown = FlownScript()
+        self.plots = Plots(self.board)
+        self.tuning = VehicleTuning(self.board)
+        self.speed = SpeedControl(self.board, simulator.node)
+        self._flight: list[rospy.Subscriber] = []
+        self._hears = False  # whether the vehicle's script listens to commands now, as its node says
+        self._followed = ""
+        self.show_status("no simulation")
 
-        Its buttons call `simulator` and send `commands`; it offers `scenes`, sets `viewpoint` and `selection`, and
-        sends pictures through `socket`.
-        """
-        self._gui = gui
-        self._simulator = simulator
-        self._commands = commands
-        self._scenes = scenes
-        self._selection = selection
-        gui.set_panel_label("drone_sim")
-        self._status = gui.add_text("Status", "no simulation", disabled=True)
-        self._message = gui.add_html("")
-        self.say("")
-        tabs = gui.add_tab_group()
-        with tabs.add_tab("Fly"):
-            self._toolbar()
-        with tabs.add_tab("View"):
-            self._view(viewpoint)
-        with tabs.add_tab("Cameras"):
-            self.cameras = CameraSwitches(gui, socket)
-        with tabs.add_tab("Plots"):
-            self.plots = VehiclePlots(gui)
-            self.sensor = SensorPlot(gui)
-        with tabs.add_tab("Tune"):
-            self.tuning = VehicleTuning(gui, self.say)
-        with tabs.add_tab("Log"):
-            self.diagnosis = TextLog(gui, "Diagnosis")
-            self.log = TextLog(gui, "Log")
+    @property
+    def answers(self) -> dict[str, Answer]:
+        """What answers each question."""
+        return {
+            "panel": self.board.whole,
+            "call": self._call,
+            "request": lambda message: {"said": self._commands.request(one_of(message, "request", REQUESTS))},
+            "speed": self.speed.set,
+            "scene": self._load,
+            "vehicle": self._choose,
+            "tune": self.tuning.set,
+            "plots": self.plots.answer,
+        }
 
-    def _toolbar(self) -> None:
-        gui = self._gui
-        run = gui.add_button_group(
-            "Simulation", ("start", "stop", "restart"), hint="Start the flight; end it, and put all back; both"
-        )
-        run.on_click(lambda event: self._call(event.target.value))
-        pause = gui.add_button_group("Pause", ("pause", "resume", "step"), hint="A step is 0.05 s")
-        pauses: dict[str, tuple[Any, ...]] = {"step": ("step",), "pause": ("pause", True), "resume": ("pause", False)}
-        pause.on_click(lambda event: self._call(*pauses[event.target.value]))
-        self.speed = SpeedControl(gui, self._simulator.node, self.say)
-        snapshot = gui.add_button_group("Snapshot", ("snapshot", "restore"), hint="Remember this moment; go back to it")
-        snapshot.on_click(lambda event: self._call(event.target.value))
-        self._scene = gui.add_dropdown("Scene", ("",), hint="What stands around the drone; starts anew")
-        self._scene.on_update(lambda event: self._load(event))
-        self._vehicles = gui.add_dropdown("Vehicle", ("",), hint="The one that the keys fly")
-        self._vehicles.on_update(lambda event: self._commands.choose(event.target.value))
-        ask = gui.add_button_group("Flight", REQUESTS)
-        ask.on_click(lambda event: self.say(self._commands.request(event.target.value)))
+    def _call(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Call a service of the simulation, and tell what it says."""
+        done, said = self._simulator.call(*_CALLS[one_of(message, "call", list(_CALLS))])
+        return {"done": done, "said": said}
 
-    def _view(self, viewpoint: Viewpoint) -> None:
-        gui = self._gui
-        self._look = gui.add_dropdown(
-            "Look", (BEHIND, FREE), initial_value=viewpoint.choice, hint="Where one looks from; free: drag the scene"
-        )
-        self._look.on_update(lambda event: setattr(viewpoint, "choice", event.target.value))
-        self.axes = gui.add_checkbox("Frames", False, hint="The axes of all frames: x red, y green, z blue")
-        self.handles = gui.add_checkbox("Handles", True, hint="The arrows that drag drone and sphere")
-        self._objects = gui.add_dropdown("Drag", ("",), hint="The object that gets arrows; so does a click on it")
-        self._objects.on_update(lambda event: setattr(self._selection, "name", event.target.value))
-        self.shadows = gui.add_checkbox("Shadows", True)
-        self.strength = gui.add_slider("Push by a click, N", min=0.1, max=3.0, step=0.1, initial_value=0.5)
-
-    def _call(self, service: str, *request: Any) -> None:
-        self.say(f"{service} ...")
-        self._simulator.call_aside(
-            service, *request, then=lambda done, said: self.say(f"{service}: {'' if done else 'failed: '}{said}")
-        )
-
-    def _load(self, event: Any) -> None:
-        if event.client is None:  # the server itself has set it
-            return
+    def _load(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Start anew in another scene. Raises ValueError."""
+        name = one_of(message, "scene", self.board.get("scenes", {}).get("all", []))
         try:
-            self._simulator.set_parameter("scene_file", self._scenes.file(event.target.value))
+            self._simulator.set_parameter("scene_file", self._scenes.file(name))
         except FAILURES as error:
-            self.say(f"load_scene: failed: {' '.join(str(error).split())}")
-            return
-        self._call("load_scene")
+            raise ValueError(f"scene = {name}: {' '.join(str(error).split())}") from None
+        done, said = self._simulator.call("load_scene")
+        self._show_scenes(self._scenes.file(name))
+        return {"done": done, "said": said}
 
-    # ---- what is said
+    def _choose(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Let the keys fly another vehicle. Raises ValueError."""
+        vehicles = self.board.get("vehicles", {}).get("all", [])
+        self._commands.choose(one_of(message, "vehicle", vehicles))
+        self._show_vehicles(vehicles)
+        return {"said": f"the keys fly {self._commands.vehicle}"}
 
-    def say(self, line: str) -> None:
-        """Show one line, for a while."""
-        self._said_at = time.monotonic()
-        self._message.content = _MESSAGE.format(html.escape(line))
-
-    def clear_old_message(self) -> None:
-        """Show what has been said no more when it has been read."""
-        if self._said_at and time.monotonic() - self._said_at > _READ:
-            self.say("")
-            self._said_at = 0.0
+    # ---- what is shown
 
     def show_status(self, status: str) -> None:
         """Show what the simulation does."""
-        if self._status.value != status:
-            self._status.value = status
+        self.board.show("status", status)
 
-    def offer_viewpoints(self, choices: tuple[str, ...]) -> None:
-        """Offer where to look from."""
-        set_options(self._look, choices)
+    def offer(self, found: FoundTopics, scene: str, script: str) -> None:
+        """Offer vehicles and scenes that there are; `scene` and `script` are what the node's parameters say."""
+        if self._commands.vehicle not in found.vehicles:
+            self._commands.choose(found.vehicles[0] if found.vehicles else "")
+        self._show_vehicles(list(found.vehicles))
+        self._show_scenes(scene)
+        self.plots.offer(found.sensors)
+        self.flown.look(script)
+        self._show_flown()
 
-    def offer_objects(self, names: tuple[str, ...]) -> None:
-        """Offer the objects of the scene, and show the one that is chosen."""
-        choices = ("", *names)
-        if self._selection.name not in choices:
-            self._selection.name = ""
-        set_options(self._objects, choices)
-        if self._objects.value != self._selection.name:
-            self._objects.value = self._selection.name
+    def _show_vehicles(self, vehicles: list[str]) -> None:
+        self.board.show("vehicles", {"all": vehicles, "now": self._commands.vehicle})
 
-    def offer(self, found: FoundTopics, scene: str) -> None:
-        """Offer vehicles, cameras and scenes that there are; `scene` is the file of the one that is flown."""
-        if set_options(self._vehicles, found.vehicles or ("",)):
-            self._commands.choose(self._vehicles.value)
-        scenes, name = self._scenes.offered(scene)
-        set_options(self._scene, scenes)
-        if self._scene.value != name:
-            self._scene.value = name
-        self.cameras.offer(found.cameras)
-        self.sensor.offer(found.sensors)
+    def _show_scenes(self, scene: str) -> None:
+        scenes, now = self._scenes.offered(scene)
+        self.board.show("scenes", {"all": list(scenes), "now": now})
 
+    def follow(self, vehicle: str) -> None:
+        """Show what a vehicle does, '' for none."""
+        self.plots.follow(vehicle)
+        self.tuning.follow(vehicle)
+        if vehicle == self._followed:
+            return
+        self._followed = vehicle
+        for one in self._flight:
+            one.unregister()
+        self.board.show("flight", "")
+        self._hears, self._flight = False, []
+        if vehicle:
+            self._flight = [
+                rospy.Subscriber(f"/{vehicle}/state", String, lambda one: self.board.show("flight", one.data[:80])),
+                rospy.Subscriber(f"/{vehicle}/hears_commands", Bool, self._on_hears),
+            ]
 
-class TextLog:
-    """A heading, and lines below it, of whatever kind: they are text, never HTML."""
+    def _on_hears(self, message: Bool) -> None:
+        self._hears = message.data
+        self._show_flown()
 
-    def __init__(self, gui: Any, heading: str):
-        """Draw `heading` into `gui`, without lines."""
-        self._heading = heading
-        self._lines: list[str] = []
-        self._drawn = gui.add_html(self._html())
-
-    def show(self, lines: list[str]) -> None:
-        """Show these lines in the place of the last ones."""
-        lines = [one[:_LONGEST] for one in lines]
-        if lines != self._lines:
-            self._lines = lines
-            self._drawn.content = self._html()
-
-    def add(self, line: str) -> None:
-        """Show one more line; the oldest goes when there are many."""
-        self.show([*self._lines[1 - _LINES :], line])
-
-    def _html(self) -> str:
-        heading, text = html.escape(self._heading), html.escape("\n".join(self._lines))
-        body = f'<div style="{_AT_THE_END}"><pre style="{_STYLE}">{text}</pre></div>'
-        return f'<div style="margin:6px 10px;font-size:12px;font-weight:600">{heading}</div>{body}'
+    def _show_flown(self) -> None:
+        listens = self._hears or self.flown.said["listens"]  # a script that is not loaded hears nothing yet
+        self.board.show("flown", {**self.flown.said, "listens": listens})
 
 
 class SimulatorListener:
@@ -210,7 +145,8 @@ class SimulatorListener:
             ("/rosout_agg", Log, self._on_log),
             ("/diagnostics", DiagnosticArray, self._on_diagnostics),
             (f"{node}/state", String, lambda message: panel.show_status(message.data)),
-            (f"{node}/parameter_updates", Config, panel.speed.show_set),
+            (f"{node}/signals", String, panel.plots.on_signals),
+            (f"{node}/parameter_updates", Config, panel.speed.on_set),
         )
         self._listening = [rospy.Subscriber(*one, queue_size=20) for one in heard]
 
@@ -222,9 +158,7 @@ class SimulatorListener:
     def _on_log(self, message: Any) -> None:
         if message.name != self._node:
             return
-        line = f"{_LEVELS.get(message.level, '')}{message.msg}"
-        self._panel.log.add(line)
-        self._socket.tell({"log": line})
+        self._panel.board.log(f"{_LEVELS.get(message.level, '')}{message.msg}")
         failure = script_failure(message.msg) if message.level >= Log.ERROR else None
         if failure is not None:
             self._socket.tell({"failure": failure._asdict()})
@@ -234,8 +168,9 @@ class SimulatorListener:
         found = {one.name.removeprefix(own): one for one in message.status if one.name.startswith(own)}
         if not found:  # another node's
             return
-        wrong = [f"{name}: {one.message}" for name, one in found.items() if one.level != DiagnosticStatus.OK]
-        fine = [f"{name}: {one.message}" for name, one in found.items() if one.level == DiagnosticStatus.OK]
-        self._panel.diagnosis.show([*(wrong or ["nothing is wrong"]), "", *fine])
+        said = [
+            {"of": name, "said": one.message, "wrong": one.level != DiagnosticStatus.OK} for name, one in found.items()
+        ]
+        self._panel.board.show("diagnosis", sorted(said, key=lambda one: not one["wrong"]))
         values = {one.key: one.value for one in found["simulation"].values} if "simulation" in found else {}
-        self._panel.speed.show_actual(values.get("real-time factor", ""))
+        self._panel.board.show("pace", values.get("real-time factor", ""))

@@ -1,181 +1,184 @@
-"""Things to drag in the browser: the handles that the simulation offers to rviz, as viser's transform controls."""
+"""Things to drag in the browser: the handles that the simulation offers to rviz, and who holds which of them.
+
+A handle is said to the browsers as a marker of the kind `handle`: its name is `ns`, its server is `layer`. What it
+looks like where that is always to be seen, such as the green sphere, as markers of their own, in the layer of `server`.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
+import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_msgs.msg import Header
-from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit, InteractiveMarkerUpdate
+from visualization_msgs.msg import (
+    InteractiveMarker,
+    InteractiveMarkerFeedback,
+    InteractiveMarkerInit,
+    InteractiveMarkerUpdate,
+    Marker,
+)
 
 from drone_sim.mechanics import frames
-from drone_sim.ros.core.message_conversion import WORLD_FRAME, xyz
+from drone_sim.message_text import shown
+from drone_sim.ros.cockpit.scene import scene_state
+from drone_sim.ros.cockpit.scene.markers import entry_of, pose_of
+from drone_sim.ros.cockpit.scene.scene_state import Entry, Key
+from drone_sim.ros.core.message_conversion import WORLD_FRAME
 
-LARGE = {"scale": 0.25}  # m
-ANYWHERE = {"scale": 90.0, "fixed": True}  # pixels, near or far
 _STILL = 0.25  # s, after which the simulation is told once more that a handle is held
-_KINDS = {
+_UNSEEN = 0.05  # opacity of what is there for the mouse alone
+_FARTHEST = 1e6  # m, of what a browser may ask for
+PHASES = {
     "start": InteractiveMarkerFeedback.MOUSE_DOWN,
-    "update": InteractiveMarkerFeedback.POSE_UPDATE,
+    "move": InteractiveMarkerFeedback.POSE_UPDATE,
     "end": InteractiveMarkerFeedback.MOUSE_UP,
 }
-_UPRIGHT = (1.0, 0.0, 0.0, 0.0)  # wxyz
 
 
-class _DragControl:
-    """Arrows and planes along the axes, and a ring about the vertical, which turns by itself."""
+class Drag(NamedTuple):
+    """What a browser says of a handle: start, move or end, and where it is now in the world."""
 
-    def __init__(self, scene: Any, name: str, visible: bool, size: Mapping[str, Any]):
-        look = {"depth_test": False, **size}
-        self.arrows = scene.add_transform_controls(name, disable_rotations=True, visible=visible, **look)
-        alone = {"active_axes": (True, True, False), "disable_axes": True, "disable_sliders": True}
-        self.ring = scene.add_transform_controls(f"{name}/turn", **alone, **look)
+    server: str
+    name: str
+    phase: str
+    pose: scene_state.Pose
 
-    def put(self, pose: Pose) -> None:
-        turn = pose.orientation
-        for control, name, value in (
-            (self.arrows, "position", xyz(pose.position)),
-            (self.arrows, "wxyz", (turn.w, turn.x, turn.y, turn.z)),
-            (self.ring, "wxyz", _UPRIGHT),
-        ):
-            if tuple(getattr(control, name)) != value:
-                setattr(control, name, value)
 
-    @property
-    def pose(self) -> Pose:
-        (w, x, y, z), (rw, rx, ry, rz) = (map(float, one.wxyz) for one in (self.arrows, self.ring))
-        turn = frames.multiply_quaternions((x, y, z, w), (rx, ry, rz, rw))
-        return Pose(Point(*map(float, self.arrows.position)), Quaternion(*turn))
+def read_drag(given: Mapping[str, Any]) -> Drag:
+    """Return the drag in a browser's message. Raises ValueError."""
+    phase = given.get("drag")
+    if not isinstance(phase, str) or phase not in PHASES:
+        raise ValueError(f"drag = {shown(phase)}: must be one of {', '.join(PHASES)}")
+    for name in ("server", "name"):
+        if not isinstance(given.get(name), str):
+            raise ValueError(f"{name} = {shown(given.get(name))}: must be a name")
+    return Drag(given["server"], given["name"], phase, _read_pose(given.get("pose")))
 
-    def remove(self) -> None:
-        self.ring.remove()
-        self.arrows.remove()
+
+def _read_pose(given: Any) -> scene_state.Pose:
+    wrong = ValueError("pose: must be x, y, z (m), and a quaternion x, y, z, w")
+    if not isinstance(given, list) or len(given) != len(scene_state.AT_REST):
+        raise wrong
+    if any(not isinstance(one, (int, float)) or isinstance(one, bool) or abs(one) > _FARTHEST for one in given):
+        raise wrong
+    length = sum(one * one for one in given[3:]) ** 0.5
+    if length < 0.5:
+        raise wrong
+    return (*map(float, given[:3]), *(one / length for one in given[3:]))
+
+
+class _Held(NamedTuple):
+    browser: int
+    said: float  # s, when the simulation was told last
+    pose: scene_state.Pose
 
 
 class DragControls:
-    """One control for each interactive marker of a server. Messages are taken in any thread, and shown in one."""
+    """The handles of one interactive marker server. Any thread may call."""
 
     def __init__(
         self,
-        scene: Any,
+        server: str,
         publish: Callable[[InteractiveMarkerFeedback], None],
-        folder: str = "handles",
-        is_offered: Callable[[str], bool] = lambda _: True,
-        size: Mapping[str, Any] = LARGE,
         clock: Callable[[], float] = time.monotonic,
     ):
-        """Show controls of `size` below `folder` in `scene`, for each marker that `is_offered`.
+        """Begin without handles.
 
         `publish` sends what is dragged to the topic `…/feedback`; `clock` returns s.
         """
-        self._scene, self._folder, self._size = scene, folder, size
-        self._publish = publish
-        self._is_offered = is_offered
-        self._clock = clock
-        self._lock = threading.Lock()
-        self._known: dict[str, Pose] = {}
-        self._shown: dict[str, _DragControl] = {}
-        self._held: dict[str, tuple[int, float]] = {}  # by whom, and when that was said last
-        self._visible = True
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All markers there are, with a control or without."""
-        with self._lock:
-            return tuple(sorted(self._known))
-
-    @property
-    def held(self) -> bool:
-        """Whether somebody drags one."""
-        return bool(self._held)
+        self._server = server
+        self._publish, self._clock = publish, clock
+        self._lock = threading.RLock()
+        self._there: dict[str, tuple[InteractiveMarker, Pose]] = {}
+        self._changed: set[str] = set()
+        self._told: dict[str, set[Key]] = {}
+        self._held: dict[str, _Held] = {}
 
     def on_init(self, message: InteractiveMarkerInit) -> None:
         """Take all that there are."""
         with self._lock:
-            self._known = {one.name: one.pose for one in message.markers}
+            self._changed |= self._there.keys()
+            self._there = {one.name: (one, one.pose) for one in message.markers}
+            self._changed |= self._there.keys()
 
     def on_update(self, message: InteractiveMarkerUpdate) -> None:
         """Take what has come, gone or moved."""
         with self._lock:
-            self._known.update({one.name: one.pose for one in message.markers})
-            self._known.update({one.name: one.pose for one in message.poses if one.name in self._known})
+            for one in message.markers:
+                self._there[one.name] = one, one.pose
+                self._changed.add(one.name)
+            for pose in message.poses:
+                if pose.name in self._there:
+                    self._there[pose.name] = self._there[pose.name][0], pose.pose
+                    self._changed.add(pose.name)
             for name in message.erases:
-                self._known.pop(name, None)
+                self._there.pop(name, None)
+                self._changed.add(name)
 
-    def show(self, browsers: Collection[int] = ()) -> None:
-        """Put the handles where they are, but for those that somebody in one of the open browsers drags."""
+    def take(self) -> dict[Key, Entry | None]:
+        """Return what has changed of the handles since the last call, None for what is gone."""
         with self._lock:
-            wanted = {name: pose for name, pose in self._known.items() if self._is_offered(name)}
-            held = dict(self._held)
-        for name in self._shown.keys() - wanted.keys():
-            self._let_go(name)
-            self._shown.pop(name).remove()
-        for name, (browser, said) in held.items():
-            if browser not in browsers:
-                self._let_go(name)
-            elif self._clock() - said > _STILL:
-                self._tell(name, browser, InteractiveMarkerFeedback.KEEP_ALIVE)
-        for name, pose in wanted.items():
-            control = self._shown.get(name) or self._make(name)
-            if name not in self._held:
-                control.put(pose)
+            names, self._changed = self._changed, set()
+            changed: dict[Key, Entry | None] = {}
+            for name in names:
+                told = self._entries(*self._there[name]) if name in self._there else {}
+                changed.update(dict.fromkeys(self._told.pop(name, set()) - told.keys()))
+                changed.update(told)
+                if told:
+                    self._told[name] = set(told)
+            return changed
 
-    def forget(self) -> None:
-        """Have none."""
+    def _entries(self, handle: InteractiveMarker, pose: Pose) -> dict[Key, Entry | None]:
+        said = {"kind": "handle", "layer": self._server, "ns": handle.name, "frame": WORLD_FRAME}
+        entries: dict[Key, Entry | None] = {(self._server, handle.name, ""): Entry(said, {}, pose_of(pose))}
+        looks = [one for control in handle.controls if control.always_visible for one in control.markers]
+        for number, look in enumerate(one for one in looks if one.type == Marker.SPHERE and one.color.a > _UNSEEN):
+            entry = entry_of(look, self._server, lambda _: None)
+            if entry is not None:
+                place = _multiply(pose_of(pose), pose_of(look.pose))
+                told = {**entry.said, "ns": handle.name, "frame": WORLD_FRAME}
+                entries[self._server, handle.name, str(number)] = Entry(told, {}, place)
+        return entries
+
+    # ---- dragging
+
+    def drag(self, browser: int, given: Drag) -> None:
+        """Tell the simulation what a browser drags. Whoever comes second is not heard until the first lets go."""
         with self._lock:
-            self._known = {}
-        self.show()
+            held = self._held.get(given.name)
+            is_ours = held is not None and held.browser == browser
+            if given.name not in self._there or (is_ours if given.phase == "start" else not is_ours):
+                return
+            if given.phase == "start" and held is not None:
+                return
+            self._tell(given.name, browser, PHASES[given.phase], given.pose)
 
-    def show_all(self, visible: bool) -> None:
-        """Let the handles be seen, or not."""
-        if visible == self._visible:
-            return
-        self._visible = visible
-        for control in self._shown.values():
-            control.arrows.visible = visible
-
-    def _make(self, name: str) -> _DragControl:
-        path = f"/{self._folder}/{name.replace('/', '_')}"
-        control = self._shown[name] = _DragControl(self._scene, path, self._visible, self._size)
-
-        async def drag(event: Any) -> None:  # so, and not in a thread, the events keep their order
-            self._tell(name, event.client_id, _KINDS[event.phase])
-
-        control.arrows.on_update(drag)
-        control.ring.on_update(drag)
-        return control
-
-    def _let_go(self, name: str) -> None:
-        """Tell for a browser that has gone, or has lost its handle."""
-        if name in self._held:
-            self._tell(name, self._held[name][0], InteractiveMarkerFeedback.MOUSE_UP)
-
-    def _tell(self, name: str, browser: int, kind: int) -> None:
-        control = self._shown.get(name)
-        if control is None:
-            return
-        pose = control.pose
+    def keep(self, browsers: Collection[int]) -> None:
+        """Tell that what is held is held still; let go for browsers that have gone, and of handles that have."""
         with self._lock:
-            if kind == InteractiveMarkerFeedback.MOUSE_UP:
-                self._held.pop(name, None)
-            else:
-                self._held[name] = browser, self._clock()
-            if name in self._known:
-                self._known[name] = pose  # until the simulation says where it is
+            for name, held in list(self._held.items()):
+                if held.browser not in browsers or name not in self._there:
+                    self._tell(name, held.browser, InteractiveMarkerFeedback.MOUSE_UP, held.pose)
+                elif self._clock() - held.said > _STILL:
+                    self._tell(name, held.browser, InteractiveMarkerFeedback.KEEP_ALIVE, held.pose)
+
+    def _tell(self, name: str, browser: int, kind: int, pose: scene_state.Pose) -> None:
+        if kind == InteractiveMarkerFeedback.MOUSE_UP:
+            self._held.pop(name, None)
+        else:
+            self._held[name] = _Held(browser, self._clock(), pose)
         who = {"header": Header(frame_id=WORLD_FRAME), "client_id": f"cockpit/{browser}", "marker_name": name}
-        self._publish(InteractiveMarkerFeedback(**who, event_type=kind, pose=pose))
+        place = Pose(Point(*pose[:3]), Quaternion(*pose[3:]))
+        with contextlib.suppress(rospy.ROSException):  # the view is being closed
+            self._publish(InteractiveMarkerFeedback(**who, event_type=kind, pose=place))
 
 
-class Selection:
-    """The same for all browsers."""
-
-    def __init__(self) -> None:
-        """Begin with none."""
-        self.name = ""
-
-    def toggle(self, name: str) -> None:
-        """Take another one; let go of the one that has been taken."""
-        self.name = "" if name == self.name else name
+def _multiply(above: scene_state.Pose, below: scene_state.Pose) -> scene_state.Pose:
+    """Return a pose that is seen from another one as that one is."""
+    x, y, z = frames.transform(frames.from_quaternion(above[:3], above[3:]), below[:3])
+    return (x, y, z, *frames.multiply_quaternions(above[3:], below[3:]))

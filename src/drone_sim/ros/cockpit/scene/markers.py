@@ -1,149 +1,131 @@
-"""MarkerArrays, which the simulation makes for rviz, in the browser's scene."""
+"""MarkerArrays, which the simulation makes for rviz, as what the browsers show.
+
+What is said of a marker: `kind`; `layer`, the topic's name; `ns`; `color` r g b a (0..1, as on a screen); `scale`, m;
+and where it has them `text`, `mesh` (an address), `own` (the mesh has its own colours) and `lit` (false: it is as
+bright from everywhere). Its arrays: `points` (x y z each, m), `colors` (r g b a each).
+"""
 
 from __future__ import annotations
 
-import copy
-import io
 import threading
 from collections.abc import Callable, Collection
-from typing import Any, NamedTuple
+from typing import Any
 
-from geometry_msgs.msg import Pose, Vector3
-from std_msgs.msg import ColorRGBA, Header
+import numpy as np
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_sim.ros.cockpit.scene import looks
-from drone_sim.ros.cockpit.scene.frames import FrameTree
+from drone_sim.ros.cockpit.scene.scene_state import AT_REST, Entry, Key, Pose
+from drone_sim.ros.core.message_conversion import xyz
 
-_Key = tuple[str, int]
-_DIGITS = 2  # of a size in m
-_SHADES = 1  # digits of a colour
+KINDS = {
+    Marker.ARROW: "arrow",
+    Marker.CUBE: "cube",
+    Marker.SPHERE: "sphere",
+    Marker.CYLINDER: "cylinder",
+    Marker.LINE_STRIP: "strip",
+    Marker.LINE_LIST: "lines",
+    Marker.CUBE_LIST: "cubes",
+    Marker.SPHERE_LIST: "spheres",
+    Marker.POINTS: "points",
+    Marker.TEXT_VIEW_FACING: "text",
+    Marker.MESH_RESOURCE: "mesh",
+    Marker.TRIANGLE_LIST: "triangles",
+}
+_LEAST = {"strip": 2, "lines": 2, "cubes": 1, "spheres": 1, "points": 1, "triangles": 3}  # points, to be seen
+_DIGITS, _SHADES = 3, 3  # of a size in m, of a colour: who could tell more apart
 
 
-class _Look(NamedTuple):
-    kind: bytes
-    form: bytes  # points and words, which may change in place
-
-
-class _ShownMarker(NamedTuple):
-    handle: Any  # None where there is nothing to see
-    look: _Look
-    marker: Marker
-
-
-class MarkerNodes:
-    """The markers of one topic. Messages are taken in any thread, and shown in the one that calls `show`."""
+class MarkerTopic:
+    """The markers of one topic; any thread may call."""
 
     def __init__(
         self,
-        scene: Any,
-        topic: str,
-        frames: FrameTree,
-        on_new: Callable[[Marker, Any], None] = lambda *_: None,
+        layer: str,
+        mesh_url: Callable[[str], str | None] = lambda _resource: None,
         *,
         hidden: Collection[str] = (),
-        casts: bool = False,
+        is_shaded: bool = False,
     ):
-        """Show those of `topic` in `scene`, each at its frame in `frames`; begin with none.
+        """Begin with none; `mesh_url` returns where a browser gets a mesh, None where it cannot be read.
 
-        `on_new` is called with every marker that is made anew, and its handle. `hidden` are namespaces that the browser
-        has in another way; with `casts` the markers throw shadows.
+        `hidden` are namespaces that the browser has in another way. With `is_shaded` the light that is painted on for
+        rviz is left out: the browser has a sun.
         """
-        self._scene = scene
-        self._name = topic.replace("/", "_")
-        self._frames = frames
-        self._on_new = on_new
-        self._hidden, self._casts = hidden, casts
-        self._wanted: dict[_Key, Marker] = {}
+        self.layer = layer
+        self._mesh_url = mesh_url
+        self._hidden, self._is_shaded = hidden, is_shaded
         self._lock = threading.Lock()
-        self._changed = False
-        self._shown: dict[_Key, _ShownMarker] = {}
+        self._there: dict[Key, Entry] = {}
+        self._changed: dict[Key, Entry | None] = {}
 
     def on_markers(self, message: MarkerArray) -> None:
         """Take a message."""
+        numbers: dict[str, int] | None = None
+        fresh: dict[Key, Entry | None] = {}
+        for marker in message.markers:
+            if marker.action == Marker.DELETEALL:
+                # All is told anew: the n-th of its namespace is the one that was the n-th, whatever its id is now.
+                numbers, fresh = {}, dict.fromkeys(self._there)
+                continue
+            number = marker.id if numbers is None else numbers.get(marker.ns, 0)
+            if numbers is not None:
+                numbers[marker.ns] = number + 1
+            key = (self.layer, marker.ns, str(number))
+            fresh[key] = None if marker.action == Marker.DELETE else self._entry(marker)
+        self._put(fresh)
+
+    def take(self) -> dict[Key, Entry | None]:
+        """Return what has changed since the last call, None for what is gone."""
         with self._lock:
-            for marker in message.markers:
-                key = marker.ns, marker.id
-                if marker.action == Marker.DELETEALL:
-                    self._wanted.clear()
-                elif marker.action == Marker.DELETE:
-                    self._wanted.pop(key, None)
-                elif marker.ns not in self._hidden:
-                    if self._casts:
-                        marker.colors = []  # light that was painted on for rviz; here is a sun
-                    self._wanted[key] = marker
-            self._changed = True
+            changed, self._changed = self._changed, {}
+        return changed
 
-    def forget(self) -> None:
-        """Show nothing."""
+    def _put(self, fresh: dict[Key, Entry | None]) -> None:
         with self._lock:
-            self._wanted.clear()
-        self._changed = True
-        self.show()
+            for key, entry in fresh.items():
+                if entry is None:
+                    self._there.pop(key, None)
+                else:
+                    self._there[key] = entry
+            self._changed.update(fresh)
 
-    def show(self, frames_changed: bool = False) -> None:
-        """Put into the scene what has changed; what hangs on a frame that is not known yet waits for it."""
-        if not (self._changed or frames_changed):
-            return
-        with self._lock:
-            wanted, self._changed = dict(self._wanted), False
-        for key in self._shown.keys() - wanted.keys():
-            self._remove(key)
-        for key, marker in wanted.items():
-            self._put(key, marker)
-
-    def _put(self, key: _Key, marker: Marker) -> None:
-        before, look = self._shown.get(key), _look(marker)
-        if before is not None and self._change(before, look, marker):
-            self._shown[key] = before._replace(look=look, marker=marker)
-            return
-        parent = self._frames.name(marker.header.frame_id)
-        if parent is None:
-            return
-        namespace = marker.ns.replace("/", "_")
-        name = f"{parent}/{self._name}/{namespace}/{marker.id}"
-        if before is not None and before.handle is not None and before.handle.name != name:
-            self._remove(key)
-        handle = looks.show(self._scene, name, marker, self._casts)
-        if handle is None:
-            self._remove(key)
-        else:
-            self._on_new(marker, handle)
-        self._shown[key] = _ShownMarker(handle, look, marker)
-
-    @staticmethod
-    def _change(before: _ShownMarker, look: _Look, marker: Marker) -> bool:
-        """Show a marker by what is there already; tell whether that was possible."""
-        same = before.look == look
-        if before.handle is None or before.look.kind != look.kind:
-            return same
-        if not (same or looks.change(before.handle, marker)):
-            return False
-        if before.marker.pose != marker.pose:
-            place = looks.place(marker)
-            before.handle.position, before.handle.wxyz = place["position"], place["wxyz"]
-        return True
-
-    def _remove(self, key: _Key) -> None:
-        gone = self._shown.pop(key, None)
-        if gone is not None and gone.handle is not None:
-            gone.handle.remove()
+    def _entry(self, marker: Marker) -> Entry | None:
+        return None if marker.ns in self._hidden else entry_of(marker, self.layer, self._mesh_url, self._is_shaded)
 
 
-def _look(marker: Marker) -> _Look:
-    """Return what differs between two markers that look different; their poses, times and ids do not.
+def entry_of(
+    marker: Marker, layer: str, mesh_url: Callable[[str], str | None], is_shaded: bool = False
+) -> Entry | None:
+    """Return what a browser is told of a marker, None where there is nothing to see."""
+    kind = KINDS.get(marker.type, "")
+    points = np.array([(one.x, one.y, one.z) for one in marker.points], dtype=np.float32)
+    if not kind or len(points) < _LEAST.get(kind, 0):
+        return None
+    color = marker.color
+    said: dict[str, Any] = {
+        "kind": kind,
+        "layer": layer,
+        "ns": marker.ns,
+        "frame": marker.header.frame_id,
+        "color": [round(one, _SHADES) for one in (color.r, color.g, color.b, color.a)],
+        "scale": [round(one, _DIGITS) for one in xyz(marker.scale)],
+    }
+    if kind == "text":
+        said["text"] = marker.text
+    if kind == "mesh":
+        said["mesh"], said["own"] = mesh_url(marker.mesh_resource), bool(marker.mesh_use_embedded_materials)
+        if said["mesh"] is None:
+            return None
+    arrays = {"points": points.ravel()} if len(points) else {}
+    if len(points) and len(marker.colors) == len(points) and not is_shaded:
+        shades = np.array([(one.r, one.g, one.b, one.a) for one in marker.colors], dtype=np.float32)
+        arrays["colors"] = np.round(shades, _SHADES).ravel()
+        said["lit"] = False
+    return Entry(said, arrays, pose_of(marker.pose))
 
-    Colours and sizes that nobody could tell apart are the same: what is made anew is gone for a moment.
-    """
-    bare = copy.copy(marker)
-    bare.header, bare.pose, bare.points, bare.text = Header(frame_id=marker.header.frame_id), Pose(), [], ""
-    bare.scale = Vector3(*(round(value, _DIGITS) for value in (marker.scale.x, marker.scale.y, marker.scale.z)))
-    bare.colors = [ColorRGBA(*(round(value, _SHADES) for value in (c.r, c.g, c.b, c.a))) for c in marker.colors]
-    form = Marker(points=marker.points, text=marker.text)
-    return _Look(_bytes(bare), _bytes(form))
 
-
-def _bytes(marker: Marker) -> bytes:
-    data = io.BytesIO()
-    marker.serialize(data)
-    return data.getvalue()
+def pose_of(pose: Any) -> Pose:
+    """Return a message's pose; one without an orientation is upright, as in rviz."""
+    turn = pose.orientation
+    quaternion = (turn.x, turn.y, turn.z, turn.w)
+    return (*xyz(pose.position), *(quaternion if any(quaternion) else AT_REST[3:]))

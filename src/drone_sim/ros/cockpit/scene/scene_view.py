@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,123 +15,115 @@ from visualization_msgs.msg import (
     InteractiveMarkerFeedback,
     InteractiveMarkerInit,
     InteractiveMarkerUpdate,
-    Marker,
     MarkerArray,
 )
 
-from drone_sim.render.renderer import TO_SUN
+from drone_sim.message_text import near_names, shown
 from drone_sim.ros.cockpit.scene.frames import FrameTree
-from drone_sim.ros.cockpit.scene.handles import ANYWHERE, DragControls, Selection
-from drone_sim.ros.cockpit.scene.markers import MarkerNodes
+from drone_sim.ros.cockpit.scene.handles import DragControls, read_drag
+from drone_sim.ros.cockpit.scene.markers import MarkerTopic
+from drone_sim.ros.cockpit.scene.meshes import MeshStore
+from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.core.message_conversion import WORLD_FRAME
 
 _SCENE, _BODIES, _AROUND = "scene", "view/bodies", "view/surroundings"
 _OTHERS = ("drawing", "view/path", "view/height", "view/command", "view/forces", "view/state")
-_AWAY = 50.0  # m; only the direction counts
-_BRIGHT = 2.2
-_DARK = 0.45  # what a shadow takes away of the floor's brightness
-_FLOOR = "floor"  # the namespace of the marker on which shadows fall
+_SERVERS = ("markers", "objects")
+_STRONGEST = 100.0  # N, of a push
 
 
 class SceneView:
     """Everything at one namespace, that of the only drone or of the node."""
 
-    def __init__(self, scene: Any, namespace: str, sun: Sunlight, selection: Selection):
-        """Listen at `namespace`; show it in `scene`, lit by `sun`. A click on an object changes `selection`."""
+    def __init__(self, state: SceneState, meshes: MeshStore, namespace: str):
+        """Listen at `namespace`; put what is heard into `state`, and mesh files into `meshes`."""
         self.namespace = namespace
-        self.frames = FrameTree(scene)
-        self.strength = 0.5  # N, of a click on a vehicle
-        self._selection, self._sun = selection, sun
+        self._state = state
         self._pushers: dict[str, rospy.Publisher] = {}
+        self._frames = FrameTree()
         self._markers = {
-            _SCENE: MarkerNodes(scene, _SCENE, self.frames, self._make_choosable, casts=True),
-            _BODIES: MarkerNodes(scene, _BODIES, self.frames, self._make_pushable, casts=True),
-            _AROUND: MarkerNodes(scene, _AROUND, self.frames, sun.shine_on, hidden=("sky",)),
-            **{name: MarkerNodes(scene, name, self.frames) for name in _OTHERS},
+            _SCENE: MarkerTopic(_SCENE, meshes.url, is_shaded=True),
+            _BODIES: MarkerTopic(_BODIES, meshes.url, is_shaded=True),
+            _AROUND: MarkerTopic(_AROUND, meshes.url, hidden=("sky", "ground")),
+            **{name: MarkerTopic(name, meshes.url) for name in _OTHERS},
         }
-        drags = [
-            rospy.Publisher(f"{namespace}/{name}/feedback", InteractiveMarkerFeedback, queue_size=10)
-            for name in ("markers", "objects")
-        ]
-        self.handles = DragControls(scene, drags[0].publish)
-        self.objects = DragControls(scene, drags[1].publish, "objects", lambda name: name == selection.name, ANYWHERE)
-        heard = [
+        self._feedback = {
+            name: rospy.Publisher(f"{namespace}/{name}/feedback", InteractiveMarkerFeedback, queue_size=10)
+            for name in _SERVERS
+        }
+        self._handles = {name: DragControls(name, one.publish) for name, one in self._feedback.items()}
+        heard: list[tuple[str, Any, Callable[[Any], None]]] = [
             *((f"{namespace}/{name}", MarkerArray, one.on_markers) for name, one in self._markers.items()),
-            ("/tf", TFMessage, self.frames.on_transforms),
-            ("/tf_static", TFMessage, self.frames.on_transforms),
-            (f"{namespace}/markers/update_full", InteractiveMarkerInit, self.handles.on_init),
-            (f"{namespace}/markers/update", InteractiveMarkerUpdate, self.handles.on_update),
-            (f"{namespace}/objects/update_full", InteractiveMarkerInit, self.objects.on_init),
-            (f"{namespace}/objects/update", InteractiveMarkerUpdate, self.objects.on_update),
+            ("/tf", TFMessage, self._frames.on_transforms),
+            ("/tf_static", TFMessage, self._frames.on_transforms),
         ]
-        self._listening = [*drags, *(rospy.Subscriber(*one, queue_size=20) for one in heard)]
+        for name, handles in self._handles.items():
+            heard.append((f"{namespace}/{name}/update_full", InteractiveMarkerInit, handles.on_init))
+            heard.append((f"{namespace}/{name}/update", InteractiveMarkerUpdate, handles.on_update))
+        self._listening = [*self._feedback.values(), *(rospy.Subscriber(*one, queue_size=20) for one in heard)]
 
-    def show(self, browsers: Collection[int]) -> None:
-        """Put into the scene what is new, for the browsers that are open."""
-        self.frames.show()
-        grown, self.frames.new = self.frames.new, False
-        for markers in self._markers.values():
-            markers.show(frames_changed=grown)
-        for handles in (self.handles, self.objects):
-            handles.show(browsers)
+    def wait(self, seconds: float) -> None:
+        """Wait until something has moved, or so many s."""
+        self._frames.came.wait(seconds)
+        self._frames.came.clear()
+
+    def keep(self, browsers: Collection[int]) -> None:
+        """Say of what is dragged that it is held still; let go for browsers that are not open any more."""
+        for handles in self._handles.values():
+            handles.keep(browsers)
+
+    def collect(self) -> bool:
+        """Put what is new into the state; return whether there is anything."""
+        markers = {}
+        # A handle is shown once the simulation would hear of it: what is said before that is lost.
+        heard = [self._handles[name] for name, one in self._feedback.items() if one.get_num_connections()]
+        sources: list[MarkerTopic | DragControls] = [*self._markers.values(), *heard]
+        for source in sources:
+            markers.update(source.take())
+        return self._state.change(self._frames.take(), markers)
+
+    def drag(self, browser: int, message: Mapping[str, Any]) -> None:
+        """Take what a browser says of a handle. Raises ValueError."""
+        given = read_drag(message)
+        if given.server not in self._handles:
+            raise ValueError(f"server = {shown(given.server)}: must be one of {', '.join(_SERVERS)}")
+        self._handles[given.server].drag(browser, given)
+
+    def push(self, message: Mapping[str, Any]) -> None:
+        """Push the vehicle that a browser names, along the `ray` (world), with `newtons`. Raises ValueError."""
+        vehicle, ray, newtons = read_push(message)
+        if vehicle not in self._pushers:
+            raise ValueError(f"push = {shown(vehicle)}: {near_names(vehicle, self._pushers)}")
+        push(self._pushers[vehicle].publish, ray, newtons)
+
+    def meet(self, vehicles: Collection[str]) -> None:
+        """Hear which vehicles there are: the first message of a new publisher would be heard by nobody."""
+        for one in vehicles:
+            if one not in self._pushers:
+                self._pushers[one] = rospy.Publisher(f"/{one}/push", WrenchStamped, queue_size=1)
 
     def close(self) -> None:
         """Listen no more, and show nothing."""
         for one in (*self._listening, *self._pushers.values()):
             one.unregister()
-        for markers in self._markers.values():
-            markers.forget()
-        for one in (self.handles, self.objects, self._sun, self.frames):
-            one.forget()
-
-    def _make_choosable(self, marker: Marker, handle: Any) -> None:
-        """Let a click on an object, whose name is the marker's namespace, choose it."""
-        if hasattr(handle, "on_click"):  # lines have none
-            handle.on_click(lambda _: self._selection.toggle(marker.ns))
-
-    def _make_pushable(self, marker: Marker, handle: Any) -> None:
-        """Let a click on a part of a vehicle, whose name is the marker's namespace, push it."""
-        vehicle = marker.ns
-        if vehicle not in self._pushers:  # now: the first message of a new publisher is heard by nobody
-            self._pushers[vehicle] = rospy.Publisher(f"/{vehicle}/push", WrenchStamped, queue_size=1)
-
-        @handle.on_click
-        def _(event: Any) -> None:
-            push(self._pushers[vehicle].publish, event.ray_direction, self.strength)
+        self._state.clear()
 
 
-class Sunlight:
-    """The sun of one scene; without a GPU its shadows make every picture take twice as long or more."""
+def read_push(message: Mapping[str, Any]) -> tuple[str, Sequence[float], float]:
+    """Return vehicle, direction (world) and force (N) of a browser's message. Raises ValueError."""
+    vehicle, ray = message.get("push"), message.get("ray")
+    newtons: Any = message.get("newtons")
+    if not isinstance(vehicle, str):
+        raise ValueError(f"push = {shown(vehicle)}: must be the name of a vehicle")
+    if not isinstance(ray, list) or len(ray) != 3 or not all(_is_number(one) for one in ray) or not any(ray):
+        raise ValueError("ray: must be x, y and z of a direction")
+    if not _is_number(newtons) or not 0 < newtons <= _STRONGEST:
+        raise ValueError(f"newtons = {shown(newtons)}: must be a number above 0, {_STRONGEST:g} at most")
+    return vehicle, ray, float(newtons)
 
-    def __init__(self, scene: Any):
-        """Shine on `scene`, with shadows."""
-        self._on = True
-        self._floors: dict[str, Any] = {}
-        scene.configure_default_lights(enabled=False)
-        place = tuple(map(float, _AWAY * np.array(TO_SUN)))
-        self._sun = scene.add_light_directional("/sun", intensity=_BRIGHT, cast_shadow=True, position=place)
 
-    def shine_on(self, marker: Marker, handle: Any) -> None:
-        """Let shadows fall on what has come into the scene, if it is a floor."""
-        if marker.ns == _FLOOR:
-            self._floors[handle.name] = handle
-            handle.receive_shadow = self._darkness
-
-    def cast(self, shadows: bool) -> None:
-        """Let there be shadows, or not."""
-        if shadows == self._on:
-            return
-        self._on = self._sun.cast_shadow = shadows
-        for handle in self._floors.values():
-            handle.receive_shadow = self._darkness
-
-    def forget(self) -> None:
-        """Have no floor."""
-        self._floors.clear()
-
-    @property
-    def _darkness(self) -> float | bool:
-        return _DARK if self._on else False
+def _is_number(given: Any) -> bool:
+    return isinstance(given, (int, float)) and not isinstance(given, bool) and math.isfinite(given)
 
 
 def push(publish: Callable[[WrenchStamped], None], direction: Sequence[float], strength: float) -> None:

@@ -1,4 +1,4 @@
-"""Where the cockpit listens, checked before viser tries it; what opens it in a browser, and where that is told."""
+"""Where the cockpit listens, checked before the server tries it; what opens it in a browser, and where that is told."""
 
 from __future__ import annotations
 

@@ -1,19 +1,15 @@
-"""The server: the page at once, and socket and scene once there is something to show."""
+"""The server: the page at once, and its socket once there is something to show."""
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import io
 import secrets
+import threading
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent import futures
 from pathlib import Path
 from typing import Any
 
-import viser
-from viser.infra import _infra
-from viser.infra._async_message_buffer import AsyncMessageBuffer
 from websockets.asyncio.server import ServerConnection
 
 from drone_sim.ros.cockpit.server.access_control import AccessControl, Content, Handler
@@ -25,28 +21,29 @@ _KINDS = {
     ".css": "text/css; charset=utf-8",
     ".svg": "image/svg+xml",
 }
+_PATIENCE = 5.0  # s, in which the server ends
 
 
 def page_files() -> dict[str, tuple[str, bytes]]:
-    """Return content type and content of the page around the scene, as `web/` builds it, by the path that is asked."""
+    """Return content type and content of the page, as `web/` builds it, by the path that is asked."""
     files = [file for file in (Path(__file__).parents[1] / "page").iterdir() if file.suffix in _KINDS]
     found = {f"/{file.name}": (_KINDS[file.suffix], file.read_bytes()) for file in files}
     return {**found, "/": found["/index.html"]}
 
 
 class PageServer:
-    """The server with page, socket and scene, which are empty until `begin`."""
+    """The server with page and socket, in a thread of its own. The socket waits until `begin`."""
 
     def __init__(self, address: Any, port: Any):
         """Listen at `address`, at `port` or the next one that is free. Raises AddressError where nothing can."""
-        self._begun: Future[tuple[Handler, Callable[[str], Content]]] = Future()
+        self._begun: futures.Future[tuple[Handler, Callable[[str], Content]]] = futures.Future()
         self._files, token = page_files(), secrets.token_urlsafe(16)
-        access = AccessControl(token, self._find, self._talk)
-        host, port = free_place(address, port)
-        leave_to_the_loop()
-        with access.before_viser(), contextlib.redirect_stdout(io.StringIO()):  # viser prints an address without token
-            self.server = viser.ViserServer(host=host, port=port, label="drone_sim", verbose=False)
-        self.port = self.server.get_port()
+        host, wanted = free_place(address, port)
+        self._loop = asyncio.new_event_loop()
+        threading.Thread(target=self._loop.run_forever, name="page server", daemon=True).start()
+        listening = AccessControl(token, self._find, self._talk).serve(host, wanted)
+        self._server = asyncio.run_coroutine_threadsafe(listening, self._loop).result()
+        self.port = int(next(iter(self._server.sockets)).getsockname()[1])
         self.address, self.address_elsewhere = urls(host, self.port, token)
 
     @property
@@ -56,8 +53,18 @@ class PageServer:
         return self.address + (f" and, on other machines, at {elsewhere}" if elsewhere else "")
 
     def begin(self, socket: Handler, beside: Callable[[str], Content]) -> None:
-        """Let `socket` serve the browsers that are there, and those that come; `beside` finds pictures of the page."""
+        """Let `socket` serve the browsers that are there, and those that come; `beside` finds what the page shows."""
         self._begun.set_result((socket, beside))
+
+    def stop(self) -> None:
+        """Close all sockets, and listen no more."""
+        self._server.close()
+        closing = asyncio.run_coroutine_threadsafe(self._server.wait_closed(), self._loop)
+        try:
+            closing.result(_PATIENCE)
+        except futures.TimeoutError:
+            closing.cancel()
+        self._loop.call_soon_threadsafe(self._loop.stop)
 
     def _find(self, path: str) -> Content:
         return self._files.get(path) or (self._begun.result()[1](path) if self._begun.done() else None)
@@ -65,36 +72,3 @@ class PageServer:
     async def _talk(self, connection: ServerConnection) -> None:
         socket, _ = await asyncio.shield(asyncio.wrap_future(self._begun))  # others wait for it, too
         await socket(connection)
-
-
-# ---- what wakes viser's senders: an event of its event loop, which viser also sets from other threads
-
-
-class _OfTheLoop(asyncio.Event):
-    """An event that other threads than its loop's cannot set.
-
-    asyncio.Event goes through those who wait for it, who come and go meanwhile: a thread that draws would end with
-    "deque mutated during iteration". viser has the loop itself set the event after every such call.
-    """
-
-    def set(self) -> None:
-        """Wake those who wait, in the event loop; do nothing in another thread."""
-        try:
-            asyncio.get_running_loop()
-        except RuntimeError:
-            return
-        super().set()
-
-
-class _MessageBuffer(AsyncMessageBuffer):
-    """What is to be sent to browsers."""
-
-    def __init__(self, *args: Any, **options: Any):
-        """Take what viser gives."""
-        super().__init__(*args, **options)
-        self.message_event = _OfTheLoop()
-
-
-def leave_to_the_loop() -> None:
-    """Let no thread but the event loop wake the senders of any viser server of this process."""
-    _infra.AsyncMessageBuffer = _MessageBuffer  # type: ignore[misc]

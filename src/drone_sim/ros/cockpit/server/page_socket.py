@@ -17,23 +17,39 @@ from websockets.exceptions import ConnectionClosed
 from drone_sim.ros.cockpit.teleop import HeldCommands, read_command
 
 Answer = Callable[[Mapping[str, Any]], Mapping[str, Any]]
+Taken = Callable[[int, Mapping[str, Any]], None]
+SceneSince = Callable[[int], tuple[int, bytes]]
 _MESSAGES = 32  # after which the oldest go: this browser does not take them
+_SCENE = "scene"  # the name under which a browser says that it has shown a message of the scene
+_UNSHOWN = 2  # messages of the scene that are on their way at most: over a slow line one is shown while another comes
 
 
 class PageSocket:
     """The browsers that are connected; what one asks is answered in a thread, for it may take its time."""
 
-    def __init__(self, held: HeldCommands, answers: Mapping[str, Answer]):
-        """Leave commands in `held`; `answers` answer questions, by their `ask`, and raise ValueError."""
+    def __init__(
+        self,
+        held: HeldCommands,
+        answers: Mapping[str, Answer],
+        takes: Mapping[str, Taken] | None = None,
+        scene: SceneSince = lambda version: (version, b""),
+    ):
+        """Leave commands in `held`; `answers` answer questions, by their `ask`, and raise ValueError.
+
+        `takes` take messages that are not answered, with the number of the browser, by what they begin with; they are
+        called in their order and must be quick. `scene` returns what has changed since a version, and the version now.
+        """
         self._held = held
         self._answers = answers
+        self._takes = takes or {}
+        self._scene = scene
         self._numbers = itertools.count()
         self._out: dict[int, tuple[asyncio.AbstractEventLoop, SendQueue]] = {}
 
     async def serve(self, connection: ServerConnection) -> None:
         """Talk with one browser until it goes."""
         browser = next(self._numbers)
-        box = SendQueue()
+        box = SendQueue(self._scene)
         self._out[browser] = asyncio.get_running_loop(), box
         sending = asyncio.create_task(_send_from(box, connection))
         try:
@@ -45,6 +61,15 @@ class PageSocket:
             del self._out[browser]
             sending.cancel()
             await asyncio.to_thread(self._held.release, browser)
+
+    @property
+    def browsers(self) -> set[int]:
+        """The numbers of those that are connected; any thread may ask."""
+        return set(self._out)
+
+    def show_scene(self) -> None:
+        """Send what has changed in the scene to each browser that has shown what it got; any thread may call."""
+        self._leave(SendQueue.wake)
 
     def tell(self, message: Mapping[str, Any]) -> None:
         """Send something to all browsers; any thread may call."""
@@ -80,6 +105,10 @@ class PageSocket:
                 return
             if isinstance(message.get("shown"), str):
                 self._out[browser][1].shown(message["shown"])
+                return
+            take = next((take for name, take in self._takes.items() if name in message), None)
+            if take is not None:
+                take(browser, message)
                 return
             asked = message.get("ask")
             ask = self._answers.get(asked) if isinstance(asked, str) else None
@@ -127,10 +156,15 @@ async def _send_from(box: SendQueue, connection: ServerConnection) -> None:
 
 
 class SendQueue:
-    """Used in the thread of its event loop. A picture goes when the browser has shown the last one of that name."""
+    """Used in the thread of its event loop. A picture goes when the browser has shown the last one of that name.
 
-    def __init__(self) -> None:
-        """Begin empty."""
+    So does the scene, of which a browser gets what has changed since the message before.
+    """
+
+    def __init__(self, scene: SceneSince = lambda version: (version, b"")):
+        """Begin empty; `scene` returns what has changed since a version, and the version now."""
+        self._scene, self._version = scene, -1
+        self._unshown = 0
         self._messages: deque[str] = deque(maxlen=_MESSAGES)
         self._pictures: dict[str, bytes] = {}
         self._owed: set[str] = set()  # names of those that are on their way
@@ -139,6 +173,10 @@ class SendQueue:
     def put(self, message: str) -> None:
         """Leave a message."""
         self._messages.append(message)
+        self._came.set()
+
+    def wake(self) -> None:
+        """Hear that there may be something new in the scene."""
         self._came.set()
 
     def wants(self, name: str) -> bool:
@@ -151,8 +189,10 @@ class SendQueue:
         self._came.set()
 
     def shown(self, name: str) -> None:
-        """Hear that a picture has been shown."""
+        """Hear that a picture, or a message of the scene, has been shown."""
         self._owed.discard(name)
+        if name == _SCENE:
+            self._unshown = max(0, self._unshown - 1)
         self._came.set()
 
     def forget(self, name: str) -> None:
@@ -171,6 +211,11 @@ class SendQueue:
     def _ready(self) -> Iterator[str | bytes]:
         if self._messages:
             yield self._messages.popleft()
+        if self._unshown < _UNSHOWN:
+            self._version, changed = self._scene(self._version)
+            if changed:
+                self._unshown += 1
+                yield changed
         for name in self._pictures.keys() - self._owed:
             self._owed.add(name)
             yield self._pictures.pop(name)

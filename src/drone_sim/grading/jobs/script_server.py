@@ -1,0 +1,86 @@
+"""The program in whose forks scripts run, each in one of its own: in the sandbox, where there is one.
+
+It knows no plan, no seed, and no judge: a door leads from a script's process to the process of its flight, and that is
+all there is.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import random
+import shutil
+import socket
+import stat
+import sys
+import tempfile
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from drone_sim.grading.jobs.limited_process import LimitedProcess, open_to_itself
+from drone_sim.grading.jobs.server import HANDED_IN, Requests
+from drone_sim.scripting.door import script_process
+
+DOOR = 3  # its descriptor, beside which nothing is open
+
+
+def main() -> None:
+    """Serve: each request names a script, and files to be laid down for it; how its process ended goes back.
+
+    A message ends the process, whatever it does.
+    """
+    is_alone = sys.argv[1:] == ["alone"]  # in a sandbox, where it sees its own processes only
+    script_process.import_all()
+    requests = Requests()
+    folders = [tempfile.gettempdir(), *([HANDED_IN] if is_alone else [])]
+    with contextlib.suppress(EOFError):  # nobody wants it any more
+        for request, door in requests:
+            for path in request["handed_in"]:
+                _lay(f"{HANDED_IN}{path}", requests.receive())
+            run = functools.partial(_run, request, door)
+            process = LimitedProcess(request["limits"], run, {}, [door], is_alone)
+            with process:
+                has_ended = process.watch(requests.fileno())
+            requests.receive()
+            is_last = not all([_cleared(folder) for folder in folders])  # what cannot be removed here, its client does
+            requests.reply(json.dumps({"end": process.end if has_ended else "", "is_last": is_last}).encode())
+            if is_last:
+                break
+
+
+def _run(request: dict[str, Any], door: int, _outputs: Mapping[str, int]) -> None:
+    """Serve the script's end of the door, in a process of its own."""
+    if door != DOOR:
+        os.dup2(door, DOOR, inheritable=False)
+        os.close(door)
+    open_to_itself()
+    random.seed(request["random"])
+    np.random.seed(request["random"] % 2**32)
+    script_process.serve(socket.socket(fileno=DOOR), request["script"])
+
+
+def _lay(path: str, content: bytes) -> None:
+    """Write a file of the script that is to be flown."""
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    with open(path, "wb") as file:
+        file.write(content)
+
+
+def _cleared(folder: str) -> bool:
+    """Remove what a flight has left in a folder; return whether nothing is there any more."""
+    os.chmod(folder, stat.S_IRWXU)
+    for entry in os.scandir(folder):
+        with contextlib.suppress(OSError, RecursionError):
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path)
+            else:
+                os.unlink(entry.path)
+    return not os.listdir(folder)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""What the two programs have in common that fork a process for each flight: that of the judge, and that of the script.
+
+Such a program has imported everything. Its input is a connection that brings requests in JSON, and takes the replies.
+It ends with it, whatever a flight does, and where nothing has been asked for a while.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import json
+import os
+import signal
+from collections.abc import Iterator
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle
+from typing import Any
+
+from drone_sim.grading.jobs.limited_process import guard
+
+HANDED_IN = "/handed_in"  # below which the files of a script are laid in a sandbox, each under its whole path
+READY = b"ready"  # said once, after the imports
+_IDLE = 120.0  # s
+
+
+class Requests:
+    """What is asked of the program."""
+
+    def __init__(self) -> None:
+        """Take the program's own input, under another number; under its own is nothing any more."""
+        guard()
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # from the first process of a sandbox the kernel keeps it, then
+        self._connection: Connection = Connection(os.dup(0))
+        nothing = os.open(os.devnull, os.O_RDWR)
+        os.dup2(nothing, 0)
+        os.close(nothing)
+
+    def __iter__(self) -> Iterator[tuple[dict[str, Any], int]]:
+        """Say that it is ready, and give each request, with one end of the connection between judge and script."""
+        gc.collect()
+        gc.freeze()  # a fork that counts references copies fewer pages
+        self._connection.send_bytes(READY)
+        with contextlib.suppress(EOFError):  # the input has ended
+            while self._connection.poll(_IDLE):
+                request = json.loads(self._connection.recv_bytes())
+                door = recv_handle(self._connection)
+                try:
+                    yield request, door
+                finally:
+                    os.close(door)
+
+    def fileno(self) -> int:
+        """Return what is readable where there is more to receive, or the input has ended."""
+        return self._connection.fileno()
+
+    def receive(self) -> bytes:
+        """Return what comes next. Raises EOFError."""
+        return self._connection.recv_bytes()
+
+    def reply(self, *parts: bytes) -> None:
+        """Answer the last request."""
+        for one in parts:
+            self._connection.send_bytes(one)

@@ -1,0 +1,269 @@
+"""What a submission may call: to fly, to look, to say and to draw something. All else needs a word in the plan.
+
+A function is free because it is said to be, here; one that nobody has thought of is not. `rules` looks at what has
+come of a flight, whatever was called.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from drone_sim.grading.plan import Plan
+from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.run.simulation import Simulation
+from drone_sim.run.simulation_setup import script_of
+from drone_sim.scripting.api import (
+    custom_data,
+    distances,
+    drawings,
+    graphs,
+    image_filters,
+    matrices,
+    modules,
+    names,
+    object_collections,
+    packing,
+    ros_functions,
+    sensors,
+    signals,
+    threads,
+    trajectories,
+    vision,
+    windows,
+    wireless,
+)
+from drone_sim.scripting.api.calls import declaration_of
+from drone_sim.scripting.api.constants import CONSTANTS, bare
+from drone_sim.scripting.api.ignored import MODULES
+from drone_sim.scripting.api.simulation import SimulationFunctions
+
+MOVE, PUSH, CHANGE, NEVER = "move", "push", "change", ""
+MOST_TRIED = 20  # that a result tells of
+_FREE_CLASSES: tuple[type, ...] = (
+    custom_data.CustomDataFunctions,
+    distances.DistanceFunctions,
+    drawings.DrawingFunctions,
+    graphs.GraphFunctions,
+    image_filters.ImageFilters,
+    matrices.Matrices,
+    matrices.Poses,
+    names.NameFunctions,
+    object_collections.CollectionFunctions,
+    packing.Bits,
+    packing.Packing,
+    packing.Tables,
+    ros_functions.RosFunctions,
+    ros_functions.ServiceFunctions,
+    ros_functions.TopicFunctions,
+    sensors.ProximitySensors,
+    sensors.Sensors,
+    signals.SignalFunctions,
+    signals.TubeFunctions,
+    threads.Threads,
+    trajectories.TrajectoryFunctions,
+    vision.VisionSensors,
+    windows.Dialogs,
+    windows.Views,
+    wireless.Wireless,
+)
+# Beside these: what asks other scripts, ends the flight, or makes nothing but frames.
+_FREE = [
+    *("callScriptFunction", "stopSimulation", "addLog", "addStatusbarMessage", "createDummy", "createPath"),
+    "resamplePath",
+]
+_READING = ("get", "is", "check", "read")  # what the names of functions begin with that only read
+# Of an object, by its handle, which comes first; a script's own marks are its own.
+_MOVING = [
+    "setObjectPosition",
+    "setObjectOrientation",
+    "setObjectQuaternion",
+    "setObjectPose",
+    "setObjectMatrix",
+    "setObjectParent",
+    "moveToObject",
+    "moveToPosition",
+    "rmlMoveToPosition",
+    "followPath",
+]
+_MOVING_ALWAYS = [
+    "setPathPosition",
+    "setJointForce",
+    "setJointInterval",
+    "setJointMode",
+    "setJointTargetForce",
+    "setJointTargetPosition",
+    "setJointTargetVelocity",
+    "setSphericalJointMatrix",
+    "moveToJointPositions",
+    "rmlMoveToJointPositions",
+    "resetDynamicObject",
+]
+_BY_PARAMETERS = [
+    "moveToConfig",
+    "moveToConfig_init",
+    "moveToConfig_step",
+    "moveToConfig_cleanup",
+    "moveToPose",
+    "moveToPose_init",
+]
+_ACTIONS = {
+    **dict.fromkeys(_MOVING_ALWAYS, MOVE),
+    **dict.fromkeys(("addForce", "addForceAndTorque"), PUSH),
+    "saveModel": NEVER,  # writes a file
+}
+_PARAMETERS = ("setScriptSimulationParameter", "setUserParameter")
+_DRIVES = "particleVelocity"
+_SELF = CONSTANTS["handle_self"]
+_FRAMES = ("dummy", "path", "camera", "vision_sensor", "script")  # what may hang on a mark
+Look = Callable[[list[Any]], str | None]
+
+
+class Forbidden(ValueError):
+    """A submission has called what the plan does not allow; one line."""
+
+
+class Permissions:
+    """Looks at each call of a submission before it is carried out, and keeps what was tried."""
+
+    def __init__(self, plan: Plan, simulation: Simulation, submission: str):
+        """Hold a `plan` against a `simulation`, in which the script `submission` flies what has none of its own."""
+        self._allowed = {*plan.allowed}
+        self._simulation = simulation
+        self._objects, self._scripts = simulation.context.objects, simulation.context.scripts
+        own = [
+            one
+            for one in simulation.vehicles.values()
+            if script_of(one.parameters, simulation.parameters, submission) == submission
+        ]
+        self._own = {one.object_name for one in own}  # whose scripts are the submission
+        self._propellers = {name for one in own for name in one.propulsion.script_parameters}
+        self._marks: set[int] = set()  # handles that are known to be marks'
+        self._settable: set[tuple[int, str]] = set()  # parameters that are known to be free
+        self.tried: list[str] = []  # in one line each; the first time of each thing that was tried with each object
+        self._known: set[tuple[str, str]] = set()
+        looks: tuple[tuple[Sequence[str], Look], ...] = (
+            (_MOVING, self._of_object),
+            (_PARAMETERS, self._of_parameter),
+            (_BY_PARAMETERS, self._of_motion),
+            (("setJointPosition",), self._of_joint),
+        )
+        self._looks = {f"sim.{name}": look for named, look in looks for name in named}
+
+    def __call__(self, function: str, arguments: list[Any]) -> None:
+        """Raise Forbidden for a call that the submission may not make."""
+        look = self._looks.get(function)
+        action = look(arguments) if look is not None else _action_of(function)
+        if action is not None and action not in self._allowed:
+            self._refuse(function, action, arguments)
+
+    def _refuse(self, function: str, action: str, arguments: list[Any]) -> None:
+        verb, what = action or "write", "the scene" if _is_of_scene(function) else self._name(arguments)
+        if (verb, what) not in self._known and len(self.tried) < MOST_TRIED:
+            self._known.add((verb, what))
+            self.tried.append(f"tried to {verb} {what} at {self._simulation.time:.2f} s ({function})")
+        would = f" (allowed: [{action}] would)" if action else ""
+        raise Forbidden(f"the plan does not allow a script to {verb} {what}{would}")
+
+    def _name(self, arguments: list[Any]) -> str:
+        """Return what a call is about, as a person calls it."""
+        one = self._object(arguments)
+        if one is not None:
+            return one.name
+        script = self._scripts.get(arguments[0]) if arguments and _is_handle(arguments[0]) else None
+        return f"the script of {script.name}" if script is not None else "the scene"
+
+    def _object(self, arguments: list[Any]) -> SceneObject | None:
+        """Return the object whose handle comes first."""
+        return self._objects.get(bare(arguments[0])) if arguments and _is_handle(arguments[0]) else None
+
+    # ---- what depends on what it is done to
+
+    def _of_object(self, arguments: list[Any]) -> str | None:
+        """Return what moving an object needs: nothing, of a mark."""
+        if arguments and type(arguments[0]) is int and arguments[0] in self._marks:
+            return None
+        one = self._object(arguments)
+        if one is None or not self._is_mark(one):
+            return MOVE
+        self._marks.add(self._objects.handle_of(one))
+        return None
+
+    def _is_mark(self, one: SceneObject) -> bool:
+        """Tell whether an object is a frame for a script's own use: nothing solid, which carries nothing solid."""
+        if one.kind not in ("dummy", "path") or one.body is not None:
+            return False
+        below = (other for other in map(self._objects.get, self._objects) if other is not None and other.hangs_on(one))
+        return all(other.kind in _FRAMES for other in below)
+
+    def _of_joint(self, arguments: list[Any]) -> str | None:
+        """Return what turning a joint needs: nothing, of a vehicle's own propeller, whose blades are seen to turn."""
+        one = self._object(arguments)
+        vehicles = self._simulation.vehicles.values()
+        is_blade = one is not None and any(
+            vehicle.propulsion.blades.has(one.name) for vehicle in vehicles if vehicle.object_name in self._own
+        )
+        return None if is_blade else MOVE
+
+    def _of_motion(self, arguments: list[Any]) -> str | None:
+        """Return what a motion needs: nothing, of a mark, or of mere numbers."""
+        given = arguments[0] if arguments else None
+        if not isinstance(given, Mapping):
+            return None
+        moved = given.get("object")
+        return MOVE if given.get("joints") else None if moved is None else self._of_object([moved])
+
+    def _of_parameter(self, arguments: list[Any]) -> str | None:
+        """Return what setting a script's parameter needs: nothing, of its own, or of how fast a propeller turns."""
+        if len(arguments) < 2 or not _is_handle(arguments[0]) or type(arguments[1]) is not str:
+            return CHANGE
+        handle, name = arguments[:2]
+        if handle == _SELF or (handle, name) in self._settable:
+            return None
+        script = self._script(handle, arguments)
+        if script in self._own or (script in self._propellers and name == _DRIVES):
+            self._settable.add((handle, name))
+            return None
+        return CHANGE
+
+    def _script(self, handle: int, arguments: list[Any]) -> str:
+        """Return the object of the script that a handle means, its own or its object's; '' for none."""
+        script = self._scripts.get(handle)
+        if script is not None:
+            return script.name
+        one = self._object(arguments)
+        if one is not None and one.kind == "script":
+            one = one.parent
+        return one.name if one is not None and one.name in self._scripts else ""
+
+
+def _is_of_scene(function: str) -> bool:
+    """Tell whether what comes first in a call is not the handle of an object, or of a script."""
+    name = function.partition(".")[2]
+    return name.startswith(("create", "load")) or hasattr(SimulationFunctions, name)
+
+
+def _is_handle(value: Any) -> bool:
+    return type(value) is int or (type(value) is float and value.is_integer())
+
+
+def _action_of(function: str) -> str | None:
+    """Return what the plan has to allow for a function, None for nothing, NEVER where it cannot."""
+    if function in _free():
+        return None
+    name = function.partition(".")[2]
+    return _ACTIONS.get(name, CHANGE)
+
+
+@functools.cache
+def _free() -> frozenset[str]:
+    """Return the functions that are free, each as module.name."""
+    found = {f"sim.{name}" for name in _FREE}
+    found.update(f"{module}.{name}" for module, groups in MODULES.items() for one in groups for name in one.functions)
+    for kind in {*_FREE_CLASSES, *modules.SIM}:
+        for attribute in vars(kind).values():
+            declaration = declaration_of(attribute)
+            if declaration and (kind in _FREE_CLASSES or attribute.__name__.startswith(_READING)):
+                found.update(f"{declaration.module}.{name}" for name in declaration.names)
+    return frozenset(found)

@@ -1,0 +1,1 @@
+"""V-REP's legacy remote API (`simxStart`): commands over TCP call the functions that child scripts call."""

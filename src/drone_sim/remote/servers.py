@@ -1,0 +1,54 @@
+"""Both remote APIs at once: CoppeliaSim's over ZeroMQ, and V-REP's legacy one."""
+
+from __future__ import annotations
+
+from drone_sim.remote.control import MovedObjects
+from drone_sim.remote.conversation import RemoteApi
+from drone_sim.remote.legacy.server import LegacyServer
+from drone_sim.remote.server import RemoteApiServer
+from drone_sim.run.parameters import RemoteApiParameters
+from drone_sim.run.player import Player
+from drone_sim.scripting.api.backend import Backend
+
+
+class RemoteApiServers(RemoteApi):
+    """Serves both. One thread owns it, that of the simulation; `wake` alone may be called from any."""
+
+    def __init__(self, parameters: RemoteApiParameters, player: Player, backend: Backend | None = None):
+        """Listen for who drives a `player`; `backend` carries the messages of the clients that have some.
+
+        Raises OSError, in one line.
+        """
+        moved = MovedObjects(player.simulation)
+        self.zeromq = RemoteApiServer(player, parameters.address, parameters.port, backend, moved=moved)
+        try:
+            self.legacy = LegacyServer(player, parameters.address, parameters.legacy_port, moved, self.zeromq.everybody)
+        except OSError:
+            self.zeromq.close()
+            raise
+        self.address = f"{self.zeromq.address} (ZeroMQ) and on {self.legacy.address} (simxStart)"
+        self.zeromq.watch(self.legacy.fileno())
+
+    @property
+    def holds(self) -> bool:
+        """Whether a client of either wants to be asked before the next step, and has not said so yet."""
+        return self.zeromq.holds or self.legacy.holds
+
+    def wait(self, seconds: float) -> None:
+        """Sleep for so long, or until something has been done for a client."""
+        self.zeromq.wait(0.0 if self.legacy.has_work else seconds)
+        self.legacy.serve()
+
+    def serve(self) -> None:
+        """Answer what has come by now."""
+        self.zeromq.serve()
+        self.legacy.serve()
+
+    def wake(self) -> None:
+        """End a `wait`; any thread may call it."""
+        self.zeromq.wake()
+
+    def close(self) -> None:
+        """Let go of all clients, and of the ports."""
+        self.legacy.close()
+        self.zeromq.close()

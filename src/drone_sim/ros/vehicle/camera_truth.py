@@ -1,0 +1,179 @@
+"""What a camera publishes of the truth behind its picture, below `<topic>/truth`; nothing is made that nobody hears."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import genpy
+import numpy as np
+import rospy
+from cv_bridge import CvBridge
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from sensor_msgs.msg import Image, PointCloud2, PointField
+from std_msgs.msg import ColorRGBA, Header, String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from drone_sim.mechanics.frames import to_quaternion
+from drone_sim.ros.core.publishing import NewSubscribers, Stamp
+from drone_sim.sensors.camera import Camera
+from drone_sim.sensors.truth import PictureTruth, Seen
+
+try:
+    from vision_msgs.msg import (
+        BoundingBox2D,
+        BoundingBox3D,
+        Detection2D,
+        Detection2DArray,
+        Detection3D,
+        Detection3DArray,
+        ObjectHypothesisWithPose,
+    )
+except ImportError:  # Debian has no package of it
+    Detection2DArray = Detection3DArray = None
+
+_LINE = 0.01  # m, of the boxes in rviz
+_COLOR = ColorRGBA(1.0, 0.55, 0.1, 0.35)
+_bridge = CvBridge()
+
+
+class TruthOutput:
+    """The topics of one camera's truth."""
+
+    def __init__(self, topic: str, frame: str, new_subscribers: NewSubscribers):
+        """Advertise below `topic`; what is published is in `frame`, and `new_subscribers` notes who listens."""
+        self._frame = frame
+        self._depth_before: np.ndarray | None = None
+        self._labels = rospy.Publisher(f"{topic}/truth/labels", String, queue_size=1, latch=True)
+        self._labelled = ""
+        kinds: dict[str, tuple[type[genpy.Message], Callable[[PictureTruth, Header], genpy.Message]]] = {
+            "instances": (Image, lambda truth, header: _image(truth.output("instance"), "mono16", header)),
+            "categories": (Image, lambda truth, header: _image(truth.categories, "mono16", header)),
+            "depth": (Image, lambda truth, header: _image(truth.output("depth"), "32FC1", header)),
+            "normals": (Image, lambda truth, header: _image(truth.output("normal"), "32FC3", header)),
+            "points": (PointCloud2, lambda truth, header: _cloud(truth.points, header)),
+            "boxes": (String, lambda truth, header: String(json.dumps(described(truth.seen(), header)))),
+            "box_markers": (MarkerArray, lambda truth, header: _markers(truth.seen(), header)),
+        }
+        if Detection2DArray is not None:
+            kinds["detections"] = Detection2DArray, lambda truth, header: _detections(truth.seen(), header)
+            kinds["detections_3d"] = Detection3DArray, lambda truth, header: _detections_3d(truth.seen(), header)
+        self._made = {
+            rospy.Publisher(f"{topic}/truth/{name}", kind, subscriber_listener=new_subscribers, queue_size=1): make
+            for name, (kind, make) in kinds.items()
+        }
+        self._flow, self._flow_known = (
+            rospy.Publisher(f"{topic}/truth/{name}", Image, subscriber_listener=new_subscribers, queue_size=1)
+            for name in ("flow", "flow_known")
+        )
+
+    @property
+    def _publishers(self) -> list[Any]:
+        return [self._labels, *self._made, self._flow, self._flow_known]
+
+    def publish(self, camera: Camera, stamp: Stamp) -> None:
+        """Publish what somebody listens to, of what the camera sees now."""
+        heard = [one for one in self._made if one.get_num_connections()]
+        flows = any(one.get_num_connections() for one in (self._flow, self._flow_known))
+        if not (heard or flows or self._labels.get_num_connections()):
+            self._depth_before = None
+            return
+        truth = camera.truth()
+        if truth is None:
+            return
+        header = Header(stamp=stamp(), frame_id=self._frame)
+        self._publish_labels(truth)
+        if flows:
+            self._publish_flow(truth, header)
+        for one in heard:
+            one.publish(self._made[one](truth, header))
+
+    def _publish_labels(self, truth: PictureTruth) -> None:
+        numbered = truth.numbered
+        text = json.dumps({
+            "instances": {number: one._asdict() for number, one in enumerate(numbered.identities, 1)},
+            "categories": dict(enumerate(numbered.categories, 1)),
+        })  # fmt: skip
+        if text != self._labelled:
+            self._labelled = text
+            self._labels.publish(text)
+
+    def _publish_flow(self, truth: PictureTruth, header: Header) -> None:
+        before = truth.output("depth") if self._depth_before is None else self._depth_before
+        flow, known = truth.flow(before)
+        if self._depth_before is None:  # there is no picture before
+            known[:] = False
+        self._depth_before = truth.output("depth")
+        self._flow.publish(_image(flow, "32FC2", header))
+        self._flow_known.publish(_image(255 * known.astype(np.uint8), "mono8", header))
+
+    def close(self) -> None:
+        """Advertise no more."""
+        for one in self._publishers:
+            one.unregister()
+
+
+def _image(picture: np.ndarray, encoding: str, header: Header) -> Image:
+    return _bridge.cv2_to_imgmsg(np.ascontiguousarray(picture), encoding, header)
+
+
+def _cloud(points: np.ndarray, header: Header) -> PointCloud2:
+    height, width = points.shape[:2]
+    fields = [PointField(name, 4 * place, PointField.FLOAT32, 1) for place, name in enumerate("xyz")]
+    size = {"height": height, "width": width, "point_step": 12, "row_step": 12 * width}
+    return PointCloud2(header=header, fields=fields, is_dense=False, data=points.tobytes(), **size)
+
+
+def described(objects: list[Seen], header: Header | None = None) -> dict[str, Any]:
+    """Return boxes as JSON has them: px, m, and the optical frame's pose of each box in space."""
+    stamp = {} if header is None else {"stamp": header.stamp.to_sec(), "frame": header.frame_id}
+    return {**stamp, "objects": [
+        {
+            "number": one.number, **one.identity._asdict(), "pixels": one.pixels,
+            "visible": [round(float(value), 2) for value in one.visible],
+            "full": [round(float(value), 2) for value in one.full],
+            "occlusion": round(one.occlusion, 4), "truncation": round(one.truncation, 4),
+            "position": one.pose[:3, 3].round(5).tolist(),
+            "orientation": [round(value, 6) for value in _quaternion(one)],
+            "size": one.size.round(5).tolist(),
+        }
+        for one in objects
+    ]}  # fmt: skip
+
+
+def _quaternion(one: Seen) -> tuple[float, ...]:
+    return tuple(map(float, to_quaternion(tuple(one.pose[:3].ravel()))))
+
+
+def _pose(one: Seen) -> Pose:
+    return Pose(Point(*one.pose[:3, 3]), Quaternion(*_quaternion(one)))
+
+
+def _markers(objects: list[Seen], header: Header) -> MarkerArray:
+    """Return the boxes in space for rviz, each with its name; those of the picture before go."""
+    made = [Marker(header=header, action=Marker.DELETEALL)]
+    for one in objects:
+        shared = {"header": header, "id": one.number, "pose": _pose(one)}
+        made.append(Marker(ns="boxes", type=Marker.CUBE, scale=Vector3(*(one.size + _LINE)), color=_COLOR, **shared))
+        text = {"text": one.identity.name, "color": ColorRGBA(1, 1, 1, 1), "scale": Vector3(0, 0, 0.1)}
+        made.append(Marker(ns="names", type=Marker.TEXT_VIEW_FACING, **text, **shared))
+    return MarkerArray(made)
+
+
+def _detections(objects: list[Seen], header: Header) -> Any:
+    made = []
+    for one in objects:
+        left, top, right, bottom = one.visible
+        box = BoundingBox2D(size_x=right - left, size_y=bottom - top)
+        box.center.x, box.center.y = (left + right) / 2, (top + bottom) / 2
+        made.append(Detection2D(header=header, bbox=box, results=[ObjectHypothesisWithPose(id=one.number, score=1.0)]))
+    return Detection2DArray(header=header, detections=made)
+
+
+def _detections_3d(objects: list[Seen], header: Header) -> Any:
+    made = []
+    for one in objects:
+        box = BoundingBox3D(center=_pose(one), size=Vector3(*one.size))
+        made.append(Detection3D(header=header, bbox=box, results=[ObjectHypothesisWithPose(id=one.number, score=1.0)]))
+    return Detection3DArray(header=header, detections=made)

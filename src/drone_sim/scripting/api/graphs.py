@@ -1,0 +1,106 @@
+"""`sim`: the streams of graphs, numbers that a script gives to be plotted. The cockpit draws them."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+from drone_sim.scripting.api.calls import sim
+from drone_sim.scripting.api.types import Handle, Name, Number, WrongValue, numbers
+
+_MOST = 1000  # streams
+_LONGEST_NAME = 200  # characters
+
+
+class Graphs:
+    """Streams by handle: the graph that each is of, its name, and its latest value, None where it has none yet."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._streams: dict[int, tuple[int, str, float | None]] = {}
+
+    def add(self, handle: int, graph: int, name: str) -> int:
+        """Add a stream to a graph, unless that has one of this name; return its handle. Raises ValueError."""
+        if not isinstance(name, str):
+            raise WrongValue("the name of a stream is a string")
+        if len(name) > _LONGEST_NAME:
+            raise ValueError(f"the name of a stream has at most {_LONGEST_NAME} characters, not {len(name)}")
+        known = next((key for key, one in self._streams.items() if one[:2] == (graph, name)), None)
+        if known is not None:
+            return known
+        if len(self._streams) >= _MOST:
+            raise ValueError(f"{_MOST} streams of graphs are there already: destroy some")
+        self._streams[handle] = graph, name, None
+        return handle
+
+    def set(self, graph: int, stream: int, value: float | None) -> None:
+        """Give a stream its next value. Raises ValueError for one that the graph has not."""
+        if self._streams.get(stream, (None,))[0] != graph:
+            raise ValueError(f"the graph {graph} has no stream with the handle {stream}")
+        self._streams[stream] = (*self._streams[stream][:2], value)
+
+    def remove(self, graph: int, stream: int) -> None:
+        """Remove a stream. Raises ValueError for one that the graph has not."""
+        self.set(graph, stream, None)
+        del self._streams[stream]
+
+    def reset(self, graph: int) -> None:
+        """Forget the values of a graph's streams."""
+        self._streams = {
+            key: (own, name, None if own == graph else value) for key, (own, name, value) in self._streams.items()
+        }
+
+    def values(self) -> dict[str, float]:
+        """Return the latest value of each stream that has one, by name."""
+        return {name: value for _, name, value in self._streams.values() if value is not None}
+
+    def save_state(self) -> Callable[[], None]:
+        """Return a function that brings the present streams back."""
+        kept = copy.copy(self._streams)
+
+        def restore() -> None:
+            self._streams = copy.copy(kept)
+
+        return restore
+
+
+class GraphFunctions:
+    """Graphs, numbers to be plotted: the cockpit draws them. Any object may stand for a graph, of which there are none.
+
+    Colours, units and ranges are accepted and ignored.
+    """
+
+    def __init__(self, graphs: Graphs, new_handle: Callable[[], int]):
+        """Take the graphs of the simulation; `new_handle` gives a handle that nothing else has."""
+        self._graphs, self._new_handle = graphs, new_handle
+
+    @sim("45", addGraphDataStream="")
+    def addGraphStream(self, graph: Handle, name: Name, *_look: Any) -> int:
+        """Add a stream of numbers to a graph; return its handle."""
+        return self._graphs.add(self._new_handle(), graph, name)
+
+    @sim("45")
+    def setGraphStreamValue(self, graph: Handle, stream: Handle, value: Number) -> None:
+        """Give a stream its next value."""
+        self._graphs.set(graph, stream, numbers((value,), 1)[0])
+
+    @sim("345")
+    def setGraphUserData(self, graph: Handle, name: Name, value: Number) -> None:
+        """Give the stream of a name its next value (3.x)."""
+        stream = self._graphs.add(self._new_handle(), graph, name)
+        self._graphs.set(graph, stream, numbers((value,), 1)[0])
+
+    @sim("45")
+    def destroyGraphCurve(self, graph: Handle, stream: Handle) -> None:
+        """Remove a stream from a graph."""
+        self._graphs.remove(graph, stream)
+
+    @sim("345")
+    def resetGraph(self, graph: Handle) -> None:
+        """Forget the values of a graph's streams."""
+        self._graphs.reset(graph)

@@ -1,0 +1,110 @@
+"""All functions of the script API, for docs/api.md and for editors: an API of a drone that is not there."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+from drone_sim.mechanics.clock import Clock
+from drone_sim.mechanics.object_tree import ObjectTree
+from drone_sim.mechanics.velocity_meter import VelocityMeter
+from drone_sim.scripting.api import ignored
+from drone_sim.scripting.api.calls import Api, Declaration, contents, declaration_of, flat_name
+from drone_sim.scripting.api.drawings import Drawings
+from drone_sim.scripting.api.host import ScriptContext, Surroundings
+from drone_sim.scripting.api.messages import MessageBus
+from drone_sim.scripting.api.modules import make_plugins, make_sim, make_sim_ros, make_sim_vision
+from drone_sim.scripting.api.registry import Scripts
+from drone_sim.scripting.api.windows import Windows
+
+_MANUAL = "https://manual.coppeliarobotics.com/en"
+_PAGES = {"simROS": "rosInterf", "simUI": "simUI", "simVision": "simVision"}  # of the manual, one for each plugin
+
+
+def apis() -> dict[str, Api]:
+    """Return every module of the script API, of a drone that is not there."""
+    scripts = Scripts()
+    scripts.add("Drone", {})
+    clock, objects = Clock(0.05), ObjectTree()
+    host: Any = SimpleNamespace(
+        context=ScriptContext(
+            clock=clock,
+            gravity=-9.81,
+            drawings=Drawings(shown=False),
+            windows=Windows(),
+            objects=objects,
+            velocities=VelocityMeter(objects, clock),
+            scripts=scripts,
+        ),
+        sensors={},
+        own_script="Drone",
+    )
+    ros = make_sim_ros(MessageBus("drone"), host.context.clock)
+    vision = make_sim_vision(host, Surroundings())
+    return {"sim": make_sim(host, Surroundings()), "simROS": ros, "simVision": vision, **make_plugins(host)}
+
+
+def declared(api: Api) -> Iterator[tuple[Declaration, Any]]:
+    """Yield each function of a module once, with its declaration."""
+    seen: set[int] = set()
+    for function in contents(api)[1].values():
+        declaration = declaration_of(function)
+        if declaration is not None and id(declaration) not in seen:
+            seen.add(id(declaration))
+            yield declaration, function
+
+
+def is_ignored(function: Any) -> bool:
+    """Tell whether a function of the API does nothing."""
+    return bool(function.__module__ == ignored.__name__)
+
+
+def first_paragraph(doc: str) -> str:
+    """Return the first paragraph of a docstring, on one line."""
+    return " ".join(doc.split("\n\n")[0].split())
+
+
+def for_editors() -> dict[str, Any]:
+    """Return all that a script may name, as JSON takes it.
+
+    `functions`: rows of module, name, name in 3.x, generations, arguments, sentence, address of the manual's page;
+    `constants`: names and values of `sim`.
+    """
+    found = apis()
+    rows = [
+        [module, name, flat_name(module, name), generations, _arguments(function), _sentence(function), page]
+        for module, api in found.items()
+        for declaration, function in declared(api)
+        for name, generations in declaration.names.items()
+        for page in [_page(module, name, generations)]
+    ]
+    return {"functions": sorted(rows), "constants": dict(sorted(contents(found["sim"])[2].items()))}
+
+
+def _sentence(function: Any) -> str:
+    if is_ignored(function):
+        return "Accepted, and does nothing here."
+    return first_paragraph(inspect.getdoc(function) or "")
+
+
+def _arguments(function: Any) -> str:
+    """Return 'objectHandle, relativeTo=-1': what a function takes, without the kinds of the values."""
+    if is_ignored(function):
+        return "..."
+    shown = []
+    for one in inspect.signature(function).parameters.values():
+        star = "*" if one.kind is one.VAR_POSITIONAL else "**" if one.kind is one.VAR_KEYWORD else ""
+        default = "" if one.default is one.empty else f"={one.default!r}"
+        shown.append(f"{star}{one.name.lstrip('_')}{default}")
+    return ", ".join(shown)
+
+
+def _page(module: str, name: str, generations: str) -> str:
+    """Return the address of a function's page in CoppeliaSim's manual; '' for what is drone_sim's own."""
+    if not generations:
+        return ""
+    if module in _PAGES:
+        return f"{_MANUAL}/{_PAGES[module]}.htm"
+    return f"{_MANUAL}/regularApi/{flat_name(module, name)}.htm" if module == "sim" else ""

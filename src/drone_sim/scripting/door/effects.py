@@ -1,0 +1,52 @@
+"""What functions of the API only read, and of what kind it is; and what those change that return nothing.
+
+A read may be made before the script asks for it, and its answer kept until a call may have changed what is of its kind.
+A call that returns nothing may wait for the next message. Any other function is called when the script calls it, and
+may have changed everything.
+"""
+
+from __future__ import annotations
+
+from drone_sim.scripting.api.matrices import Matrices, Poses
+from drone_sim.scripting.api.packing import Bits, Packing, Tables
+
+PLACES, MOTION, PARAMETERS, SIGNALS, TIME, NAMES = "places", "motion", "parameters", "signals", "time", "names"
+KINDS = (PLACES, MOTION, PARAMETERS, SIGNALS, TIME, NAMES)
+
+# Neither reads nor changes anything but what it is given: called in the script's process.
+OWN_CLASSES: tuple[type, ...] = (Matrices, Poses, Bits, Packing, Tables)
+OWN_THREADS = [
+    "setThreadSwitchTiming",
+    "setThreadAutomaticSwitch",
+    "getThreadAutomaticSwitch",
+    "setStepping",
+    "acquireLock",
+    "releaseLock",
+    "getThreadId",
+    "setThreadResumeLocation",
+    "delegateChildScriptExecution",
+]
+OWN_LOG = ("addLog", "addStatusbarMessage")
+
+# Reads of places that are known, and settings of marks, which the script's process may do by itself (`places`).
+PLACED = ["getObjectPosition", "getObjectOrientation", "getObjectQuaternion", "getObjectPose", "getObjectMatrix"]
+PUT = ["setObjectPosition", "setObjectOrientation", "setObjectQuaternion", "setObjectPose", "setObjectMatrix"]
+
+_READS = {
+    PLACES: "getObjectParent getJointPosition",
+    MOTION: "getObjectVelocity getVelocity",
+    PARAMETERS: "getScriptSimulationParameter getUserParameter",
+    SIGNALS: "getInt32Signal getFloatSignal getStringSignal",
+    TIME: "getSimulationTime getSimulationTimeStep getSimulationState getThreadExitRequest",
+    NAMES: "getObjectHandle getObject getScriptHandle",
+}
+_CHANGES: dict[tuple[str, ...], str] = {
+    (PLACES, MOTION): " ".join(PUT),
+    (PARAMETERS,): "setScriptSimulationParameter setUserParameter",
+    (SIGNALS,): "setInt32Signal setFloatSignal setStringSignal clearInt32Signal clearFloatSignal clearStringSignal",
+    (): "addDrawingObjectItem addForce addForceAndTorque",
+}
+READS = {f"sim.{name}": kind for kind, names in _READS.items() for name in names.split()}
+CHANGES = {f"sim.{name}": kinds for kinds, names in _CHANGES.items() for name in names.split()}
+READS["simROS.getTime"] = TIME
+CHANGES["simROS.publish"] = ()

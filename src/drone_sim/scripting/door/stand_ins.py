@@ -1,0 +1,371 @@
+"""The API in the script's process: functions that look like those of the simulation, and ask it through the door.
+
+Most calls of a controller cost nothing on the way: what it reads in every phase comes with the phase, as long as it has
+changed nothing of that kind; what it sets goes with the end of the phase, once a call of the same form has succeeded.
+Between two questions lies a `stretch` of a phase, and each has reads of its own that are known to come.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from math import isfinite
+from typing import Any, NamedTuple, Protocol
+
+from drone_sim.mechanics.object_tree import WORLD
+from drone_sim.scripting.api import modules
+from drone_sim.scripting.api.calls import Api, Function, functions_of
+from drone_sim.scripting.api.constants import CONSTANTS, bare
+from drone_sim.scripting.api.control import Call, Steps, Turns, Wait, waits
+from drone_sim.scripting.api.host import Surroundings
+from drone_sim.scripting.api.ignored import PLUGINS, Ignored
+from drone_sim.scripting.api.image_filters import ImageFilters
+from drone_sim.scripting.api.scripts import ScriptFunctions
+from drone_sim.scripting.api.threads import Threads
+from drone_sim.scripting.door import effects
+from drone_sim.scripting.door.places import Place, Places
+
+MOST_EXPECTED = 200  # reads of a stretch
+_MOST_STRETCHES = 50  # of a phase, that are remembered
+_MOST_FORMS = 10_000  # of calls that have succeeded
+_NOT_KNOWN = object()
+_PLAIN = frozenset((int, float, str, bool, type(None)))
+_ALL_PLAIN = _PLAIN.issuperset
+_ALL_NUMBERS = frozenset((float, int)).issuperset
+Read = tuple[str, tuple[Any, ...]]  # a function, and what it is called with
+Answers = tuple[list[Any], list[Place]]  # what expected reads have brought (Ellipsis: nothing), where objects are
+NO_ANSWERS: Answers = ([], [])
+
+
+class Asking(Protocol):
+    """What leads to the simulation."""
+
+    def ask(self, item: list[Any]) -> tuple[Any, Answers]:
+        """Return the answer to an item, and what is expected to be read next; raises its error."""
+
+    def leave(self, item: list[Any]) -> None:
+        """Leave an item for the next message."""
+
+    def marked(self, value: Any) -> Any:
+        """Return a value as a message can have it."""
+
+
+class Expected(NamedTuple):
+    """What a stretch is expected to read."""
+
+    reads: tuple[Read, ...] = ()
+    handles: tuple[int, ...] = ()  # of objects whose places it asks for
+
+
+_NOTHING = Expected()
+
+
+class Stretch:
+    """What a part of a phase reads: before its first question, or between one and the next."""
+
+    __slots__ = ("changed", "handles", "known", "number", "phase", "reads")
+
+    def __init__(self, phase: str, number: int, known: dict[Read, Any]):
+        """It is the so-and-so-many-th of a `phase`, and begins with what is known of its reads."""
+        self.phase, self.number, self.known = phase, number, known
+        self.reads: dict[Read, None] = {}
+        self.handles: dict[int, None] = {}
+        self.changed: set[str] = set()  # kinds of what is not as it was at its beginning
+
+    def forget(self, kind: str) -> None:
+        """Know nothing of a kind any more."""
+        if kind not in self.changed:
+            self.changed.add(kind)
+            self.known = {read: value for read, value in self.known.items() if effects.READS[read[0]] != kind}
+
+
+class StandIns:
+    """The modules of one script."""
+
+    def __init__(self, end: Asking, called: Callable[[Callable[[], Any]], Any], turns: Turns):
+        """`end` leads to the simulation; `called` calls what waits for it, off the script's time.
+
+        `turns` are those of the script's thread.
+        """
+        self._end, self._called = end, called
+        self._stretches: list[Stretch] = []  # of the phases that run, each in the one before
+        self._expected: dict[tuple[str, int], Expected] = {}
+        self._succeeded: set[Any] = set()
+        self._places = Places()
+        own = _own_functions(turns)
+        self.modules = {
+            name: Api(
+                name, {key: own.get(one) or self._stand_in(name, one) for key, one in functions.items()}, constants
+            )
+            for name, functions, constants in declared()
+        }
+
+    # ---- phases
+
+    def begin(self, phase: str, answers: Answers) -> None:
+        """Begin a phase with the answers to what is expected in it."""
+        self._begin(phase, 0, answers)
+
+    def _begin(self, phase: str, number: int, answers: Answers) -> None:
+        values, places = answers
+        reads = self._expected.get((phase, number), _NOTHING).reads
+        known = {read: value for read, value in zip(reads, values) if value is not Ellipsis}
+        self._stretches.append(Stretch(phase, number, known))
+        self._places.take(places)
+
+    def end(self) -> None:
+        """End the phase."""
+        stretch = self._stretches.pop()
+        key = stretch.phase, stretch.number
+        before = self._expected.get(key, _NOTHING)
+        if before.reads == (*stretch.reads,) and before.handles == (*stretch.handles,):
+            return
+        if stretch.number < _MOST_STRETCHES:
+            self._expected[key] = Expected(tuple(stretch.reads), tuple(stretch.handles))
+            reads = [[name, *self._end.marked(list(arguments))] for name, arguments in stretch.reads]
+            self._end.leave(["reads", stretch.phase, stretch.number, reads, list(stretch.handles)])
+
+    # ---- calls
+
+    def _stand_in(self, module: str, function: Function) -> Function:
+        name = f"{module}.{function.__name__}"
+        if waits(function):
+            made = self._waiting(name)
+        elif module == "sim" and function.__name__ in effects.PLACED:
+            made = self._placed(name, self._places.function(function.__name__))
+        elif module == "sim" and function.__name__ in effects.PUT:
+            made = self._putting(name, self._places.function(function.__name__))
+        elif name in effects.READS:
+            made = self._reading(name, effects.READS[name])
+        elif name in effects.CHANGES:
+            made = self._changing(name, effects.CHANGES[name])
+        else:
+            made = self._asking(name)
+        made.__name__, made.__qualname__, made.__doc__ = function.__name__, function.__qualname__, function.__doc__
+        made.__annotations__ = function.__annotations__
+        made.__signature__ = _signature(function)  # type: ignore[attr-defined]
+        return made
+
+    def _asking(self, name: str) -> Function:
+        def call(*arguments: Any, **named: Any) -> Any:
+            return self._ask(name, arguments, named)
+
+        return call
+
+    def _reading(self, name: str, kind: str) -> Function:
+        stretches = self._stretches
+
+        def read(*arguments: Any, **named: Any) -> Any:
+            stretch, key = stretches[-1], (name, arguments)
+            if named or kind in stretch.changed or not _is_hashable(arguments):
+                return self._ask(name, arguments, named)
+            if len(stretch.reads) < MOST_EXPECTED:
+                stretch.reads[key] = None
+            found = stretch.known.get(key, _NOT_KNOWN)
+            if found is _NOT_KNOWN:
+                found = stretch.known[key] = self._send(name, arguments, named, -1)[0]
+            return _copied(found)
+
+        return read
+
+    def _placed(self, name: str, function: Function) -> Function:
+        stretches, places = self._stretches, self._places
+
+        def read(*arguments: Any, **named: Any) -> Any:
+            stretch = stretches[-1]
+            if named or effects.PLACES in stretch.changed or not 1 <= len(arguments) <= 2:
+                return self._ask(name, arguments, named)
+            handle, frame = arguments if len(arguments) == 2 else (*arguments, WORLD)
+            if type(handle) is not int or type(frame) is not int:
+                return self._ask(name, arguments, named)
+            stretch.handles[handle] = None
+            if frame != WORLD:
+                stretch.handles[frame] = None
+            if places.knows(handle, frame):
+                return function(handle, frame)
+            return self._send(name, arguments, named, -1)[0]
+
+        return read
+
+    def _putting(self, name: str, function: Function) -> Function:
+        change = self._changing(name, (effects.PLACES, effects.MOTION))
+        stretches, places, succeeded, end = self._stretches, self._places, self._succeeded, self._end
+
+        def put(*arguments: Any, **named: Any) -> Any:
+            stretch = stretches[-1]
+            if named or effects.PLACES in stretch.changed or not arguments or not _is_hashable(arguments[:1]):
+                return change(*arguments, **named)
+            handle = arguments[0]
+            if type(handle) is int:
+                stretch.handles[handle] = None
+            if not places.is_mark(handle) or _form(name, arguments) not in succeeded:
+                return change(*arguments, **named)
+            try:
+                function(*arguments)
+            except Exception:  # which the simulation says better
+                return change(*arguments, **named)
+            end.leave(["set", name, *arguments])
+            places.forget_below(handle)
+            for key in [one for one in stretch.known if effects.READS[one[0]] == effects.MOTION]:
+                if not places.is_apart(bare(key[1][0]), handle):
+                    del stretch.known[key]
+            return None
+
+        return put
+
+    def _changing(self, name: str, kinds: tuple[str, ...]) -> Function:
+        stretches, succeeded, end = self._stretches, self._succeeded, self._end
+
+        def change(*arguments: Any, **named: Any) -> Any:
+            stretch = stretches[-1]
+            for kind in kinds:
+                stretch.forget(kind)
+            form = None if named else _form(name, arguments)
+            if form in succeeded and form is not None:
+                end.leave(["set", name, *arguments])
+                return None
+            found, _ = self._send(name, arguments, named, -1)
+            if form is not None and found is None and len(succeeded) < _MOST_FORMS:
+                succeeded.add(form)
+            return found
+
+        return change
+
+    def _ask(self, name: str, arguments: Any, named: Any) -> Any:
+        """Call a function there; what was known may be no more."""
+        stretch = self._stretches[-1]
+        try:
+            found, answers = self._send(name, arguments, named, stretch.number + 1)
+        except Exception:  # it may have done something before it failed
+            for kind in effects.KINDS:
+                stretch.forget(kind)
+            self._places.take(())
+            raise
+        phase, number = stretch.phase, stretch.number + 1
+        self.end()
+        self._begin(phase, number, answers)
+        return found
+
+    def _send(self, name: str, arguments: Any, named: Any, stretch: int) -> tuple[Any, Answers]:
+        marked = self._end.marked
+        by_name = [[key, marked(one)] for key, one in named.items()]
+        item = ["call", name, stretch, by_name, *map(marked, arguments)]
+        return self._called(lambda: self._end.ask(item))  # type: ignore[no-any-return]
+
+    # ---- what has to be waited for
+
+    def _waiting(self, name: str) -> Function:
+        def call(*arguments: Any, **named: Any) -> Wait:
+            return _WaitThere(self._ask(name, arguments, named), self._step)
+
+        return call
+
+    def _step(self, number: int, answer: Any) -> Any:
+        return self._ask("wait", (number, answer), {})
+
+
+class _WaitThere(Wait):
+    """What a function waits for in the simulation's process."""
+
+    def __init__(self, number: int, step: Callable[[int, Any], Any]):
+        super().__init__(lambda: False)
+        self._number, self._step, self._value = number, step, None
+        self.value = lambda: self._value
+
+    def __iter__(self) -> Steps:
+        answer = None
+        while True:
+            how, *rest = self._step(self._number, answer)
+            if how == "over":
+                self._value = rest[0]
+                return
+            answer = yield Call(rest[0], list(rest[1])) if how == "call" else None
+
+
+def _is_hashable(arguments: tuple[Any, ...]) -> bool:
+    return all(type(one) is not list and type(one) is not dict for one in arguments) and _has_hash(arguments)
+
+
+def _has_hash(arguments: tuple[Any, ...]) -> bool:
+    try:
+        hash(arguments)
+    except TypeError:
+        return False
+    return True
+
+
+def _form(name: str, arguments: tuple[Any, ...]) -> Any:
+    """Return what calls have in common that differ in their last finite number, or list of such, alone; else None."""
+    others = arguments[:-1]
+    if not arguments or not _ALL_PLAIN(map(type, others)):
+        return None
+    last = arguments[-1]
+    kind = type(last)
+    if kind is float:
+        return (name, others, float) if isfinite(last) else None
+    if kind is list:
+        is_fit = last and _ALL_NUMBERS(map(type, last)) and isfinite(sum(last))
+        return (name, others, list, len(last)) if is_fit else None
+    return (name, arguments) if kind in _PLAIN else None
+
+
+def _copied(value: Any) -> Any:
+    """Return a value of the script's own, which it may change."""
+    kind = type(value)
+    if kind is list:
+        return list(map(_copied, value)) if value and type(value[0]) is not float else value[:]
+    if kind is tuple:
+        return tuple(map(_copied, value))
+    if kind is dict:
+        return {key: _copied(one) for key, one in value.items()}
+    return value
+
+
+# ---- what there is
+
+
+@functools.cache
+def declared() -> list[tuple[str, dict[str, Function], dict[str, Any]]]:
+    """Return each module: its name, its functions, which belong to nothing and are not to be called, its constants."""
+    ignored = Ignored("", int)
+    return [
+        ("sim", {**ignored.functions("sim"), **_functions_of(modules.SIM)}, CONSTANTS),
+        ("simROS", _functions_of(modules.SIM_ROS), {}),
+        ("simVision", _functions_of((ImageFilters,)), {}),
+        *((name, ignored.functions(name), {}) for name in PLUGINS),
+        ("simRemoteApi", _functions_of(modules.SIM_REMOTE_API), {}),
+    ]
+
+
+@functools.cache
+def _signature(function: Function) -> inspect.Signature:
+    return inspect.signature(function)
+
+
+@functools.cache
+def _empty(kind: type) -> Any:
+    return object.__new__(kind)
+
+
+def _functions_of(kinds: tuple[type, ...]) -> dict[str, Function]:
+    return functions_of(*map(_empty, kinds))
+
+
+def prepare() -> None:
+    """Look at all functions, once for many processes."""
+    for _, functions, _ in declared():
+        for one in functions.values():
+            _signature(one)
+
+
+def _own_functions(turns: Turns) -> dict[Function, Function]:
+    """Return the functions that are called here, by what `declared` gives for them."""
+    threads = Threads.__new__(Threads)
+    threads._surroundings = Surroundings(turns=turns)
+    log = _empty(ScriptFunctions)
+    found = {getattr(_empty(Threads), name): getattr(threads, name) for name in effects.OWN_THREADS}
+    found.update((one, one) for name in effects.OWN_LOG if (one := getattr(log, name)))
+    for kind in effects.OWN_CLASSES:
+        found.update((one, one) for one in functions_of(_empty(kind)).values())
+    return found

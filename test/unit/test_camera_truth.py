@@ -1,0 +1,113 @@
+"""What a drone's camera knows to be true of its picture: names, categories, boxes, flow; and nothing for nobody."""
+
+import numpy as np
+import pytest
+import yaml
+from test_renderer_outputs import inner
+
+from drone_sim.mechanics.state import Pose
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+SCENE = {
+    "drone": {"position": [0, 0, 1]},
+    "objects": [
+        {"name": "Wall", "shape": "box", "size": [0.1, 2.0, 2.0], "position": [4, 0, 1.5], "category": "obstacle"},
+        {"name": "Post7", "shape": "box", "size": [0.2, 0.4, 1.0], "position": [2.5, 0.5, 1.0]},
+        {"name": "Aside", "shape": "box", "size": [0.2, 1.0, 0.2], "position": [2.5, -1.5, 1.0]},
+    ],
+}
+
+
+@pytest.fixture(
+    name="simulation", params=[None, {"model": "plumb_bob", "coefficients": [-0.2, 0.05]}], ids=["pinhole", "lens"]
+)
+def _simulation(request, tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(yaml.safe_dump(SCENE))
+    cameras = {"front": {"lens": request.param}} if request.param else {}
+    simulation = Simulation(parameters.load({"scene_file": str(scene), "cameras": cameras}))
+    for _ in range(5):
+        simulation.step()
+    yield simulation
+    simulation.close()
+
+
+def by_name(truth):
+    return {one.identity.name: one for one in truth.seen()}
+
+
+def test_masks_and_boxes_have_the_names_of_the_scene(simulation):
+    truth = simulation.drone.cameras["front"].truth()
+    seen = by_name(truth)
+    assert {"Wall", "Post7", "Aside", "Floor"} <= set(seen)
+    assert {name: one.identity.category for name, one in seen.items()} == {
+        "Wall": "obstacle", "Post7": "Post", "Aside": "Aside", "Floor": "Floor",
+    }  # fmt: skip
+    mask, categories = truth.output("instance"), truth.categories
+    for one in seen.values():
+        assert one.pixels == (mask == one.number).sum()
+        category = truth.numbered.categories.index(one.identity.category) + 1
+        assert (categories[mask == one.number] == category).all()
+        rows, columns = np.nonzero(mask == one.number)
+        assert one.visible[:2] == (columns.min() - 0.5, rows.min() - 0.5)
+        assert one.visible[2:] == (columns.max() + 0.5, rows.max() + 0.5)
+
+
+def test_boxes_in_space_are_where_the_objects_are(simulation):
+    camera = simulation.drone.cameras["front"]
+    eye = np.reshape((*camera.pose(), 0, 0, 0, 1), (4, 4))
+    for entry in SCENE["objects"]:
+        one = by_name(camera.truth())[entry["name"]]
+        np.testing.assert_allclose((eye @ one.pose)[:3, 3], entry["position"], atol=1e-6)
+        np.testing.assert_allclose(np.abs(eye[:3, :3] @ one.pose[:3, :3]), np.eye(3), atol=1e-6)
+        np.testing.assert_allclose(one.size, entry["size"], atol=1e-6)
+
+
+def test_what_hides_and_what_leaves_the_picture_is_counted(simulation):
+    camera = simulation.drone.cameras["front"]
+    seen = by_name(camera.truth())
+    assert seen["Post7"].occlusion == 0 and seen["Post7"].truncation == 0
+    assert 0.02 < seen["Wall"].occlusion < 0.4 and seen["Wall"].truncation == 0
+    assert 0.2 < seen["Aside"].truncation < 0.9
+    assert seen["Aside"].full.right > camera.intrinsics.width
+    alone = np.count_nonzero(camera.truth().output("instance") == seen["Wall"].number)
+    assert alone / (1 - seen["Wall"].occlusion) == pytest.approx(alone + hidden(camera, seen), rel=0.01)
+
+
+def hidden(camera, seen):
+    """Count the pixels of the post that the wall is behind."""
+    truth = camera.truth()
+    rays = camera.intrinsics.rays[truth.output("instance") == seen["Post7"].number]
+    pose, size = seen["Wall"].pose, seen["Wall"].size
+    near = rays / rays[:, 2:] * (pose[2, 3] - size[0] / 2)
+    local = (near - pose[:3, 3]) @ pose[:3, :3]
+    return (np.abs(local[:, 1:]) <= size[1:] / 2).all(axis=1).sum()
+
+
+def test_flow_is_that_of_reprojected_points(simulation):
+    camera = simulation.drone.cameras["front"]
+    first = camera.truth()
+    depth, before = first.output("depth"), first.moment
+    simulation.drone.body.move(Pose((0.05, 0.03, 1.02), (0.0, 0.0, 0.02, 0.9998)))
+    truth = camera.truth()
+    flow, known = truth.flow(depth)
+    world = truth.points @ truth.moment.camera_pose[:3, :3].T + truth.moment.camera_pose[:3, 3]
+    then = camera.intrinsics.project((world - before.camera_pose[:3, 3]) @ before.camera_pose[:3, :3])
+    assert known.mean() > 0.3
+    missed = np.abs(flow - (camera.intrinsics.pixels - then)).max(axis=-1)
+    assert missed[known & inner(truth.output("instance"))].max() < 0.1, "apart from edges, between two things"
+    assert np.linalg.norm(flow[known], axis=1).max() > 5
+    assert (flow[~known] == 0).all()
+
+
+def test_nothing_is_drawn_for_a_truth_that_nobody_asks(simulation, monkeypatch):
+    camera = simulation.drone.cameras["front"]
+    picture = camera.take()
+    drawn = []
+    renderer = simulation.vision._renderer
+    monkeypatch.setattr(renderer, "render_outputs", lambda *_, **__: drawn.append(1))
+    simulation.step()
+    camera.look()
+    assert drawn == []
+    assert picture.shape == (480, 640, 3)

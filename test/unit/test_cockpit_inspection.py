@@ -1,0 +1,127 @@
+"""Variables and breakpoints between the simulation and the browsers, without either of them."""
+
+import json
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from std_msgs.msg import String
+
+from drone_sim.ros.cockpit.editor import inspection
+from drone_sim.ros.cockpit.editor.inspection import ScriptInspector
+from drone_sim.ros.cockpit.editor.script_store import ScriptStore
+
+
+class Topic:
+    """A publisher or subscriber of nobody's, which remembers."""
+
+    there = None
+
+    def __init__(self, name, _kind, callback=None, **_options):
+        self.name, self.callback, self.published = name, callback, []
+        Topic.there[name] = self
+
+    def publish(self, text):
+        self.published.append(json.loads(text))
+
+    def unregister(self):
+        del Topic.there[self.name]
+
+
+@pytest.fixture(name="now")
+def _now(monkeypatch):
+    """The monotonic clock, in a list; topics are nobody's."""
+    now = [100.0]
+    monkeypatch.setattr(inspection.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(Topic, "there", {})
+    monkeypatch.setattr(inspection.rospy, "Publisher", Topic)
+    monkeypatch.setattr(inspection.rospy, "Subscriber", Topic)
+    return now
+
+
+@pytest.fixture(name="told")
+def _told():
+    return []
+
+
+@pytest.fixture(name="inspector")
+def _inspector(tmp_path, now, told):
+    (tmp_path / "a.py").write_text("x = 1\n")
+    return ScriptInspector("/sim", ScriptStore(tmp_path, {}), told.append)
+
+
+def ask(inspector, **message):
+    return inspector.answers["inspect"]({"page": "one", **message})
+
+
+def listens(topic):
+    return f"/sim/{topic}" in Topic.there
+
+
+def test_breakpoints_of_all_pages_are_published_and_go_with_them(inspector, now, tmp_path):
+    ask(inspector, breakpoints={"mine/a.py": [3, 1], "mine/gone.py": [1]})
+    ask(inspector, page="two", breakpoints={"mine/a.py": [2, 3]})
+    inspector.look(True)
+    published = Topic.there["/sim/breakpoints"].published
+    assert published == [{str(tmp_path / "a.py"): [1, 2, 3]}] and listens("variables") and listens("names")
+    ask(inspector, page="two", breakpoints={})
+    assert published[1:] == [{str(tmp_path / "a.py"): [1, 3]}], "at once"
+    now[0] += 100.0
+    inspector.look(True)
+    assert published[2:] == [{}] and not listens("variables") and not listens("names")
+
+
+def test_nobody_listens_where_nobody_looks(inspector, now, told):
+    ask(inspector, looks=False)
+    inspector.look(True)
+    assert not listens("variables") and listens("names") and not listens("breakpoints")
+    ask(inspector, looks=True)
+    inspector.look(True)
+    assert listens("variables")
+    now[0] += 5.0
+    inspector.look(True)
+    assert not listens("variables") and told == [{"variables": None}]
+    inspector.look(False)
+    assert not listens("names")
+
+
+def test_what_flies_is_told_only_where_somebody_follows_it(inspector, told):
+    ask(inspector, looks=True)
+    inspector.look(True)
+
+    def say(state):
+        Topic.there["/sim/variables"].callback(String(data=json.dumps({"state": state})))
+        return [one["variables"]["state"] for one in told]
+
+    for state in ("flying", "paused", "flying", "flying", "flying"):
+        said = say(state)
+    assert said[1:] == ["paused", "flying"], "and that it goes on"
+    ask(inspector, looks=True, live=True)
+    assert say("flying")[3:] == ["flying"]
+    for nonsense in ("[1]", "{", "[" * 100_000, "x" * (1 << 21)):
+        Topic.there["/sim/variables"].callback(String(data=nonsense))
+    assert len(told) == 4
+
+
+def test_names_reach_the_page(inspector):
+    assert ask(inspector) == {"objects": [], "parameters": []}
+    inspector.look(True)
+    for names in ({"objects": ["Floor"], "parameters": ["Kz"]}, {"objects": [1]}, []):
+        Topic.there["/sim/names"].callback(String(data=json.dumps(names)))
+    assert ask(inspector) == {"objects": ["Floor"], "parameters": ["Kz"]}
+
+
+@pytest.mark.parametrize(
+    ("message", "said"),
+    [
+        ({"page": ""}, "needs a page"),
+        ({"page": "x" * 41}, "needs a page"),
+        ({"breakpoints": []}, "must be a mapping"),
+        ({"breakpoints": {"mine/a.py": [1.5]}}, "lines"),
+        ({"breakpoints": {"mine/a.py": list(range(501))}}, "at most 500"),
+    ],
+)
+def test_what_a_browser_must_not_ask(inspector, message, said):
+    with pytest.raises(ValueError, match=said):
+        ask(inspector, **message)

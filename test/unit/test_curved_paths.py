@@ -1,0 +1,329 @@
+"""Paths of V-REP 3.x: the line through control points, its frames, what counts for its length, from the file on."""
+
+import itertools
+import math
+import struct
+
+import numpy as np
+import pytest
+import yaml
+from vrep_encoder import chunk, file, integers, numbers, scene_object
+
+from drone_sim.importing.main import main
+from drone_sim.mechanics import frames
+from drone_sim.mechanics.controlled_path import ControlledPath, PathRules
+from drone_sim.mechanics.path_curves import ControlPoint, Station
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+CLOSED, AUTOMATIC, FLAT, X_UP = 0x04, 0x08, 0x40, 0x800
+CORNER = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
+SQUARE = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0)]
+STRAIGHT_ON = (0.0, 0.0, 0.0, 1.0)
+
+
+def about_z(angle):
+    return (0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2))
+
+
+def path(points, turns=(), before=0.5, after=0.5, count=15, **rules):
+    turns = turns or [STRAIGHT_ON] * len(points)
+    stations = [Station(tuple(map(float, point)), turn) for point, turn in zip(points, turns)]
+    controls = [ControlPoint(one, before, after, count) for one in stations]
+    return ControlledPath(("Way",), "", None, frames.IDENTITY, controls, PathRules(**rules))
+
+
+def quadratic(first, corner, last, count):
+    """The points of a Bezier curve, as the textbooks have them."""
+    t = np.linspace(0, 1, count)[:, None]
+    return (1 - t) ** 2 * np.array(first) + 2 * t * (1 - t) * np.array(corner) + t**2 * np.array(last)
+
+
+def axes(m):
+    """The x, y and z axis of a frame."""
+    return [tuple(round(value, 9) + 0.0 for value in m[axis:11:4]) for axis in range(3)]
+
+
+def length_of(points):
+    return sum(math.dist(one, other) for one, other in itertools.pairwise(points))
+
+
+# ---- the line
+
+
+def test_a_corner_is_a_curve_between_the_middles_of_its_pieces():
+    curve = quadratic((1 - 0.8 / 2, 0, 0), (1, 0, 0), (1, 0.4 / 2, 0), 7)
+    way = path(CORNER, before=0.8, after=0.4, count=7)
+    assert np.allclose(way.points, [(0, 0, 0), *curve, (1, 1, 0)])
+    assert way.length == pytest.approx(length_of([(0, 0, 0), *curve, (1, 1, 0)]))
+
+
+def test_a_closed_line_has_a_curve_at_every_point_and_comes_back():
+    way = path(SQUARE, closed=True)
+    assert way.points[0] == way.points[-1] == pytest.approx((0, 0.5, 0))
+    assert len(way.points) == 4 * 15 + 1
+    corner = length_of(quadratic((1.5, 0, 0), (2, 0, 0), (2, 0.5, 0), 15))
+    assert way.length == pytest.approx(4 * (corner + 1))
+    assert way.at(-0.5) == pytest.approx(way.at(way.length - 0.5))
+
+
+@pytest.mark.parametrize("points", [[(0, 0, 0), (1, 0, 0), (3, 0, 0)], CORNER])
+def test_without_a_bend_or_a_curve_it_is_straight(points):
+    is_straight = points is not CORNER
+    assert path(points, count=15 if is_straight else 1).points == points
+
+
+def test_two_points_are_not_closed():
+    assert path(CORNER[:2], closed=True).length == 1
+
+
+def test_few_points():
+    assert path([]).length == 0 and path([]).table == []
+    with pytest.raises(ValueError, match="'Way' has no points"):
+        path([]).at(0)
+    assert frames.position(path([(1, 2, 3)]).at(7)) == (1, 2, 3)
+
+
+# ---- what counts
+
+
+@pytest.mark.parametrize(
+    ("counts", "length"),
+    [
+        ("dl", 3),
+        ("dac", 1),
+        ("max_dl_dac", 3),
+        ("dl_and_dac", 4),
+        ("sqrt_dl2_and_dac2", math.sqrt(10)),
+        ("dl_if_nonzero", 3),
+        ("dac_if_nonzero", 1),
+    ],
+)
+def test_the_length_counts_way_and_turn_by_its_method(counts, length):
+    turns = [STRAIGHT_ON, about_z(2.0)]
+    way = path([(0, 0, 0), (3, 0, 0)], turns, orientation="own", counts=counts, metres_per_radian=0.5)
+    assert way.length == pytest.approx(length)
+
+
+def test_a_turn_on_the_spot_counts_where_there_is_no_way():
+    points, turns = [(0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 2, 0)], [STRAIGHT_ON, STRAIGHT_ON, about_z(1.5), about_z(1.5)]
+    way = path(points, turns, count=1, orientation="own", metres_per_radian=2.0)
+    assert way.length == pytest.approx(1 + 3 + 2)
+    assert frames.position(way.at(2.5)) == pytest.approx((1, 0, 0))
+    assert frames.to_euler(way.at(2.5))[2] == pytest.approx(0.75)
+    assert path(points, turns, count=1, orientation="own", counts="dl").length == pytest.approx(3)
+
+
+def test_a_pause_counts():
+    stations = [Station((0.0, 0.0, 0.0)), Station((1.0, 0.0, 0.0), pause=0.25)]
+    rules = PathRules(metres_per_pause=4.0)
+    way = ControlledPath(("Way",), "", None, frames.IDENTITY, [ControlPoint(one) for one in stations], rules)
+    assert way.length == pytest.approx(1 + 1)
+
+
+def test_it_carries_flags_and_numbers():
+    stations = [
+        Station((0.0, 0.0, 0.0), flags=1, channels=(0.0, 0.0, 0.0, 8.0)),
+        Station((2.0, 0.0, 0.0), flags=2, channels=(1.0, 0.0, 0.0, 4.0)),
+    ]
+    way = ControlledPath(("Way",), "", None, frames.IDENTITY, [ControlPoint(one) for one in stations], PathRules())
+    assert way.carried(0.5) == (1, pytest.approx([0.25, 0, 0, 7])) and way.carried(1.5)[0] == 2
+
+
+# ---- frames
+
+
+def test_z_looks_ahead_and_y_out_of_the_bend():
+    way = path(CORNER, count=1)
+    x, y, z = axes(way.at(1))
+    half = round(math.sqrt(0.5), 9)
+    assert (x, y, z) == ((0, 0, 1), (half, -half, 0), (half, half, 0))
+    assert [axes(way.at(along))[2] for along in (0, 2)] == [(1, 0, 0), (0, 1, 0)]
+
+
+def test_a_straight_line_has_y_up_and_x_up_where_it_says_so():
+    ends = [(0, 0, 0), (0, 3, 0)]
+    assert axes(path(ends).at(1)) == [(-1, 0, 0), (0, 0, 1), (0, 1, 0)]
+    assert axes(path(ends, orientation="x_up").at(1)) == [(0, 0, 1), (1, 0, 0), (0, 1, 0)]
+    assert axes(path([(0, 0, 0), (0, 0, 1)]).at(0)) == [(0, -1, 0), (1, 0, 0), (0, 0, 1)]
+
+
+def test_between_two_bends_y_turns_from_one_to_the_other():
+    points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 2, 0), (1, 2, 1)]
+    _, y, z = axes(path(points, count=1).at(2))
+    assert z == (0, 1, 0)
+    assert y == pytest.approx((math.sqrt(0.5), 0, -math.sqrt(0.5)))
+
+
+# ---- from a file
+
+
+def mixed(double, single, numbers_before, whole, numbers_after, version):
+    width, tag = ("d", double) if version >= 24 else ("f", single)
+    form = f"<{len(numbers_before)}{width}{whole[0]}{len(numbers_after)}{width}"
+    return chunk(tag, struct.pack(form, *numbers_before, whole[1], *numbers_after))
+
+
+def control_point(position, turn=(1, 0, 0, 0), factors=(0.5, 0.5), count=15, speed=1.0, version=22):
+    own = mixed("_t2", "At2", (*position, *turn, *factors), ("i", count), (speed,), version)
+    own += numbers("_t3", "At3", 0.0, version=version)
+    own += mixed("_t4", "At4", (), ("H", 3), (1.5, 0, 0, 0), version)
+    return chunk("Pat", own + b"EOO")
+
+
+def path_object(handle, name, *points, switches=AUTOMATIC, counts=5, version=22, along=0.25, **more):
+    own = b"".join(points) + integers("At2", switches)
+    own += mixed("_v3", "Av3", (0.0636620,), ("i", counts), (), version) + numbers("_v9", "Av9", 1.0, version=version)
+    own += numbers("_m2", "Jm2", along, 0.01, 0.0, 0.0, version=version)
+    return scene_object(
+        "PAT", handle, name, own=chunk("Var", b"\0") + chunk("Ntp", own + b"EOO"), version=version, **more
+    )
+
+
+@pytest.fixture(name="imported")
+def _imported(tmp_path, capsys):
+    def do(*chunks, version=22):
+        given = tmp_path / "Way.ttt"
+        given.write_bytes(file(*chunks, version=version))
+        assert main([str(given), str(tmp_path / "out"), "--force"]) == 0
+        do.said = capsys.readouterr().out
+        return tmp_path / "out" / "scene.yaml"
+
+    return do
+
+
+@pytest.mark.parametrize("version", [16, 22, 24, 25])
+def test_a_path_is_brought_with_its_control_points(imported, version):
+    turn = (math.cos(0.5), 0, 0, math.sin(0.5))
+    points = [
+        control_point((0, 0, 0), version=version),
+        control_point((1, 0, 0.5), turn, (0.9, 0.2), 9, version=version),
+    ]
+    switches = FLAT | CLOSED
+    scene = imported(path_object(0, "Way", *points, switches=switches, counts=3, version=version), version=version)
+    (entry,) = yaml.safe_load(scene.read_text())["objects"]
+    carried = {"flags": 3, "channels": [1.5, 0, 0, 0]}
+    curve = {"factors": [0.9, 0.2], "count": 9}
+    assert entry["control_points"] == [
+        {"position": [0, 0, 0], **carried},
+        {"position": [1, 0, 0.5], "turn": pytest.approx([0, 0, math.sin(0.5), math.cos(0.5)]), **curve, **carried},
+    ]
+    rest = {key: value for key, value in entry.items() if key != "control_points"}
+    assert rest == {
+        "name": "Way",
+        "kind": "curved_path",
+        "closed": True,
+        "flat": True,
+        "orientation": "own",
+        "counts": "dl_and_dac",
+        "along": 0.25,
+        "position": [0, 0, 0],
+    }
+    assert "Way: " not in imported.said
+
+
+def test_what_is_not_brought_of_a_path_is_said(imported):
+    imported(path_object(0, "Way", control_point((0, 0, 0), speed=0.5), control_point((1, 0, 0))))
+    assert "Way: a path: its velocity profile is not brought" in imported.said
+
+
+def test_more_points_than_can_be_kept_are_brought_as_fewer(imported):
+    points = [control_point((index % 2, index, 0), count=100) for index in range(1500)]
+    scene = imported(path_object(0, "Way", *points))
+    (entry,) = yaml.safe_load(scene.read_text())["objects"]
+    assert len(entry["control_points"]) == 1500 and entry["control_points"][7]["count"] == 66
+    assert "Way: a path: its curves have fewer points" in imported.said
+    parameters.load({"scene_file": str(scene)})
+
+
+@pytest.mark.parametrize("place", [math.nan, 1e9])
+def test_a_control_point_that_is_nowhere_is_left_out(imported, place):
+    points = [control_point(point) for point in ((0, 0, 0), (place, 0, 0), (3, 0, 0))]
+    scene = imported(path_object(0, "Way", *points))
+    (entry,) = yaml.safe_load(scene.read_text())["objects"]
+    assert [one["position"] for one in entry["control_points"]] == [[0, 0, 0], [3, 0, 0]]
+    assert "Way: a path: 1 of its control points are nowhere: left out" in imported.said
+
+
+FOLLOW = """
+if (sim_call_type==sim_childscriptcall_initialization) then
+    path=simGetObjectHandle('Way')
+    length=simGetPathLength(path)
+    simSetFloatSignal('length',length)
+    simSetFloatSignal('begins',simGetPathPosition(path))
+    p=simGetPositionOnPath(path,0.5)
+    simSetFloatSignal('middle',p[1])
+    e=simGetOrientationOnPath(path,0.5)
+    simSetFloatSignal('beta',e[2])
+    simSetPathPosition(path,99)
+    simSetFloatSignal('position',simGetPathPosition(path))
+    flags,channels=simGetDataOnPath(path,0.5)
+    simSetFloatSignal('data',flags+channels[1])
+    near=simGetClosestPositionOnPath(path,{5,0,9})
+    simSetFloatSignal('near',near)
+    simCutPathCtrlPoints(path,-1,0)
+    simSetFloatSignal('empty',simGetPathLength(path))
+    data={0,0,5,0,0,0,1,0,1,0.5,0.5, 3,0,5,0,0,0,1,0,1,0.5,0.5, 3,4,5,0,0,0,1,0,1,0.5,0.5}
+    simInsertPathCtrlPoints(path,1,0,3,data)
+    simSetFloatSignal('triangle',simGetPathLength(path))
+    simCutPathCtrlPoints(path,2,1)
+    simSetFloatSignal('cut',simGetPathLength(path))
+    made=simCreatePath(-1,{1,sim_distcalcmethod_dac,0},{0.01,0.5,1})
+    simInsertPathCtrlPoints(made,0,0,1,{0,0,0,0,0,0,1,0,15,0.5,0.5})
+    simInsertPathCtrlPoints(made,0,1,1,{0,0,9,0,0,0,1,0,15,0.5,0.5})
+    simSetFloatSignal('made',simGetPathLength(made))
+end
+"""
+
+
+def test_3x_scripts_read_and_change_it(imported, tmp_path):
+    points = [control_point(point) for point in ((0, 0, 0), (4, 0, 0), (8, 0, 0))]
+    scene = imported(path_object(0, "Way", *points, at=(1, 0, 2)))
+    script = tmp_path / "follow.lua"
+    script.write_text(FOLLOW)
+    values = {"scene_file": str(scene), "vehicles": {"drone": {}}}
+    simulation = Simulation(parameters.load(values), script=str(script))
+    try:
+        simulation.step()
+        found = {name: simulation.context.signals.get(float, name) for name in ("length", "begins", "middle", "beta")}
+        assert found == pytest.approx({"length": 8, "begins": 0.25, "middle": 5, "beta": math.pi / 2})
+        names = ("position", "data", "near", "empty", "triangle", "cut", "made")
+        found = {name: simulation.context.signals.get(float, name) for name in names}
+        assert found == pytest.approx(
+            {"position": 8, "data": 4.5, "near": 0.5, "empty": 0, "triangle": 12, "cut": 3, "made": 0}
+        )
+    finally:
+        simulation.close()
+
+
+ALONG = """
+function threadFunction()
+    path=simGetObjectHandle('Way')
+    box=simCreateDummy(0.1)
+    simSetIntegerSignal('box',box)
+    simFollowPath(box,path,3,0.5,VELOCITY)
+    simSetFloatSignal('took',simGetSimulationTime())
+end
+simSetThreadSwitchTiming(200)
+threadFunction()
+"""
+
+
+@pytest.mark.parametrize(("velocity", "end"), [(2.0, 9.0), (-2.0, 1.0)])
+def test_an_object_follows_it_to_its_end_or_to_its_beginning(imported, tmp_path, velocity, end):
+    points = [control_point(point) for point in ((0, 0, 0), (4, 0, 0), (8, 0, 0))]
+    scene = imported(path_object(0, "Way", *points, at=(1, 0, 2)))
+    script = tmp_path / "along.lua"
+    script.write_text(ALONG.replace("VELOCITY", str(velocity)))
+    simulation = Simulation(parameters.load({"scene_file": str(scene), "vehicles": {"drone": {}}}), script=str(script))
+    try:
+        places = []
+        for _ in range(60):
+            simulation.step()
+            box = simulation.context.signals.get(int, "box")
+            places.append(frames.position(simulation.context.objects.matrix(box))[0] if box is not None else 0.0)
+        assert places[-1] == pytest.approx(end)
+        assert simulation.context.signals.get(float, "took") == pytest.approx(2.0, abs=0.15)
+        assert abs(places[20] - 5) == pytest.approx(2 * 20 * 0.05, abs=0.25)
+    finally:
+        simulation.close()

@@ -1,0 +1,739 @@
+"""V-REP's legacy remote API (`simxStart`): what a client sends, and what comes back."""
+
+import socket
+import struct
+
+import pytest
+from legacy_client import (
+    BLOCKING,
+    DISCONTINUE,
+    FAILED,
+    ONESHOT,
+    PACKET,
+    SPLIT,
+    STREAMING,
+    Client,
+    Reply,
+    command,
+    floats,
+    ints,
+    message,
+    packets,
+    text,
+)
+
+from drone_sim.remote.legacy import session
+from drone_sim.remote.legacy.server import LegacyServer
+from drone_sim.remote.servers import RemoteApiServers
+from drone_sim.run import parameters
+from drone_sim.run.player import Player
+from drone_sim.run.simulation import Simulation
+
+SCRIPT = """
+def sysCall_init():
+    simRemoteApi.start(PORT)
+    simRemoteApi.start(OTHER, 1300, False, True)
+
+def turned(whole, real, texts, buffer):
+    return whole[::-1], [2 * one for one in real], [one.upper() for one in texts], buffer
+
+def wrong(whole, real, texts, buffer):
+    return 'text'
+
+def sysCall_actuation():
+    sim.setInt32Signal('status', simRemoteApi.status(PORT))
+    if sim.getInt32Signal('fail'):
+        raise RuntimeError('as it was told')
+    if sim.getInt32Signal('close'):
+        simRemoteApi.stop(PORT)
+"""
+SYNCHRONOUS, FREE, TRIGGER, GOODBYE = 0x0001, 0x0002, 0x0003, 0x000A
+HANDLE, POSITION, SET_POSITION = 0x3001, 0x200E, 0x101B
+START, PAUSE, STOP = ((0x1007, ints(which)) for which in range(3))
+SET_FLOAT, GET_FLOAT = 0x3013, 0x3010
+SET_STRING, GET_STRING, APPEND, TAKE, READ_STREAM = 0x3015, 0x3012, 0x3016, 0x3017, 0x3018
+WORLD = -1
+
+
+class Stage:
+    """A stopped simulation, its server, and clients."""
+
+    def __init__(self, script):
+        values = {
+            "script": str(script),
+            "vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}},
+            "cameras": {"floor": {"width": 6, "height": 4}},
+            "scene": {"objects": [{"shape": "box", "name": "Crate", "size": [0.2] * 3, "position": [3, 0, 0.09]}]},
+            "remote_api": {"serve": True, "address": "127.0.0.1", "legacy_port": 0},
+        }
+        self.simulation = Simulation(parameters.load(values), started=False)
+        self.player = Player(self.simulation, self.simulation.step, lambda _state: None, simulated_time=False)
+        self.now = 0.0  # s
+        self.server = LegacyServer(self.player, "127.0.0.1", 0, clock=lambda: self.now)
+        self.clients = []
+
+    def client(self, port=None):
+        self.clients.append(Client(port or self.server.port, self.server.wait))
+        return self.clients[-1]
+
+    def go(self, steps=1):
+        """Take so many steps, as far as clients let it; return how many were taken."""
+        before = self.simulation.steps
+        for _ in range(steps):
+            self.server.serve()
+            if self.player.playing and not self.server.holds:
+                self.player.step()
+        return self.simulation.steps - before
+
+    def settled(self, condition):
+        for _ in range(2000):
+            if condition():
+                return True
+            self.server.wait(0.001)
+        return False
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        return one.getsockname()[1]
+
+
+@pytest.fixture(name="theatre", scope="module")
+def _theatre(tmp_path_factory):
+    script, ports = tmp_path_factory.mktemp("legacy") / "script.py", [free_port(), free_port()]
+    script.write_text(SCRIPT.replace("PORT", str(ports[0])).replace("OTHER", str(ports[1])))
+    stage = Stage(script)
+    stage.ports = ports
+    yield stage
+    stage.server.close()
+    stage.simulation.close()
+
+
+@pytest.fixture(name="stage")
+def _stage(theatre):
+    yield theatre
+    for client in theatre.clients:
+        client.vanish()
+    theatre.clients.clear()
+    assert theatre.settled(lambda: not theatre.server._guests)
+    theatre.player.stop()
+    theatre.simulation.context.signals.clear()
+
+
+# ---- messages
+
+
+def test_an_empty_message_is_answered_with_its_number_and_the_state(stage):
+    client = stage.client()
+    first, second = client.ask(), client.ask()
+    assert (first.number, second.number, first.sent, second.sent) == (0, 1, 1000, 1001)
+    assert not first.answers and first.version == 11
+    assert first.state & 3 == 0
+    client.call(*START)
+    assert client.ask().state & 3 == 1
+    client.call(*PAUSE)
+    assert client.ask().state & 3 == 3
+
+
+def test_commands_of_a_message_are_answered_together_in_order(stage):
+    client, name = stage.client(), text("Quadricopter")
+    put = command(SET_FLOAT, text("a"), floats(1.5))
+    reply = client.ask(put, command(GET_FLOAT | BLOCKING, text("a")), command(HANDLE, name))
+    assert list(reply.answers) == [(SET_FLOAT, text("a")), (GET_FLOAT | BLOCKING, text("a")), (HANDLE, name)]
+    assert reply.answers[GET_FLOAT | BLOCKING, text("a")] == floats(1.5)
+
+
+def test_a_message_of_many_packets_and_an_answer_of_many(stage):
+    client, long = stage.client(), bytes(range(256)) * 400
+    client.send_bytes(packets(message(0, command(SET_STRING, text("long"), long)), piece=200))
+    assert client.received().answers == {(SET_STRING, text("long")): b""}
+    assert client.call(GET_STRING, text("long")) == long
+
+
+def test_a_command_that_comes_in_pieces_is_carried_out_when_it_is_whole(stage):
+    client, key = stage.client(), text("split")
+    code = (SET_STRING | SPLIT, 100)
+    assert not client.ask(command(code, key, b"abc", 0, 7)).answers
+    assert not client.ask(command(code, key, b"de", 3, 7)).answers
+    assert client.call(GET_STRING, key) == FAILED
+    assert client.ask(command(code, key, b"fg", 5, 7)).answers == {(SET_STRING | SPLIT, key): b""}
+    assert client.call(GET_STRING, key) == b"abcdefg"
+
+
+def test_the_time_of_a_command_is_the_simulations_in_milliseconds(stage):
+    client = stage.client()
+    assert client.ask(command(HANDLE, text("Floor"))).times == [0]
+    client.call(*START)
+    stage.go(3)
+    assert client.ask(command(HANDLE, text("Floor"))).times == [150]
+
+
+# ---- modes
+
+
+def test_a_stream_is_answered_once_for_every_step(stage):
+    client, key = stage.client(), ints(stage.client().handle("Quadricopter"), WORLD)
+    streams = POSITION | STREAMING
+    client.call(*START)
+    assert client.ask(command(streams, key)).answers == {(streams, key): floats(0, 0, 0.8)}
+    assert not client.ask().answers
+    stage.go()
+    assert list(client.ask().answers) == [(streams, key)]
+    assert not client.ask().answers
+
+
+def test_a_stream_goes_on_while_the_simulation_stands_but_not_with_every_message(stage):
+    client, key = stage.client(), text("a")
+    client.call(SET_FLOAT, key, floats(1))
+    client.ask(command(GET_FLOAT | STREAMING, key))
+    client.call(SET_FLOAT, key, floats(2))
+    assert not client.ask().answers
+    stage.now += 0.06
+    assert client.ask().answers == {(GET_FLOAT | STREAMING, key): floats(2)}
+
+
+def test_a_stream_with_a_delay_waits_for_it(stage):
+    client, key = stage.client(), text("a")
+    client.call(SET_FLOAT, key, floats(1))
+    assert client.ask(command((GET_FLOAT | STREAMING, 500), key)).answers
+    stage.now += 0.4
+    assert not client.ask().answers
+    stage.now += 0.2
+    assert client.ask().answers
+
+
+def test_discontinue_ends_a_stream_and_is_answered_as_that(stage):
+    client, key = stage.client(), text("a")
+    client.ask(command(GET_FLOAT | STREAMING, key))
+    assert client.ask(command(GET_FLOAT | DISCONTINUE, key)).answers == {(GET_FLOAT | DISCONTINUE, key): b""}
+    stage.now += 1
+    assert not client.ask().answers
+
+
+def test_what_sets_something_may_stream(stage):
+    client, target = stage.client(), ints(stage.client().handle("Quadricopter_target"))
+    client.ask(command(SET_POSITION | STREAMING, target, ints(WORLD) + floats(1, 0, 1)))
+    client.call(SET_POSITION, target, ints(WORLD) + floats(0, 0, 0))
+    stage.now += 1
+    client.ask()
+    assert client.numbers("3f", POSITION, target + ints(WORLD)) == (1, 0, 1)
+
+
+def test_a_stream_of_an_object_that_goes_is_an_error(stage):
+    client = stage.client()
+    client.call(*START)
+    key = ints(*client.numbers("i", 0x0009, data=floats(0.1) + bytes(13)), WORLD)
+    assert client.ask(command(POSITION | STREAMING, key)).answers[POSITION | STREAMING, key] == floats(0, 0, 0)
+    assert client.call(0x1028, key[:4]) == b""
+    stage.go()
+    assert client.ask().answers == {(POSITION | STREAMING, key): FAILED}
+    assert client.errors() == [f"simxGetObjectPosition: no object has the handle {struct.unpack_from('<i', key)[0]}"]
+
+
+def test_there_is_an_end_to_what_streams(stage):
+    client = stage.client()
+    for count in range(11):
+        client.ask(*(command(GET_FLOAT | STREAMING, text(f"{100 * count + one}")) for one in range(100)))
+    assert client.errors() == ["simxGetFloatSignal: 1000 commands stream already"] * 50
+
+
+# ---- steps
+
+
+def test_a_synchronous_client_triggers_exactly_one_step_with_each_call(stage):
+    client = stage.client()
+    assert client.call(SYNCHRONOUS) == b"" and client.call(*START) == b""
+    assert stage.go(5) == 0
+    for steps in range(1, 6):
+        client.send(command(TRIGGER | BLOCKING))
+        assert client.received(looks=20) is None
+        assert stage.go(3) == 1
+        reply = client.received()
+        assert reply.answers == {(TRIGGER | BLOCKING, b""): b""} and reply.times == [50 * steps]
+    assert client.call(FREE) == b""
+    assert stage.go(5) == 5
+
+
+def test_what_streams_comes_with_the_answer_to_the_trigger(stage):
+    client, key = stage.client(), ints(stage.client().handle("Quadricopter"), WORLD)
+    client.ask(command(SYNCHRONOUS), command(*START), command(POSITION | STREAMING, key))
+    client.send(command(TRIGGER | BLOCKING))
+    assert stage.settled(lambda: not stage.server.holds)
+    stage.go()
+    assert list(client.received().answers) == [(TRIGGER | BLOCKING, b""), (POSITION | STREAMING, key)]
+
+
+def test_the_simulation_waits_for_every_synchronous_client(stage):
+    one, other, third = stage.client(), stage.client(), stage.client()
+    for client in (one, other):
+        client.call(SYNCHRONOUS)
+    third.call(*START)
+    one.send(command(TRIGGER | BLOCKING))
+    assert one.received(looks=20) is None
+    assert stage.go(3) == 0
+    other.send(command(TRIGGER | BLOCKING))
+    assert other.received(looks=20) is None
+    assert stage.go(3) == 1
+    assert one.received() and other.received()
+    assert third.ask(command(HANDLE, text("Floor"))).times == [50]
+
+
+def test_a_client_stays_synchronous_through_stop_and_start(stage):
+    client = stage.client()
+    client.ask(command(SYNCHRONOUS), command(*START))
+    client.call(*STOP)
+    client.call(*START)
+    assert stage.go(3) == 0
+
+
+def test_a_trigger_while_nothing_plays_is_answered_at_once(stage):
+    client = stage.client()
+    client.call(SYNCHRONOUS)
+    assert client.call(TRIGGER) == b""
+    client.ask(command(*START), command(*PAUSE))
+    assert client.call(TRIGGER) == b""
+
+
+def test_who_triggers_is_answered_when_another_stops_the_simulation(stage):
+    client, other = stage.client(), stage.client()
+    client.ask(command(SYNCHRONOUS), command(*START))
+    client.send(command(TRIGGER | BLOCKING))
+    assert client.received(looks=20) is None
+    other.call(*STOP)
+    assert client.received().answers == {(TRIGGER | BLOCKING, b""): b""}
+
+
+@pytest.mark.parametrize("how", ["vanish", "goodbye", "silence", "amid a trigger"])
+def test_who_has_gone_holds_nothing(stage, how):
+    client = stage.client()
+    client.ask(command(SYNCHRONOUS), command(*START))
+    assert stage.server.holds
+    if how == "goodbye":
+        client.send(command(GOODBYE, ints(0)))
+        assert client.is_let_go()
+    elif how == "silence":
+        stage.now += 601
+    else:
+        if how == "amid a trigger":
+            client.send(command(TRIGGER | BLOCKING))
+            assert client.received(looks=20) is None
+        client.vanish()
+    assert stage.settled(lambda: not stage.server._guests)
+    assert stage.go(3) == 3
+
+
+# ---- functions
+
+
+def test_objects(stage):
+    client = stage.client()
+    drone, base, crate = (client.handle(name) for name in ("Quadricopter", "Quadricopter_base", "/Crate"))
+    assert client.numbers("i", 0x1012, ints(base)) == (drone,)
+    assert client.numbers("i", 0x200B, ints(drone, 0)) == (base,)
+    assert client.numbers("i", 0x200B, ints(crate, 0)) == (-1,)
+    count, *handles = struct.unpack_from(f"<{1 + 3}i", client.call(0x102A, ints(-2)))
+    assert count > 20 and handles == sorted(handles)
+    assert client.numbers("3f", POSITION, ints(crate, WORLD)) == pytest.approx((3, 0, 0.09))
+    assert client.numbers("3f", 0x1019, ints(crate), ints(WORLD)) == pytest.approx((3, 0, 0.09))  # of older clients
+    assert client.call(0x101A, ints(crate), ints(WORLD) + floats(0, 0, 0.5)) == b""
+    assert client.numbers("3f", 0x200D, ints(crate, WORLD)) == pytest.approx((0, 0, 0.5))
+    assert client.call(0x1801, ints(crate), ints(WORLD) + floats(0, 0, 0, 1)) == b""
+    assert client.numbers("4f", 0x2801, ints(crate, WORLD)) == (0, 0, 0, 1)
+    assert client.numbers("6f", 0x1036, ints(crate)) == (0,) * 6
+    assert client.numbers("f", 0x2007, ints(crate, 3005)) == (0,)  # sim_shapefloatparam_mass
+    assert client.numbers("i", 0x2008, ints(crate, 3003)) == (1,)  # sim_shapeintparam_static
+    assert client.call(0x200A, ints(crate, 10), ints(3)) == b""
+    count, copy = client.numbers("2i", 0x102E, ints(0), ints(crate))
+    assert count == 1 and copy != crate
+    assert client.call(0x101C, ints(copy), ints(base) + b"\1") == b""
+    assert client.numbers("i", 0x1012, ints(copy)) == (base,)
+    assert client.call(0x1028, ints(copy)) == b""
+    assert client.call(POSITION, ints(copy, WORLD)) == FAILED
+    assert client.call(0x102F, ints(0), ints(drone, base)) == b""
+    assert client.numbers("3i", 0x0006) == (2, drone, base)
+
+
+def test_joints(stage):
+    client = stage.client()
+    joint = ints(client.handle("Quadricopter_propeller_joint1"))
+    assert client.call(0x1002, joint, floats(0.5)) == b""
+    assert client.numbers("f", 0x1001, joint) == (0.5,)
+    for set_target in (0x1008, 0x100C, 0x100E):
+        assert client.call(set_target, joint, floats(1)) == b""
+    assert client.call(0x100D, ints(client.handle("Crate"))) == FAILED
+    assert "is not a joint of the scene" in client.errors()[0]
+
+
+def test_signals(stage):
+    client, key = stage.client(), text("a")
+    for put, get, clear, data in (
+        (SET_FLOAT, GET_FLOAT, 0x300D, floats(2.5)),
+        (0x3014, 0x3011, 0x300E, ints(-7)),
+        (SET_STRING, GET_STRING, 0x300F, b"\xff\0\1"),
+    ):
+        assert client.call(get, key) == FAILED
+        assert client.call(put, key, data) == b""
+        assert client.call(get, key) == data
+        assert client.call(clear, key) == b""
+        assert client.call(get, key) == FAILED
+    assert client.errors() == []  # what is not set is nothing to speak of
+    client.call(SET_STRING, key, b"abc")
+    client.call(APPEND, key, b"\xff")
+    assert client.call(TAKE, key) == b"abc\xff"
+    assert client.call(TAKE, key) == FAILED
+
+
+def test_a_stream_that_takes_a_signal_ends_with_it(stage):
+    client, key = stage.client(), text("a")
+    client.ask(command(TAKE | STREAMING, key))
+    client.call(SET_STRING, key, b"first")
+    stage.now += 1
+    assert client.ask().answers == {(TAKE | STREAMING, key): b"first"}
+    client.call(SET_STRING, key, b"second")
+    stage.now += 1
+    assert not client.ask().answers
+
+
+def test_a_stream_of_a_string_says_nothing_where_there_is_nothing_new(stage):
+    client, key = stage.client(), text("a")
+    assert not client.ask(command(READ_STREAM | STREAMING, key)).answers
+    for part in (b"one", b"two"):
+        client.call(APPEND, key, part)
+        stage.now += 1
+        assert client.ask().answers == {(READ_STREAM | STREAMING, key): part}
+        stage.now += 1
+        assert not client.ask().answers
+
+
+def test_pictures(stage):
+    client = stage.client()
+    sensor = ints(client.handle("FloorVision"))
+    colors, greys, depths = (client.call(code, sensor) for code in (0x1004, 0x1003, 0x1017))
+    assert colors[:8] == greys[:8] == depths[:8] == ints(6, 4)
+    assert (len(colors), len(greys), len(depths)) == (8 + 6 * 4 * 3, 8 + 6 * 4, 8 + 6 * 4 * 4)
+    triggers, packets_found, values = struct.unpack_from("<Bii", client.call(0x1011, sensor))
+    assert (triggers, packets_found, values) == (0, 1, 15)
+    assert client.call(0x1006, sensor, bytes(72)) == b""
+
+
+def test_distances_and_collisions(stage):
+    client = stage.client()
+    pair = ints(client.handle("Crate"), client.handle("Floor"))
+    assert client.numbers("i", 0x200F, pair) == (1,)
+    assert client.numbers("f", 0x2010, pair) == pytest.approx((0,), abs=1e-3)
+    for code, key in ((0x300A, text("Collision")), (0x1026, ints(3)), (0x1027, ints(3)), (0x300B, text("Distance"))):
+        assert client.call(code, key) == FAILED
+    assert all("there are no collision and distance objects" in one for one in client.errors())
+
+
+@pytest.mark.parametrize(
+    ("kind", "what", "counts"),
+    [
+        (109, 0, (0, 0, 1)),
+        (0, 1, (1, 0, 0)),
+        (0, 2, (1, 0, 0)),
+        (4, 3, (0, 3, 0)),
+        (0, 7, (0, 4, 0)),
+        (0, 9, (0, 6, 0)),
+        (0, 11, (0, 7, 0)),
+        (109, 17, (0, 3, 0)),
+        (0, 19, (0, 6, 0)),
+    ],
+)
+def test_one_thing_about_all_objects_of_a_kind(stage, kind, what, counts):
+    answer = stage.client().call(0x200C, ints(kind, what))
+    handles, *found = struct.unpack_from("<4i", answer)
+    assert handles and tuple(found) == tuple(one * handles for one in counts)
+    if what == 0:
+        assert b"Quadricopter_base\0" in answer
+    else:
+        assert len(answer) == 16 + 4 * (handles + sum(found))
+
+
+def test_the_simulation_as_a_whole(stage):
+    client = stage.client()
+    assert client.numbers("f", 0x1023, ints(1)) == pytest.approx((0.05,))  # sim_floatparam_simulation_time_step
+    assert client.numbers("i", 0x1021, ints(1)) == (40600,)  # simxGetPingTime asks for that
+    assert client.numbers("3f", 0x101D, ints(0)) == pytest.approx((0, 0, -9.81))
+    assert client.numbers("i", 0x101F, ints(16)) == (0,)  # sim_boolparam_display_enabled
+    assert client.call(0x1020, ints(16), ints(1)) == client.call(0x1022, ints(8), ints(0)) == b""
+    assert client.call(0x1025, ints(13)) == b"\0"
+    assert client.call(0x1024, ints(1), floats(0.01)) == FAILED
+    assert "the time step stays 0.05 s, not 0.01" in client.errors()[0]
+    for code, key in ((0x3002, text("/nowhere/scene.ttt")), (0x3003, text("nothing.ttm")), (0x0005, b"")):
+        assert client.call(code, key) == FAILED
+    assert client.call(0x3004, text("tmp_1234"), b"content") == FAILED
+    assert "no files are taken over" in client.errors()[-1]
+
+
+def test_what_is_for_a_person_to_look_at(stage, caplog):
+    client = stage.client()
+    assert client.call(0x3008, text("hello")) == b""
+    looks = ints(50, 0, 98765, 0, 98765, 0) + floats(-10, 0, 0, -10, 0, 0)
+    console = ints(*client.numbers("i", 0x3009, text("a console"), looks))
+    for code, data in ((0x1015, text("a line\n")), (0x1015, b""), (0x1016, ints(0)), (0x1014, b"")):
+        assert client.call(code, console, data) == b""
+    dialog = text("how?") + ints(1) + text("") + floats(*[-10] * 12)
+    handle, _ = client.numbers("2i", 0x300C, text("a dialog"), dialog)
+    assert client.numbers("i", 0x102D, ints(handle)) == (1,)
+    assert client.call(0x102C, ints(handle)) == b"\0"
+    assert client.call(0x102B, ints(handle)) == b"" and client.call(0x102B, ints(handle)) == FAILED
+    ui = ints(*client.numbers("i", 0x3007, text("UI")))
+    assert client.numbers("4i", 0x2003, ui)[1:] == (-1, 0, 0)  # the first is lost on clients
+    assert client.call(0x2002, ui + ints(3), ints(500)) == b"" and client.call(0x3005, text("ui.ttb")) == FAILED
+    assert all(f in caplog.text for f in ("hello", "a line", "a dialog: how?"))
+
+
+def test_a_function_of_a_script_is_called(stage):
+    client = stage.client()
+    client.call(*START)
+    given = ints(2, 1, 2, 3) + ints(1, 2) + floats(1.5) + text("ab") + text("c") + b"\xff\0x"
+    key = ints(1) + text("Quadricopter") + text("turned")
+    assert client.call(0x3401, key, given) == ints(2, 1, 2, 3, 2, 1) + floats(3) + text("AB") + text("C") + b"\xff\0x"
+    nothing = ints(0, 0, 0, 0)
+    for wrong, data in (
+        (ints(6) + text("Quadricopter") + text("turned"), nothing),
+        (ints(1) + text("Quadricopter") + text("wrong"), nothing),
+        (ints(1) + text("Quadricopter") + text("absent"), nothing),
+        (key, ints(1, 0, 0, 0)),
+        (key, ints(-1, 0, 0, 0)),
+        (key, b"abc"),
+    ):
+        assert client.call(0x3401, wrong, data) == FAILED
+    said = client.errors()
+    assert "there are child scripts alone" in said[0] and "returned something else" in said[1]
+    assert len(said) == 6 and not any("\n" in one for one in said)
+
+
+def test_a_mistake_is_an_error_and_one_line_in_the_log(stage, caplog):
+    client = stage.client()
+    for _ in range(3):
+        assert client.call(HANDLE, text("Quadricoptr")) == FAILED
+    lines = [one.getMessage() for one in caplog.records if "Quadricoptr" in one.getMessage()]
+    assert len(lines) == 1 and lines[0].startswith("simxGetObjectHandle: no object named 'Quadricoptr'; near names are")
+    assert client.call(0x1FFF, ints(1)) == FAILED
+    assert client.call(SET_POSITION, ints(1), b"short") == FAILED
+    assert client.errors()[3:] == [
+        "command 0x1fff: there is no such command",
+        "simxSetObjectPosition: 5 bytes of data, 16 are expected",
+    ]
+    assert client.errors() == []
+
+
+def test_a_script_that_fails_stops_the_simulation_and_clients_are_heard(stage):
+    client = stage.client()
+    client.ask(command(SYNCHRONOUS), command(*START), command(0x3014, text("fail"), ints(1)))
+    client.send(command(TRIGGER | BLOCKING))
+    assert client.received(looks=20) is None
+    stage.go()
+    assert client.received() and client.ask().state & 1 == 0
+
+
+def test_signals_that_are_set_before_the_start_are_there_in_flight_and_gone_after_it(stage):
+    client, key = stage.client(), text("speed")
+    client.call(SET_FLOAT, key, floats(5))
+    client.call(*START)
+    stage.go()
+    assert client.numbers("f", GET_FLOAT, key) == (5,)
+    client.call(*STOP)
+    assert client.call(GET_FLOAT, key) == FAILED
+
+
+def test_there_is_an_end_to_an_answer(stage, monkeypatch):
+    monkeypatch.setattr(session, "_LARGEST", 100_000)
+    client = stage.client()
+    client.call(SET_STRING, text("long"), bytes(60_000))
+    client.ask(*[command(GET_STRING | BLOCKING, text("long"))] * 4)
+    assert client.errors() == ["simxGetStringSignal: an answer of more than 100000 bytes"] * 2
+
+
+# ---- ports of scripts
+
+
+def test_a_script_opens_a_port_while_the_simulation_runs(stage):
+    client = stage.client()
+    with pytest.raises(ConnectionRefusedError):
+        stage.client(stage.ports[0])
+    client.call(*START)
+    stage.server.serve()
+    third = stage.client(stage.ports[0])
+    assert third.handle("Floor") == client.handle("Floor")
+    stage.go(2)
+    assert client.numbers("i", 0x3011, text("status")) == (1,)
+    client.call(0x3014, text("close"), ints(1))
+    stage.go()
+    assert third.is_let_go()
+    assert stage.simulation.running
+    client.call(*STOP)
+    stage.server.serve()
+    with pytest.raises(ConnectionRefusedError):
+        stage.client(stage.ports[1])
+
+
+def test_a_port_may_begin_synchronous(stage):
+    stage.client().call(*START)
+    assert stage.go(2) == 2
+    client = stage.client(stage.ports[1])
+    client.ask()
+    assert stage.go(2) == 0
+    client.send(command(TRIGGER | BLOCKING))
+    assert client.received(looks=20) is None
+    assert stage.go(2) == 1
+
+
+# ---- wicked clients
+
+
+def packet(size, left=0, first=1, content=None):
+    return PACKET.pack(first, size, left) + (bytes(size) if content is None else content)
+
+
+HEAD = message(0)
+WICKED = [
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1:19997\r\n\r\n",
+    b"\x16\3\1\2\0\1\0\1\xfc\3\3" + bytes(512),
+    packet(10, first=256),
+    packet(0),
+    packet(-5, content=b""),
+    packet(5, left=-1),
+    packet(5),  # shorter than a header
+    packet(18, left=3) + packet(18, left=7),
+    packets(HEAD + b"rubbish"),
+    packets(HEAD + command(HANDLE, text("a"))[:-1] + bytes(7)),
+    packets(HEAD + command(HANDLE, b"no end")),
+    packets(HEAD + command(POSITION, ints(1))),
+    packets(HEAD + command(POSITION, ints(1, 2, 3))),
+    packets(HEAD + command(0x3401, ints(1) + text("one text"))),
+    packets(HEAD + command(6 << 16, b"")),
+    packets(HEAD + command(-1, b"")),
+    packets(HEAD + struct.pack("<iiHiiHiBB", -26, 26, 0, 0, 1, 0, 0, 0, 0)),
+    packets(HEAD + struct.pack("<iiHiiHiBB", 2**31 - 1, 26, 0, 0, 1, 0, 0, 0, 0)),
+    packets(HEAD + struct.pack("<iiHiiHiBB", 26, 26, 60000, 0, 1, 0, 0, 0, 0)),
+    packets(HEAD + struct.pack("<iiHiiHiBB", 26, 2**31 - 1, 0, 0, SPLIT | 1, 0, 0, 0, 0)),
+    packets(HEAD + struct.pack("<iiHiiHiBB", 26, 26, 0, -1, SPLIT | 1, 0, 0, 0, 0)),
+    packets(HEAD + command(HANDLE, text("a")) * 2001),
+    packet(32767, left=32767) + b"".join(packet(32767, left=left) for left in range(32766, 32500, -1)),
+]
+
+
+@pytest.mark.parametrize("sent", WICKED, ids=range(len(WICKED)))
+def test_rubbish_is_let_go_with_one_line_and_the_flight_goes_on(stage, sent, caplog):
+    stage.now += 10
+    good = stage.client()
+    good.call(*START)
+    caplog.clear()
+    client = stage.client()
+    try:
+        client.send_bytes(sent)
+        assert client.is_let_go()
+    except OSError:  # it was let go before it had said all
+        pass
+    assert stage.settled(lambda: len(stage.server._guests) == 1)
+    (line,) = [one.getMessage() for one in caplog.records if "is let go" in one.getMessage()]
+    assert line.isprintable()
+    assert stage.go(3) == 3
+    assert good.handle("Floor") >= 0
+
+
+def test_half_a_message_hinders_nobody(stage):
+    half, good = stage.client(), stage.client()
+    half.send_bytes(packets(message(0, command(HANDLE, text("Floor"))))[:-3])
+    assert half.received(looks=20) is None
+    assert good.handle("Floor") >= 0
+    half.send_bytes(packets(message(0, command(HANDLE, text("Floor"))))[-3:])
+    assert half.received() is not None
+
+
+def test_a_client_that_never_reads_hinders_nobody(stage):
+    deaf, good = stage.client(), stage.client()
+    good.call(SET_STRING, text("long"), bytes(4_000_000))
+    ask = packets(message(0, command(GET_STRING | BLOCKING, text("long"))))
+    for _ in range(10):
+        deaf.peer.send(ask)
+    good.call(*START)
+    assert stage.go(3) == 3
+    (guest,) = [one for one in stage.server._guests.values() if one.connection.has_to_write]
+    assert len(guest.connection._out) <= 4_100_000
+    answers = [deaf.received() for _ in range(10)]
+    assert all(isinstance(one, Reply) and len(one.answers) == 1 for one in answers)
+
+
+def test_of_two_hundred_connections_those_that_speak_are_heard(stage, caplog):
+    stage.now += 10
+    for _ in range(200):
+        stage.client()
+    stage.server.serve()
+    client = stage.client()
+    assert client.handle("Floor") >= 0
+    assert len(stage.server._guests) <= 100
+    assert len([one for one in caplog.records if "clients are there already" in one.getMessage()]) == 1
+
+
+def test_a_hundred_clients_that_have_spoken_are_the_most(stage):
+    spoken = [stage.client() for _ in range(100)]
+    for one in spoken:
+        one.ask()
+    assert stage.client().is_let_go()
+    assert spoken[0].handle("Floor") >= 0
+
+
+def test_much_at_once_is_spread_over_several_steps(stage):
+    busy = [stage.client() for _ in range(20)]
+    stage.player.start()
+    began, stage.server._clock = stage.now, iter(range(10**9)).__next__  # a clock that says: late already
+    try:
+        for one in busy:
+            one.send(command(HANDLE, text("Floor")))
+        assert stage.settled(lambda: stage.server.has_work)
+        assert all(one.received() for one in busy)
+    finally:
+        stage.server._clock = lambda: stage.now
+    assert began == stage.now
+
+
+# ---- both servers
+
+
+def test_both_remote_apis_are_served_at_once(stage):
+    from remote_client import Client as OtherClient
+
+    values = parameters.load({"remote_api": {"serve": True, "port": 0, "legacy_port": 0}})
+    servers = RemoteApiServers(values.remote_api, stage.player)
+    try:
+        assert servers.address.endswith(" (simxStart)")
+        old, new = Client(servers.legacy.port, servers.wait), OtherClient(servers.zeromq)
+        new._server = servers
+        old.ask(command(SYNCHRONOUS), command(*START))
+        assert servers.holds and new.sim("getSimulationState") == 17
+        new.sim("setStepping", True)
+        old.call(FREE)
+        assert servers.holds
+        assert old.call(*STOP) == b""  # ends everybody's stepping
+        old.call(*START)
+        assert not servers.holds
+        old.vanish()
+        new.vanish()
+    finally:
+        servers.close()
+
+
+def test_a_port_that_is_taken_is_one_line(stage):
+    taken = {"serve": True, "port": 0, "legacy_port": stage.server.port}
+    with pytest.raises(OSError, match=f"remote_api: cannot listen on 127.0.0.1:{stage.server.port}: "):
+        RemoteApiServers(parameters.load({"remote_api": taken}).remote_api, stage.player)
+    with pytest.raises(OSError, match=r"remote_api: cannot listen on nowhere\.invalid:0: "):
+        LegacyServer(stage.player, "nowhere.invalid", 0)
+    assert LegacyServer(stage.player, "*", 0).close() is None
+
+
+def test_nobody_beyond_this_machine_is_let_in_unless_told(stage):
+    assert parameters.load().remote_api.address == "127.0.0.1"
+    stage.server.serve()
+    (door,) = stage.server._doors._doors.values()
+    assert door.getsockname()[0] == "127.0.0.1"
+
+
+def test_the_modes_of_oneshot_and_blocking_differ_on_the_clients_side_alone(stage):
+    client, key = stage.client(), text("Floor")
+    (one,) = client.ask(command(HANDLE | ONESHOT, key)).answers.values()
+    assert one == client.call(HANDLE, key)

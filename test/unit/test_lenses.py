@@ -1,0 +1,173 @@
+"""Lenses: what they do against OpenCV's models, and what OpenCV's calibration makes of pictures taken through them."""
+
+import cv2
+import numpy as np
+import pybullet
+import pytest
+from drawing import AHEAD, at, box, looking
+from test_renderer_outputs import cast, inner, random_scene
+
+from drone_sim.render.distortion import Distorted
+from drone_sim.render.renderer import Renderer
+
+BLACK, WHITE = (0.05, 0.05, 0.05, 1.0), (0.95, 0.95, 0.95, 1.0)
+COLUMNS, ROWS, SQUARE = 9, 6, 0.08  # inner corners of the board, and m
+WIDE = Distorted(640, 480, 1.1, 0.02, 50.0, "plumb_bob", (-0.25, 0.08, 0.001, -0.0007, 0.0))
+RATIONAL = Distorted(
+    640, 480, 1.1, 0.02, 50.0, "rational_polynomial", (0.3, 0.05, 0.0005, -0.0005, 0.01, 0.5, 0.1, 0.01)
+)
+FISHEYE = Distorted(640, 480, 2.6, 0.02, 50.0, "equidistant", (0.03, -0.008, 0.002, -0.0004))
+LENSES = pytest.mark.parametrize("lens", [WIDE, RATIONAL, FISHEYE], ids=lambda lens: lens.model)
+
+
+@pytest.fixture(name="smooth", scope="module")
+def _smooth():
+    renderer = Renderer(samples=4)
+    yield renderer
+    renderer.close()
+
+
+def camera_matrix(lens):
+    return np.reshape(lens.K, (3, 3))
+
+
+def by_opencv(lens, points, matrix=None, coefficients=None):
+    """Return the pixels of points in the optical frame."""
+    matrix = camera_matrix(lens) if matrix is None else matrix
+    coefficients = np.array(lens.D if coefficients is None else coefficients).ravel()
+    project = cv2.fisheye.projectPoints if lens.is_fisheye else cv2.projectPoints
+    given = points[:, None] if lens.is_fisheye else points
+    return project(given, np.zeros(3), np.zeros(3), matrix, coefficients)[0].reshape(-1, 2)
+
+
+@LENSES
+def test_pixels_are_where_opencv_has_them_and_rays_lead_back(lens):
+    points = np.random.RandomState(1).uniform((-1, -1, 1.5), (1, 1, 3), (200, 3))
+    np.testing.assert_allclose(lens.project(points), by_opencv(lens, points), atol=1e-9)
+    sees = np.isfinite(lens.rays[..., 0])
+    np.testing.assert_allclose(lens.project(2 * lens.rays[sees]), lens.pixels[sees], atol=1e-5)
+
+
+def test_a_fisheye_sees_what_is_behind_it_and_no_farther_than_it_can():
+    lens = Distorted(640, 480, np.radians(220), 0.02, 50.0, "equidistant")
+    np.testing.assert_allclose(lens.rays[240, 0], (-np.cos(0.34), 0, -np.sin(0.34)), atol=0.01)
+    assert np.isnan(lens.rays[0, 0]).all()
+    np.testing.assert_allclose(lens.project(np.array([1.0, 0.0, -0.1]))[0], 319.5 + lens.fx * 1.6704649, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("plumb_bob", (-0.8,)), r"\[-0.8, 0.0, 0.0, 0.0, 0.0\]: such a plumb_bob lens folds the picture"),
+        (("equidistant", (0.1,) * 5), "5 coefficients: equidistant has 4"),
+        (("barrel", ()), "model 'barrel': must be one of plumb_bob, rational_polynomial, equidistant"),
+    ],
+)
+def test_what_is_no_lens_is_refused(given, said):
+    with pytest.raises(ValueError, match=said):
+        Distorted(640, 480, 1.8, 0.02, 50.0, *given)
+
+
+def board():
+    """Return the visuals of a board, and their poses in its frame, whose z is its normal and whose origin a corner."""
+    wide, high = (COLUMNS + 1) * SQUARE, (ROWS + 1) * SQUARE
+    middle = np.array((wide / 2 - SQUARE, high / 2 - SQUARE))
+    visuals, poses = [box("paper", (wide + SQUARE, high + SQUARE, 0.01), WHITE)], [at(*middle, -0.005)]
+    for column in range(COLUMNS + 1):
+        for row in range(ROWS + 1):
+            if (column + row) % 2 == 0:
+                visuals.append(box((column, row), (SQUARE, SQUARE, 0.0002), BLACK))
+                poses.append(at((column - 0.5) * SQUARE, (row - 0.5) * SQUARE, 0.0))
+    return visuals, np.array(poses)
+
+
+def views(lens):
+    """Return poses of the board in the camera's optical frame, spread over what the lens sees."""
+    far = 0.62 if lens.is_fisheye else 1.35
+    grid = [(u, v) for v in (0.3, 0.5, 0.7) for u in (0.25, 0.42, 0.58, 0.75)]
+    random = np.random.RandomState(3)
+    for u, v in grid:
+        ray = lens.rays[int(v * lens.height), int(u * lens.width)]
+        turn = cv2.Rodrigues(random.uniform(-0.35, 0.35, 3))[0]
+        pose = np.eye(4)
+        axis = np.cross((0, 0, 1.0), ray)
+        angle = np.arctan2(np.linalg.norm(axis), ray[2])
+        towards = cv2.Rodrigues(axis / max(np.linalg.norm(axis), 1e-9) * angle)[0]
+        pose[:3, :3] = towards @ turn @ np.diag((1.0, -1.0, -1.0))
+        pose[:3, 3] = ray * far - pose[:3, :3] @ ((COLUMNS - 1) * SQUARE / 2, (ROWS - 1) * SQUARE / 2, 0)
+        yield pose
+
+
+def corners(renderer, lens):
+    """Return the corners on the board, m, and where they are found in pictures of it, px."""
+    visuals, local = board()
+    renderer.set_visuals(visuals)
+    flat = np.array([(SQUARE * n, SQUARE * m, 0) for m in range(ROWS) for n in range(COLUMNS)])
+    found = []
+    for pose in views(lens):
+        picture = renderer.render(lens, AHEAD, AHEAD @ pose @ local)
+        grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+        is_there, places = cv2.findChessboardCornersSB(grey, (COLUMNS, ROWS), flags=cv2.CALIB_CB_ACCURACY)
+        if is_there:
+            found.append(places.reshape(-1, 2))
+    return flat.astype(np.float32), found
+
+
+@LENSES
+def test_calibration_gives_the_lens_back(smooth, lens):
+    flat, found = corners(smooth, lens)
+    assert len(found) >= 8
+    size = lens.width, lens.height
+    if lens.is_fisheye:
+        flags = cv2.fisheye.CALIB_RECOMPUTE_EXTRINSIC | cv2.fisheye.CALIB_FIX_SKEW
+        given = [flat[None].astype(np.float64)] * len(found), [one[None].astype(np.float64) for one in found]
+        _, matrix, coefficients, *_ = cv2.fisheye.calibrate(*given, size, None, None, flags=flags)
+    else:
+        flags = cv2.CALIB_RATIONAL_MODEL if lens.model == "rational_polynomial" else 0
+        _, matrix, coefficients, *_ = cv2.calibrateCamera([flat] * len(found), found, size, None, None, flags=flags)
+    wanted = camera_matrix(lens)
+    np.testing.assert_allclose((matrix[0, 0], matrix[1, 1]), lens.fx, rtol=0.005)
+    np.testing.assert_allclose(matrix[:2, 2], wanted[:2, 2], atol=0.005 * lens.width)
+    across = lens.rays[40:-40:40, 40:-40:40].reshape(-1, 3)
+    missed = by_opencv(lens, across, matrix, coefficients) - lens.project(across)
+    assert np.abs(missed).max() < 0.005 * lens.width
+
+
+def test_undistorted_straight_lines_are_straight(smooth):
+    smooth.set_visuals([box("wall", (0.1, 20.0, 20.0), WHITE), box("beam", (0.1, 20.0, 0.5), BLACK)])
+    picture = smooth.render(WIDE, AHEAD, np.array([at(3, 0, 1), at(2.9, 0, 1.6)]))
+    bent = edge(picture)
+    straight = edge(cv2.undistort(picture, camera_matrix(WIDE), np.array(WIDE.D)))
+    assert np.abs(bent).max() > 5
+    assert np.abs(straight).max() < 0.2
+
+
+def edge(picture):
+    """Return how far the upper edge of what is dark is off the straight line through it, px, for each column."""
+    grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY).astype(float)
+    columns = np.arange(60, picture.shape[1] - 60)
+    rows = []
+    for column in columns:
+        one = grey[:, column]
+        middle = (one.max() + one.min()) / 2
+        row = np.flatnonzero((one[:-1] > middle) & (one[1:] <= middle))[0]
+        rows.append(row + (one[row] - middle) / (one[row] - one[row + 1]))
+    return np.array(rows) - np.polyval(np.polyfit(columns, rows, 1), columns)
+
+
+@LENSES
+def test_masks_and_depths_through_a_lens_are_what_rays_meet(renderer, lens):
+    visuals, poses, client = random_scene(np.random.RandomState(4))
+    eye = looking((0, 0, 1), (4, 0.2, 1.1))
+    bodies, points, _ = cast(client, lens, eye)
+    pybullet.disconnect(client)
+    renderer.set_visuals(visuals)
+    numbers = np.arange(1, len(visuals) + 1)
+    drawn = renderer.render_outputs(("depth", "instance"), lens, eye, poses, instances=numbers)
+    sure = inner(bodies) & inner(drawn["instance"]) & np.isfinite(lens.rays[..., 0])
+    assert (drawn["instance"][sure] != bodies[sure]).mean() < 1e-3
+    there = sure & (bodies > 0) & (drawn["instance"] == bodies)
+    away = points - eye[:3, 3]
+    depth = np.linalg.norm(away, axis=-1) if lens.is_fisheye else away @ eye[:3, 2]
+    assert there.sum() > 10_000
+    assert np.percentile(np.abs(drawn["depth"] - depth)[there], 99) < 0.01

@@ -1,0 +1,165 @@
+"""What is true of a picture's pixels, against rays that PyBullet casts, closed forms, and reprojected depths."""
+
+import numpy as np
+import pybullet
+import pytest
+from drawing import AHEAD, CAMERA, GREY, RED, at, box, looking
+
+from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.renderer import Moment
+from drone_sim.shapes.box import Box
+from drone_sim.shapes.cylinder import Cylinder
+from drone_sim.shapes.sphere import Sphere
+from drone_sim.shapes.visual import Visual
+
+SMALL = Intrinsics(64, 48, np.radians(70.0), 0.05, 50.0)
+EVERYTHING = ("depth", "instance", "normal", "before")
+
+
+def rotation(random):
+    """Return a random turn, (3, 3)."""
+    turn, _ = np.linalg.qr(random.normal(size=(3, 3)))
+    return turn * np.linalg.det(turn)
+
+
+def flat(camera):
+    """Return the pixels' rays as far as z = 1, (height, width, 3)."""
+    return camera.rays / camera.rays[..., 2:]
+
+
+def random_scene(random):
+    """Return visuals, their poses, and a PyBullet client with the same."""
+    client = pybullet.connect(pybullet.DIRECT)
+    visuals, poses = [], []
+    for number in range(12):
+        size = random.uniform(0.2, 0.8, 3)
+        if number % 3 == 0:
+            shape, form = Box(tuple(size)), {"shapeType": pybullet.GEOM_BOX, "halfExtents": size / 2}
+        elif number % 3 == 1:
+            shape, form = Sphere((size[0],)), {"shapeType": pybullet.GEOM_SPHERE, "radius": size[0]}
+        else:
+            shape = Cylinder((size[0] / 2, size[1]))
+            form = {"shapeType": pybullet.GEOM_CYLINDER, "radius": size[0] / 2, "height": size[1]}
+        pose = at(*random.uniform((2, -2, -1), (6, 2, 3)))
+        pose[:3, :3] = rotation(random)
+        visuals.append(Visual(number, shape, GREY))
+        poses.append(pose)
+        body = pybullet.createCollisionShape(physicsClientId=client, **form)
+        quaternion = pybullet.getQuaternionFromEuler((0, 0, 0)) if number % 3 == 1 else quaternion_of(pose)
+        pybullet.createMultiBody(0, body, -1, pose[:3, 3], quaternion, physicsClientId=client)
+    return visuals, np.array(poses), client
+
+
+def quaternion_of(pose):
+    """Return x, y, z, w of a pose."""
+    w = np.sqrt(max(0.0, 1 + np.trace(pose[:3, :3]))) / 2
+    turn = pose[:3, :3]
+    if w > 1e-3:
+        axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / (4 * w)
+        return [*axis, w]
+    values, vectors = np.linalg.eigh((turn + turn.T) / 2)
+    return [*vectors[:, np.argmax(values)], 0.0]
+
+
+def cast(client, camera, camera_pose):
+    """Return body number (from 1, 0 for none), hit point and normal in the world, for each pixel."""
+    far = np.nan_to_num(camera.rays, nan=1.0) @ camera_pose[:3, :3].T * 20 + camera_pose[:3, 3]
+    ends = far.reshape(-1, 3)
+    hits = []
+    for first in range(0, len(ends), 10_000):  # as many as PyBullet takes at a time, and fewer
+        part = ends[first : first + 10_000]
+        origin = np.tile(camera_pose[:3, 3], (len(part), 1))
+        hits += pybullet.rayTestBatch(origin.tolist(), part.tolist(), physicsClientId=client)
+    shape = camera.height, camera.width
+    bodies = np.array([one[0] + 1 for one in hits]).reshape(shape)
+    return (
+        bodies,
+        np.array([one[3] for one in hits]).reshape(*shape, 3),
+        np.array([one[4] for one in hits]).reshape(*shape, 3),
+    )
+
+
+def inner(labels):
+    """Tell where a pixel and its eight neighbours are of one thing."""
+    same = np.ones(labels.shape, bool)
+    for axis in (0, 1):
+        for way in (-1, 1):
+            same &= np.roll(labels, way, axis) == labels
+    for way in (-1, 1):
+        same &= np.roll(np.roll(labels, way, 0), 1, 1) == labels
+        same &= np.roll(np.roll(labels, way, 0), -1, 1) == labels
+    same[[0, -1]] = same[:, [0, -1]] = False
+    return same
+
+
+def test_masks_depths_and_normals_are_what_rays_meet(renderer):
+    """In 100 random scenes, at every pixel that is not at an edge."""
+    random, compared = np.random.RandomState(29), 0
+    eye = looking((0, 0, 1), (4, 0.2, 1.1))
+    for _ in range(100):
+        visuals, poses, client = random_scene(random)
+        bodies, points, normals = cast(client, SMALL, eye)
+        pybullet.disconnect(client)
+        renderer.set_visuals(visuals)
+        numbers = np.arange(1, len(visuals) + 1)
+        drawn = renderer.render_outputs(("depth", "instance", "normal"), SMALL, eye, poses, instances=numbers)
+        sure = inner(bodies) & inner(drawn["instance"])
+        np.testing.assert_array_equal(drawn["instance"][sure], bodies[sure])
+        there = sure & (bodies > 0)
+        compared += there.sum()
+        depth = (points - eye[:3, 3]) @ eye[:3, 2]
+        even = there & (np.array([isinstance(one.shape, Box) for one in visuals])[bodies - 1])
+        even &= inner((normals @ (1, 10, 100)).round(3))  # of one face: no edge of a box
+        np.testing.assert_allclose(drawn["depth"][even], depth[even], atol=2e-3)
+        cosine = np.einsum("ijk,ijk->ij", drawn["normal"], normals @ eye[:3, :3])
+        assert np.degrees(np.arccos(np.clip(cosine[even], -1, 1))).max(initial=0) < 1
+    assert compared > 30_000
+
+
+@pytest.mark.parametrize("shape", [Sphere((0.7,)), Cylinder((0.5, 1.5))])
+def test_the_normals_of_round_things_are_theirs(renderer, shape):
+    renderer.set_visuals([Visual("one", shape, RED)])
+    drawn = renderer.render_outputs(("normal", "depth"), CAMERA, AHEAD, at(3, 0.2, 1)[None])
+    there = inner(np.isfinite(drawn["depth"])) & np.isfinite(drawn["depth"])
+    points = flat(CAMERA)[there] * drawn["depth"][there, None] @ AHEAD[:3, :3].T + AHEAD[:3, 3] - (3, 0.2, 1)
+    radial = points * ((1, 1, 1) if isinstance(shape, Sphere) else (1, 1, 0))
+    radial /= np.linalg.norm(radial, axis=1, keepdims=True)
+    cosine = np.einsum("ij,ij->i", drawn["normal"][there] @ AHEAD[:3, :3].T, radial)
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 1
+
+
+def test_the_normals_of_what_is_scaled_unevenly_stand_upright_on_it(renderer):
+    turned = at(3, 0, 1)
+    turned[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
+    renderer.set_visuals([box("flat", (0.05, 2.0, 1.0))])
+    normal = renderer.render_outputs(("normal",), CAMERA, AHEAD, turned[None])["normal"][120, 160]
+    np.testing.assert_allclose(normal @ AHEAD[:3, :3].T, (-0.8, -0.6, 0), atol=1e-6)
+
+
+def test_where_a_point_was_before_is_known_to_the_picture(renderer):
+    visuals = [box("moves", (0.5, 0.5, 0.5)), box("stands", (0.3, 6.0, 6.0))]
+    then, now = np.array([at(3, 0.1, 1), at(5, 0, 1)]), np.array([at(2.9, -0.1, 1.1), at(5, 0, 1)])
+    turned = looking((0.05, 0.1, 1.02), (3, 0.3, 1.0))
+    renderer.set_visuals(visuals)
+    before = Moment(AHEAD, then)
+    drawn = renderer.render_outputs(EVERYTHING, CAMERA, turned, now, instances=np.array([1, 2]), before=before)
+    there = np.isfinite(drawn["depth"])
+    points = flat(CAMERA) * np.nan_to_num(drawn["depth"])[..., None] @ turned[:3, :3].T + turned[:3, 3]
+    moved = np.where((drawn["instance"] == 1)[..., None], now[0, :3, 3] - then[0, :3, 3], 0)
+    seen = (points - moved - AHEAD[:3, 3]) @ AHEAD[:3, :3]
+    np.testing.assert_allclose(drawn["before"][there], seen[there], atol=2e-3)
+    assert np.isnan(drawn["before"][~there]).all()
+    assert np.abs(CAMERA.project(seen) - CAMERA.pixels)[drawn["instance"] == 1].max() > 5
+
+
+def test_outputs_are_the_same_alone_and_together(renderer):
+    renderer.set_visuals([box("a", (0.5, 0.5, 0.5)), box("glass", (0.1, 0.5, 2), (1, 1, 1, 0.3))])
+    poses = np.array([at(3, 0, 1), at(2, 0.6, 1)])
+    given = {"instances": np.array([7, 60000]), "before": Moment(AHEAD, poses)}
+    together = renderer.render_outputs(EVERYTHING, CAMERA, AHEAD, poses, **given)
+    for name in EVERYTHING:
+        alone = renderer.render_outputs((name,), CAMERA, AHEAD, poses, **given)[name]
+        np.testing.assert_array_equal(alone, together[name])
+    assert set(np.unique(together["instance"])) == {0, 7, 60000}, "what one can see through is there, too"
+    with pytest.raises(ValueError, match="needs the moment before"):
+        renderer.render_outputs(("before",), CAMERA, AHEAD, poses)

@@ -1,0 +1,329 @@
+"""A script in another process: it flies the same to the last bit, and what comes from there is checked."""
+
+import json
+import marshal
+import math
+import struct
+from pathlib import Path
+
+import behind_door
+import pytest
+
+from drone_sim.grading import flight, tasks
+from drone_sim.grading import plan as plans
+from drone_sim.mechanics.state import Pose, Twist
+from drone_sim.scripting.api.control import Turns
+from drone_sim.scripting.door import effects, simulation_end, stand_ins, values
+from drone_sim.vehicles.commands import Empty, request
+
+ROOT = Path(__file__).resolve().parents[2]
+PLAN = """
+duration: 4.0
+config: {sensors: {imu: {kind: imu, rate: 20}}, script_time_limit: 2.0}
+timeline:
+  - {at: 0.5, twist: {linear: [1, 0, 0]}}
+  - {at: 1.5, twist: {linear: [0, 0.5, 0.2], angular: [0, 0, 0.5]}}
+  - {at: 2.5, object: {name: Ball, position: [1, 0, 2]}}
+  - {at: 3.0, twist: {}}
+scene: scene.yaml
+criteria:
+  - {kind: signal, signal: said, equals: 1}
+"""
+SCENE = "objects: [{name: Ball, shape: sphere, size: [0.2], position: [2, 0, 1]}]\n"
+SCRIPTS = sorted(
+    [
+        *(ROOT / "docs" / "tutorial").glob("[1-7]_*.py"),
+        *(ROOT / "docs" / "tutorial" / "solutions").glob("*.py"),
+        *(ROOT / "test" / "unit" / "scripts").glob("tutorial_v?.lua"),
+    ]
+)
+TASKS = [one.name for one in sorted(tasks.folder().iterdir()) if (one / "solution.py").exists()]
+# What a script may do beside the tutorial's; each flies as it does without a door.
+PYTHON = """
+import math, random
+import tutorial
+
+def sysCall_init():
+    tutorial.sysCall_init()
+    self.mark = sim.getObjectHandle("Track_base")
+    self.ball = sim.getObjectHandle("Ball")
+    self.heard = 0
+    BEGIN
+
+def sysCall_actuation():
+    tutorial.sysCall_actuation()
+    ACT
+
+def sysCall_sensing():
+    tutorial.sysCall_sensing()
+    SENSE
+
+def say(value):
+    sim.setStringSignal("said", repr(value))
+"""
+DOES = {
+    "reads what it has put": "for one in (1, 2): sim.setObjectPosition(self.mark, -1, [one, 2, 3]);"
+    " say([sim.getObjectPosition(self.mark, -1), sim.getObjectPose(self.d, self.mark), sim.getVelocity(self.mark)])",
+    "turns what it has put": "sim.setObjectOrientation(self.mark, self.d, [0.1, 0.2, 0.3]);"
+    " say([sim.getObjectQuaternion(self.mark, -1), sim.getObjectVelocity(self.mark), sim.getObjectMatrix(self.mark)])",
+    "reads signals that it sets": "sim.setFloatSignal('a', sim.getSimulationTime());"
+    " sim.setFloatSignal('b', 2 * sim.getFloatSignal('a')); say([sim.getFloatSignal('b'), sim.getStringSignal('c')])",
+    "reads in another way every time": "t = sim.getSimulationTime();"
+    " say([sim.getObjectPosition(one, -1) for one in ((self.d,), (self.ball, self.d), ())[int(20 * t) % 3]])",
+    "changes what it reads": "p = sim.getObjectPosition(self.d, -1); p[0] = 7; say(sim.getObjectPosition(self.d, -1))",
+    "draws lots": "say([random.random(), sim.getRandom()])",
+    "asks wrongly": "say(tried(lambda: sim.getObjectPosition(99, -1)) + tried(lambda: sim.getObjectPosition('x'))"
+    " + tried(lambda: sim.setFloatSignal('a', 'b')) + tried(lambda: sim.setObjectPosition(self.mark, -1, [1, 2]))"
+    " + tried(sim.getObjectPosition) + tried(lambda: sim.setObjectPosition(self.mark, -1, [1, 2, math.nan])))",
+    "calls itself": "say(sim.callScriptFunction('twice', sim.handle_self, 3, [1, 'b', b'\\xff', None, {2: 3}]))",
+    "calls by attributes": "say(sim.getScriptFunctions(sim.getScriptHandle()).twice(4))",
+    "names its arguments": "say(sim.getObjectPosition(self.d, relativeTo=self.mark))",
+    "reads sensors": "say(sim.readSensor(sim.getObjectHandle('imu')))",
+    "packs": "say(sim.unpackTable(sim.packTable({'a': [1, 2.5, 'c', True]})))",
+}
+HELPERS = """
+on_twist = tutorial.on_twist
+
+def twice(value, *others):
+    return 2 * value, *others
+
+def tried(call):
+    try:
+        return [call()]
+    except Exception as error:
+        return [type(error).__name__, str(error)]
+
+def heard(message):
+    self.heard += 1
+    say([self.heard, str(message), message.linear.x])
+"""
+LUA = """
+function sysCall_init()
+    d = sim.getObjectHandle('Quadricopter_base')
+    mark = sim.getObjectHandle('Track_base')
+    simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'heard')
+    simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', function(message) x = message.linear.x end)
+    n, x = 0, 0
+end
+function heard(message) n = n + message.linear.x end
+function sysCall_thread()
+    while true do
+        sim.wait(0.3)
+        n = n + 1
+        sim.setObjectPosition(mark, -1, {n, x, 0})
+        sim.switchThread()
+    end
+end
+function sysCall_sensing()
+    local p, v = sim.getObjectPosition(d, mark), sim.getObjectVelocity(d)
+    local ok, why = pcall(sim.getObjectPosition, 99, -1)
+    sim.setStringSignal('said', string.format('%.17g %.17g %d %s', p[1], v[3], n, tostring(why)))
+end
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("door")
+    (made / "scene.yaml").write_text(SCENE)
+    (made / "plan.yaml").write_text(PLAN)
+    (made / "quick.yaml").write_text(PLAN.replace("limit: 2.0", "limit: 0.2"))
+    return made
+
+
+@pytest.fixture(scope="module")
+def plan(folder):
+    return plans.read(folder / "plan.yaml")
+
+
+@pytest.fixture
+def quick(folder):
+    return plans.read(folder / "quick.yaml")
+
+
+def same(plan, script, seed=0):
+    """Return the result, which is the same with and without a door."""
+    elsewhere, why_closed = behind_door.flown(plan, str(script), seed)
+    assert elsewhere == flight.grade(plan, str(script), seed) and not why_closed
+    return elsewhere
+
+
+# ---- the same flight
+
+
+@pytest.mark.parametrize("script", ["pilot", *SCRIPTS], ids=lambda one: "/".join(Path(one).parts[-2:]))
+def test_a_script_flies_the_same_behind_a_door(plan, script):
+    same(plan, script)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_solution_of_a_task_flies_the_same_behind_a_door(task):
+    task_plan = plans.read(tasks.find(task))
+    shorter = task_plan.model_copy(update={"duration": min(4.0, task_plan.duration)})
+    result = same(shorter, tasks.folder() / task / "solution.py", seed=1)
+    assert result.error is None
+
+
+@pytest.mark.parametrize("where", ["BEGIN", "ACT", "SENSE"])
+@pytest.mark.parametrize("what", DOES)
+def test_what_a_script_does_comes_out_the_same_behind_a_door(plan, tmp_path, what, where):
+    text = PYTHON.replace(where, DOES[what])
+    for other in ("BEGIN", "ACT", "SENSE"):
+        text = text.replace(other, "pass")
+    path = tmp_path / "does.py"
+    path.write_text(text + HELPERS)
+    result = same(plan, path)
+    assert result.error is None and result.flown == 4.0
+
+
+def test_a_callback_hears_the_same_behind_a_door(plan, tmp_path):
+    for given in ("heard", "'heard'"):
+        path = tmp_path / "hears.py"
+        begin = f"simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', {given})"
+        path.write_text(PYTHON.replace("BEGIN", begin).replace("ACT", "pass").replace("SENSE", "pass") + HELPERS)
+        assert "Twist(linear=" in same(plan, path).outcomes[0].said
+
+
+def test_a_thread_waits_the_same_behind_a_door(plan, tmp_path):
+    path = tmp_path / "waits.py"
+    thread = """
+def sysCall_thread():
+    while True:
+        late = sim.wait(0.12)
+        say([late, sim.getSimulationTime(), sim.getObjectPosition(self.d, -1)])
+        sim.setThreadSwitchTiming(3)
+        sim.switchThread()
+"""
+    path.write_text(PYTHON.replace("BEGIN", "pass").replace("ACT", "pass").replace("SENSE", "pass") + HELPERS + thread)
+    assert same(plan, path).error is None
+
+
+def test_lua_flies_the_same_behind_a_door(plan, tmp_path):
+    path = tmp_path / "flies.lua"
+    path.write_text(LUA)
+    assert "no object has the handle 99" in same(plan, path).outcomes[0].said
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "sim.getObjectPosition(99, -1)",
+        "1 / 0",
+        "sim.nothing()",
+        "sim.getObjectPosition()",
+        "while True: pass",
+        "sim.wait(1)",
+    ],
+)
+def test_what_fails_says_the_same_behind_a_door(quick, tmp_path, body):
+    path = tmp_path / "fails.py"
+    path.write_text(f"def sysCall_actuation():\n    {body}\n")
+    assert same(quick, path).error.startswith(f"[actuation] {path}:2: ")
+
+
+def test_a_controller_asks_nothing_that_can_be_told_before(plan, monkeypatch):
+    came = []
+    receive = simulation_end.Channel.receive
+    monkeypatch.setattr(simulation_end.Channel, "receive", lambda self: came.append(receive(self)) or came[-1])
+    longer = plan.model_copy(update={"timeline": [], "duration": 10.0})
+    behind_door.flown(longer, "pilot")
+    assert len([one for one in came if one]) < 1.5 * 200 + 100  # messages of 200 steps, and the beginning
+
+
+# ---- values
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        *(
+            None,
+            True,
+            3,
+            2.5,
+            math.inf,
+            "é\ud800",
+            b"\xff\0",
+            [],
+            [1, [2.5, None]],
+            (1, (2, "x")),
+            {},
+            {"a": 1, 2: (3,)},
+        ),
+        *([{"t": [1]}], Twist(), Empty(), request(Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)))),
+    ],
+    ids=repr,
+)
+def test_values_come_through_as_they_are(value):
+    there = values.incoming(marshal.loads(marshal.dumps(values.outgoing(value))), int, int)
+    assert repr(there) == repr(value)
+    if not hasattr(value, "_fields"):
+        here = values.unmarked(values.read(values.written([["set", values.marked(value, id)]]))[0][1], int)
+        assert repr(here) == repr(value)
+
+
+def test_all_that_is_said_of_functions_is_of_functions_that_there_are():
+    known = {f"{name}.{key}" for name, functions, _ in stand_ins.declared() for key in functions}
+    named = {*effects.READS, *effects.CHANGES, *(f"sim.{one}" for one in (*effects.PLACED, *effects.PUT))}
+    assert named <= known and set(effects.OWN_THREADS) <= {one.partition(".")[2] for one in known}
+    assert stand_ins.StandIns(None, None, Turns()).modules.keys() == {name for name, _, _ in stand_ins.declared()}
+
+
+# ---- what comes from a process that has been taken over
+
+SAID = {
+    "no JSON": (b"\x80\x04N.", "no message: no JSON"),
+    "a text": (b'"x"', "no message: no list of items"),
+    "items that are none": (b'[1, "x", []]', "no message: no list of items"),
+    "no end of it": (b"[" * 100_000, "no message: no JSON"),
+    "numbers without end": (b"[" + b"9" * 100_000 + b"]", "no message: no JSON"),
+    "a function that is none": (json.dumps([["call", "os.system", -1, [], "id"]]).encode(), "no function of the API"),
+    "a function by a list": (json.dumps([["call", ["x"], -1, []]]).encode(), "no function of the API"),
+    "an attribute": (json.dumps([["call", "sim.__class__", -1, []]]).encode(), "no function of the API"),
+    "an order": (json.dumps([["quit"]]).encode(), "'quit' is none"),
+    "a call without all": (json.dumps([["call"]]).encode(), "no call"),
+    "a question not waited for": (json.dumps([["set", "sim.stopSimulation"]]).encode(), "has to be waited for"),
+    "reads that are calls": (json.dumps([["reads", "x", 0, [["sim.stopSimulation"]], []]]).encode(), "no read"),
+    "too many reads": (json.dumps([["reads", "x", 0, [["sim.getSimulationTime"]] * 201, []]]).encode(), "too many"),
+    "an end with more": (json.dumps([["end", 1, 2, 3, 4]]).encode(), "no end of a call"),
+    "a failure of numbers": (json.dumps([["failed", 1, 2, 3, 4, 5]]).encode(), "no failure"),
+    "a mark that is none": (json.dumps([["end", True, {"x": 1}]]).encode(), "no mark"),
+    "fields of its own": (json.dumps([["end", True, {"o": [["__class__", 1]]}]]).encode(), "no field"),
+    "a mapping of lists": (json.dumps([["end", True, {"d": [[[1], 1]]}]]).encode(), "no key"),
+}
+
+
+@pytest.mark.parametrize("what", SAID)
+def test_what_is_no_message_ends_the_flight_in_one_line(plan, what):
+    message, said = SAID[what]
+
+    def serve(end):
+        end.sendall(struct.pack("<I", len(message)) + message)
+        end.recv(2**20)
+
+    result, why_closed = behind_door.flown(plan, "pilot", serve=serve)
+    assert not result.passed and result.points == 0
+    assert said in result.error and said in why_closed and "\n" not in result.error
+
+
+def test_a_message_without_end_is_not_waited_for(plan):
+    result, _ = behind_door.flown(plan, "pilot", serve=lambda end: end.sendall(struct.pack("<I", 2**32 - 1)))
+    assert result.error.endswith("its process has ended")
+
+
+def test_a_process_that_is_silent_is_not_waited_for(quick, monkeypatch):
+    monkeypatch.setattr(simulation_end, "GRACE", 0.2)
+    result, _ = behind_door.flown(quick, "pilot", serve=lambda end: end.recv(1) and end.recv(2**20) and end.recv(1))
+    assert "did not return after 0.2 s (script_time_limit)" in result.error
+
+
+def test_a_process_that_floods_is_not_heard_out(quick, monkeypatch):
+    monkeypatch.setattr(simulation_end, "GRACE", 0.2)
+    message = json.dumps([["set", "sim.setInt32Signal", "said", 1]]).encode()
+
+    def serve(end):
+        while True:
+            end.sendall(struct.pack("<I", len(message)) + message)
+
+    result, _ = behind_door.flown(quick, "pilot", serve=serve)
+    assert "did not return after 0.2 s (script_time_limit)" in result.error

@@ -1,0 +1,327 @@
+"""What helps to write a script: completion, errors while one types, a console, variables, breakpoints, files."""
+
+import re
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+import rospy
+from cockpit_page import open_page, wait_until
+
+COUNTS = """\
+import helper
+
+
+def sysCall_init():
+    self.count = 0
+    self.gains = {"p": 1.5}
+
+
+def sysCall_actuation():
+    twice = 2 * self.count
+    self.count += 1
+    print("counted")
+    helper.check(self.count)
+"""
+HELPER = "def check(count):\n    if count > LIMIT:\n        raise ValueError('too many')\n"
+
+
+@pytest.fixture(name="desk", scope="module")
+def _desk(cockpit, browser):
+    """A page that these tests share; what they have written and flown is gone in the end."""
+    cockpit.start_afresh()
+    cockpit.scripts.mkdir(exist_ok=True)
+    before = {path.name for path in cockpit.scripts.glob("*")}
+    with open_page(cockpit, browser) as page:
+        page.set_viewport_size({"width": 1280, "height": 720})
+        yield page
+    cockpit.start_afresh()
+    for path in cockpit.scripts.glob("*"):
+        if path.name not in before:
+            path.unlink()
+
+
+def text(page):
+    return page.inner_text("#text .cm-content")
+
+
+def choose(page, item):
+    page.click("#more")
+    page.get_by_role("menuitem", name=item).click()
+
+
+def begin(page, name, item="New Python script"):
+    """Make a new script by the menu."""
+    choose(page, item)
+    page.keyboard.type(name)
+    page.keyboard.press("Enter")
+    ending = "lua" if "Lua" in item else "py"
+    wait_until(page, lambda: page.input_value("#script") == f"mine/{name}.{ending}")
+    wait_until(page, lambda: "sysCall_cleanup" in text(page))
+
+
+def write(page, words):
+    """Write a text in the place of all that there is."""
+    page.locator("#text .cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(words)
+
+
+def write_at_the_end(page, words):
+    page.locator("#text .cm-content").click()
+    page.keyboard.press("Control+End")
+    page.keyboard.type(words)
+
+
+def open_file(cockpit, page, name, content):
+    """Write a file as another program does, and open it."""
+    (cockpit.scripts / name).write_text(content)
+    wait_until(page, lambda: page.locator(f"#script option[value='mine/{name}']").count())
+    page.select_option("#script", f"mine/{name}")
+    wait_until(page, lambda: content.split("\n")[0] in text(page))
+
+
+def accept(page):
+    """Take what is offered; in its first 75 ms, Enter begins a line, for people who have not seen it yet."""
+    page.wait_for_timeout(200)
+    page.keyboard.press("Enter")
+
+
+def run(page):
+    page.click("#run")
+    wait_until(page, lambda: page.inner_text("#said").startswith(("started", "paused at")))
+
+
+def wrong(page):
+    return page.locator("#text .cm-lintRange-error").all_inner_texts()
+
+
+# ---- completion and hover
+
+
+def test_a_new_script_and_what_may_be_written_into_it(cockpit, desk):
+    begin(desk, "mine")
+    assert "def sysCall_actuation" in text(desk)
+    write_at_the_end(desk, "\nx = sim.getObjectVel")
+    card = desk.locator(".cm-completionInfo")
+    wait_until(desk, lambda: card.count() and "sim.getObjectVelocity(" in card.inner_text())
+    assert card.locator("a").get_attribute("href").endswith("/regularApi/simGetObjectVelocity.htm")
+    accept(desk)
+    desk.keyboard.type("(sim.getObject('Quadricopter_b")
+    options = desk.locator(".cm-tooltip-autocomplete li")
+    wait_until(desk, lambda: options.count() and options.first.inner_text().startswith("Quadricopter_base"))
+    accept(desk)
+    wait_until(desk, lambda: "x = sim.getObjectVelocity(sim.getObject('Quadricopter_base'))" in text(desk))
+    desk.keyboard.press("End")
+    desk.keyboard.type("\nself.dro")
+    wait_until(desk, lambda: options.count() and options.first.inner_text() == "drone")
+    desk.keyboard.press("Escape")
+    desk.locator("#text .cm-line", has_text="self.position = ").get_by_text("getObjectPosition").hover()
+    hover = desk.locator(".cm-tooltip-hover")
+    wait_until(desk, lambda: hover.count() and "Return the position of an object" in hover.inner_text())
+
+
+def test_old_names_and_phases_in_lua(desk):
+    begin(desk, "mine", "New Lua script")
+    write(desk, "sysCall_act")
+    options = desk.locator(".cm-tooltip-autocomplete li")
+    desk.keyboard.type("u")
+    wait_until(desk, lambda: options.count() and options.first.inner_text().startswith("sysCall_actuation"))
+    accept(desk)
+    wait_until(desk, lambda: text(desk).startswith("function sysCall_actuation()"))
+    desk.keyboard.type("simGetObjectPosi")
+    wait_until(desk, lambda: options.count() and options.first.inner_text().startswith("simGetObjectPosition"))
+    desk.keyboard.press("Escape")
+
+
+# ---- errors
+
+
+@pytest.mark.parametrize(
+    ("item", "good", "ending", "unknown"),
+    [
+        ("New Python script", "def sysCall_init():\n    sim.getObject('.')\n", "x = ", "\nsim.getObjct('.')"),
+        (
+            "New Lua script",
+            "function sysCall_init()\n  simGetObjectHandle('.')\nend\n",
+            "if x",
+            "\nsimGetObjctHandle('.')",
+        ),
+    ],
+)
+def test_errors_are_underlined_while_one_types_and_go_when_they_are_mended(desk, item, good, ending, unknown):
+    begin(desk, "wrong", item)
+    write(desk, good)
+    write_at_the_end(desk, ending)
+    wait_until(desk, lambda: wrong(desk))
+    write(desk, good)
+    wait_until(desk, lambda: not wrong(desk))
+    desk.keyboard.press("Control+End")
+    desk.keyboard.insert_text(unknown)
+    wait_until(desk, lambda: wrong(desk) in (["getObjct"], ["simGetObjctHandle"]))
+    desk.locator("#text .cm-lintRange-error").hover()
+    message = desk.locator(".cm-tooltip-lint")
+    wait_until(desk, lambda: message.count() and "near names are" in message.inner_text())
+    write(desk, good)
+    wait_until(desk, lambda: not wrong(desk))
+    choose(desk, "Delete")
+    wait_until(desk, lambda: desk.is_visible("#question"))
+    desk.get_by_role("button", name="OK").click()
+
+
+def test_what_cannot_be_read_is_not_flown_and_what_flies_goes_on(cockpit, desk):
+    cockpit.start_afresh()
+    open_file(cockpit, desk, "unreadable.py", "def sysCall_init(:\n    pass\n")
+    wait_until(desk, lambda: desk.inner_text("#flying") == "built-in/pilot.py flies")
+    desk.click("#run")
+    wait_until(desk, lambda: "unreadable.py:1: SyntaxError" in desk.inner_text("#console"))
+    assert "line 1: SyntaxError" in desk.inner_text("#said") and wrong(desk)
+    assert rospy.get_param("/drone_sim/script") == "pilot" and desk.inner_text("#flying") == "built-in/pilot.py flies"
+
+
+# ---- console
+
+
+def test_the_console_counts_filters_and_leads_to_the_line_of_another_file(cockpit, desk):
+    late = "def sysCall_init():\n    sim.addLog(sim.verbosity_scriptwarnings, 'step late by 3 ms')\n\n\nLIMIT = 3\n"
+    (cockpit.scripts / "helper.py").write_text(HELPER.replace("LIMIT", "3"))
+    open_file(cockpit, desk, "counts.py", COUNTS + late.replace("def sysCall_init():\n    ", ""))
+    desk.click("#run")
+    wait_until(desk, lambda: "counted  (4 times)" in desk.inner_text("#console"))
+    wait_until(desk, lambda: "helper.py:3" in desk.inner_text("#console"))
+    assert "late by 3 ms" not in desk.inner_text("#console")
+    desk.get_by_label("late steps").check()
+    assert "late by 3 ms" in desk.inner_text("#console")
+    desk.get_by_label("late steps").uncheck()
+    desk.get_by_role("button", name="helper.py:3").click()
+    wait_until(desk, lambda: desk.input_value("#script") == "mine/helper.py")
+    desk.keyboard.type("# here")
+    wait_until(desk, lambda: text(desk).split("\n")[2].startswith("# here"))
+    desk.get_by_role("button", name="Clear").click()
+    assert desk.inner_text("#console") == ""
+
+
+# ---- variables and breakpoints
+
+
+def line_number(page, line):
+    numbers = page.locator("#text .cm-lineNumbers .cm-gutterElement")
+    return numbers.filter(has_text=re.compile(rf"^{line}$")).locator("visible=true")
+
+
+def shown(page, name):
+    """What the table shows of a variable."""
+    row = page.locator("#variables tr", has=page.locator("th", has_text=re.compile(rf"^[▸▾]?{name}$")))
+    return row.locator("td").first.inner_text()
+
+
+def test_a_breakpoint_pauses_with_the_variables_of_its_line(cockpit, desk):
+    (cockpit.scripts / "helper.py").write_text("def check(count):\n    return count\n")
+    open_file(cockpit, desk, "breaks.py", COUNTS)
+    line_number(desk, 8).click()  # an empty line, and then the function's head: its first line is meant
+    run(desk)
+    wait_until(desk, lambda: "Paused at line 10 of breaks.py, t = 0.00 s" in desk.inner_text("#variables-of"))
+    assert desk.inner_text("#said") == "paused at line 10, t = 0.00 s"
+    assert "twice = 2" in desk.inner_text("#text .cm-paused") and shown(desk, "count") == "0"
+    desk.locator("#text .cm-line", has_text="self.count += 1").click()
+    desk.keyboard.press("F9")
+    line_number(desk, 10).click()
+    while "line 11" not in desk.inner_text("#variables-of"):  # the simulation hears of it a little later
+        cockpit.call("step")
+        desk.wait_for_timeout(300)
+    count = int(shown(desk, "count"))
+    assert shown(desk, "twice") == str(2 * count), "as they were at that line"
+    cockpit.call("step")
+    wait_until(desk, lambda: shown(desk, "count") == str(count + 1))
+    assert shown(desk, "twice") == str(2 * count + 2)
+    assert desk.locator("#variables tr.changed").count() == 2
+    desk.get_by_role("button", name="gains").click()
+    assert shown(desk, "'p'") == "1.5"
+    line_number(desk, 11).click()
+    wait_until(desk, lambda: not desk.locator("#text .cm-breakpoint").count())
+    while desk.locator("#text .cm-paused").count():  # the simulation hears of it a little later
+        cockpit.call("pause", False)
+        desk.wait_for_timeout(500)
+    desk.get_by_label("live").check()
+    wait_until(desk, lambda: "breaks.py: flying" in desk.inner_text("#variables-of"))
+    before = int(shown(desk, "count"))
+    wait_until(desk, lambda: int(shown(desk, "count")) > before)
+    desk.get_by_label("live").uncheck()
+    desk.get_by_role("tab", name="Console").click()
+
+
+def test_a_breakpoint_stays_with_its_line(cockpit, browser):
+    with open_page(cockpit, browser) as page:
+        open_file(cockpit, page, "stays.py", COUNTS)
+        line_number(page, 11).click()
+        page.locator("#text .cm-content").click()
+        page.keyboard.press("Control+Home")
+        page.keyboard.type("# one more line\n")
+        assert page.locator("#text .cm-breakpoint").count() == 1
+        run(page)
+        wait_until(page, lambda: "line 12" in page.inner_text("#variables-of"))
+        page.keyboard.press("Control+End")
+        line_number(page, 12).click()
+        wait_until(page, lambda: not page.locator("#text .cm-breakpoint").count())
+        while page.locator("#text .cm-paused").count():
+            cockpit.call("pause", False)
+            page.wait_for_timeout(500)
+
+
+# ---- files
+
+
+def test_files_are_renamed_duplicated_deleted_and_brought_back(cockpit, desk):
+    open_file(cockpit, desk, "first.py", "# the first\n")
+    (cockpit.scripts / "taken.py").write_text("# taken\n")
+    choose(desk, "Rename")
+    desk.keyboard.type("taken")
+    desk.keyboard.press("Enter")
+    wait_until(desk, lambda: "mine/taken.py: is there already" in desk.inner_text("#name-said"))
+    desk.keyboard.type("second")
+    desk.keyboard.press("Enter")
+    wait_until(desk, lambda: desk.input_value("#script") == "mine/second.py")
+    assert (cockpit.scripts / "second.py").read_text() == "# the first\n"
+    assert not (cockpit.scripts / "first.py").exists() and not desk.is_visible("#name")
+    choose(desk, "Duplicate")
+    wait_until(desk, lambda: desk.input_value("#script") == "mine/second_2.py")
+    choose(desk, "Delete")
+    wait_until(desk, lambda: "mine/second_2.py is deleted" in desk.inner_text("#question"))
+    assert not (cockpit.scripts / "second_2.py").exists()
+    desk.get_by_role("button", name="Undo").click()
+    wait_until(desk, lambda: desk.input_value("#script") == "mine/second_2.py")
+    wait_until(desk, lambda: text(desk).startswith("# the first"))
+    desk.select_option("#script", "built-in/pilot.py")
+    wait_until(desk, lambda: "takes off" in text(desk))
+    desk.click("#more")
+    assert desk.get_by_role("menuitem", name="Delete").is_disabled()
+    desk.keyboard.press("Escape")
+    assert not desk.is_visible("#menu")
+
+
+def test_files_are_downloaded_and_dropped_on_the_text(cockpit, desk):
+    open_file(cockpit, desk, "down.py", "# down\n")
+    with desk.expect_download() as loaded:
+        choose(desk, "Download")
+    assert loaded.value.suggested_filename == "down.py" and loaded.value.path().read_text() == "# down\n"
+    for name, content in (("up.py", "# up\r\n"), ("up.txt", "no script"), ("down.py", "# another\n")):
+        dropped = desk.evaluate_handle(
+            """([name, text]) => {
+                const data = new DataTransfer();
+                data.items.add(new File([text], name));
+                return data;
+            }""",
+            [name, content],
+        )
+        desk.dispatch_event("#text .cm-content", "drop", {"dataTransfer": dropped})
+        if name == "up.py":
+            wait_until(desk, lambda: desk.input_value("#script") == "mine/up.py")
+        elif name == "up.txt":
+            wait_until(desk, lambda: "ends in .py or .lua" in desk.inner_text("#said"))
+    wait_until(desk, lambda: "is there already" in desk.inner_text("#name-said"))
+    desk.keyboard.type("other")
+    desk.keyboard.press("Enter")
+    wait_until(desk, lambda: desk.input_value("#script") == "mine/other.py")
+    assert (cockpit.scripts / "up.py").read_text() == "# up\n"
+    assert (cockpit.scripts / "other.py").read_text() == "# another\n"

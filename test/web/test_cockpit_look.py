@@ -1,0 +1,117 @@
+"""How the page looks: contrast, targets and room for the scene, light and dark, from a phone to a large screen."""
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_page import Panel, open_page, wait_until
+
+CONTRAST = 4.5  # to 1, of text on its ground: WCAG 2.2, level AA
+TARGET = 32  # px, height of what is pressed
+# All visible text of the page around the scene whose contrast is too low, and all buttons that are too low.
+LOOK = """([contrast, target]) => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
+    const ink = canvas.getContext("2d", { willReadFrequently: true });
+    const rgba = (colour) => {
+        ink.clearRect(0, 0, 1, 1);
+        ink.fillStyle = colour;
+        ink.fillRect(0, 0, 1, 1);
+        const [r, g, b, a] = ink.getImageData(0, 0, 1, 1).data;
+        return [r, g, b, a / 255];
+    };
+    const over = ([r, g, b, a], under) => [r, g, b].map((one, at) => one * a + under[at] * (1 - a));
+    const light = (rgb) => {
+        const [r, g, b] = rgb.map((one) => (one /= 255) <= 0.03928 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4);
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const ground = (element) => {
+        if (!element) return rgba(getComputedStyle(document.body).backgroundColor).slice(0, 3);
+        return over(rgba(getComputedStyle(element).backgroundColor), ground(element.parentElement));
+    };
+    const isSeen = (one) => one.checkVisibility({ visibilityProperty: true }) && one.getBoundingClientRect().height;
+    const wrong = [];
+    const left = "script, #scene *, .cm-editor *, canvas, option, optgroup";
+    for (const one of document.querySelectorAll(`body *:not(${left})`)) {
+        if (!isSeen(one) || one.closest(":disabled, svg, .stick, .u-legend")) continue;
+        const name = `${one.tagName}#${one.id}.${one.className} ${one.textContent.slice(0, 30)}`;
+        const written = [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
+        const text = written || one.matches("input, select");
+        const behind = ground(one);
+        const [a, b] = [light(over(rgba(getComputedStyle(one).color), behind)), light(behind)];
+        const found = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+        if (text && found < contrast) wrong.push(`${name}: contrast ${found.toFixed(2)}`);
+        if (!one.matches("button, select, input")) continue;
+        const target_ = one.matches("[type=checkbox], [type=radio]") ? one.closest("label") ?? one : one;
+        const { height } = target_.getBoundingClientRect();
+        const isSmall = height < target - 0.5 && !one.closest(".field, #editor");
+        if (isSmall) wrong.push(`${name}: ${height} px high`);
+    }
+    return wrong;
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_can_be_read_and_buttons_can_be_hit(cockpit, browser, scheme):
+    with open_page(cockpit, browser, color_scheme=scheme, viewport={"width": 1440, "height": 900}) as page:
+        panel = Panel(page)
+        for name in ("View", "Cameras", "Plots", "Tune", "Log"):
+            panel.show(name)
+            page.locator(f"#{name.lower()}-panel").wait_for()
+            assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []
+        panel.press("Stop", "stopped")
+        panel.press("Step", "failed")
+        assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []
+        for opens, closes in (("#home", "#doors-close"), ("#help-open", "#help-close")):
+            page.click(opens)
+            assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []
+            page.click(closes)
+        panel.press("Start", "started")
+
+
+@pytest.mark.parametrize("width, height, share", [(1440, 900, 0.55), (1280, 720, 0.55), (1920, 1080, 0.55)])
+def test_the_scene_has_room_and_nothing_is_cut_off(cockpit, browser, width, height, share):
+    with open_page(cockpit, browser, viewport={"width": width, "height": height}) as page:
+        scene = page.locator("#scene")
+        assert scene.bounding_box()["width"] >= share * width
+        assert page.evaluate(
+            "[...document.querySelectorAll('#toolbar > *')].every((one) => one.scrollWidth <= one.clientWidth + 1)"
+        )
+        assert page.evaluate("document.querySelector('#toolbar').scrollWidth") <= width
+        page.click("#toggle")
+        wait_until(page, lambda: scene.bounding_box()["width"] == width)
+
+
+def test_panel_and_editor_are_as_they_were_left(cockpit, browser):
+    with open_page(cockpit, browser) as page:
+        Panel(page).show("Tune")
+        edge = page.locator("#side-edge")
+        before = page.locator("#panel").bounding_box()["width"]
+        edge.focus()
+        edge.press("ArrowLeft")
+        wider = page.locator("#panel").bounding_box()["width"]
+        assert wider > before
+        page.click("#other-side")
+        page.reload()
+        page.locator("#tune-panel").wait_for()
+        assert page.locator("#panel").bounding_box()["width"] == wider
+        assert page.locator("#rail").bounding_box()["x"] < 100
+        page.locator("#tune-filter").press("Escape")
+        assert not page.locator("#panel").is_visible()
+
+
+@pytest.mark.parametrize("width, height", [(820, 1180), (390, 844)])
+def test_on_touch_screens_thumbs_reach_both_sticks_and_nothing_lies_above_the_drone(cockpit, browser, width, height):
+    size = {"width": width, "height": height}
+    with open_page(cockpit, browser, viewport=size, has_touch=True, is_mobile=True) as page:
+        for stick, near in (("left", 0), ("right", width)):
+            box = page.locator(f"#{stick}").bounding_box()
+            middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+            assert abs(middle[0] - near) < 110 and height - middle[1] < 200
+        top = page.evaluate(
+            "([x, y]) => document.elementFromPoint(x, y).closest('#scene') !== null", [width / 2, height / 2]
+        )
+        assert top, "the middle of the scene is free"
+        page.tap("#toggle")
+        page.locator("#editor").wait_for()
+        assert page.locator("#editor").bounding_box()["width"] == width
+        assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -1,0 +1,117 @@
+// Toolbar, side panels, start page and message line: everything of the page but the scene and the editor.
+import { Board } from "./board.js";
+import { Cameras } from "./cameras.js";
+import { at, icon } from "./dom.js";
+import { keep, kept } from "./kept.js";
+import { Log } from "./log.js";
+import { Notice } from "./notice.js";
+import { Plots } from "./plots.js";
+import { Side } from "./side.js";
+import { Start } from "./start.js";
+import { Toolbar } from "./toolbar.js";
+import { Tune } from "./tune.js";
+import { View } from "./view.js";
+
+const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // where the script covers the scene
+
+export class Panels {
+  // `socket()` and `scene()` are there once the page is; `go` has what the doors of the start page do, `open(script)`
+  // opens one.
+  constructor({ socket, scene, go, open }) {
+    for (const element of document.querySelectorAll("[data-icon]")) element.prepend(icon(element.dataset.icon));
+    this.board = new Board();
+    this.notice = new Notice(at("notice"));
+    this.ask = (ask, more) => socket().ask(ask, more);
+    this.toolbar = new Toolbar(this.board, (...asked) => this.act(...asked), this.notice, scene);
+    this.cameras = new Cameras(this.board, (...asked) => this.act(...asked));
+    this.plots = new Plots(this.board, this.ask);
+    this.tune = new Tune(this.board, this.ask, this.notice);
+    this.log = new Log(this.board);
+    this.view = new View(scene());
+    this.side = new Side((panel) => {
+      this.plots.show(panel === "plots");
+      if (panel === "view") this.view.list();
+    });
+    at("why").onclick = () => this.side.open("log");
+    this.board.on("vehicles", ({ now }) => (scene().vehicle = now));
+    this.board.on("master", (answers) => this.master(answers));
+    at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
+    this.showScript(!TOUCH.matches);
+    const doors = { tutorial: () => this.enter(go.tutorial), tasks: () => this.enter(go.tasks), fly: () => this.showScript(false) };
+    this.start = new Start(doors, (script) => this.enter(() => open(script)));
+    this.keys();
+  }
+
+  enter(go) {
+    this.showScript(true);
+    go();
+  }
+
+  showScript(is) {
+    document.body.classList.toggle("wide", !is);
+    at("toggle").setAttribute("aria-expanded", String(is));
+  }
+
+  // Asks, and shows the answer on the message line.
+  async act(ask, more) {
+    this.notice.clear();
+    try {
+      const { said, done = true } = await this.ask(ask, more);
+      if (said) this.notice.say(done ? said : `${more.call ?? ask}: failed: ${said}`, !done);
+    } catch (error) {
+      this.notice.say(error.message, true);
+    }
+  }
+
+  keys() {
+    at("help-open").onclick = () => at("sheet").showModal();
+    at("help-close").onclick = () => at("sheet").close();
+    at("sheet").onclick = (event) => event.target === at("sheet") && at("sheet").close();
+    window.addEventListener("keydown", (event) => {
+      if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.target.closest?.("input, textarea, select, [contenteditable], dialog")) return;
+      if (event.key === "?") at("sheet").showModal();
+      if (event.key.toLowerCase() === "v") this.view.next();
+    });
+  }
+
+  // ---- what the node says
+
+  async connected() {
+    const whole = await this.ask("panel");
+    this.version = Math.max(this.version ?? 0, whole.version);
+    this.board.take(whole);
+    this.start.load();
+    this.log.begin(whole.lines);
+  }
+
+  told(message) {
+    if (message.panel) {
+      if (message.version > this.version + 1) this.connected().catch(() => {}); // it missed something
+      this.version = message.version;
+      this.board.take(message);
+    }
+    if (message.log) this.log.add(message.log);
+    if (message.pictures) this.cameras.show(message.pictures);
+  }
+
+  lost() {
+    this.version = undefined; // another node counts anew
+    this.board.take({ panel: { status: "no simulation", flight: "" }, version: Infinity });
+    this.board.begin();
+  }
+
+  master(answers) {
+    if (answers !== (this.hasMaster ?? true)) {
+      this.notice.say(answers ? "the ROS master is there again" : "no ROS master answers: waiting for one", !answers);
+    }
+    this.hasMaster = answers;
+  }
+
+  // The first one is opened by the page itself: that is not what somebody goes on with.
+  opened(script) {
+    const isOther = this.shown !== undefined && script !== this.shown;
+    if (isOther || !kept("script", "")) keep("script", script);
+    this.shown = script;
+  }
+}

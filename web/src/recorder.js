@@ -1,0 +1,36 @@
+// A button that records what a stream shows, and saves it as a film when it is pressed once more.
+import { save, stamp } from "./dom.js";
+
+const KIND = "video/webm";
+
+export class Recorder {
+  // `stream()` gives a MediaStream when the recording begins; `ended` hears of its end.
+  constructor(button, stream, name, notice, ended = () => {}) {
+    this.button = button;
+    this.stream = stream;
+    this.name = name;
+    this.notice = notice;
+    this.ended = ended;
+    this.recorder = null;
+    button.setAttribute("aria-pressed", "false");
+    button.onclick = () => (this.recorder ? this.recorder.stop() : this.begin());
+  }
+
+  begin() {
+    if (!window.MediaRecorder?.isTypeSupported(KIND)) return this.notice.say("this browser records no videos", true);
+    const parts = [];
+    this.recorder = new MediaRecorder(this.stream(), { mimeType: KIND });
+    this.recorder.ondataavailable = ({ data }) => parts.push(data);
+    this.recorder.onstop = () => {
+      for (const track of this.recorder.stream.getTracks()) track.stop();
+      this.recorder = null;
+      this.button.setAttribute("aria-pressed", "false");
+      this.ended();
+      save(new Blob(parts, { type: KIND }), `drone_sim-${this.name}-${stamp()}.webm`);
+      this.notice.say("the video is saved where your browser puts downloads");
+    };
+    this.recorder.start(1000); // ms: so much is lost at most
+    this.button.setAttribute("aria-pressed", "true");
+    this.notice.say("recording: press again to end and save it");
+  }
+}

@@ -1,0 +1,305 @@
+// The scene: what the node tells is shown, and what the mouse does to it is told to the node.
+import * as THREE from "three";
+import { ACCENT, quality } from "./looks.js";
+import { Batch } from "./batch.js";
+import { Canvas } from "./canvas.js";
+import { Gizmo } from "./gizmo.js";
+import { Hand, headingOf } from "./hand.js";
+import { Outline } from "./outline.js";
+import { Surroundings } from "./surroundings.js";
+import { Words } from "./text.js";
+import { Tree } from "./tree.js";
+import { BEHIND, FOV, FREE, View } from "./view.js";
+
+const BODIES = "view/bodies";
+const OBJECTS = "objects"; // the server of handles, and `scene`, the layer, of what stands in the scene
+const TARGETS = "markers"; // the server of the handles of vehicles and of their green spheres
+const BASE = "base_link", TRACK = "Track_base", EYE = "_optical";
+const STEP = 0.05; // s, of the simulation
+const HOVERED = 0xffffff;
+const STORE = "drone_sim.scene";
+const LAYERS = { path: "view/path", command: "view/command", forces: "view/forces", labels: "view/state" };
+const SHOWN = { frames: false, path: true, command: true, forces: false, handles: true, labels: true };
+
+export class Scene {
+  constructor(element, { say }) {
+    this.say = say;
+    this.followedVehicle = "";
+    this.pushes = 0.5; // N
+    this.views = [BEHIND, FREE];
+    this.selected = "";
+    this.world = new THREE.Scene();
+    this.world.matrixWorldAutoUpdate = false;
+    this.camera = new THREE.PerspectiveCamera(FOV, 1, 0.05, 4000);
+    this.tree = new Tree(this.world, () => this.change());
+    this.batch = new Batch(this.world);
+    this.view = new View(this.camera);
+    this.view.onFree = () => this.look(FREE);
+    this.gizmo = new Gizmo();
+    this.outline = new Outline();
+    this.canvas = new Canvas(element, (renderer, seconds) => this.paint(renderer, seconds));
+    if (this.canvas.isFast) quality.anisotropy = 8;
+    if (this.canvas.isFast) this.tree.smooth = STEP;
+    this.surroundings = new Surroundings(this.world, this.canvas.isFast);
+    this.canvas.onFit = (width, height) => this.fit(width, height);
+    this.hand = new Hand(this);
+    this.canvas.dom.tabIndex = 0;
+    this.canvas.dom.setAttribute("role", "application");
+    this.canvas.dom.setAttribute("aria-label", "The scene");
+    this.shown = { ...SHOWN, shadows: this.canvas.isFast };
+    const kept = recall();
+    this.wanted = kept.view ?? BEHIND; // a camera may come later
+    this.show(kept.shown ?? {});
+    if (kept.view === FREE) this.look(FREE);
+    this.canvas.fit();
+  }
+
+  // Whom the view behind follows.
+  get vehicle() {
+    return this.followedVehicle;
+  }
+
+  set vehicle(name) {
+    if (name === this.followedVehicle) return;
+    this.followedVehicle = name;
+    this.tree.isNew = true;
+    this.change();
+  }
+
+  // ---- from the node
+
+  take(header, bytes) {
+    try {
+      this.tree.take(header, new Float32Array(bytes.slice().buffer));
+    } finally {
+      this.canvas.then(() => this.say({ shown: "scene" }));
+    }
+  }
+
+  change() {
+    this.canvas.change();
+  }
+
+  // Looks what there is, after frames or markers have come or gone.
+  sort() {
+    this.tree.isNew = false;
+    this.bodies = new Map(); // name of a vehicle -> what its frames begin with
+    this.handles = new Map(); // [server, name] -> the place of a handle
+    for (const object of this.tree.markers.values()) {
+      const { layer, ns, kind, frame } = object.userData.said;
+      if (layer === BODIES && frame.endsWith(BASE)) this.bodies.set(ns, frame.slice(0, -BASE.length));
+      if (kind === "handle") this.handles.set(key(layer, ns), object);
+    }
+    if (!this.bodies.has(this.vehicle) && this.bodies.size) this.followedVehicle = this.bodies.keys().next().value;
+    if (this.selected && !this.meshesOf(this.selected).length && !this.handleOf(this.selected)) this.select("");
+    this.offerViews();
+    this.batch.build(this.tree.markers.values());
+  }
+
+  // Shows what is to be seen now, and marks what is under the mouse, or selected.
+  arrange() {
+    this.isArranged = true;
+    for (const object of this.tree.markers.values()) object.visible = this.isShown(object.userData.said);
+    this.mark();
+  }
+
+  rearrange() {
+    this.isArranged = false;
+    this.change();
+  }
+
+  isShown({ layer, ns }) {
+    if (layer === "view/height") return ns === "shadow" ? !this.shown.shadows : this.shown.labels;
+    if (layer === LAYERS.forces) return this.shown.forces || this.bodies.has(this.active);
+    const [name] = Object.entries(LAYERS).find(([, one]) => one === layer) ?? [];
+    return name ? this.shown[name] : true;
+  }
+
+  offerViews() {
+    const prefix = this.bodies.get(this.vehicle) ?? "";
+    const eyes = [...this.tree.byName.keys()].filter((name) => name.endsWith(EYE) && name.startsWith(prefix)).sort();
+    const views = [BEHIND, FREE, ...eyes];
+    if (String(views) === String(this.views)) return;
+    this.views = views;
+    this.turn(views.includes(this.wanted) ? this.wanted : views.includes(this.view.name) ? this.view.name : BEHIND);
+    this.onViews?.();
+  }
+
+  // ---- what one sees
+
+  look(view) {
+    if (!this.views.includes(view)) return;
+    this.wanted = view;
+    this.keep();
+    this.turn(view);
+  }
+
+  turn(view) {
+    this.view.look(view);
+    this.change();
+    if (view === this.told) return;
+    this.told = view;
+    this.onLook?.(view);
+  }
+
+  // Looks at something by its name, or at the vehicle, from near.
+  frame(name = this.selected || this.vehicle) {
+    const meshes = this.meshesOf(name);
+    if (name === this.vehicle && this.view.name === BEHIND) this.view.reset();
+    else if (meshes.length) {
+      const box = new THREE.Box3();
+      for (const mesh of meshes) box.expandByObject(mesh);
+      const ball = box.getBoundingSphere(new THREE.Sphere());
+      this.view.lookAt(ball.center, ball.radius);
+    }
+    this.change();
+  }
+
+  show(layers) {
+    Object.assign(this.shown, layers);
+    if (this.canvas.renderer) this.canvas.renderer.shadowMap.enabled = this.shown.shadows;
+    this.surroundings.sun.castShadow = this.shown.shadows;
+    this.tree.showFrames(this.shown.frames);
+    this.keep();
+    this.rearrange();
+  }
+
+  select(name) {
+    if (name === this.selected) return;
+    this.selected = name;
+    this.onSelect?.(name);
+    this.rearrange();
+  }
+
+  keep() {
+    remember({ view: this.wanted, shown: this.shown });
+  }
+
+  // A picture of the scene, as PNG.
+  snapshot() {
+    if (!this.canvas.renderer) return Promise.reject(new Error("this browser draws no scene"));
+    this.canvas.draw(); // what was painted before may have been thrown away
+    return new Promise((done, fail) => this.canvas.dom.toBlob((blob) => (blob ? done(blob) : fail(new Error("no picture"))), "image/png"));
+  }
+
+  // What the canvas shows, as a video.
+  stream() {
+    const stream = this.canvas.dom.captureStream();
+    this.change();
+    return stream;
+  }
+
+  fit(width, height) {
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.unit = (2 * Math.tan(THREE.MathUtils.degToRad(FOV / 2))) / height; // m of a pixel, at 1 m
+    Words.unit = this.unit;
+    this.world.traverse((one) => one.fixed && one.fit());
+  }
+
+  paint(renderer, seconds) {
+    if (this.tree.isNew) {
+      this.sort();
+      this.isArranged = false;
+    }
+    if (!this.isArranged) this.arrange();
+    if (this.tree.isMoved) this.batch.place();
+    this.tree.isMoved = false;
+    const isMoving = this.tree.advance(performance.now());
+    this.world.updateMatrixWorld();
+    const isLate = this.view.update(this.followed, seconds);
+    this.camera.updateMatrixWorld();
+    this.surroundings.follow(this.camera, this.place(this.vehicle) ?? this.view.aim);
+    this.surroundings.sky.updateMatrixWorld();
+    this.surroundings.ground.updateMatrixWorld();
+    this.surroundings.sun.updateMatrixWorld();
+    this.putGizmo();
+    renderer.clear();
+    renderer.render(this.world, this.camera);
+    this.outline.render(renderer, this.camera);
+    this.gizmo.render(renderer, this.camera, this.unit);
+    if (isLate || isMoving) this.change();
+  }
+
+  get followed() {
+    if (this.view.name !== BEHIND) return this.tree.byName.get(this.view.name);
+    return this.tree.byName.get(`${this.bodies?.get(this.vehicle) ?? ""}${TRACK}`);
+  }
+
+  // Where a vehicle is in the world, undefined where that is not known.
+  place(vehicle) {
+    const frame = this.bodies?.has(vehicle) && this.tree.byName.get(this.bodies.get(vehicle) + BASE);
+    return frame ? new THREE.Vector3().setFromMatrixPosition(frame.matrixWorld) : undefined;
+  }
+
+  // ---- what has handles
+
+  // What is selected, dragged or, of vehicles and their spheres, under the mouse: this one has handles.
+  get active() {
+    if (this.hand.dragged) return this.hand.dragged.name;
+    if (this.hand.hovered && this.handleOf(this.hand.hovered)?.userData.said.layer === TARGETS) return this.hand.hovered;
+    return this.selected;
+  }
+
+  // The handle of a vehicle, a sphere or an object. That of a vehicle alone has another name than this.
+  handleOf(name) {
+    const own = this.handles?.get(key(TARGETS, name)) ?? this.handles?.get(key(OBJECTS, name));
+    if (own || !this.bodies?.has(name)) return own;
+    return [...this.handles.values()].find((one) => one.userData.said.layer === TARGETS && !this.looks(TARGETS, one.userData.said.ns));
+  }
+
+  looks(layer, ns) {
+    return [...this.tree.markers.values()].some(({ userData: { said } }) => said.layer === layer && said.ns === ns && said.kind !== "handle");
+  }
+
+  // What the mouse may meet.
+  things() {
+    return [...this.tree.markers.values()].filter((one) => isThing(one.userData.said));
+  }
+
+  meshesOf(name) {
+    const meshes = [];
+    for (const object of this.things()) {
+      if (object.userData.said.ns !== name) continue;
+      object.traverse((one) => one.isMesh && !one.isInstancedMesh && meshes.push(one));
+    }
+    return meshes;
+  }
+
+  mark() {
+    const lit = [];
+    if (this.hand.hovered && this.hand.hovered !== this.selected) lit.push([this.meshesOf(this.hand.hovered), HOVERED, 1.5]);
+    if (this.selected) lit.push([this.meshesOf(this.selected), ACCENT, 2.5]);
+    this.outline.show(lit);
+  }
+
+  putGizmo() {
+    const name = this.active;
+    const handle = name && this.shown.handles ? this.handleOf(name) : null;
+    if (!handle) return this.gizmo.put(null);
+    if (this.hand.dragged?.now) return this.gizmo.put(this.hand.dragged.now.place, this.hand.dragged.now.heading);
+    this.gizmo.put(this.place(name) ?? handle.getWorldPosition(new THREE.Vector3()), headingOf(handle));
+  }
+
+}
+
+const key = (server, name) => `${server} ${name}`;
+
+// Whether the mouse meets it: bodies, objects, green spheres.
+const isThing = ({ layer, kind }) => kind !== "handle" && [BODIES, "scene", TARGETS].includes(layer);
+
+function recall() {
+  try {
+    return JSON.parse(localStorage.getItem(STORE)) ?? {};
+  } catch {
+    return {};
+  }
+}
+
+function remember(what) {
+  try {
+    localStorage.setItem(STORE, JSON.stringify(what));
+  } catch {
+    // a browser that keeps nothing
+  }
+}

@@ -1,0 +1,113 @@
+// The buttons above the scene, and their keys.
+import { Recorder } from "./recorder.js";
+import { at, create, save, stamp } from "./dom.js";
+
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 0];
+const OTHER = { "no simulation": "No simulation" };
+
+const speedText = (factor) => (factor === 0 ? "fastest" : `${factor} ×`);
+const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+// Whoever writes, reads or moves a bar presses no keys of ours; on a focused button Space is that button's own.
+const hasKeys = ({ target, key }) =>
+  target.closest?.("input, textarea, select, article, summary, [contenteditable], [role=separator], dialog") ||
+  ([" ", "Enter"].includes(key) && target.closest?.("button, a"));
+
+export class Toolbar {
+  // `act(ask, more)` asks the node, and shows its answer; `scene()` is the scene, once it is there.
+  constructor(board, act, notice, scene) {
+    this.board = board;
+    this.act = act;
+    for (const [id, press] of Object.entries({
+      "sim-start": () => this.call(this.is("paused") ? "resume" : "start"),
+      "sim-pause": () => this.call({ flying: "pause", paused: "resume" }[this.status] ?? "start"),
+      "sim-step": () => this.call(this.is("flying") ? "pause" : "step"),
+      "sim-restart": () => this.call("restart"),
+      "sim-stop": () => this.call("stop"),
+      snapshot: () => this.call("snapshot"),
+      restore: () => this.call("restore"),
+      takeoff: () => act("request", { request: "takeoff" }),
+      land: () => act("request", { request: "land" }),
+      reset: () => act("request", { request: "reset" }),
+      "go-home": () => act("request", { request: "home" }),
+      photo: () => scene().snapshot().then((blob) => save(blob, `drone_sim-${stamp()}.png`)),
+      "toolbar-more": () => this.unfold(),
+    }))
+      at(id).onclick = press;
+    new Recorder(at("video"), () => scene().stream(), "scene", notice);
+    at("speed").onchange = () => act("speed", { factor: Number(at("speed").value) });
+    at("scene-choice").onchange = () => act("scene", { scene: at("scene-choice").value });
+    at("vehicle").onchange = () => act("vehicle", { vehicle: at("vehicle").value });
+    for (const part of ["status", "flight", "diagnosis"]) board.on(part, () => this.showStatus());
+    board.on("speed", (factor) => this.showSpeed(factor));
+    board.on("pace", (pace) => (at("pace").textContent = Number(pace) ? `${Number(pace).toFixed(2)} ×` : ""));
+    board.on("scenes", ({ all, now }) => this.offer(at("scene-choice"), all, now));
+    board.on("vehicles", ({ all, now }) => {
+      this.offer(at("vehicle"), all, now);
+      at("vehicle-part").hidden = all.length < 2;
+    });
+    this.listen();
+  }
+
+  get status() {
+    return this.board.get("status", "no simulation");
+  }
+
+  is(status) {
+    return this.status === status;
+  }
+
+  call(service) {
+    return this.act("call", { call: service });
+  }
+
+  unfold() {
+    const open = at("toolbar").classList.toggle("unfolded");
+    at("toolbar-more").setAttribute("aria-expanded", String(open));
+  }
+
+  // A click leaves no focus behind: the next Space would press the same button again.
+  listen() {
+    const buttons = [...document.querySelectorAll("button[data-key]")];
+    for (const button of buttons) {
+      button.title += ` (${button.dataset.key.replace(" ", ", ")})`;
+      button.addEventListener("click", (event) => event.detail && button.blur());
+    }
+    window.addEventListener("keydown", (event) => {
+      if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || event.repeat || hasKeys(event)) return;
+      const key = event.key === " " ? "Space" : event.key.length === 1 ? event.key.toUpperCase() : event.key;
+      const found = buttons.find((one) => one.dataset.key.split(" ").includes(key));
+      const button = key === "Enter" && this.is("stopped") ? at("sim-start") : found;
+      if (!button || button.disabled) return;
+      event.preventDefault();
+      button.click();
+    });
+  }
+
+  showStatus() {
+    const flight = this.board.get("flight", "");
+    const says = this.is("flying") && flight && !flight.startsWith("unknown") ? flight : this.status;
+    const wrong = this.board.get("diagnosis", []).filter((one) => one.wrong).map((one) => one.said);
+    at("status").textContent = OTHER[says] ?? capital(says);
+    at("status").dataset.is = this.status;
+    at("why").hidden = !wrong.length || this.is("no simulation");
+    at("why").textContent = wrong.length === 1 ? "1 complaint" : `${wrong.length} complaints`;
+    at("why").title = `${wrong.join("\n")}\n(opens the log)`;
+    at("state").classList.toggle("wrong", !at("why").hidden);
+    at("sim-start").disabled = this.is("flying") || this.is("no simulation");
+    at("sim-pause").setAttribute("aria-pressed", String(this.is("paused")));
+    for (const id of [...["pause", "step", "restart", "stop"].map((one) => `sim-${one}`), "snapshot", "restore"]) at(id).disabled = this.is("no simulation");
+  }
+
+  showSpeed(factor) {
+    const speeds = SPEEDS.includes(factor) ? SPEEDS : [factor, ...SPEEDS];
+    at("speed").replaceChildren(...speeds.map((one) => new Option(speedText(one), one)));
+    at("speed").value = factor;
+  }
+
+  offer(select, all, now) {
+    const options = all.map((one) => create("option", { value: one, textContent: one === "none" ? "as launched" : one }));
+    select.replaceChildren(...options);
+    select.value = now;
+  }
+}

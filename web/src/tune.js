@@ -1,0 +1,145 @@
+// Gains and other parameters: sliders and numbers, sent as they are moved, one at a time and at last the latest.
+import { at, create } from "./dom.js";
+import { keep, kept } from "./kept.js";
+
+const OPEN = ["Gains", "Script parameters"]; // groups that are unfolded at first
+const STEPS = 200; // of a slider
+const WIDE = 20; // times the value: a range that is wider than this needs a slider of its own
+
+const shown = (value) => (typeof value === "number" ? String(Number(value.toPrecision(7))) : value);
+
+export class Tune {
+  constructor(board, ask, notice) {
+    this.ask = ask;
+    this.notice = notice;
+    this.board = board;
+    this.fields = new Map(); // what shows a value, by name
+    this.waiting = new Map(); // the latest value of each name that is being set
+    board.on("tuning", (groups) => this.build(groups));
+    board.on("values", (values) => this.fill(values));
+    at("tune-filter").oninput = () => this.filter();
+  }
+
+  build(groups) {
+    const { id, value } = document.activeElement; // who is writing goes on to
+    this.fields.clear();
+    const made = groups.map(({ group, fields }) => this.group(group, fields));
+    at("tune-groups").replaceChildren(...made);
+    this.fill(this.board.get("values", {}));
+    this.filter();
+    const field = id.startsWith("tune ") && document.getElementById(id);
+    if (!field) return;
+    if (field.type === "text") field.value = value;
+    field.focus();
+  }
+
+  group(name, fields) {
+    const group = create("details", {}, create("summary", { textContent: name, onclick: () => keep(`tune/${name}`, !group.open) }));
+    group.dataset.name = name;
+    if (!fields.length) group.append(create("p", { textContent: "The script that flies reads none of these." }));
+    group.append(...fields.map((field) => this.field(field)));
+    return group;
+  }
+
+  field(field) {
+    const { name, kind, words, unit, hint } = field;
+    const row = create("div", { className: "field", title: hint || name });
+    row.dataset.name = `${name} ${hint}`.toLowerCase();
+    const id = `tune ${name}`;
+    const label = create("label", { htmlFor: id, textContent: name });
+    if (unit) label.append(" ", create("small", { textContent: unit }));
+    row.append(label);
+    if (words.length) row.append(this.input(name, create("select", { id }, ...words.map((one) => new Option(one, one)))));
+    else if (kind === "bool") row.append(this.input(name, create("input", { id, type: "checkbox" }), "checked"));
+    else if (kind === "str") row.append(this.input(name, create("input", { id, type: "text" })));
+    else this.number(row, field, id);
+    return row;
+  }
+
+  // A number is taken as it is written; its slider goes as far as a hand can choose from.
+  number(row, { name, kind, low, high }, id) {
+    const range = [low, high].map((end) => (end === null ? "" : shown(end))).join(" to ");
+    const text = create("input", { id, type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false });
+    const slider = create("input", { type: "range", step: "any", "aria-label": `${name}, slider`, tabIndex: -1 });
+    text.title = range.trim() === "to" ? name : `${name}: ${range}`;
+    text.onchange = () => {
+      const value = Number(text.value.trim().replace(",", "."));
+      if (text.value.trim() === "" || Number.isNaN(value)) this.refuse(name, `${name} = ${text.value}: must be a number`);
+      else this.set(name, value);
+    };
+    text.onkeydown = (event) => {
+      if (event.key === "Escape") this.refuse(name, "");
+    };
+    slider.oninput = () => {
+      const fine = (slider.max - slider.min) / STEPS;
+      const rounded = Number((Math.round(slider.valueAsNumber / fine) * fine).toPrecision(6));
+      text.value = shown(kind === "int" ? Math.round(slider.valueAsNumber) : rounded);
+      this.set(name, Number(text.value));
+    };
+    row.append(text, slider);
+    this.fields.set(name, (value) => {
+      if (document.activeElement !== text || !this.isWritten(text, value)) text.value = shown(value);
+      text.dataset.holds = shown(value);
+      if (document.activeElement === slider) return;
+      const far = Math.max(Math.abs(value) * 2, 1);
+      slider.min = Math.max(low ?? -far, high - low <= WIDE * far ? low : Math.min(0, -far * (value < 0)));
+      slider.max = Math.min(high ?? far, high - low <= WIDE * far ? high : far);
+      slider.value = value;
+    });
+  }
+
+  // Whether somebody is writing something else than what held before: that is not overwritten.
+  isWritten(text) {
+    return text.value !== text.dataset.holds;
+  }
+
+  input(name, element, property = "value") {
+    element.onchange = () => this.set(name, element[property]);
+    this.fields.set(name, (value) => (element[property] = value));
+    return element;
+  }
+
+  fill(values) {
+    for (const [name, show] of this.fields) {
+      if (name in values && !this.waiting.has(name)) show(values[name]);
+    }
+  }
+
+  refuse(name, said) {
+    this.notice.say(said, true);
+    const holds = this.board.get("values", {})[name];
+    document.activeElement?.blur?.();
+    if (holds !== undefined) this.fields.get(name)?.(holds);
+  }
+
+  async set(name, value) {
+    const isGoing = this.waiting.has(name);
+    this.waiting.set(name, value);
+    if (isGoing) return; // its answer sends this one
+    while (this.waiting.has(name)) {
+      const wanted = this.waiting.get(name);
+      const done = await this.ask("tune", { name, value: wanted }).then(
+        ({ said }) => this.notice.say(said) ?? true,
+        (error) => this.notice.say(error.message, true) ?? false,
+      );
+      if (this.waiting.get(name) !== wanted) continue;
+      this.waiting.delete(name);
+      const holds = this.board.get("values", {})[name];
+      if (!done && holds !== undefined) document.activeElement?.closest?.("#tune-panel") && document.activeElement.blur();
+      if (holds !== undefined) this.fields.get(name)?.(done ? wanted : holds);
+    }
+  }
+
+  filter() {
+    const sought = at("tune-filter").value.trim().toLowerCase();
+    for (const group of at("tune-groups").children) {
+      let some = !sought;
+      for (const row of group.querySelectorAll(".field")) {
+        row.hidden = sought && !row.dataset.name.includes(sought);
+        some ||= !row.hidden;
+      }
+      group.hidden = !some;
+      group.open = sought ? some : kept(`tune/${group.dataset.name}`, OPEN.includes(group.dataset.name));
+    }
+  }
+}
