@@ -26,7 +26,7 @@ criteria:
 """
 # What a Python script does in each sensing; `found` is what it has laid its hands on, if anything.
 PYTHON = """
-import contextlib, ctypes, gc, glob, os, signal, socket, struct, subprocess, sys, time
+import contextlib, ctypes, gc, glob, os, re, signal, socket, struct, subprocess, sys, time
 HERE = os.path.dirname(__file__)
 
 def attempt():
@@ -83,14 +83,14 @@ SEARCHES = {  # each would find something, were it there
     "        found = found or [one for one in frame.f_locals if one in ('plan', 'simulation', 'seed', 'judge')]\n"
     "        frame = frame.f_back",
     "the seed": "found = [one for one in gc.get_objects() if type(one) is dict and SEED in one.values()]",
-    "the plan in memory": "other = bytes(one ^ 1 for one in range(256))  # its own word is not what it looks for\n"
-    "    word = TITLE\n"
+    "the plan in memory": "word = re.compile(b''.join(b'\\\\x%02x' % (one ^ 1) for one in TITLE))"
+    "  # its own memory never holds the word as it is written\n"
     "    for line in open('/proc/self/maps').read().splitlines():\n"
     "        low, high = (int(one, 16) for one in line.split()[0].split('-'))\n"
     "        if 'rw' in line and high - low < 2**27:\n"
     "            with contextlib.suppress(OSError), open('/proc/self/mem', 'rb') as memory:\n"
     "                memory.seek(low)\n"
-    "                found = found or (word in memory.read(high - low).translate(other) and line)",
+    "                found = found or (word.search(memory.read(high - low)) and line)",
     "the plan's file": "found = open(FOLDER + '/attacked.yaml').read()",
     "another submission": "found = open(FOLDER + '/other.py').read()",
     "the secret": "found = open(FOLDER + '/secret').read()",
