@@ -28,6 +28,7 @@ from drone_sim.grading.arguments import (
     results_folder,
     status_of,
 )
+from drone_sim.grading.autograder import archive as autograder
 from drone_sim.grading.jobs import files
 from drone_sim.grading.jobs.files import Unreadable, given_script, read
 from drone_sim.grading.jobs.job import Job, contents_of, key_of, unpacked
@@ -57,7 +58,17 @@ def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = Non
     if verify.asks_for_it(given):
         return verify.main(given, guardian)
     options = _parser().parse_intermixed_args(given)
+    if options.autograder:
+        return status_of(PROGRAM, lambda: _write_autograder(options), None)
     return status_of(PROGRAM, lambda: _Grading(options, guardian).run(), guardian)
+
+
+def _write_autograder(options: argparse.Namespace) -> int:
+    if options.script or options.secret:
+        raise ValueError("--autograder: takes a plan and --seeds alone; who hands in can read whatever is in the zip")
+    plan = plans.read(tasks.find(options.plan))
+    autograder.write(plan, options.seeds or plan.seeds, options.autograder)
+    return 0
 
 
 class _Grading:
@@ -221,6 +232,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--key", metavar="FILE", help="sign what --json writes")
     parser.add_argument("--verify", metavar="RESULTS.json", help="fly what --json wrote once more, and compare")
     parser.add_argument("--gradescope", metavar="results.json", help="write one script's results for Gradescope")
+    parser.add_argument("--autograder", metavar="OUT.zip", help="fly nothing: write an autograder for Gradescope")
     parser.add_argument("--html", metavar="DIR", help="write a report with plots and a replay of every flight")
     return parser
 

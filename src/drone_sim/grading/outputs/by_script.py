@@ -61,7 +61,8 @@ class ScriptResults:
     def errors(self) -> list[str]:
         """What went wrong in the flights beside criteria, each once, with the script's name instead of its path."""
         errors = (trouble for one in self.flights for trouble in one.troubles)
-        return list(dict.fromkeys(one.replace(self.script, self.label) if self.script else one for one in errors))
+        name = PurePath(self.script).name
+        return list(dict.fromkeys(one.replace(self.script, name) if self.script else one for one in errors))
 
 
 def by_script(results: Iterable[Result], names: Mapping[str, str] | None = None) -> list[ScriptResults]:
