@@ -214,7 +214,7 @@ def test_marks_are_as_moodle_reads_them(tmp_path):
     assert (bo["Full name"], bo["ID number"], bo["Email address"], bo["Grade"]) == ("'=Bo", "8", "b@x", "2.5")
     assert bo["Maximum Grade"] == "3" and bo["Feedback comments"] == "1 of 2 flights passed; failed: no_contact in 1"
     assert (che["Full name"], che["Grade"], script["Full name"]) == ("Che", "2.5", "c.py")
-    assert script["Feedback comments"] == "0 of 1 flights passed; a?b"
+    assert script["Feedback comments"] == "0 of 1 flights passed; ended by an error: 1"
 
 
 def test_a_plan_without_a_title_goes_by_its_name(tmp_path):

@@ -45,10 +45,15 @@ def _row(person: Person, result: ScriptResults) -> tuple[str, ...]:
 
 
 def feedback(result: ScriptResults) -> str:
-    """Return how a script has done, in one line."""
+    """Return how a script has done, in one line, the same every time.
+
+    Of errors it says how many: a busy machine may stop an endless script by another limit. The report has them.
+    """
     failed = ", ".join(f"{name} in {count}" for name, count in result.failures)
     said = [f"{result.passed} of {len(result.flights)} flights passed", failed and f"failed: {failed}"]
-    return "; ".join(filter(None, [*said, *result.errors[:1]]))
+    errors = sum(one.error is not None for one in result.flights)
+    tried = [line for one in result.flights for line in one.tried][:1]
+    return "; ".join(filter(None, [*said, f"ended by an error: {errors}" if errors else "", *tried]))
 
 
 def _cell(text: str) -> str:
