@@ -5,6 +5,7 @@ import itertools
 import json
 import os
 import resource
+import shutil
 import socket
 import subprocess
 import sys
@@ -349,12 +350,14 @@ def test_a_script_of_any_name_is_flown_and_told(programs, folder, tmp_path, caps
 # ---- many
 
 
-def test_the_key_is_of_the_contents(plan, folder):
+def test_the_key_is_of_the_contents_wherever_they_lie(plan, folder, tmp_path):
     (folder / "helper.py").write_text("gain = 1\n")
     path = script(folder, "imports", "import helper")
     key = job_of(plan, path, 0).key
     assert job_of(plan, path, 0).key == key
     assert len({key, job_of(plan, path, 1).key, job_of(plan, path, 0, {"control": {"Kzref": 3}}).key}) == 3
+    moved = shutil.copytree(folder, tmp_path / "moved")
+    assert job_of(plan, str(moved / "imports.py"), 0).key == key
     (folder / "helper.py").write_text("gain = 2\n")
     assert job_of(plan, path, 0).key != key
 
