@@ -10,12 +10,13 @@ import rospy
 from drone_sim.grading.permissions import CHANGE, MOST_TRIED, MOVE, PUSH
 from drone_sim.grading.plan import Plan
 
+_HANDLES = ("objects/feedback", "markers/feedback")  # rviz's, of a vehicle that is alone, or of all
 _OF_A_VEHICLE = {  # what a topic asks for
-    **dict.fromkeys(("set_pose", "initialpose", "reset"), MOVE),
+    **dict.fromkeys(("set_pose", "initialpose", "reset", *_HANDLES), MOVE),
     "push": PUSH,
     **dict.fromkeys(("weather", "set_wind", "faults"), CHANGE),
 }
-_OF_THE_SCENE = ("set_object_pose", "objects/feedback", "markers/feedback")  # of rviz's handles, too
+_OF_THE_SCENE = ("set_object_pose", *_HANDLES)
 
 
 class LiveRules:
