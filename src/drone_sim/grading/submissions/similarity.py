@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from drone_sim.files.resources import package_path
 from drone_sim.grading.jobs.files import Unreadable, read
 from drone_sim.grading.plan import Plan
 from drone_sim.scripting.python.helpers import BUILT_IN
@@ -55,8 +56,9 @@ class Pair(NamedTuple):
 
 
 def given_by(plan: Plan) -> dict[str, str]:
-    """Return what everybody begins with: the built-in scripts, and `start` beside the plan."""
-    paths = [*BUILT_IN.glob("*.py"), *BUILT_IN.glob("*.lua"), *plan.folder.glob("start.*")]
+    """Return what everybody begins with: the built-in scripts, the tutorial's, and `start` beside the plan."""
+    folders = BUILT_IN, package_path() / "docs" / "tutorial"
+    paths = [*(path for one in folders for path in one.rglob("*.*")), *plan.folder.glob("start.*")]
     return {str(path): source_of([path]) for path in paths if path.is_file()}
 
 
