@@ -36,7 +36,7 @@ pygments_style = "friendly"
 pygments_dark_style = "github-dark"
 
 _ROW = re.compile(r"^\| \*\*([^*]+)\*\* \| (.+) \|$", re.MULTILINE)
-_PAGE = re.compile(r"\]\(([^)#]+)\.(?:md|rst)\)")
+_PAGE = re.compile(r"\[(\w)([^\]]*)\]\(([^)#]+)\.(?:md|rst)\)")
 
 
 def setup(app: Sphinx) -> None:
@@ -54,7 +54,7 @@ def _add_navigation(_app: Sphinx, page: str, source: list[str]) -> None:
 
 def _toctrees(readme: str) -> Iterator[str]:
     for part, pages in _ROW.findall(readme):
-        yield _toctree(part, "\n".join(_PAGE.findall(pages)))
+        yield _toctree(part, "\n".join(f"{first.upper()}{rest} <{page}>" for first, rest, page in _PAGE.findall(pages)))
 
 
 def _toctree(caption: str, pages: str, *options: str) -> str:

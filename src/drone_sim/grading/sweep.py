@@ -127,6 +127,8 @@ class _Sweep:
         for one in self._ranges:
             for value in dict.fromkeys(one.ends if options.optimize else one.values):
                 self._plan.parameters(changes=_changes([one], [value]))
+        if options.plot:
+            from drone_sim.grading import heat_map  # noqa: F401 - where there is no matplotlib, nothing is flown
         for path in filter(None, (options.csv, options.plot)):
             writing.check(path)
         if options.plot and not (options.plot.endswith((".png", ".svg", ".pdf"))):
