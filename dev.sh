@@ -236,10 +236,10 @@ lint() {
   lint_catkin "$bin/catkin_lint"
 }
 
-# The site of README.md and docs, in docs/html: every link and anchor in it is checked.
-make_docs() { # make_docs OPTION-OF-SPHINX...
+# The site of README.md and docs, in docs/html: every link and anchor is checked, also of pages that have not changed.
+make_docs() {
   make_venv requirements-docs.txt
-  "$venv/bin/python" -m sphinx -q -W --keep-going -j auto -c docs/site -d build/docs . docs/html "$@"
+  "$venv/bin/python" -m sphinx -q -E -W --keep-going -j auto -c docs/site -d build/docs . docs/html
   say "the manual is in $root/docs/html/index.html"
 }
 
@@ -319,7 +319,7 @@ case "$command" in
     make_venv "${ALL[@]}" requirements-web.txt
     exec .venv/bin/python -m pytest test/web "$@" ;;
   lint) install_packages git; setup; lint ;;
-  docs) install_packages python3-venv; make_docs "$@" ;;
+  docs) install_packages python3-venv; make_docs ;;
   bench) setup; make_venv "${ALL[@]}"; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   docs-commands) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/docs/run.py "$@" ;;
