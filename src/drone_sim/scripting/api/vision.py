@@ -190,7 +190,8 @@ class VisionSensors(Functions):
         found = self._objects[bare(handle)]
         if isinstance(found, Eye) and found.color_coded:
             handles = self._picture(handle, "handles", only).astype("<u4")
-            return _part(handles.view(np.uint8).reshape(*handles.shape, 4)[:, :, :3], pos, size)
+            channels = handles.view(np.uint8).reshape(*handles.shape, 4)
+            return _part(np.ascontiguousarray(channels[:, :, :3]), pos, size)
         return _part(self._picture(handle, "color", only), pos, size)
 
     def _depths(
