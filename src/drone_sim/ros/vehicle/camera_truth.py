@@ -32,6 +32,7 @@ try:
 except ImportError:  # Debian has no package of it
     Detection2DArray = Detection3DArray = None
 
+_FLOOR = "Floor"  # whose box is around everything
 _LINE = 0.01  # m, of the boxes in rviz
 _COLOR = ColorRGBA(1.0, 0.55, 0.1, 0.35)
 _bridge = CvBridge()
@@ -134,9 +135,9 @@ def _pose(one: Seen) -> Pose:
 
 
 def _markers(objects: list[Seen], header: Header) -> MarkerArray:
-    """Return the boxes in space for rviz, each with its name; those of the picture before go."""
+    """Return the boxes in space for rviz, each with its name, but the floor's; those of the picture before go."""
     made = [Marker(header=header, action=Marker.DELETEALL)]
-    for one in objects:
+    for one in (each for each in objects if each.identity.name != _FLOOR):
         shared = {"header": header, "id": one.number, "pose": _pose(one)}
         made.append(Marker(ns="boxes", type=Marker.CUBE, scale=Vector3(*(one.size + _LINE)), color=_COLOR, **shared))
         text = {"text": one.identity.name, "color": ColorRGBA(1, 1, 1, 1), "scale": Vector3(0, 0, 0.1)}
