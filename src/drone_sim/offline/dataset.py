@@ -98,8 +98,9 @@ def check(folder: str) -> None:
     """Raise OSError, in one line, where `folder` cannot become a dataset: it must be empty, or not be there."""
     with writing.naming(folder):
         if os.path.lexists(folder):
-            if os.listdir(folder):
-                raise OSError(0, "is not empty; a dataset needs a folder of its own")
+            what = "is a file" if not os.path.isdir(folder) else "is not empty" if os.listdir(folder) else ""
+            if what:
+                raise OSError(0, f"{what}; a dataset needs a folder of its own")
         elif not os.path.isdir(os.path.dirname(os.path.abspath(folder))):
             raise OSError(0, f"no such folder: {os.path.dirname(os.path.abspath(folder))}")
 

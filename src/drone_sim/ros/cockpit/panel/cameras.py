@@ -113,8 +113,8 @@ class CameraSwitches:
                 continue
             name = self._names.get(topic, topic)
             stamp = message.header.stamp.to_sec()
-            over = camera.overlay.said(stamp) if camera.overlay else {}
-            said = {"picture": topic, "name": name, "note": caption, "step": _step(message), **over}
+            over = {"step": _step(message), **camera.overlay.said(stamp)} if camera.overlay else {}
+            said = {"picture": topic, "name": name, "note": caption, **over}
             self._socket.show_picture(said, camera.overlay.painted(picture, stamp) if camera.overlay else picture)
 
     def rest(self, resting: bool) -> None:
