@@ -63,6 +63,11 @@ class CameraSwitches:
                 self.turn(topic, False)
             for topic in self._views & (self._sources.keys() - before):
                 self.turn(topic, True)
+            for topic, camera in self._shown.items():
+                if camera.source != self._sources[topic]:  # another scene: there is truth now, or none any more
+                    camera.listen(False)
+                    self._shown[topic] = following = _CameraListener(self._sources[topic])
+                    following.listen(not self._resting)
 
     def turn_asked(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Turn a switch, as a browser asks. Raises ValueError for a topic that there is not."""
@@ -127,7 +132,7 @@ class CameraSwitches:
 
 class _CameraListener:
     def __init__(self, source: ImageTopic):
-        self._source = source
+        self.source = source
         self._latest: deque[Any] = deque(maxlen=1)
         self._subscriber: rospy.Subscriber | None = None
         self.overlay = overlays.Overlay(source.topic) if source.has_truth else None
@@ -138,7 +143,7 @@ class _CameraListener:
             self.overlay.listen(self._subscriber is not None)
 
     def listen(self, on: bool) -> None:
-        source = self._source
+        source = self.source
         if self.overlay is not None:
             self.overlay.listen(on)
         if on and self._subscriber is None:
