@@ -52,6 +52,7 @@ NOT_RUN = {  # with the reason
     "rosrun drone_sim joy_teleop": GAMEPAD,
     "rosrun drone_sim joy_teleop _device:=/dev/input/js1 _drone:=drone2 _axes/vx/scale:=2": GAMEPAD,
     "rosrun drone_sim joy_teleop _config:=$PWD/my_pad.yaml": GAMEPAD,
+    "rosrun stereo_image_proc stereo_image_proc __ns:=/drone/stereo": ANOTHER,
     "python3 try_cone.py": EXTENDING,
     "python3 try_temperature.py": EXTENDING,
     "python3 try_leash.py": EXTENDING,
