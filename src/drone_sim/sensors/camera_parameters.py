@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from drone_sim.config.types import TOPIC, Checked, Finite, Name, Switch, Within
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.sensors.imperfections import Imperfections
 from drone_sim.sensors.sensor import MountParameters
 
 MAX_CAMERAS = 16
@@ -32,8 +33,8 @@ class LensParameters(Checked):
     coefficients: Annotated[tuple[Finite, ...], Field(max_length=8)] = ()
 
 
-class CameraParameters(Checked):
-    """A vision sensor: where it sits, what it sees."""
+class CameraParameters(Imperfections):
+    """A vision sensor: where it sits, what it sees, and how well."""
 
     object: Name
     topic: Annotated[str, Field(pattern=TOPIC, max_length=128)]
@@ -55,7 +56,14 @@ class CameraParameters(Checked):
             raise ValueError(f"horizontal_fov: must be from 0.01 to {WIDEST}, without an equidistant lens")
         if self.lens is not None:
             self.intrinsics()
+        if self.kind == "depth":
+            self._refuse_imperfections()
         return self
+
+    def _refuse_imperfections(self) -> None:
+        for name in Imperfections.model_fields:
+            if getattr(self, name).is_on:
+                raise ValueError(f"{name}: is of kind color")
 
     def intrinsics(self) -> Intrinsics:
         """Return how it makes pixels of the world."""

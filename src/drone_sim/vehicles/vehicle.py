@@ -17,7 +17,7 @@ from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.sensors.camera import Camera
+from drone_sim.sensors.camera import Camera, CameraFitting
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.commands import LANDED, RESET, Commands, FlightState, request
@@ -60,7 +60,7 @@ class Vehicle:
         self.handles: list[int] = []  # of its objects
         self._cleared = -1  # how often the tree had been, when they were added
         self.cameras = {
-            name: Camera(one, partial(self.optical, one), context.vision) for name, one in parameters.cameras.items()
+            name: Camera(one, self._fitting(name, one), context.vision) for name, one in parameters.cameras.items()
         }
         context.blades.append(self.propulsion.blades)
         context.names[self.body.number] = (parameters.name, self.object_name)
@@ -137,9 +137,15 @@ class Vehicle:
 
     def optical(self, camera: CameraParameters) -> Matrix:
         """World from a camera's optical frame (z forward, x right, y down)."""
+        return frames.multiply(self._sensor(camera).matrix(), OPTICAL_FROM_SENSOR)
+
+    def _sensor(self, camera: CameraParameters) -> SceneObject:
         objects = self.context.objects
-        sensor = objects.matrix(objects.handle(camera.object + self.suffix))
-        return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
+        return objects[objects.handle(camera.object + self.suffix)]
+
+    def _fitting(self, name: str, camera: CameraParameters) -> CameraFitting:
+        pose, clock = partial(self.optical, camera), self.context.clock
+        return CameraFitting(f"{self.name}/{name}", pose, lambda: self._sensor(camera).velocity(), clock)
 
     # ---- from outside
 
