@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from drone_sim.config.types import TOPIC, Checked, Finite, Name, Switch, Within
+from drone_sim.config.types import TOPIC, Checked, Finite, Name, ParameterError, Switch, Within
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.sensors.imperfections import Imperfections
@@ -63,7 +63,7 @@ class CameraParameters(Imperfections):
     def _refuse_imperfections(self) -> None:
         for name in Imperfections.model_fields:
             if getattr(self, name).is_on:
-                raise ValueError(f"{name}: is of kind color")
+                raise ParameterError("is of cameras of kind color", (name,))
 
     def intrinsics(self) -> Intrinsics:
         """Return how it makes pixels of the world."""

@@ -11,7 +11,7 @@ from drone_sim.forces.drag import DragParameters
 from drone_sim.forces.force import Force
 from drone_sim.forces.pushes import Pushes
 from drone_sim.mechanics import frames, urdf
-from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
@@ -137,15 +137,21 @@ class Vehicle:
 
     def optical(self, camera: CameraParameters) -> Matrix:
         """World from a camera's optical frame (z forward, x right, y down)."""
-        return frames.multiply(self._sensor(camera).matrix(), OPTICAL_FROM_SENSOR)
-
-    def _sensor(self, camera: CameraParameters) -> SceneObject:
         objects = self.context.objects
-        return objects[objects.handle(camera.object + self.suffix)]
+        sensor = objects.matrix(objects.handle(camera.object + self.suffix))
+        return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
 
     def _fitting(self, name: str, camera: CameraParameters) -> CameraFitting:
-        pose, clock = partial(self.optical, camera), self.context.clock
-        return CameraFitting(f"{self.name}/{name}", pose, lambda: self._sensor(camera).velocity(), clock)
+        pose, velocity = partial(self.optical, camera), partial(self._velocity, camera)
+        return CameraFitting(f"{self.name}/{name}", pose, velocity, self.context.clock)
+
+    def _velocity(self, camera: CameraParameters) -> tuple[Vector, Vector]:
+        """Velocity of a camera and of its turn: now, or over the last step, where a script moves it."""
+        objects, meter = self.context.objects, self.context.velocities
+        handle = objects.handle(camera.object + self.suffix)
+        if objects[handle].carrier is not None:
+            return objects[handle].velocity()
+        return meter.velocity(handle)[0], meter.rotation(handle)
 
     # ---- from outside
 

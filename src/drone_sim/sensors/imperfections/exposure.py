@@ -10,12 +10,12 @@ gain, likewise. A picture is exposed as those before it have shown, as in camera
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from drone_sim.config.types import Finite, Switch, Within
+from drone_sim.config.types import Finite, ParameterError, Switch, Within
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.sensors.imperfections.imperfection import Imperfection, Shot
 
@@ -40,11 +40,10 @@ class ExposureParameters(Imperfection):
         default=0.2, description="s, in which it follows what it sees, when it is automatic"
     )
 
-    @model_validator(mode="after")
-    def _can_be(self) -> ExposureParameters:
+    def model_post_init(self, _context: Any) -> None:
+        """Refuse to follow without an exposure time."""
         if self.automatic and not self.time:
-            raise ValueError("automatic: needs the longest time")
-        return self
+            raise ParameterError("needs time, the longest that it takes", ("automatic",), "true")
 
     @property
     def is_on(self) -> bool:

@@ -11,12 +11,12 @@ approximation: of a mean below some ten electrons the shape is another one, mean
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from drone_sim.config.types import Finite, Within
+from drone_sim.config.types import Finite, ParameterError, Within
 from drone_sim.sensors.imperfections.imperfection import Imperfection, Shot
 
 
@@ -31,11 +31,10 @@ class PixelNoiseParameters(Imperfection):
     )
     seed: Annotated[int, Within(0, 2**63 - 1)] = 0
 
-    @model_validator(mode="after")
-    def _can_be(self) -> PixelNoiseParameters:
+    def model_post_init(self, _context: Any) -> None:
+        """Refuse electrons of which nobody knows how many make a picture white."""
         if self.read and not self.full_well:
-            raise ValueError("read: counts in electrons, and needs full_well")
-        return self
+            raise ParameterError("needs full_well, the electrons of a white pixel", ("read",), f"{self.read:g}")
 
     @property
     def is_on(self) -> bool:
