@@ -61,6 +61,8 @@ def gathered(
 
     `draw` returns rows of the picture (uint8 RGB) at a time after the stamp, from the first to the one before the end.
     """
+    if len(moments) == 1:
+        return decoded(draw(*moments[0][:3]))
     width, height = size
     light = np.zeros((height, width, 3), np.float32)
     for time, first, end, several in moments:

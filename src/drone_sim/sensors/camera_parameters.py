@@ -48,6 +48,7 @@ class CameraParameters(Imperfections):
     lens: LensParameters | None = None
     near: Annotated[Finite, Within(1e-4, 1e4)]
     far: Annotated[Finite, Within(1e-3, 1e5)]
+    baseline: Annotated[Finite, Within(0, 100)] = 0.0  # m, of the right camera of a pair: how far from the left one
     truth: Switch = False  # whether it publishes what is behind its pictures, too
 
     @model_validator(mode="after")
@@ -68,7 +69,9 @@ class CameraParameters(Imperfections):
     def intrinsics(self) -> Intrinsics:
         """Return how it makes pixels of the world."""
         own = self.width, self.height, self.horizontal_fov, self.near, self.far
-        return Intrinsics(*own) if self.lens is None else _lens(*own, self.lens.model, self.lens.coefficients)
+        if self.lens is None:
+            return Intrinsics(*own, baseline=self.baseline)
+        return _lens(*own, self.lens.model, self.lens.coefficients, baseline=self.baseline)
 
     def topics(self) -> Iterator[tuple[str, str]]:
         """Yield what it publishes, and what each topic is."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
+import cv2
 import numpy as np
 from pydantic import Field
 
@@ -94,7 +95,7 @@ class ExposureControl:
 
     def meter(self, light: np.ndarray, brightness: float | None, now: float) -> None:
         """Look at light of a picture at some time, before it is brightened, that was taken with such a brightness."""
-        mean = float(np.dot(light.reshape(-1, 3).mean(axis=0), _LUMINANCE))
+        mean = float(np.dot(cv2.mean(light)[:3], _LUMINANCE))
         self._wanted, self._at = _GREY / max(mean, _DARKEST), now
         self._brightness = self._wanted if brightness is None else brightness
 

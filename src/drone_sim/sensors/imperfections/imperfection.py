@@ -15,13 +15,14 @@ from drone_sim.render.intrinsics import Intrinsics
 class Shot:
     """One picture that is taken: through which lens, exposed for how long (s), amplified by how much.
 
-    `random` returns a generator of its own for each seed: always the same for a picture of the same camera and time.
+    `normal` returns standard normal numbers for each pixel and colour, float32, by a seed: always the same for a
+    picture of the same camera and time.
     """
 
     lens: Intrinsics
     exposure: float
     gain: float
-    random: Callable[[int], np.random.Generator]
+    normal: Callable[[int], np.ndarray]
 
 
 class Imperfection(Checked):

@@ -44,7 +44,7 @@ class PixelNoiseParameters(Imperfection):
     def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:
         """Add it."""
         electrons = np.minimum(light * np.float32(self.full_well / shot.gain), np.float32(self.full_well))
-        varied = shot.random(self.seed).standard_normal(light.shape, dtype=np.float32)
+        varied = shot.normal(self.seed)
         varied *= np.sqrt(electrons + np.float32(self.read**2))
         varied += electrons
         varied *= np.float32(shot.gain / self.full_well)

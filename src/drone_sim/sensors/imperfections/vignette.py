@@ -39,6 +39,6 @@ class VignetteParameters(Imperfection):
 
 @lru_cache(maxsize=16)
 def _share(lens: Intrinsics, power: float) -> np.ndarray:
-    """Return the share of light that reaches each pixel, (height, width, 1) float32."""
+    """Return the share of light that reaches each pixel, (height, width, 3) float32."""
     cosine = np.nan_to_num(lens.rays[..., 2:])
-    return np.asarray(np.clip(cosine, 0.0, 1.0) ** power, dtype=np.float32)
+    return np.asarray(np.clip(cosine, 0.0, 1.0).repeat(3, axis=2) ** power, dtype=np.float32)
