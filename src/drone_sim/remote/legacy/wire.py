@@ -17,9 +17,14 @@ LARGEST = 8 * 1024 * 1024  # bytes of a message
 VERSION = 11  # of the protocol
 _MOST_COMMANDS = 2000  # of a message
 _PACKET = struct.Struct("<hhh")
-_PIECE, _OLD_PIECE = 30_000, 244  # bytes of a message in a packet that is sent; V-REP 3.1's clients have room for no more
+_PIECE, _OLD_PIECE = (
+    30_000,
+    244,
+)  # bytes of a message in a packet that is sent; V-REP 3.1's clients have room for no more
 _MOST_PACKETS = 2**15 - 1  # of a message
-_HEADER = struct.Struct("<HBiiiHB")  # check sum (of V-REP 3.1's clients), version, number, client's time, server's time, scene, state
+_HEADER = struct.Struct(
+    "<HBiiiHB"
+)  # check sum (of V-REP 3.1's clients), version, number, client's time, server's time, scene, state
 _COMMAND = struct.Struct("<iiHiiHiBB")  # size, size of the whole, key's, shift, code and mode, delay, time, status, 0
 _FAILED = 1  # of a status
 _CODE = 0xFFFF
