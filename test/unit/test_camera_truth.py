@@ -118,7 +118,9 @@ def test_what_was_asked_of_the_last_picture_is_drawn_with_the_next(simulation, m
     camera.take()
     camera.truth().want(("depth", "instance"))
     simulation.step()
+    taken = simulation.vision.pictures
     picture = camera.look()
+    assert simulation.vision.pictures == taken + 1
     renderer, drawn = simulation.vision._renderer, []
     with monkeypatch.context() as patched:
         patched.setattr(renderer, "render_outputs", lambda *_, **__: drawn.append(1))

@@ -27,7 +27,7 @@ from drone_sim.render.target import Box, Target
 from drone_sim.shapes.visual import Visual
 
 _MOST_LENSES = 16
-_ROWS = 16
+_ROWS = 16  # the fewest that are drawn of a picture
 
 
 class Moment(NamedTuple):
@@ -95,12 +95,15 @@ class Renderer:
     def render_rows(
         self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, rows: tuple[int, int]
     ) -> np.ndarray:
-        """Rows of the picture that `render` returns: from the first to the one before the second of `rows`."""
+        """Rows of the picture that `render` returns: from the first to the one before the second of `rows`.
+
+        Through a lens they take as long as the whole picture.
+        """
         first, end = rows
         if isinstance(intrinsics, Distorted):
             return self.render(intrinsics, camera_pose, poses)[first:end]
-        high = -(first - end) // _ROWS * _ROWS + _ROWS  # of a few heights, so that there are only a few targets
-        box = Box(0, first, intrinsics.width, min(high, intrinsics.height))
+        high = min(max(_ROWS, 1 << (end - first - 1).bit_length()), intrinsics.height)  # so that there are few targets
+        box = Box(0, first, intrinsics.width, high)
         view = _View(intrinsics, camera_pose, poses, box=box)
         return self._draw((COLOR,), view, None)[COLOR][: end - first]
 
@@ -175,18 +178,18 @@ class Renderer:
     # ---- drawing
 
     def _draw(self, names: tuple[str, ...], view: _View, into: np.ndarray | None) -> dict[str, np.ndarray]:
-        """Draw colours, outputs or both, into the arrays that are given, or new ones."""
+        """Draw colours, outputs or both; the colours into an array, if it is given."""
         if isinstance(view.intrinsics, Distorted):
             return self._draw_through(view.intrinsics, names, view, into)
         view = view._replace(poses=np.asarray(view.poses, dtype=np.float64))
         outputs = tuple(name for name in names if name != COLOR)
         if len(outputs) == len(names):
-            return self._draw_outputs(outputs, view, into)
+            return self._draw_outputs(outputs, view)
         if outputs and self._samples:  # of several samples there is no one depth
-            return {**self._draw_picture((), view, into), **self._draw_outputs(outputs, view, into)}
+            return {**self._draw_picture((), view, into), **self._draw_outputs(outputs, view)}
         return self._draw_picture(outputs, view, into)
 
-    def _draw_outputs(self, names: tuple[str, ...], view: _View, into: np.ndarray | None) -> dict[str, Any]:
+    def _draw_outputs(self, names: tuple[str, ...], view: _View) -> dict[str, Any]:
         role = Role("bare", names)
         with self._current() as gl:
             self._place(names, view)
@@ -194,7 +197,7 @@ class Renderer:
             target = self._cleared(names, view, 0.0)
             gl.enable_only(gl.DEPTH_TEST)
             self._draw_batches(gl, self._batches.all, role)
-            return target.read(into)
+            return target.read(None)
 
     def _draw_picture(self, outputs: tuple[str, ...], view: _View, into: np.ndarray | None) -> dict[str, Any]:
         """Draw solid things, floor, sky, shadows, what can be seen through; of the ground there are only outputs."""

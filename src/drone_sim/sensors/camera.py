@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -78,10 +78,17 @@ class Camera(Sensor):
             gather = partial(self._vision.light, self.intrinsics, self._matrix(), velocity)
             return self._photography.take(self.intrinsics, gather)
         asked, self._truth = self._truth, None
-        truth = self._vision.truth(self.intrinsics, self._matrix(), self._moment) if asked is not None else None
-        if asked is None or truth is None:
+        if asked is None:
             return self._vision.picture(kind, self.intrinsics, self._matrix())
-        truth.want((COLOR, *asked.drawn))
+        return self._taken_with(asked.drawn)
+
+    def _taken_with(self, names: Sequence[str]) -> np.ndarray:
+        """Return a picture that is drawn together with outputs, which `truth` then has."""
+        truth = self._vision.truth(self.intrinsics, self._matrix(), self._moment)
+        if truth is None:
+            return self._vision.picture(COLOR, self.intrinsics, self._matrix())
+        with self._vision.taking():
+            truth.want((COLOR, *names))
         self._drawn = self._vision.changes, self.pose(), truth
         return truth.output(COLOR)
 

@@ -83,7 +83,7 @@ class Vision:
         `kind` "color": (height, width, 3) uint8 RGB. "depth": (height, width) float32, metres along the
         optical z, NaN beyond the far plane. Raises ValueError for an orthographic one where there is no OpenGL.
         """
-        with self._taking() as renderer:
+        with self.taking() as renderer:
             if renderer is None:
                 return self._tiny_picture(kind, intrinsics, pose)
             render = renderer.render if kind == COLOR else renderer.render_depth
@@ -96,7 +96,7 @@ class Vision:
         bodies go on as they do at the pose while the shutter is open. Without OpenGL it is so for no time at all.
         """
         speed = lens.fx * (np.linalg.norm(velocity[3:]) + np.linalg.norm(velocity[:3]) / _AWAY)
-        with self._taking() as renderer:
+        with self.taking() as renderer:
             if renderer is None:
                 return decoded(self._tiny_picture(COLOR, lens, pose))
             poses, velocities = self._subject.visual_poses(), self._subject.visual_velocities()
@@ -109,7 +109,7 @@ class Vision:
             return gathered(shutter.moments(lens.height, speed), (lens.width, lens.height), draw)
 
     @contextmanager
-    def _taking(self) -> Iterator[Renderer | None]:
+    def taking(self) -> Iterator[Renderer | None]:
         """Count a picture, and the time that it takes; give what draws it, None where there is no OpenGL."""
         self._open()
         began = time.perf_counter()
