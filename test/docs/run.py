@@ -32,9 +32,12 @@ import vrep_quadricopter
 
 PATIENCE = 120.0  # s, for whatever does not end
 AT_ONCE = 4
-ENDLESS = ("rostopic echo ", "rosrun drone_sim view", "python3 $(rospack find drone_sim)/docs/fleet/follow.py")
+ENDLESS = (
+    *("rostopic echo ", "rosrun drone_sim view", "rosrun drone_sim record_truth"),
+    "python3 $(rospack find drone_sim)/docs/fleet/follow.py",
+)
 NEEDS_NONE = ("rosrun drone_sim ", "cat ", "source ", "rosbag info")  # a simulator
-NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim doctor")
+NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim record_truth", "rosrun drone_sim doctor")
 WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|\bERROR:")
 REFUSED = re.compile(rf"{WRONG.pattern}|refused")  # by the simulator, whatever the command has said
 FLYING = "commands on "

@@ -155,11 +155,11 @@ def _ffmpeg_errors() -> Iterator[None]:
 # ---- of a flight without ROS: what one camera of a vehicle sees, as its topic would show it
 
 
-def camera_of(vehicle: EquipmentParameters, name: str | None) -> str:
+def camera_of(vehicle: EquipmentParameters, name: str | None, asked: str = "--video") -> str:
     """Return the name of a vehicle's camera, by default of its first one. Raises ValueError."""
     cameras = vehicle.cameras
     if not cameras:
-        raise ValueError("--video: the vehicle has no camera")
+        raise ValueError(f"{asked}: the vehicle has no camera")
     if name is not None and name not in cameras:
         raise ValueError(f"--camera {shown(name)}: no such camera; {near_names(name, cameras)}")
     return next(iter(cameras)) if name is None else name

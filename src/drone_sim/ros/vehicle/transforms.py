@@ -12,7 +12,6 @@ from drone_sim.mechanics import frames
 from drone_sim.ros.core.message_conversion import BASE_LINK, TRACK_BASE, WORLD_FRAME, first_frame, frame, transform
 from drone_sim.ros.core.publishing import NewSubscribers
 from drone_sim.run.pacing import Throttle
-from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 _EYES = 1 / 30  # s of real time, between two turns of the blades, which are for eyes
@@ -68,15 +67,11 @@ def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
     places = {
         BASE_LINK: vehicle.body.matrix,
         TRACK_BASE: vehicle.track.matrix(),
-        **{one.frame: vehicle.optical(one) for one in own.cameras.values() if _tells_frame(one)},
+        # The URDF does not know cameras with a mount; the frame of a stereo pair is its left camera's.
+        **{one.frame: vehicle.optical(one) for one in own.cameras.values() if one.mount and not one.baseline},
         **{name: matrix() for name, matrix in vehicle.instruments.moving_frames.items()},
     }
     return [transform(now, WORLD_FRAME, frame(own, name), matrix) for name, matrix in places.items()]
-
-
-def _tells_frame(camera: CameraParameters) -> bool:
-    """Tell whether the URDF does not know its frame, nor is that the one of the left camera of a pair."""
-    return camera.mount is not None and not camera.baseline
 
 
 def _turning(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
