@@ -1,13 +1,15 @@
 """When the rows of a picture are exposed: a rolling shutter, and motion blur.
 
 Row r of h is exposed for `exposure` s, the middle of which is (r + 1/2 - h/2) / h · readout after the picture's stamp:
-so the stamp is in the middle of the picture. A pixel's light is the mean over its row's exposure; it is
-computed of pictures at moments between which little moves, a pixel or two (P. Haeberli and K. Akeley, The Accumulation
-Buffer, SIGGRAPH 1990), of which each is drawn in the rows alone that are exposed then.
+so the stamp is in the middle of the picture. A pixel's light is the mean over its row's exposure; it is computed of
+pictures at moments between which little moves, a pixel or two (P. Haeberli and K. Akeley, The Accumulation Buffer,
+SIGGRAPH 1990). Each is drawn in the rows alone that are exposed then, and counts by how much of a row's exposure it
+stands for.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -18,6 +20,7 @@ from drone_sim.render.light import decoded
 
 _MOST = 64  # moments of a picture; what moves faster is drawn in larger steps
 _STEP = 1.5  # px, from moment to moment
+_LEAST = 1e-6  # of a row's light
 
 
 class Shutter(NamedTuple):
@@ -31,27 +34,25 @@ class Shutter(NamedTuple):
         whole = self.exposure + self.readout
         step = max(_STEP / max(speed, 1e-9), whole / _MOST)
         if whole < step / 2:
-            return [Exposed(0.0, 0, height, 1)]
-        several = max(1, round(self.exposure / step))  # in which a row is exposed
-        if several > 1:
-            step = self.exposure / several
-        middles = ((np.arange(height) + 0.5) / height - 0.5) * self.readout
-        first = np.rint(middles / step - (several - 1) / 2).astype(int)  # moments of the rows; moment k is at k · step
-        numbers = range(first[0], first[-1] + several)
-        ends = np.searchsorted(first, numbers, "right"), np.searchsorted(first, np.subtract(numbers, several), "right")
-        return [Exposed(k * step, int(start), int(end), several) for k, end, start in zip(numbers, *ends)]
+            return [Exposed(0.0, 0, np.ones(height))]
+        wide = max(self.exposure, step)  # of a row's exposure; the moment number k is that of the step around k · step
+        middles = ((np.arange(height) + 0.5) / height - 0.5) * self.readout / step + 0.5
+        begin, end = middles - wide / step / 2, middles + wide / step / 2
+        moments = []
+        for number in range(math.floor(begin[0]), math.ceil(end[-1])):
+            shares = (np.clip(end, number, number + 1) - np.clip(begin, number, number + 1)) * step / wide
+            rows = np.flatnonzero(shares > _LEAST)
+            if len(rows):
+                moments.append(Exposed(number * step, int(rows[0]), shares[rows[0] : rows[-1] + 1]))
+        return moments
 
 
 class Exposed(NamedTuple):
-    """A moment, s after the stamp; the first of the rows that are exposed then, and the one after the last.
-
-    `several` is the number of moments in which each row is exposed.
-    """
+    """A moment, s after the stamp; the first row that is exposed then; how much of its light each row gets then."""
 
     time: float
     first: int
-    end: int
-    several: int
+    shares: np.ndarray
 
 
 def gathered(
@@ -61,15 +62,16 @@ def gathered(
 
     `draw` returns rows of the picture (uint8 RGB) at a time after the stamp, from the first to the one before the end.
     """
-    if len(moments) == 1:
-        return decoded(draw(*moments[0][:3]))
     width, height = size
-    light = np.zeros((height, width, 3), np.float32)
-    for time, first, end, several in moments:
-        if end > first:
-            part = light[first:end]
-            cv2.add(part, decoded(draw(time, first, end), 1 / several), dst=part)
-    return light
+    if len(moments) == 1:
+        return decoded(draw(0.0, 0, height))
+    light = np.zeros((height, width * 3), np.float32)
+    for time, first, shares in moments:
+        end = first + len(shares)
+        drawn = decoded(draw(time, first, end)).reshape(len(shares), -1)
+        drawn *= shares[:, None].astype(np.float32)
+        light[first:end] += drawn
+    return light.reshape(height, width, 3)
 
 
 def moved(poses: np.ndarray, velocities: np.ndarray, time: float) -> np.ndarray:
