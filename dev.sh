@@ -232,7 +232,7 @@ lint() {
   "$bin/ruff" format --check .
   "$bin/mypy"
   PYTHONPATH=src:$PYTHONPATH "$bin/lint-imports"
-  "$bin/shellcheck" -e SC1091 dev.sh .ci/run packaging/*.sh docs/*.sh
+  "$bin/shellcheck" -e SC1091 dev.sh .ci/run packaging/*.sh docs/*.sh src/drone_sim/grading/autograder/files/*
   lint_catkin "$bin/catkin_lint"
 }
 

@@ -52,6 +52,8 @@ NOT_RUN = {  # with the reason
     "rosrun drone_sim joy_teleop": GAMEPAD,
     "rosrun drone_sim joy_teleop _device:=/dev/input/js1 _drone:=drone2 _axes/vx/scale:=2": GAMEPAD,
     "rosrun drone_sim joy_teleop _config:=$PWD/my_pad.yaml": GAMEPAD,
+    "ROS_NAMESPACE=/drone/stereo rosrun stereo_image_proc stereo_image_proc": ANOTHER,
+    "rostopic hz /drone/stereo/points2": ANOTHER,
     "python3 try_cone.py": EXTENDING,
     "python3 try_temperature.py": EXTENDING,
     "python3 try_leash.py": EXTENDING,

@@ -202,7 +202,8 @@ def test_settings_are_what_is_flown(tmp_path):
         (["--video", "nowhere/out.mp4"], "nowhere/out.mp4"),
         (["--video", "out.mp4", "--camera", "trak"], "--camera 'trak': no such camera; near names are track"),
         (["--video", "out.mp4", "--set", "time_step=0.001", "sub_step=0.001"], "1000 pictures a second; at most 240"),
-        (["--camera", "track"], "--camera track: is of --video FILE.mp4, which is not given"),
+        (["--camera", "track"], "--camera track: is of --video or --truth, and neither is given"),
+        (["--truth", "nowhere/out"], "nowhere/out: no such folder"),
         (["--csv", "a.txt", "--plot", "./a.txt"], "--csv a.txt: is the file of --plot as well"),
     ],
 )

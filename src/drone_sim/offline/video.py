@@ -13,13 +13,11 @@ import cv2
 import numpy as np
 
 from drone_sim.files import writing
-from drone_sim.message_text import near_names, shown
 from drone_sim.offline import hud
 from drone_sim.offline.pictures import to_color
 from drone_sim.offline.recording import OutputError
 from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.camera_parameters import CameraParameters
-from drone_sim.vehicles.parameters import EquipmentParameters
 from drone_sim.vehicles.situation import doing
 
 _CODEC: Final = "libx264"
@@ -139,16 +137,6 @@ def _ffmpeg_errors() -> Iterator[None]:
 
 
 # ---- of a flight without ROS: what one camera of a vehicle sees, as its topic would show it
-
-
-def camera_of(vehicle: EquipmentParameters, name: str | None) -> str:
-    """Return the name of a vehicle's camera, by default of its first one. Raises ValueError."""
-    cameras = vehicle.cameras
-    if not cameras:
-        raise ValueError("--video: the vehicle has no camera")
-    if name is not None and name not in cameras:
-        raise ValueError(f"--camera {shown(name)}: no such camera; {near_names(name, cameras)}")
-    return next(iter(cameras)) if name is None else name
 
 
 def rate_of(camera: CameraParameters, time_step: float) -> float:
