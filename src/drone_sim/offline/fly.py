@@ -12,8 +12,9 @@ import os
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
@@ -23,7 +24,6 @@ from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics.frames import to_euler
 from drone_sim.message_text import near_names, shown
 from drone_sim.offline import timeline as timeline_module
-from drone_sim.offline import video
 from drone_sim.offline.recording import OutputError, Recording
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
 from drone_sim.run import parameters as parameters_module
@@ -32,7 +32,10 @@ from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
-from drone_sim.vrep_files.reading import SUFFIXES
+from drone_sim.vrep_files.model import SUFFIXES
+
+if TYPE_CHECKING:
+    from drone_sim.offline.video import CameraRecorder
 
 _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
@@ -105,8 +108,7 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     try:
         with contextlib.ExitStack() as written:
             file = written.enter_context(writing.replacing(options.csv)) if options.csv else None
-            filming = video.filming(options.video, simulation, recorded, camera) if options.video else None
-            films = [written.enter_context(filming)] if filming else []
+            films = [written.enter_context(_filming(options.video, simulation, recorded, camera))] if camera else []
             recording = Recording(file, keep=bool(options.plot), vehicle=recorded)
             flown = status_of(
                 "fly",
@@ -155,10 +157,18 @@ def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -
         if options.camera is not None:
             raise ValueError(f"--camera {_shown(options.camera)}: is of --video FILE.mp4, which is not given")
         return ""
+    from drone_sim.offline import video
+
     own = next(one for one in parameters.fleet if one.name == vehicle)
     camera = video.camera_of(own, options.camera)
     video.rate_of(own.cameras[camera], parameters.time_step)
     return camera
+
+
+def _filming(path: str, simulation: Simulation, vehicle: str, camera: str) -> AbstractContextManager[CameraRecorder]:
+    from drone_sim.offline import video  # PyAV, which few have
+
+    return video.filming(path, simulation, vehicle, camera)
 
 
 @contextlib.contextmanager
@@ -184,7 +194,7 @@ def _fly(
     simulation: Simulation,
     timeline: Timeline,
     steps: int,
-    observers: Iterable[Recording | video.CameraRecorder],
+    observers: Iterable[Recording | CameraRecorder],
     guardian: Guardian | None,
 ) -> int:
     for observer in observers:
