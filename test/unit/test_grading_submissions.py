@@ -243,13 +243,11 @@ def test_an_autograder_has_what_gradescope_runs_and_no_solution(tmp_path, capsys
     assert not [name for name in found if "solution" in name or "__pycache__" in name or "tasks/" in name]
     first = path.read_bytes()
     assert grade.main(["hover", "--seeds", "3", "--autograder", str(path)]) == 0 and path.read_bytes() == first
+    (tmp_path / "room.yaml").write_text("objects: []\n")
+    laid(tmp_path, own__plan_dot_yaml=f"scene: {tmp_path}/room.yaml\nduration: 1\ncriteria: [{{kind: no_contact}}]\n")
     for arguments, said in (
         (["hover", "my.py"], "takes a plan and --seeds alone"),
-        ([str(tmp_path / "own" / "plan.yaml")], "room.yaml: the plan needs it, and it does not lie in the plan's folder"),
+        ([str(tmp_path / "own/plan.yaml")], "room.yaml: the plan needs it, and it does not lie in the plan's folder"),
     ):
-        (tmp_path / "own").mkdir(exist_ok=True)
-        (tmp_path / "room.yaml").write_text("objects: []\n")
-        laid(tmp_path, own__plan_dot_yaml=f"scene: {tmp_path}/room.yaml\nduration: 1\ncriteria: [{{kind: no_contact}}]\n")
-        capsys.readouterr()
         assert grade.main([*arguments, "--autograder", str(path)]) == 2
         assert said in capsys.readouterr().err
