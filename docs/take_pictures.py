@@ -14,7 +14,7 @@ from matplotlib import image
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline import hud
 from drone_sim.offline.hud import HudState
-from drone_sim.offline.video import to_color
+from drone_sim.offline.pictures import to_color
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 

@@ -396,6 +396,20 @@ def test_it_needs_no_ros(tmp_path):
 # ---- plot
 
 
+@pytest.mark.parametrize("option, module", [("--plot", "matplotlib.axes"), ("--video", "av")])
+def test_a_package_that_few_need_is_named_before_the_flight(tmp_path, monkeypatch, capsys, option, module):
+    for ours in ("plot", "video"):
+        monkeypatch.delitem(sys.modules, f"drone_sim.offline.{ours}", raising=False)
+        monkeypatch.delattr(f"drone_sim.offline.{ours}", raising=False)
+    monkeypatch.setitem(sys.modules, module, None)
+    table = tmp_path / "out.csv"
+    ending = {"--plot": "png", "--video": "mp4"}[option]
+    assert main(["--duration", "1", "--csv", str(table), option, f"{tmp_path}/out.{ending}"]) == 1
+    name = module.partition(".")[0]
+    said = f"fly: this needs the Python package {name}: `./dev.sh setup --all` installs it\n"
+    assert capsys.readouterr().err == said and not table.exists()
+
+
 def test_plot_is_a_picture(tmp_path, commands):
     out = tmp_path / "out.png"
     assert main(["--commands", commands, "--plot", str(out)]) == 0

@@ -11,9 +11,10 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
@@ -22,7 +23,7 @@ from drone_sim.config.types import ParameterError, nested
 from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics.frames import to_euler
 from drone_sim.message_text import near_names, shown
-from drone_sim.offline import dataset, video
+from drone_sim.offline import dataset
 from drone_sim.offline import timeline as timeline_module
 from drone_sim.offline.recording import OutputError, Recording
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
@@ -32,7 +33,13 @@ from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
-from drone_sim.vrep_files.reading import SUFFIXES
+from drone_sim.vehicles.parameters import EquipmentParameters
+from drone_sim.vrep_files.model import SUFFIXES
+
+if TYPE_CHECKING:
+    from drone_sim.offline.video import CameraRecorder
+
+    _Film = CameraRecorder | dataset.TruthRecorder
 
 _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
@@ -40,11 +47,6 @@ _PLOTTED = 500_000  # steps
 _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
 _YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot", "video", "truth")
 _FILES = ("script", "scene", "config", "commands", *_OUTPUTS)
-_Film = dataset.TruthRecorder | video.CameraRecorder
-_FILMS: dict[str, Callable[[str, Simulation, str, str], contextlib.AbstractContextManager[_Film]]] = {
-    "video": video.filming,
-    "truth": dataset.recording_to,
-}
 _ENDINGS = {
     "scene": (*_YAML, *SUFFIXES),
     "config": _YAML,
@@ -103,11 +105,8 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     try:
         with contextlib.ExitStack() as written:
             file = written.enter_context(writing.replacing(options.csv)) if options.csv else None
-            films = {
-                name: written.enter_context(record(name, simulation, recorded, camera))
-                for option, record in _FILMS.items()
-                if (name := getattr(options, option))
-            }
+            made = _films(options, simulation, recorded, camera)
+            films = {name: written.enter_context(film) for name, film in made.items()}
             recording = Recording(file, keep=bool(options.plot), vehicle=recorded)
             flown = status_of(
                 "fly",
@@ -178,10 +177,36 @@ def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -
             raise ValueError(f"--camera {_shown(options.camera)}: is of --video or --truth, and neither is given")
         return ""
     own = next(one for one in parameters.fleet if one.name == vehicle)
-    camera = video.camera_of(own, options.camera, asked)
+    camera = _camera_of(own, options.camera, asked)
     if options.video:
+        from drone_sim.offline import video  # PyAV, which few have
+
         video.rate_of(own.cameras[camera], parameters.time_step)
     return camera
+
+
+def _camera_of(vehicle: EquipmentParameters, name: str | None, asked: str) -> str:
+    """Return the name of a vehicle's camera, by default of its first one. Raises ValueError."""
+    cameras = vehicle.cameras
+    if not cameras:
+        raise ValueError(f"{asked}: the vehicle has no camera")
+    if name is not None and name not in cameras:
+        raise ValueError(f"--camera {shown(name)}: no such camera; {near_names(name, cameras)}")
+    return next(iter(cameras)) if name is None else name
+
+
+def _films(
+    options: argparse.Namespace, simulation: Simulation, vehicle: str, camera: str
+) -> dict[str, AbstractContextManager[_Film]]:
+    """Return what writes the camera's pictures, by the names of what is written."""
+    films: dict[str, AbstractContextManager[_Film]] = {}
+    if options.video:
+        from drone_sim.offline import video
+
+        films[options.video] = video.filming(options.video, simulation, vehicle, camera)
+    if options.truth:
+        films[options.truth] = dataset.recording_to(options.truth, simulation, vehicle, camera)
+    return films
 
 
 @contextlib.contextmanager

@@ -56,10 +56,10 @@ class Pictures:
         """Take new pictures from now on: something may be elsewhere, or look different."""
         self.changes = next(_changes)
 
-    def set_floor(self, body: int, texture: str) -> None:
-        """Say which body is the floor, which receives the shadows, and its texture; its second visual is the ground."""
+    def set_floor(self, body: int, looks: Sequence[tuple[DrawnShape, str]]) -> None:
+        """Say which body is the floor, which receives the shadows, and its looks, of which the second is the ground."""
         self._floor = body
-        self.set_texture(body, texture)
+        self.set_looks(body, {-1: looks})
 
     def set_looks(self, body: int, looks: Mapping[int, Sequence[tuple[DrawnShape, str]]]) -> None:
         """Say of which shapes a body's links (-1: the root) are, in their order, and what image covers each, or ''.
@@ -134,6 +134,25 @@ class Pictures:
             self._poses = self.changes, self._poses_of(self._inertial_from_root)
         return self._poses[1]
 
+    def visual_velocities(self) -> np.ndarray:
+        """Return the velocities of the visuals' origins and of their turns, (N, 6), m/s and rad/s in the world."""
+        poses = self.visual_poses()
+        velocities = np.zeros((len(poses), 6))
+        links = zip(self.places(), poses[:, :3, 3])
+        for number, ((body, link), origin) in enumerate(links):
+            if body not in self._standing:
+                centre, linear, angular = self._motion(body, link)
+                velocities[number] = *(linear + np.cross(angular, origin - centre)), *angular
+        return velocities
+
+    def _motion(self, body: int, link: int) -> np.ndarray:
+        """Return where a link's centre of mass is, and its velocities, in the world, (3, 3)."""
+        if link < 0:
+            centre, _ = pybullet.getBasePositionAndOrientation(body, self._client)
+            return np.array([centre, *pybullet.getBaseVelocity(body, self._client)])
+        state = pybullet.getLinkState(body, link, 1, 1, self._client)
+        return np.array([state[0], *state[6:8]])
+
     def _chosen(self, bodies: Iterable[int] | None) -> Iterable[int]:
         return self._inertial_from_root if bodies is None else bodies
 
@@ -180,7 +199,6 @@ class Pictures:
     def _part(self, key: tuple[int, int], row: Sequence[Any], shape: DrawnShape, texture: str) -> _Placed:
         link, position, orientation, rgba = row[1], *row[5:8]
         floor, ground = key == (self._floor, 0), key == (self._floor, 1)
-        texture = "" if ground else texture
         visual = Visual(
             key=key,
             shape=shape,

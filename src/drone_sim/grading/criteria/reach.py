@@ -13,8 +13,6 @@ from drone_sim.grading.criteria.criterion import Bound, Criterion, FlightPart, f
 from drone_sim.grading.result import Outcome
 
 MAX_PLACES = 200
-_FARTHEST = 2.0  # times as far as its speed says: a vehicle that got farther between two rows was put there
-_ALWAYS = 0.01  # m, that are no jump
 
 
 def _place(value: Any) -> Any:
@@ -100,13 +98,13 @@ class _FlownWay(NamedTuple):
 
 def _way(part: FlightPart) -> _FlownWay:
     """Return the way in a part of a flight; where the vehicle was put elsewhere, it stays until it is there."""
-    places, times, speeds = part.places(), part.times, part.flight.columns["speed"][part.rows]
+    places = part.places()
     steps = np.zeros_like(places)
     steps[:-1] = np.diff(places, axis=0)
-    could = _ALWAYS + _FARTHEST * np.maximum(speeds[:-1], speeds[1:]) * np.diff(times)
-    jumps = np.linalg.norm(steps[:-1], axis=1) > could
-    steps[:-1][jumps] = 0
-    return _FlownWay(times, places, steps, np.flatnonzero(jumps) + 1)
+    puts = part.flight.puts - np.arange(len(part.flight.rows))[part.rows][0]
+    puts = puts[(puts > 0) & (puts < len(places))]
+    steps[puts - 1] = 0
+    return _FlownWay(part.times, places, steps, puts)
 
 
 def _first_within(way: _FlownWay, here: _Here, place: np.ndarray, radius: float) -> _Here:

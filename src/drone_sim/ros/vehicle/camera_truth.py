@@ -9,12 +9,12 @@ from typing import Any
 import genpy
 import numpy as np
 import rospy
-from cv_bridge import CvBridge
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
+from drone_sim.ros.core.message_conversion import image
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.truth import PictureTruth, Seen, described, quaternion_of
@@ -35,7 +35,6 @@ except ImportError:  # Debian has no package of it
 _FLOOR = "Floor"  # whose box is around everything
 _LINE = 0.01  # m, of the boxes in rviz
 _COLOR = ColorRGBA(1.0, 0.55, 0.1, 0.35)
-_bridge = CvBridge()
 
 
 class TruthOutput:
@@ -48,10 +47,10 @@ class TruthOutput:
         self._labels = rospy.Publisher(f"{topic}/truth/labels", String, queue_size=1, latch=True)
         self._labelled = ""
         kinds: dict[str, tuple[type[genpy.Message], Callable[[PictureTruth, Header], genpy.Message]]] = {
-            "instances": (Image, lambda truth, header: _image(truth.output("instance"), "mono16", header)),
-            "categories": (Image, lambda truth, header: _image(truth.categories, "mono16", header)),
-            "depth": (Image, lambda truth, header: _image(truth.output("depth"), "32FC1", header)),
-            "normals": (Image, lambda truth, header: _image(truth.output("normal"), "32FC3", header)),
+            "instances": (Image, lambda truth, header: image(truth.output("instance"), "mono16", header)),
+            "categories": (Image, lambda truth, header: image(truth.categories, "mono16", header)),
+            "depth": (Image, lambda truth, header: image(truth.output("depth"), "32FC1", header)),
+            "normals": (Image, lambda truth, header: image(truth.output("normal"), "32FC3", header)),
             "points": (PointCloud2, lambda truth, header: _cloud(truth.points, header)),
             "boxes": (String, lambda truth, header: _boxes(truth.seen(), header)),
             "box_markers": (MarkerArray, lambda truth, header: _markers(truth.seen(), header)),
@@ -105,17 +104,13 @@ class TruthOutput:
         if self._depth_before is None:  # there is no picture before
             known[:] = False
         self._depth_before = truth.output("depth")
-        self._flow.publish(_image(flow, "32FC2", header))
-        self._flow_known.publish(_image(255 * known.astype(np.uint8), "mono8", header))
+        self._flow.publish(image(flow, "32FC2", header))
+        self._flow_known.publish(image(255 * known.astype(np.uint8), "mono8", header))
 
     def close(self) -> None:
         """Advertise no more."""
         for one in self._publishers:
             one.unregister()
-
-
-def _image(picture: np.ndarray, encoding: str, header: Header) -> Image:
-    return _bridge.cv2_to_imgmsg(np.ascontiguousarray(picture), encoding, header)
 
 
 def _cloud(points: np.ndarray, header: Header) -> PointCloud2:

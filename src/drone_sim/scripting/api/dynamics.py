@@ -95,7 +95,7 @@ class Massive(Protocol):
 
 
 class Dynamics(Functions):
-    """What the dynamics know of an object: masses, whether it moves, and parameters that say so."""
+    """Dynamics of an object: its mass, whether it moves, and parameters for that."""
 
     @sim("345")
     def resetDynamicObject(self, handle: Handle) -> None:

@@ -32,7 +32,7 @@ class _ForceSensor(Protocol):
 
 
 class Sensors(Functions):
-    """What force sensors of the scene read, and a vehicle's instruments."""
+    """Force sensors of the scene, and sensors of a vehicle."""
 
     @sim("345")
     def readForceSensor(self, handle: Handle) -> tuple[int, list[float], list[float]]:

@@ -56,7 +56,7 @@ class Eye(Protocol):
 
 
 class VisionSensors(Functions):
-    """What vision sensors see."""
+    """Vision sensors."""
 
     @sim("345")
     def getVisionSensorCharImage(
