@@ -220,7 +220,7 @@ lint_catkin() {
   copy=$(mktemp -d)
   # shellcheck disable=SC2064 # as it is now
   trap "rm -rf '$copy'" EXIT
-  mkdir "$copy/drone_sim"
+  mkdir -p "$copy/drone_sim/docs/html" # which ./dev.sh docs makes
   git ls-files -co --exclude-standard | grep -v '^dev.sh$' | tar -cT - | tar -xC "$copy/drone_sim"
   "$1" -q -W2 --strict --ignore uninstalled_script "$copy/drone_sim"
 }
