@@ -324,7 +324,11 @@ case "$command" in
   fuzz) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   docs-commands) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/docs/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
-  soak-web) setup; exec .venv/bin/python test/soak/web.py "$@" ;;
+  soak-web)
+    install_packages chromium
+    setup
+    make_venv "${ALL[@]}" requirements-web.txt
+    exec .venv/bin/python test/soak/web.py "$@" ;;
   recordings)
     setup
     make_venv "${ALL[@]}" requirements-recordings.txt
