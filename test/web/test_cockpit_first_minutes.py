@@ -8,7 +8,7 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 from cockpit_page import Panel, open_page, wait_until
 
-STAGES = ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera")
+STAGES = ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera", "8_gate")
 GAIN = 'self.thrust = gain("thrust_gravity")'
 
 

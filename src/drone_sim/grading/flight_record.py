@@ -59,8 +59,12 @@ class FlightRecord:
         """The rows (M,) in which the vehicle is farther from the one before than its speed says: it was put there."""
         ways = np.linalg.norm(np.diff(self.rows[:, 1:4], axis=0), axis=1)
         speeds = self.columns["speed"]
-        could = _ALWAYS + _FARTHEST * np.maximum(speeds[:-1], speeds[1:]) * np.diff(self.times)
-        return np.flatnonzero(ways > could) + 1
+        return np.flatnonzero(ways > _could(np.maximum(speeds[:-1], speeds[1:]), np.diff(self.times))) + 1
+
+    def begins_at(self, position: Sequence[float]) -> bool:
+        """Whether the vehicle can be at its first row's place if it was at `position` (m) at 0 s."""
+        way = np.linalg.norm(self.rows[0, 1:4] - position)
+        return bool(way <= _could(self.columns["speed"][0], self.times[0]))
 
     def until(self, row: int) -> FlightRecord:
         """Return the flight as it was before a row, which is not its first."""
@@ -71,6 +75,11 @@ class FlightRecord:
     def end(self) -> float:
         """Simulated time of the last row in s."""
         return float(self.rows[-1, 0])
+
+
+def _could(speed: Any, seconds: Any) -> Any:
+    """Return how far (m) a vehicle gets by itself."""
+    return _ALWAYS + _FARTHEST * speed * seconds
 
 
 _AS_RECORDED = [name.partition(" ")[0] for name in COLUMNS]

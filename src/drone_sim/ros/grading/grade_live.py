@@ -118,6 +118,8 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     if late:
         rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
     flown, put = live.within_rules(flown)
+    if flown is None:
+        return flight.ungraded(plan, script, seed, {}, put).with_tried(live.rules.tried), None
     outcomes = tuple(one.judge(flown) for one in plan.criteria)
     digest = flight.digest_of(flown.rows)
     result = result_of(plan.name, script, seed, {}, outcomes, flown.end, put or error or None, digest)
@@ -135,6 +137,7 @@ class _Live:
         self._started = False
         wanted = plan.parameters(seed)
         simulator.check_seed(wanted, self._scene)
+        self._begin = next(one.position for one in wanted.fleet if one.name == plan.vehicle_of(wanted))
         self._timeline = plan.timeline_of(wanted)
         self._sender = TimelineSender(self._timeline.entries, parameters, simulator.node)
         self.listener = FlightListener(plan, parameters, simulator.node, self._follow)
@@ -192,10 +195,16 @@ class _Live:
                 return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
         return ""
 
-    def within_rules(self, flown: FlightRecord) -> tuple[FlightRecord, str]:
-        """Return a flight up to where somebody has put the vehicle elsewhere, if so, and what there is to say of it."""
+    def within_rules(self, flown: FlightRecord) -> tuple[FlightRecord | None, str]:
+        """Return a flight up to where somebody has put the vehicle elsewhere, if so, and what there is to say of it.
+
+        It is None where that was before the first step.
+        """
         if MOVE in self._plan.allowed:
             return flown, ""
+        if not flown.begins_at(self._begin):
+            said = f"somebody moved the vehicle before {flown.times[0]:.2f} s; the plan does not allow that"
+            return None, f"{said} (allowed: [move] would)"
         own = [one.at for one in self._timeline.entries if is_put(one)]
         for row in flown.puts:
             at = flown.times[row]
