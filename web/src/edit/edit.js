@@ -1,0 +1,325 @@
+// Editing of the scene: what is selected, what is done to it, and who is told of that. The node has the scene; here is
+// what it tells of it.
+import * as THREE from "three";
+import { ACCENT } from "../scene/looks.js";
+import { FREE } from "../scene/view.js";
+import { Drag } from "./drag.js";
+import { EditHand } from "./edit_hand.js";
+import { Glyphs } from "./glyphs.js";
+import { Handles } from "./handles.js";
+import { Measure } from "./measure.js";
+import { Objects, WORLD } from "./objects.js";
+import { poseOf } from "./poses.js";
+import { boxOf } from "./boxes.js";
+
+const HOVERED = 0xffffff;
+const ALSO = 0xf4a261; // what was selected before the last one
+const MOST_LIT = 150; // meshes with an outline
+const NOTHING = { file: "", modified: false, read_only: false, state: "", undo: "", redo: "", draft: null, revision: 0 };
+
+export class Edit {
+  // `ask` asks the node, `notice` is the message line, `openScript(file)` opens one in the editor.
+  constructor(scene, ask, notice, openScript) {
+    Object.assign(this, { scene, ask, notice, openScriptFile: openScript });
+    this.objects = new Objects();
+    this.is = NOTHING; // of the scene as a whole
+    this.selected = []; // handles, the last one last
+    this.expected = new Set(); // selected, but not told yet
+    this.hearing = new Map();
+    this.isOn = false;
+    this.frame = "world"; // the axes of the handles
+    this.glyphs = new Glyphs(scene.world);
+    this.handles = new Handles(scene.camera, { changed: (change) => this.drag(change) });
+    this.measure = new Measure(scene);
+    this.hand = new EditHand(scene, this, this.handles);
+  }
+
+  on(what, act) {
+    this.hearing.set(what, [...(this.hearing.get(what) ?? []), act]);
+  }
+
+  emit(what) {
+    for (const act of this.hearing.get(what) ?? []) act();
+  }
+
+  // ---- begin and end
+
+  turn(on) {
+    if (on === this.isOn) return;
+    this.isOn = on;
+    const { scene } = this;
+    scene.select("");
+    scene.hand.enter(null);
+    scene.editing = on ? this : null;
+    scene.hand.pointer.acts = on ? { ...scene.hand.acts(), ...this.hand.acts } : scene.hand.acts();
+    if (on) {
+      this.viewBefore = scene.view.name;
+      if (scene.view.name !== FREE) scene.look(FREE);
+      this.connected();
+    } else {
+      this.endMeasure();
+      if (this.viewBefore !== FREE && scene.view.name === FREE) scene.look(this.viewBefore);
+    }
+    this.show();
+    this.emit("mode");
+  }
+
+  connected() {
+    if (this.isOn) return this.ask("tree").then(({ tree }) => this.take(tree), (error) => this.wrong(error.message));
+  }
+
+  lost() {
+    this.objects.clear();
+    this.is = NOTHING;
+    this.selected = [];
+    for (const what of ["tree", "objects", "selection"]) this.emit(what);
+    this.show();
+  }
+
+  // ---- what the node tells
+
+  take(told) {
+    if (!this.isOn) return void (this.objects.version = null);
+    const changed = this.objects.take(told);
+    if (changed === "missed") return void this.connected();
+    const { objects, gone, version, since, ...is } = told;
+    this.is = is;
+    for (const one of [...this.expected]) if (this.objects.get(one)) this.expected.delete(one);
+    const still = this.selected.filter((one) => this.objects.get(one) || this.expected.has(one));
+    if (changed === "tree") this.emit("tree");
+    this.emit("objects");
+    if (still.length !== this.selected.length || changed === "tree") this.choose(still);
+    this.show();
+  }
+
+  // Paints anew what is seen of the objects, and of what is selected.
+  show() {
+    this.glyphs.show(this.isOn ? this.objects.all() : null);
+    this.scene.rearrange();
+  }
+
+  // ---- what is selected
+
+  get last() {
+    return this.selected.at(-1);
+  }
+
+  has(handle) {
+    return this.selected.includes(handle);
+  }
+
+  select(handles, more = false) {
+    const known = handles.filter((one) => this.objects.get(one) || this.expected.has(one));
+    this.choose(more ? [...this.selected.filter((one) => !known.includes(one)), ...known] : known);
+  }
+
+  toggle(handle) {
+    this.choose(this.has(handle) ? this.selected.filter((one) => one !== handle) : [...this.selected, handle]);
+  }
+
+  choose(handles) {
+    this.selected = handles;
+    this.emit("selection");
+    this.scene.rearrange();
+  }
+
+  hover(handle) {
+    if (handle === this.hovered) return;
+    this.hovered = handle;
+    this.scene.rearrange();
+  }
+
+  // The object of what is shown in the scene: a vehicle's body is its root.
+  objectOf({ ns, handle, layer }) {
+    if (handle !== undefined) return this.objects.get(handle);
+    const named = this.objects.named(ns);
+    if (named || layer === "scene") return named;
+    return [...this.objects.all()].find((one) => one.root && one.vehicle === ns);
+  }
+
+  // What a click on an object selects: its outermost model first, what it is a part of next, then the part itself.
+  shownAs(handle) {
+    const models = this.objects.above(handle).filter((one) => this.objects.get(one).model || this.objects.get(one).root);
+    const way = [...models.reverse(), handle];
+    const at = way.findLastIndex((one) => this.has(one));
+    return way[Math.min(at + 1, way.length - 1)];
+  }
+
+  // ---- what is seen of it: the scene asks while one edits
+
+  lit() {
+    const { hovered } = this;
+    const lit = this.selected.map((one) => [this.meshesOf(one), one === this.last ? ACCENT : ALSO, 2.5]);
+    if (hovered !== undefined && !this.has(hovered)) lit.push([this.meshesOf(hovered), HOVERED, 1.5]);
+    return lit;
+  }
+
+  // Of an object, and of all that hangs on it.
+  meshesOf(handle) {
+    if (!this.objects.get(handle)) return [];
+    const handles = this.objects.withBelow(handle);
+    const names = new Set(handles.flatMap((one) => this.namesOf(this.objects.get(one))));
+    const shown = this.scene.things().filter((one) => names.has(one.userData.said.ns));
+    const meshes = [];
+    for (const one of [...shown, ...handles.map((each) => this.glyphs.get(each)).filter(Boolean)]) one.traverse((part) => part.isMesh && !part.isInstancedMesh && meshes.push(part));
+    return meshes.slice(0, MOST_LIT);
+  }
+
+  namesOf({ name, root, vehicle }) {
+    return root ? [name, vehicle] : [name];
+  }
+
+  putHandles() {
+    const one = this.objects.get(this.last);
+    const isShown = this.isOn && one && this.mayMove(one.handle) && !this.hand.measuring && this.scene.shown.handles;
+    const frame = this.handles.mode === "scale" ? "own" : this.frame;
+    this.handles.put(isShown ? this.frameOf(one.handle, frame) : null, isShown && new THREE.Vector3().setFromMatrixPosition(one.matrix));
+  }
+
+  // ---- frames and places
+
+  mayMove(handle) {
+    const one = this.objects.get(handle);
+    return Boolean(one) && one.of !== "floor" && (one.of === "scene" || one.root || one.type === "target");
+  }
+
+  mayRename({ of }) {
+    return of !== "floor";
+  }
+
+  frameOf(handle, which) {
+    const one = this.objects.get(handle);
+    if (which === "own" && one) return one.matrix;
+    return (which === "parent" && this.objects.get(one?.parent)?.matrix) || new THREE.Matrix4();
+  }
+
+  // The box about some objects, along the axes of the world.
+  boxOf(handles) {
+    this.scene.world.updateMatrixWorld();
+    return boxOf(handles.flatMap((one) => this.meshesOf(one)), handles.map((one) => this.objects.get(one).matrix));
+  }
+
+  // ---- what is done
+
+  // Does some operations as one edit, after all before it; returns the answer, undefined where it was refused.
+  do(operations, name, merge) {
+    this.doing = (this.doing ?? Promise.resolve()).then(() => this.doNow(operations, name, merge));
+    return this.doing;
+  }
+
+  async doNow(operations, name, merge) {
+    try {
+      const { is } = this;
+      const answer = await this.ask("edit", { edit: operations, name, ...(merge ? { merge } : {}) });
+      const first = answer.until_stop && !this.hasTold;
+      if (first) this.notice.say("It flies: what you edit now is undone when it is stopped.");
+      this.hasTold = Boolean(answer.until_stop) && is.state !== "stopped";
+      return answer;
+    } catch (error) {
+      this.wrong(error.message);
+      this.connected(); // what was assumed is not so
+    }
+  }
+
+  // Does what makes objects, and selects the first of them, or all.
+  async make(operations, name, isAll = false) {
+    const answer = await this.do(operations, name);
+    const made = answer?.handles ?? [];
+    const chosen = isAll ? made : made.slice(0, 1);
+    for (const one of chosen) if (!this.objects.get(one)) this.expected.add(one);
+    if (chosen.length) this.select(chosen);
+    return answer;
+  }
+
+  wrong(line) {
+    this.notice.say(line, true);
+  }
+
+  async undo(which) {
+    try {
+      const { said, handles = [] } = await this.ask(which);
+      this.notice.say(said);
+      const there = handles.filter((one) => this.objects.get(one));
+      if (there.length) this.select(there);
+    } catch (error) {
+      this.wrong(error.message);
+    }
+  }
+
+  // Puts objects at places: matrices of the world, by handle.
+  place(places, name = this.named("Move", [...places.keys()]), merge) {
+    this.assume(places);
+    const operations = [...places].map(([object, matrix]) => {
+      const pose = poseOf(matrix);
+      return { do: "move", object, position: pose.slice(0, 3), quaternion: pose.slice(3), relative_to: "world" };
+    });
+    return this.do(operations, name, merge);
+  }
+
+  // Lets objects, and what hangs on them, be there until the node tells where they are.
+  assume(places) {
+    for (const [handle, matrix] of places) {
+      const way = matrix.clone().multiply(this.objects.get(handle).matrix.clone().invert());
+      for (const one of this.objects.withBelow(handle)) this.objects.get(one).matrix = way.clone().multiply(this.objects.get(one).matrix);
+    }
+    this.glyphs.show(this.objects.all());
+  }
+
+  named(verb, handles = this.selected) {
+    return `${verb} ${handles.length === 1 ? this.objects.get(handles[0])?.alias ?? "" : `${handles.length} objects`}`;
+  }
+
+  rename({ handle, alias }, name) {
+    return this.do([{ do: "rename", object: handle, name }], `Rename ${alias}`);
+  }
+
+  hang(parent, isRelative) {
+    const objects = this.objects.roots(this.selected);
+    const under = parent === WORLD ? "the world" : this.objects.get(parent).alias;
+    return this.do([{ do: "reparent", objects, parent, keep: isRelative ? "relative" : "pose" }], `${this.named("Hang", objects)} on ${under}`);
+  }
+
+  set(handles, values) {
+    return this.do(handles.map((object) => ({ do: "set", object, values })), this.named("Change", handles));
+  }
+
+  openScript({ script }) {
+    return this.openScriptFile(script);
+  }
+
+  // ---- drags
+
+  beginDrag() {
+    const roots = this.objects.roots(this.selected).filter((one) => this.mayMove(one));
+    this.dragged = new Drag(this, roots);
+  }
+
+  drag(change) {
+    this.dragged?.go(change);
+  }
+
+  endDrag(change) {
+    this.dragged?.end(change);
+    this.dragged = null;
+  }
+
+  cancelDrag() {
+    this.dragged?.cancel();
+    this.dragged = null;
+  }
+
+  // ---- measure
+
+  beginMeasure() {
+    this.hand.measuring = this.measure;
+    this.emit("mode");
+    this.scene.rearrange();
+  }
+
+  endMeasure() {
+    this.hand.measuring = null;
+    this.measure.clear();
+    this.emit("mode");
+    this.scene.rearrange();
+  }
+}
