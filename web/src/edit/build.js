@@ -123,8 +123,8 @@ export class Build {
 
   askForArray() {
     const step = this.arrange.aside();
-    const count = (axis, value) => ({ label: `Along ${axis}`, value, type: "number", low: 1, high: 100, step: 1 });
-    const apart = (axis, value) => ({ label: `Apart along ${axis}, m`, value, type: "number" });
+    const count = (axis, value) => ({ label: `How many along ${axis}`, value, type: "number", low: 1, high: 100, step: 1 });
+    const apart = (axis, value) => ({ label: `How far apart, m`, value, type: "number" });
     const fields = [count("x", 3), apart("x", step), count("y", 1), apart("y", step), count("z", 1), apart("z", step)];
     const act = ([nx, dx, ny, dy, nz, dz]) => this.arrange.duplicate([nx, ny, nz], [dx, dy, dz]);
     askFor("Duplicate in a row, or a grid", fields, "Duplicate", act);

@@ -148,21 +148,20 @@ export class Edit {
   // ---- what is seen of it: the scene asks while one edits
 
   lit() {
-    const { hovered } = this;
-    const lit = this.selected.map((one) => [this.meshesOf(one), one === this.last ? ACCENT : ALSO, 2.5]);
-    if (hovered !== undefined && !this.has(hovered)) lit.push([this.meshesOf(hovered), HOVERED, 1.5]);
-    return lit;
+    const { hovered, last } = this;
+    const lit = [[this.meshesOf(this.selected.slice(0, -1)), ALSO, 2.5], [this.meshesOf([last]), ACCENT, 2.5]];
+    if (hovered !== undefined && !this.has(hovered)) lit.push([this.meshesOf([hovered]), HOVERED, 1.5]);
+    return lit.filter(([meshes]) => meshes.length).map(([meshes, ...how]) => [meshes.slice(0, MOST_LIT), ...how]);
   }
 
-  // Of an object, and of all that hangs on it.
-  meshesOf(handle) {
-    if (!this.objects.get(handle)) return [];
-    const handles = this.objects.withBelow(handle);
-    const names = new Set(handles.flatMap((one) => this.namesOf(this.objects.get(one))));
-    const shown = this.scene.things().filter((one) => names.has(one.userData.said.ns));
+  // Of objects, and of all that hangs on them.
+  meshesOf(handles) {
+    const all = new Set(handles.filter((one) => this.objects.get(one)).flatMap((one) => this.objects.withBelow(one)));
+    const names = new Set([...all].flatMap((one) => this.namesOf(this.objects.get(one))));
+    const shown = all.size ? this.scene.things().filter((one) => names.has(one.userData.said.ns)) : [];
     const meshes = [];
-    for (const one of [...shown, ...handles.map((each) => this.glyphs.get(each)).filter(Boolean)]) one.traverse((part) => part.isMesh && !part.isInstancedMesh && meshes.push(part));
-    return meshes.slice(0, MOST_LIT);
+    for (const one of [...shown, ...[...all].map((each) => this.glyphs.get(each)).filter(Boolean)]) one.traverse((part) => part.isMesh && !part.isInstancedMesh && meshes.push(part));
+    return meshes;
   }
 
   namesOf({ name, root, vehicle }) {
@@ -196,7 +195,7 @@ export class Edit {
   // The box about some objects, along the axes of the world.
   boxOf(handles) {
     this.scene.world.updateMatrixWorld();
-    return boxOf(handles.flatMap((one) => this.meshesOf(one)), handles.map((one) => this.objects.get(one).matrix));
+    return boxOf(this.meshesOf(handles), handles.map((one) => this.objects.get(one).matrix));
   }
 
   // ---- what is done

@@ -145,7 +145,7 @@ export class Scene {
 
   // Looks at something by its name, or at the vehicle, from near.
   frame(name = this.selected || this.vehicle) {
-    if (this.editing?.last !== undefined) this.lookAt(this.editing.meshesOf(this.editing.last));
+    if (this.editing?.last !== undefined) this.lookAt(this.editing.meshesOf(this.editing.selected));
     else if (name === this.vehicle && this.view.name === BEHIND) this.view.reset();
     else this.lookAt(this.meshesOf(name));
     this.change();
