@@ -15,7 +15,7 @@ import { Properties } from "./properties.js";
 import { SceneFiles } from "./scene_files.js";
 import { SceneText } from "./scene_text.js";
 
-const ENDS = [["−", -1, "low ends"], ["·", 0, "middles"], ["+", 1, "high ends"]];
+const ENDS = [["low", -1, "low ends"], ["middle", 0, "middles"], ["high", 1, "high ends"]];
 
 export class Build {
   // `openScript(file)` opens one in the editor, `showScript(is)` shows the place where that is, and the text.
@@ -92,6 +92,11 @@ export class Build {
     const isAway = (target) => target.closest?.("#editor") && !this.text.isShown;
     listen(this.acts, () => this.edit.isOn, isAway);
     window.addEventListener("keydown", (event) => this.escape(event));
+    at("edit-panel").addEventListener("keydown", (event) => {
+      if (event.key !== "Escape") return;
+      event.stopPropagation(); // it would fold the panel
+      this.escape(event);
+    });
   }
 
   escape(event) {
@@ -131,7 +136,7 @@ export class Build {
   }
 
   aligns(axis, number) {
-    const buttons = ENDS.map(([sign, end, words]) => create("button", { type: "button", textContent: sign, title: `The ${words} along ${axis}`, "aria-label": `Align the ${words} along ${axis}`, onclick: () => this.arrange.align(number, end) }));
+    const buttons = ENDS.map(([word, end, words]) => create("button", { type: "button", textContent: word, title: `The ${words} along ${axis}`, "aria-label": `Align the ${words} along ${axis}`, onclick: () => this.arrange.align(number, end) }));
     return create("span", { role: "group", "aria-label": `Along ${axis}` }, axis, ...buttons);
   }
 
@@ -164,7 +169,7 @@ export class Build {
       button.disabled = !what;
       button.title = `${name === "undo" ? "Undo" : "Redo"}${what ? `: ${what}` : ""} (Ctrl+${name === "undo" ? "Z" : "Y"})`;
     }
-    at("until-stop").hidden = !["running", "flying", "paused"].includes(state);
+    at("until-stop").hidden = !state || state === "stopped";
     const count = edit.selected.length;
     at("selected").textContent = !one ? "Nothing is selected" : count > 1 ? `${count} objects; the last: ${one.alias}` : one.alias;
     at("selected-type").textContent = one && count === 1 ? one.type.replaceAll("_", " ") : "";

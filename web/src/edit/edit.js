@@ -268,8 +268,11 @@ export class Edit {
     return `${verb} ${handles.length === 1 ? this.objects.get(handles[0])?.alias ?? "" : `${handles.length} objects`}`;
   }
 
-  rename({ handle, alias }, name) {
-    return this.do([{ do: "rename", object: handle, name }], `Rename ${alias}`);
+  // The tree shows the alias: one that is another than the name becomes the new name, too.
+  rename({ handle, name: before, alias, of }, name) {
+    const operations = [{ do: "rename", object: handle, name }];
+    if (of === "scene" && alias !== before) operations.push({ do: "set", object: handle, values: { alias: name } });
+    return this.do(operations, `Rename ${alias}`);
   }
 
   hang(parent, isRelative) {

@@ -18,7 +18,7 @@ export class Models {
     find.onkeydown = (event) => event.key === "Escape" && find.value && ((find.value = ""), this.show(), event.stopPropagation());
     shelf.addEventListener("pointerdown", (event) => this.down(event));
     shelf.addEventListener("keydown", (event) => this.key(event));
-    window.addEventListener("keydown", (event) => event.key === "Escape" && this.end());
+    window.addEventListener("keydown", (event) => event.key === "Escape" && this.end(), true);
     this.listen(edit.scene.canvas.element);
     edit.on("mode", () => edit.isOn && !this.groups.length && this.ask());
   }

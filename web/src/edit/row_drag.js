@@ -13,7 +13,7 @@ export class RowDrag {
   constructor(tree, edit, range, twice) {
     Object.assign(this, { tree, edit, range, twice });
     tree.addEventListener("pointerdown", (event) => this.down(event));
-    window.addEventListener("keydown", (event) => event.key === "Escape" && this.end());
+    window.addEventListener("keydown", (event) => event.key === "Escape" && this.end(), true);
   }
 
   handleAt(element) {
