@@ -24,20 +24,20 @@ export class Arrange {
   align(axis, end) {
     const { last } = this.edit;
     const ends = (box) => [box.min, box.getCenter(new THREE.Vector3()), box.max][end + 1].getComponent(axis);
-    const to = ends(this.edit.boxOf([last]));
+    const to = ends(this.edit.seen.boxOf([last]));
     this.shift(`Align ${AXES[axis]}:`, (box) => new THREE.Vector3().setComponent(axis, to - ends(box)), last);
   }
 
   shift(verb, by, without) {
     const { edit, roots } = this;
     const moved = roots.filter((one) => one !== without);
-    const places = new Map(moved.map((one) => [one, shifted(edit.objects.get(one).matrix, by(edit.boxOf([one])))]));
+    const places = new Map(moved.map((one) => [one, shifted(edit.objects.get(one).matrix, by(edit.seen.boxOf([one])))]));
     if (places.size) return edit.place(places, edit.named(verb, moved));
   }
 
   // How far a copy is put aside, so that it does not stand in what it is a copy of: m.
   aside() {
-    const size = this.edit.boxOf(this.roots).getSize(new THREE.Vector3());
+    const size = this.edit.seen.boxOf(this.roots).getSize(new THREE.Vector3());
     return Math.max(0.1, onGrid(size.x + GAP));
   }
 

@@ -136,7 +136,10 @@ export class Build {
   }
 
   aligns(axis, number) {
-    const buttons = ENDS.map(([word, end, words]) => create("button", { type: "button", textContent: word, title: `The ${words} along ${axis}`, "aria-label": `Align the ${words} along ${axis}`, onclick: () => this.arrange.align(number, end) }));
+    const buttons = ENDS.map(([word, end, words]) => {
+      const said = { type: "button", textContent: word, title: `The ${words} along ${axis}`, "aria-label": `Align the ${words} along ${axis}` };
+      return create("button", { ...said, onclick: () => this.arrange.align(number, end) });
+    });
     return create("span", { role: "group", "aria-label": `Along ${axis}` }, axis, ...buttons);
   }
 

@@ -1,7 +1,6 @@
 // Editing of the scene: what is selected, what is done to it, and who is told of that. The node has the scene; here is
 // what it tells of it.
 import * as THREE from "three";
-import { ACCENT } from "../scene/looks.js";
 import { FREE } from "../scene/view.js";
 import { Drag } from "./drag.js";
 import { EditHand } from "./edit_hand.js";
@@ -10,11 +9,8 @@ import { Handles } from "./handles.js";
 import { Measure } from "./measure.js";
 import { Objects, WORLD } from "./objects.js";
 import { poseOf } from "./poses.js";
-import { boxOf } from "./boxes.js";
+import { Seen } from "./seen.js";
 
-const HOVERED = 0xffffff;
-const ALSO = 0xf4a261; // what was selected before the last one
-const MOST_LIT = 150; // meshes with an outline
 const NOTHING = { file: "", modified: false, read_only: false, state: "", undo: "", redo: "", draft: null, revision: 0 };
 
 export class Edit {
@@ -30,6 +26,7 @@ export class Edit {
     this.frame = "world"; // the axes of the handles
     this.glyphs = new Glyphs(scene.world);
     this.handles = new Handles(scene.camera, { changed: (change) => this.drag(change) });
+    this.seen = new Seen(this);
     this.measure = new Measure(scene);
     this.hand = new EditHand(scene, this, this.handles);
   }
@@ -129,14 +126,6 @@ export class Edit {
     this.scene.rearrange();
   }
 
-  // The object of what is shown in the scene: a vehicle's body is its root.
-  objectOf({ ns, handle, layer }) {
-    if (handle !== undefined) return this.objects.get(handle);
-    const named = this.objects.named(ns);
-    if (named || layer === "scene") return named;
-    return [...this.objects.all()].find((one) => one.root && one.vehicle === ns);
-  }
-
   // What a click on an object selects: its outermost model first, what it is a part of next, then the part itself.
   shownAs(handle) {
     const models = this.objects.above(handle).filter((one) => this.objects.get(one).model || this.objects.get(one).root);
@@ -145,28 +134,7 @@ export class Edit {
     return way[Math.min(at + 1, way.length - 1)];
   }
 
-  // ---- what is seen of it: the scene asks while one edits
-
-  lit() {
-    const { hovered, last } = this;
-    const lit = [[this.meshesOf(this.selected.slice(0, -1)), ALSO, 2.5], [this.meshesOf([last]), ACCENT, 2.5]];
-    if (hovered !== undefined && !this.has(hovered)) lit.push([this.meshesOf([hovered]), HOVERED, 1.5]);
-    return lit.filter(([meshes]) => meshes.length).map(([meshes, ...how]) => [meshes.slice(0, MOST_LIT), ...how]);
-  }
-
-  // Of objects, and of all that hangs on them.
-  meshesOf(handles) {
-    const all = new Set(handles.filter((one) => this.objects.get(one)).flatMap((one) => this.objects.withBelow(one)));
-    const names = new Set([...all].flatMap((one) => this.namesOf(this.objects.get(one))));
-    const shown = all.size ? this.scene.things().filter((one) => names.has(one.userData.said.ns)) : [];
-    const meshes = [];
-    for (const one of [...shown, ...[...all].map((each) => this.glyphs.get(each)).filter(Boolean)]) one.traverse((part) => part.isMesh && !part.isInstancedMesh && meshes.push(part));
-    return meshes;
-  }
-
-  namesOf({ name, root, vehicle }) {
-    return root ? [name, vehicle] : [name];
-  }
+  // ---- the handles: the scene asks while one edits
 
   putHandles() {
     const one = this.objects.get(this.last);
@@ -190,12 +158,6 @@ export class Edit {
     const one = this.objects.get(handle);
     if (which === "own" && one) return one.matrix;
     return (which === "parent" && this.objects.get(one?.parent)?.matrix) || new THREE.Matrix4();
-  }
-
-  // The box about some objects, along the axes of the world.
-  boxOf(handles) {
-    this.scene.world.updateMatrixWorld();
-    return boxOf(this.meshesOf(handles), handles.map((one) => this.objects.get(one).matrix));
   }
 
   // ---- what is done

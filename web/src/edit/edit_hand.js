@@ -43,7 +43,7 @@ export class EditHand {
     for (const met of ray.intersectObjects(things, true)) {
       let object = met.object;
       while (object && !object.userData.said) object = object.parent;
-      const found = object && this.edit.objectOf(object.userData.said);
+      const found = object && this.edit.seen.objectOf(object.userData.said);
       if (found && without.has(found.handle)) continue;
       const normal = met.face ? met.face.normal.clone().transformDirection(met.object.matrixWorld) : up.clone();
       if (normal.dot(ray.ray.direction) > 0) normal.negate();

@@ -145,7 +145,7 @@ export class Scene {
 
   // Looks at something by its name, or at the vehicle, from near.
   frame(name = this.selected || this.vehicle) {
-    if (this.editing?.last !== undefined) this.lookAt(this.editing.meshesOf(this.editing.selected));
+    if (this.editing?.last !== undefined) this.lookAt(this.editing.seen.meshesOf(this.editing.selected));
     else if (name === this.vehicle && this.view.name === BEHIND) this.view.reset();
     else this.lookAt(this.meshesOf(name));
     this.change();
@@ -273,7 +273,7 @@ export class Scene {
   }
 
   mark() {
-    if (this.editing) return this.outline.show(this.editing.lit());
+    if (this.editing) return this.outline.show(this.editing.seen.lit());
     const lit = [];
     if (this.hand.hovered && this.hand.hovered !== this.selected) lit.push([this.meshesOf(this.hand.hovered), HOVERED, 1.5]);
     if (this.selected) lit.push([this.meshesOf(this.selected), ACCENT, 2.5]);
