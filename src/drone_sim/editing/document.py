@@ -33,7 +33,7 @@ class SceneDocument:
         """Take the scene; `read` is due."""
         self._scene = scene
         self.file: Path | None = None
-        self.base = ""
+        self.base = yaml_text.YamlText("")
         self._entries: list[tuple[int, EntryParameters]] = []  # those of the text, with their handles
         self._scripts: list[AttachedScriptParameters] = []
 
@@ -48,7 +48,7 @@ class SceneDocument:
         """Take the file that the simulation has read its scene from."""
         parameters = self._scene.simulation.parameters
         file = parameters.scene_file
-        self.file, self.base = (resolve(file) if file else None), ""
+        self.file = resolve(file) if file else None
         self._scene.folder = self.file.parent if self.file else HOME.expanduser()
         if self.file is None:
             self._take("", _settings_of(self._scene))
@@ -77,15 +77,14 @@ class SceneDocument:
 
     def take_text(self, text: str) -> None:
         """Know that a text says what the scene is now."""
-        self.base = text
+        self.base = yaml_text.YamlText(text)
         scene, tree = self._scene.simulation.scene, self._scene.tree
-        said = yaml_files.parse(text) if text else None
-        count = len((said or {}).get("objects") or ())
+        said = self.base.values
         now = [(tree.handle(one.name), scene.entry_now(index)) for index, one in scene.entries.items()]
-        names = [one.name for one in self._parsed(said)] if count else []
+        names = [one.name for one in self._parsed(said)] if said.get("objects") else []
         by_name = {one.name: (handle, one) for handle, one in now}
         self._entries = [by_name.get(name, (WORLD, now[0][1])) for name in names]
-        self._scripts = [*scene.scripts.values()] if (said or {}).get("scripts") else []
+        self._scripts = [*scene.scripts.values()] if said.get("scripts") else []
 
     def _parsed(self, said: Any) -> list[EntryParameters]:
         found = scene_parameters.from_content(copy.deepcopy(said), self._scene.folder)
@@ -110,13 +109,18 @@ class SceneDocument:
 
     # ---- as a text
 
-    def text(self, folder: Path | None = None) -> str:
-        """Return what a file in a folder, that of the scene's where none is given, says of the scene as it is now."""
+    def text(self) -> str:
+        """Return what its file would say of the scene as it is now."""
+        said, kept = self._said(self._scene.folder)
+        return self.base.rewritten(said, kept)
+
+    def _said(self, folder: Path) -> tuple[dict[str, Any], dict[str, list[int | None]]]:
+        """Return what a file in a folder says of the scene, and which items of its lists the text had."""
         here = self._scene.folder
-        folder = folder or here
         now = self._scene.content()
-        old = (yaml_files.parse(self.base) if self.base else None) or {}
-        items, kept = [], []
+        old = self.base.values
+        items: list[Any] = []
+        kept: list[int | None] = []
         rest = dict(now.entries)
         for index, (handle, before) in enumerate(self._entries):
             entry = rest.pop(handle, None)
@@ -131,9 +135,7 @@ class SceneDocument:
         if new_scripts or "scripts" in old:
             said["scripts"] = new_scripts
         ordered = {key: said[key] for key in (*old, *said) if key in said}
-        return yaml_text.rewritten(
-            self.base, ordered, {"objects": [*kept, *[None] * len(new)], "scripts": kept_scripts}
-        )
+        return ordered, {"objects": [*kept, *[None] * len(new)], "scripts": kept_scripts}
 
     def _script_items(
         self, old: list[Any], now: Mapping[str, AttachedScriptParameters], folder: Path
@@ -156,7 +158,9 @@ class SceneDocument:
         One that nobody may write to is copied.
         """
         path = self._path(name)
-        text = self.text(path.parent)
+        said, kept = self._said(path.parent)
+        text = self.base.rewritten(said, kept)
+        text = text if yaml_text.says(text, said) else yaml_text.dumped(said)
         simulation = self._scene.simulation
         try:
             simulation.parameters.with_content(yaml_files.parse(text), path.parent)
@@ -164,8 +168,8 @@ class SceneDocument:
             raise ParameterError(f"the scene as it stands cannot be saved: {error}") from None
         path.parent.mkdir(parents=True, exist_ok=True)
         if path != self.file and path.is_file():
-            with contextlib.suppress(FileNotFoundError), writing.replacing(f"{path}.bak", binary=True) as kept:
-                kept.write(path.read_bytes())
+            with contextlib.suppress(FileNotFoundError), writing.replacing(f"{path}.bak", binary=True) as before:
+                before.write(path.read_bytes())
         writing.write(path, text)
         self.file = path
         settings = _moved_files(self._scene.settings, self._scene.folder, path.parent)

@@ -19,21 +19,28 @@ _ANCHOR = re.compile(r"&([^\s,\[\]{}]+)\s")
 _Kept = Mapping[str, Sequence[int | None]]
 
 
-def rewritten(text: str, new: Mapping[str, Any], kept: _Kept) -> str:
-    """Return a text of a mapping that says something new.
+class YamlText:
+    """A text of a mapping, or an empty one."""
 
-    `kept` has for lists under the mapping's keys the index that each new item had before, None for one that is new.
-    Raises YamlError for a text that cannot be read.
-    """
-    old = yaml_files.parse(text)
-    if isinstance(old, dict):
-        made = _Rewriting(text, kept).rewrite(old, new)
-        if _says(made, new):
-            return made
-    return dumped(new)
+    def __init__(self, text: str):
+        """Read it. Raises YamlError."""
+        found = yaml_files.parse(text)
+        self.text = text
+        self.values: Mapping[str, Any] = found if isinstance(found, dict) else {}
+        self._root = yaml_files.compose(text) if self.values else None
+
+    def rewritten(self, new: Mapping[str, Any], kept: _Kept) -> str:
+        """Return a text that says something new.
+
+        `kept` has for lists under the mapping's keys the index that each new item had before, None for one that is new.
+        """
+        if self._root is None or self._root.flow_style:
+            return dumped(new)
+        return _Rewriting(self.text, self._root, kept).rewrite(self.values, new)
 
 
-def _says(text: str, wanted: Mapping[str, Any]) -> bool:
+def says(text: str, wanted: Mapping[str, Any]) -> bool:
+    """Tell whether a text says that: with anchors and aliases in odd places one may not."""
     try:
         return bool(yaml_files.parse(text) == wanted)
     except yaml_files.YamlError:
@@ -48,16 +55,14 @@ def dumped(values: Mapping[str, Any]) -> str:
 class _Rewriting:
     """Collects what takes the place of what, by positions in the text."""
 
-    def __init__(self, text: str, kept: _Kept):
-        self._text = text if text.endswith("\n") or not text else text + "\n"
+    def __init__(self, text: str, root: Any, kept: _Kept):
+        self._text = text if text.endswith("\n") else text + "\n"
+        self._root = root
         self._kept = kept
         self._parts: list[tuple[int, int, str]] = []
 
     def rewrite(self, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
-        root = yaml_files.compose(self._text)
-        if root is None or root.flow_style:
-            return dumped(new)
-        self._update(root, old, new, top=True)
+        self._update(self._root, old, new, top=True)
         self._keep_anchors()
         made, at = [], 0
         for start, end, words in sorted(self._parts, key=lambda one: one[:2]):
@@ -155,7 +160,7 @@ class _Rewriting:
         """Let what is named elsewhere be said there, where the place at which it stood says something else."""
         for start, end, _ in [*self._parts]:
             for found in _ANCHOR.finditer(self._text, start, end):
-                node = _node_at(yaml_files.compose(self._text), found.start())
+                node = _node_at(self._root, found.start())
                 alias = re.compile(rf"\*{re.escape(found[1])}(?![^\s,\]}}])")
                 if node is None:
                     continue

@@ -6,8 +6,10 @@ docs/interface.md says what both hold. A window in the browser, or a script, nee
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
+import rospkg
 import rospy
 from diagnostic_msgs.srv import AddDiagnostics  # of ROS's own services the one that takes a text and answers with one
 
@@ -32,7 +34,8 @@ class SceneEditing:
     def __init__(self, player: Player, inbox: Inbox, services: Services):
         """Advertise for the simulation of `player`, whose thread empties `inbox`; `services` tell who flies."""
         self._player, self._inbox, self._services = player, inbox, services
-        self.editor = SceneEditor(player)
+        name = rospy.get_name().strip("/").replace("/", "_")
+        self.editor = SceneEditor(player, Path(rospkg.get_ros_home()) / "drone_sim" / name)
         self._rows = SceneRows(self.editor.scene)
         self._topic = LatchedText("~scene_objects")
         self._throttle = Throttle(_PERIOD)
@@ -62,6 +65,7 @@ class SceneEditing:
     def update(self) -> None:
         """Say what is new of the tree, while somebody listens."""
         self.editor.follow()
+        self.editor.keep_draft()
         if not self._topic.is_heard or not self._throttle.passes():
             return
         is_whole = self._topic.has_new_listeners or not self._version
