@@ -92,6 +92,10 @@ class ObjectTree:
             self._loose.append(added)
         return handle
 
+    def reserve(self, handles: Mapping[str, int]) -> None:
+        """Let objects that come under these names have these handles again, where nothing else has them."""
+        self._kept = {**self._kept, **handles}
+
     def remove(self, handles: Collection[int]) -> None:
         """Take objects out of the tree; others that hang on them stay where they are, in the world."""
         going = {id(self._objects[handle]) for handle in handles}

@@ -51,6 +51,11 @@ class Services:
         """Leave the parameters as they were given."""
         self._vehicles.close()
 
+    def tell_vehicles(self) -> None:
+        """Say in the parameter who flies, and let the topics follow: the scene may have other vehicles."""
+        self._vehicles.tell(self._player.simulation.parameters)
+        self._follow()
+
     def _answer(self, job: Callable[[], str], _request: Any = None) -> tuple[bool, str]:
         try:
             answer = self._inbox.ask(job)
