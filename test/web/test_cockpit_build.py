@@ -23,6 +23,7 @@ def sysCall_init():
     sim.adjustView(view, sim.getObjectHandle("TrackCam"), 64)
 """
 FAR = 1e-4  # m, rad
+SELECTED = "scene.editing.objects.get(scene.editing.last)?.name ?? null"
 # Names of an object, of what it hangs on, and where it is in that one's frame.
 OBJECT = """name => {
     const { objects } = scene.editing;
@@ -77,10 +78,10 @@ class Builder:
         self.page.locator("#models").get_by_role("button", name=model, exact=True).hover()
         self.page.mouse.down()
         self.page.mouse.move(*self.page.evaluate(PROJECT, point), steps=4)
-        before = self.page.inner_text("#selected")
+        before = self.page.evaluate(SELECTED)
         self.page.mouse.up()
-        wait_until(self.page, lambda: self.page.inner_text("#selected") not in (before, ""))
-        return self.page.inner_text("#selected")
+        wait_until(self.page, lambda: self.page.evaluate(SELECTED) not in (before, None))
+        return self.page.evaluate(SELECTED)
 
     def write(self, relative="World", **numbers):
         """Write numbers of the position and orientation: X, Y, Z (m), Alpha, Beta, Gamma (degrees)."""
@@ -112,19 +113,19 @@ def build(builder, script):
     wait_until(builder.page, lambda: builder.page.get_by_role("treeitem").count() == 1)
     builder.select("Floor")
     builder.set("size", 10)
-    builder.rename(builder.drop("Quadricopter", [0.5, 0.5, 0]), "Drone")
+    builder.rename(builder.drop("Quadricopter of V-REP", [0.5, 0.5, 0]), "Drone")
     builder.write(X=0, Y=0, Z=0.8)
     builder.set("script", script)
     builder.unfold("Drone")
-    for camera in ("Quadricopter_floorCamera", "Quadricopter_frontCamera", "TrackCam", "Track_base"):
+    for camera in ("Quadricopter_floorCamera", "Quadricopter_frontCamera"):
         builder.select(camera)
         builder.page.keyboard.press("Delete")
         builder.row(camera).wait_for(state="detached")
-    builder.rename(builder.drop("Camera", [-1, 0, 0]), "TrackCam")
+    builder.rename(builder.drop("Camera", [1, 0.6, 0]), "TrackCam")
     builder.hang("TrackCam", "Quadricopter_base")
     builder.write("Parent", X=-0.8, Y=0, Z=0.3, Alpha=180, Beta=75, Gamma=-90)
     builder.wait("TrackCam", lambda one: near(one, (-0.8, 0, 0.3)))
-    builder.rename(builder.drop("Dummy", [1, 1, 0]), "Track_base")
+    builder.rename(builder.drop("Dummy", [1, -0.6, 0]), "Track_base")
     builder.hang("Track_base", "Quadricopter_base")
     builder.write("Parent", X=0, Y=0, Z=0)
     builder.hang("TrackCam", "Track_base")
@@ -137,3 +138,16 @@ def check(builder):
     assert builder.object("DronePosition") and builder.object("Drone")
     assert near(builder.wait("Track_base", lambda one: one["above"] == "Quadricopter_base"), (0, 0, 0))
     assert near(builder.wait("TrackCam", lambda one: one["above"] == "Track_base"), (-0.8, 0, 0.3))
+
+
+def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cockpit, browser, monkeypatch):
+    monkeypatch.setenv("ROS_MASTER_URI", os.environ["ROS_MASTER_URI"])  # that of this process, afterwards
+    cockpit.scripts.mkdir(exist_ok=True)
+    script, scene = cockpit.scripts / "stock.py", cockpit.scripts / "Drone.yaml"
+    script.write_text(SCRIPT)
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        page.click("#toggle")
+        builder = Builder(page)
+        build(builder, str(script))
+        check(builder)
+        builder.save_as(scene.name)

@@ -174,7 +174,7 @@ export class Build {
     }
     at("until-stop").hidden = !state || state === "stopped";
     const count = edit.selected.length;
-    at("selected").textContent = !one ? "Nothing is selected" : count > 1 ? `${count} objects; the last: ${one.alias}` : one.alias;
+    at("selected").textContent = !one ? "Nothing is selected" : count > 1 ? `${count} objects; the last: ${one.name}` : one.name;
     at("selected-type").textContent = one && count === 1 ? one.type.replaceAll("_", " ") : "";
     at("pose").hidden = !one || one.of === "floor";
     at("nothing").hidden = Boolean(one);

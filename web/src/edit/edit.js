@@ -51,7 +51,10 @@ export class Edit {
     scene.hand.pointer.acts = on ? { ...scene.hand.acts(), ...this.hand.acts } : scene.hand.acts();
     if (on) {
       this.viewBefore = scene.view.name;
-      if (scene.view.name !== FREE) scene.look(FREE);
+      if (scene.view.name !== FREE) {
+        scene.look(FREE);
+        scene.view.stepBack();
+      }
       this.connected();
     } else {
       this.endMeasure();
@@ -62,7 +65,10 @@ export class Edit {
   }
 
   connected() {
-    if (this.isOn) return this.ask("tree").then(({ tree }) => this.take(tree), (error) => this.wrong(error.message));
+    if (!this.isOn) return;
+    // What has been told meanwhile may be newer.
+    const take = ({ tree }) => tree.version >= (this.objects.version ?? tree.version) && this.take(tree);
+    return this.ask("tree").then(take, (error) => this.wrong(error.message));
   }
 
   lost() {
@@ -91,7 +97,7 @@ export class Edit {
 
   // Paints anew what is seen of the objects, and of what is selected.
   show() {
-    this.glyphs.show(this.isOn ? this.objects.all() : null);
+    this.glyphs.show(this.isOn ? this.seen.bodiless() : null);
     this.scene.rearrange();
   }
 
@@ -117,7 +123,7 @@ export class Edit {
   choose(handles) {
     this.selected = handles;
     this.emit("selection");
-    this.scene.rearrange();
+    this.show();
   }
 
   hover(handle) {
@@ -223,23 +229,20 @@ export class Edit {
       const way = matrix.clone().multiply(this.objects.get(handle).matrix.clone().invert());
       for (const one of this.objects.withBelow(handle)) this.objects.get(one).matrix = way.clone().multiply(this.objects.get(one).matrix);
     }
-    this.glyphs.show(this.objects.all());
+    this.glyphs.show(this.seen.bodiless());
   }
 
   named(verb, handles = this.selected) {
-    return `${verb} ${handles.length === 1 ? this.objects.get(handles[0])?.alias ?? "" : `${handles.length} objects`}`;
+    return `${verb} ${handles.length === 1 ? this.objects.get(handles[0])?.name ?? "" : `${handles.length} objects`}`;
   }
 
-  // The tree shows the alias: one that is another than the name becomes the new name, too.
-  rename({ handle, name: before, alias, of }, name) {
-    const operations = [{ do: "rename", object: handle, name }];
-    if (of === "scene" && alias !== before) operations.push({ do: "set", object: handle, values: { alias: name } });
-    return this.do(operations, `Rename ${alias}`);
+  rename({ handle, name: before }, name) {
+    return this.do([{ do: "rename", object: handle, name }], `Rename ${before}`);
   }
 
   hang(parent, isRelative) {
     const objects = this.objects.roots(this.selected);
-    const under = parent === WORLD ? "the world" : this.objects.get(parent).alias;
+    const under = parent === WORLD ? "the world" : this.objects.get(parent).name;
     return this.do([{ do: "reparent", objects, parent, keep: isRelative ? "relative" : "pose" }], `${this.named("Hang", objects)} on ${under}`);
   }
 

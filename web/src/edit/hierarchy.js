@@ -47,9 +47,9 @@ export class Hierarchy {
     this.draw();
   }
 
-  // A model begins folded: what it is made of is seldom looked at.
-  begin({ handle, model, root }) {
-    if (!(model || root) || this.known.has(handle)) return;
+  // A model begins folded, and so do a vehicle's propellers: what they are made of is seldom looked at.
+  begin({ handle, model, of, type }) {
+    if (!(model || (of === "vehicle" && type !== "dummy")) || this.known.has(handle)) return;
     this.known.add(handle);
     this.folded.add(handle);
   }
@@ -105,7 +105,7 @@ export class Hierarchy {
     row.style.cssText = `top:${number * ROW}px;padding-left:${4 + depth * INDENT}px`;
     row.setAttribute("aria-level", depth + 1);
     row.setAttribute("aria-selected", this.edit.has(handle));
-    row.append(this.folder(row, handle), icon(iconOf(one)), create("span", { className: "name", textContent: one.alias }));
+    row.append(this.folder(row, handle), icon(iconOf(one)), create("span", { className: "name", textContent: one.name }));
     if (one.script) row.append(this.script(one));
     return row;
   }
@@ -147,7 +147,7 @@ export class Hierarchy {
   keyOfFind(event) {
     if (event.key === "ArrowDown" || event.key === "Enter") {
       const sought = this.find.value.trim().toLowerCase();
-      const row = this.rows.find(({ handle }) => this.objects.get(handle).alias.toLowerCase().includes(sought));
+      const row = this.rows.find(({ handle }) => this.objects.get(handle).name.toLowerCase().includes(sought));
       if (row) this.edit.select([row.handle]);
       this.tree.focus();
     } else if (event.key === "Escape" && this.find.value) this.find.value = "";

@@ -63,7 +63,7 @@ export class SceneFiles {
   saveModel() {
     const one = this.edit.objects.get(this.edit.last);
     if (!one) return this.edit.wrong("Nothing is selected: a model is an object with all that hangs on it.");
-    this.askForFile(`Save ${one.alias} as a model`, { label: "Name", value: `${one.alias}.yaml` }, "save_model", { object: one.handle });
+    this.askForFile(`Save ${one.name} as a model`, { label: "Name", value: `${one.name}.yaml` }, "save_model", { object: one.handle });
   }
 
   // A name that is taken is asked about once more.

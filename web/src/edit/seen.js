@@ -23,6 +23,12 @@ export class Seen {
     return [...this.objects.all()].find((one) => one.root && one.vehicle === ns);
   }
 
+  // What is drawn by Glyphs, where it has no body; the parts of a vehicle while it is selected, or one of them.
+  bodiless() {
+    const vehicles = new Set(this.edit.selected.map((one) => this.objects.get(one)?.vehicle));
+    return [...this.objects.all()].filter(({ of, vehicle }) => of === "scene" || (vehicle && vehicles.has(vehicle)));
+  }
+
   // What has an outline, as Outline takes it.
   lit() {
     const { hovered, last, selected } = this.edit;
