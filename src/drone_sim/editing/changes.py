@@ -113,6 +113,7 @@ class _Changing:
         if self._new:
             self._simulation.context.objects.reserve({one.name: handle for handle, one in self._new.items()})
             self._simulation.operations.add([*self._new.values()])
+            self._simulation.scene.put_in_order()
         for handle, (one, two) in self._other.items():
             self._be(handle, one, two)
         self._place()

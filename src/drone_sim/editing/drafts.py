@@ -31,6 +31,7 @@ class Drafts:
         self._file = folder / "draft.yaml" if folder else None
         self._left = folder / "draft.left.yaml" if folder else None
         self._lock = threading.Lock()
+        self._writing: threading.Thread | None = None
         self._number = 0  # of the last text that was to be written
         with contextlib.suppress(OSError):
             if self._file and self._left:
@@ -51,7 +52,13 @@ class Drafts:
                     path.parent.mkdir(parents=True, exist_ok=True)
                     writing.write(path, f"{_HEAD}{file or _NO_FILE}\n{text}")
 
-        threading.Thread(target=write, name="draft").start()
+        self._writing = threading.Thread(target=write, name="draft")
+        self._writing.start()
+
+    def wait(self) -> None:
+        """Wait until what was to be kept is on the disk."""
+        if self._writing is not None:
+            self._writing.join()
 
     def clear(self) -> None:
         """Have no draft: all is saved."""

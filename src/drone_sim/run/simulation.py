@@ -212,13 +212,13 @@ class Simulation:
         self.scenes_read += 1
 
     def arrange(self, parameters: Parameters, rebuild: bool = True) -> None:
-        """While it is stopped: begin as these parameters say from now on, with the handles that objects have.
+        """While it is stopped: begin as these parameters say from now on, with the handles that objects have, or had.
 
         Without `rebuild`, what stands there stays until then. Raises ParameterError and UrdfError, where all is as it
         was.
         """
         if rebuild:
-            self._handles = self.context.objects.handles()
+            self._handles = self.context.objects.handles().with_those_of(self._handles)
             self._rebuild(parameters, self._handles)
         self.parameters = parameters
         self._is_arranged = True

@@ -334,6 +334,11 @@ class Scene:
         if any(isinstance(one, (JointParameters, ForceSensorParameters)) for one in self.entries.values()):
             self.write_down(self.entries)
 
+    def put_in_order(self) -> None:
+        """Let entries stand in the order of their objects' handles, as they came first."""
+        handles = {index: self.tree.handle(one.name) for index, one in self.entries.items()}
+        self.entries = dict(sorted(self.entries.items(), key=lambda pair: handles[pair[0]]))
+
     def parameters_now(self) -> SceneParameters:
         """Return what a file would say of the scene as it is now."""
         self.write_down(self.entries)
