@@ -23,7 +23,33 @@ MODELS = ROOT / "config/models"
 TAG, CORNERS = 7, 24
 WIDTH, HEIGHT, FOV = 96, 72, 0.7  # px, px, rad
 SEEN_FROM = (-0.75, -0.55, 0.45)
-SYMBOLS = {"dummy": 0.3, "joint": 0.3, "proximity_sensor": 0.3, "vision_sensor": 0.3, "camera": 0.3}  # m, of a cross
+_DARK, _ORANGE = [0.2, 0.22, 0.25], [0.95, 0.55, 0.1]
+
+
+def bar(axis, size=0.3):
+    """Return a bar along x, y or z in red, green or blue."""
+    sides, place, color = [size / 20] * 3, [0.0, 0.0, 0.02], [0.1, 0.1, 0.1]
+    sides[axis], place[axis], color[axis] = size, place[axis] + size / 2, 0.9
+    return {"shape": "box", "size": sides, "position": place, "color": color}
+
+
+CAMERA = [
+    {"shape": "box", "size": [0.2, 0.14, 0.14], "position": [0, 0, 0.1], "color": _DARK},
+    {"shape": "cylinder", "size": [0.05, 0.1], "position": [-0.14, 0, 0.1], "rpy": [0, 1.5708, 0]},
+]
+SYMBOLS = {  # of what no camera sees
+    "Dummy": [bar(0), bar(1), bar(2)],
+    "Camera": CAMERA,
+    "VisionSensor": [{**CAMERA[0], "color": [0.15, 0.35, 0.8]}, CAMERA[1]],
+    "ProximitySensor": [
+        {"shape": "mesh", "file": str(MODELS / "cone.obj"), "size": [0.3, 0.3, 0.4], "color": [*_ORANGE, 0.6]},
+        {"shape": "sphere", "size": [0.04], "position": [0, 0, 0.4], "color": _DARK},
+    ],
+    "Joint": [
+        {"shape": "cylinder", "size": [0.05, 0.2], "position": [0, 0, 0.1], "color": _ORANGE},
+        {"shape": "box", "size": [0.3, 0.04, 0.04], "position": [-0.15, 0, 0.15], "color": _DARK},
+    ],
+}
 
 
 def main():
@@ -60,14 +86,14 @@ def write_mesh(name, corners, faces):
 
 
 def picture(operation):
-    """Return the picture (HEIGHT, WIDTH, 3) uint8 of what an operation adds; what no camera sees, as a cross."""
+    """Return the picture (HEIGHT, WIDTH, 3) uint8 of what an operation adds; what no camera sees, as a symbol."""
     simulation = Simulation(load({"samples": 4}), started=False)
     editor = SceneEditor(Player(simulation, simulation.step, lambda state: None, False))
     editor.answer({"new": True})
     (first, *_) = editor.answer({"edit": [{**operation, "position": [0, 0, 0]}]})["handles"]
-    kind = simulation.context.objects[first].kind
-    if kind in SYMBOLS:
-        editor.answer({"edit": [{"do": "add", "objects": cross(SYMBOLS[kind])}]})
+    symbol = [{"name": "Part", **one} for one in SYMBOLS.get(simulation.context.objects[first].name, [])]
+    for part in symbol:
+        editor.answer({"edit": [{"do": "add", "objects": [part]}]})
     for vehicle in simulation.vehicles.values():
         vehicle.propulsion.blades.show()
     low, high = bounds(simulation)
@@ -78,16 +104,6 @@ def picture(operation):
     ).copy()
     simulation.close()
     return drawn
-
-
-def cross(size):
-    """Return three bars, along x, y and z in red, green and blue, for what has no shape."""
-    bars = []
-    for axis, name in enumerate("xyz"):
-        sides, place, color = [size / 20] * 3, [0.0, 0.0, 0.02], [0.1, 0.1, 0.1]
-        sides[axis], place[axis], color[axis] = size, place[axis] + size / 2, 0.9
-        bars.append({"name": f"bar_{name}", "shape": "box", "size": sides, "position": place, "color": color})
-    return bars
 
 
 def bounds(simulation):

@@ -378,7 +378,7 @@ class RandomEdits:
 def assert_agree(editor, folder):
     """Let tree, bodies, rviz's markers and the saved file say the same."""
     simulation = editor.simulation
-    scene, tree = simulation.scene, simulation.context.objects
+    scene = simulation.scene
     simulation.context.carried.follow()
     assert {one.name for one in scene.entries.values()} == {one.name for one in scene.objects.values()}
     for index, one in scene.objects.items():

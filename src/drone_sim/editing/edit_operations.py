@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from drone_sim.config.types import Checked
-from drone_sim.editing import records, scripts
+from drone_sim.editing import records, scripts, signs
 from drone_sim.editing.object_edits import ObjectEdits
 from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.vehicle_edits import FLOOR, VehicleEdits
@@ -32,6 +32,7 @@ class EditOperations:
         does: Mapping[type[Checked], Callable[[Any], list[int] | None]] = {
             records.Add: self._objects.add,
             records.AddModel: self._objects.add_model,
+            records.AddSign: lambda one: signs.add(self._scene, one),
             records.AddVehicle: self._vehicles.add,
             records.Remove: self._remove,
             records.Move: self._move,

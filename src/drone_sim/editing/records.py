@@ -49,13 +49,23 @@ class AddModel(Checked):
     yaw: Finite = 0.0
 
 
+class AddSign(Checked):
+    """A board with a text, whose picture is written beside the scene; its foot is at `position`."""
+
+    do: Literal["add_sign"]
+    text: Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[ -~]+$")]
+    position: Point = (0.0, 0.0, 0.0)
+    yaw: Finite = 0.0
+
+
 class AddVehicle(Checked):
-    """A vehicle with all that it carries."""
+    """A vehicle with all that it carries, so high above a place."""
 
     do: Literal["add_vehicle"]
     type: str = "quadricopter"
     name: Label = ""
     position: Point
+    height: Annotated[Finite, Within(0, 1e4)] = 0.0
     yaw: Finite = 0.0
     values: Annotated[dict[str, Any], Field(default_factory=dict)]
 
@@ -157,6 +167,7 @@ class DetachScript(Checked):
 OPERATIONS = (
     Add,
     AddModel,
+    AddSign,
     AddVehicle,
     Remove,
     Move,

@@ -49,7 +49,8 @@ class VehicleEdits:
         said = self._said()
         wanted = op.name or op.type
         name = next(one for one in (wanted, *(f"{wanted}{n}" for n in range(2, 1000))) if one not in said)
-        place = {"position": list(op.position), **({"yaw": op.yaw} if op.yaw else {})}
+        x, y, z = op.position
+        place = {"position": _rounded([x, y, z + op.height]), **({"yaw": op.yaw} if op.yaw else {})}
         self._say({**said, name: merged({**TYPES[op.type], **place}, op.values)})
         return [self.root(self._scene.simulation.vehicles[name])]
 

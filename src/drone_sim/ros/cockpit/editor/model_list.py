@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from drone_sim.editing.library import KINDS, package_models
+from drone_sim.editing.library import KINDS
 from drone_sim.editing.vehicle_edits import TYPES
 from drone_sim.files.resources import package_path
 from drone_sim.ros.cockpit.server.access_control import Content
@@ -34,7 +34,8 @@ SHAPES: dict[str, _Operation] = {
     "Plane": _shape("Plane", "box", size=[1, 1, 0.002], respondable=False),
     "Wall": _shape("Wall", "box", size=[3, 0.1, 2], color=[0.86, 0.82, 0.74]),
 }
-ARENA = ("gate", "landing_pad", "pole", "ramp", "table", "window_frame", "text_sign")
+ARENA = ("gate", "landing_pad", "pole", "ramp", "table", "window_frame")
+_SIGN = {"do": "add_sign", "text": "START"}
 SENSORS: dict[str, _Operation] = {
     "Dummy": _added("Dummy", kind="dummy", size=0.05),
     "Target sphere": _shape("Target", "sphere", size=[0.05], color=[0.2, 0.8, 0.2], respondable=False),
@@ -43,6 +44,7 @@ SENSORS: dict[str, _Operation] = {
     "Proximity sensor": _added("ProximitySensor", kind="proximity_sensor", type="cone", angle=0.5, range=2),
     "Joint": _added("Joint", kind="joint", type="revolute"),
 }
+_HEIGHT = 0.5  # m above what a vehicle is dropped on
 _BARE: dict[str, Any] = {  # V-REP's quadricopter: its own two cameras, no frame that goes with it, the stock script
     "script": "target",
     "cameras": {name: None for name in ("front", "depth", "track", "floor")},
@@ -59,9 +61,12 @@ class ModelList:
 
     def groups(self) -> list[dict[str, Any]]:
         """Return all, in groups."""
-        vehicles: dict[str, _Operation] = {name.capitalize(): {"do": "add_vehicle", "type": name} for name in TYPES}
-        vehicles["Quadricopter of V-REP"] = {"do": "add_vehicle", "type": "quadricopter", "values": _BARE}
-        arena = {name: {"do": "add_model", "model": name} for name in ARENA if name in package_models()}
+        vehicles: dict[str, _Operation] = {
+            name.capitalize(): {"do": "add_vehicle", "type": name, "height": _HEIGHT} for name in TYPES
+        }
+        vehicles["Quadricopter of V-REP"] = {**vehicles["Quadricopter"], "values": _BARE}
+        arena: dict[str, _Operation] = {name: {"do": "add_model", "model": name} for name in ARENA}
+        arena["text_sign"] = _SIGN
         return [
             {"name": "Shapes", "models": [_said(*one) for one in SHAPES.items()]},
             {"name": "Arena", "models": [_said(name.replace("_", " ").capitalize(), op) for name, op in arena.items()]},
