@@ -65,10 +65,11 @@ export class Edit {
   }
 
   connected() {
-    if (!this.isOn) return;
+    if (!this.isOn || this.asking) return;
+    this.asking = true; // once, however much is missed meanwhile
     // What has been told meanwhile may be newer.
     const take = ({ tree }) => tree.version >= (this.objects.version ?? tree.version) && this.take(tree);
-    return this.ask("tree").then(take, (error) => this.wrong(error.message));
+    return this.ask("tree").then(take, (error) => this.wrong(error.message)).finally(() => (this.asking = false));
   }
 
   lost() {

@@ -27,9 +27,9 @@ _MOST_NAMES = 2000
 class LatchedText:
     """A latched topic of text, made anew only while somebody listens, and for everybody who begins to."""
 
-    def __init__(self, topic: str):
-        """Advertise it."""
-        self._publisher = rospy.Publisher(topic, String, queue_size=1, latch=True)
+    def __init__(self, topic: str, queue_size: int = 1):
+        """Advertise it; so many messages wait for who listens, before the oldest is lost."""
+        self._publisher = rospy.Publisher(topic, String, queue_size=queue_size, latch=True)
         self._listeners = 0
         self._said = ""
 
