@@ -8,8 +8,9 @@ import yaml
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import PROJECT, Panel, open_page, wait_for, wait_until
+from cockpit_page import STARTED, open_page, ready, wait_for, wait_until
 from launched import launched
+from scene_builder import Builder
 
 # The stock script, with one view less: it shows what TrackCam sees, as the tutorial asks.
 SCRIPT = """
@@ -23,84 +24,6 @@ def sysCall_init():
     sim.adjustView(view, sim.getObjectHandle("TrackCam"), 64)
 """
 FAR = 1e-4  # m, rad
-SELECTED = "scene.editing.objects.get(scene.editing.last)?.name ?? null"
-# Names of an object, of what it hangs on, and where it is in that one's frame.
-OBJECT = """name => {
-    const { objects } = scene.editing;
-    const one = objects.named(name);
-    return one && { ...one, matrix: null, above: objects.get(one.parent)?.name ?? "" };
-}"""
-
-
-class Builder:
-    """The Edit panel, as somebody clicks it."""
-
-    def __init__(self, page):
-        self.page = page
-        Panel(page).show("Edit")
-        self.row("Floor").wait_for()
-
-    def row(self, name):
-        return self.page.get_by_role("treeitem").filter(has=self.page.get_by_text(name, exact=True)).first
-
-    def object(self, name):
-        return self.page.evaluate(OBJECT, name)
-
-    def wait(self, name, is_so):
-        """Wait until what the node tells of an object is so; return that."""
-        wait_until(self.page, lambda: (one := self.object(name)) is not None and is_so(one))
-        return self.object(name)
-
-    def menu(self, which, item):
-        self.page.get_by_role("button", name=which, exact=True).click()
-        self.page.get_by_role("menuitem", name=item).click()
-
-    def select(self, name):
-        self.row(name).click()
-        wait_until(self.page, lambda: self.page.inner_text("#selected") == name)
-
-    def unfold(self, name):
-        self.row(name).get_by_role("button", name="Unfold").click()
-
-    def rename(self, before, after):
-        self.row(before).dblclick()
-        self.page.get_by_label(f"New name of {before}").fill(after)
-        self.page.keyboard.press("Enter")
-        self.row(after).wait_for()
-
-    def hang(self, name, parent):
-        self.row(name).drag_to(self.row(parent))
-        self.wait(name, lambda one: one["above"] == parent)
-
-    def drop(self, model, point):
-        """Drag a model from the shelf to a point of the world; it is selected then."""
-        self.page.get_by_role("searchbox", name="Find a model").fill(model)
-        self.page.locator("#models").get_by_role("button", name=model, exact=True).hover()
-        self.page.mouse.down()
-        self.page.mouse.move(*self.page.evaluate(PROJECT, point), steps=4)
-        before = self.page.evaluate(SELECTED)
-        self.page.mouse.up()
-        wait_until(self.page, lambda: self.page.evaluate(SELECTED) not in (before, None))
-        return self.page.evaluate(SELECTED)
-
-    def write(self, relative="World", **numbers):
-        """Write numbers of the position and orientation: X, Y, Z (m), Alpha, Beta, Gamma (degrees)."""
-        self.page.get_by_label("Relative to").select_option(label=relative)
-        for name, value in numbers.items():
-            field = self.page.get_by_label(f"{name}, {'m' if len(name) == 1 else 'degrees'}", exact=True)
-            field.fill(str(value))
-            field.press("Enter")
-
-    def set(self, key, value):
-        field = self.page.locator("#properties").get_by_label(key, exact=True)
-        field.fill(str(value))
-        field.press("Enter")
-
-    def save_as(self, name):
-        self.menu("Scene file", "Save as")
-        self.page.get_by_label("Name", exact=True).fill(name)
-        self.page.get_by_role("button", name="Save", exact=True).click()
-        wait_until(self.page, lambda: self.page.inner_text("#scene-file") == name)
 
 
 def near(one, position):
@@ -140,6 +63,13 @@ def check(builder):
     assert near(builder.wait("TrackCam", lambda one: one["above"] == "Track_base"), (-0.8, 0, 0.3))
 
 
+def flies(page):
+    """See that it flies where it was put, and that the page shows what TrackCam sees."""
+    wait_for(page, "document.querySelector('#status').dataset.is === 'flying'")
+    window = page.locator(".picture", has_text="TrackCam")
+    wait_until(page, lambda: window.locator("img").evaluate("one => one.naturalWidth") > 0)
+
+
 def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cockpit, browser, monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", os.environ["ROS_MASTER_URI"])  # that of this process, afterwards
     cockpit.scripts.mkdir(exist_ok=True)
@@ -151,3 +81,11 @@ def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cock
         build(builder, str(script))
         check(builder)
         builder.save_as(scene.name)
+    said = yaml.safe_load(scene.read_text())
+    assert [one["name"] for one in said["objects"]] == ["TrackCam", "Track_base"]
+    with launched(f"scene:={scene}") as again, browser.new_page() as page:
+        page.add_init_script(STARTED)
+        page.goto(again.address, wait_until="commit")
+        ready(page)
+        flies(page)
+        check(Builder(page))

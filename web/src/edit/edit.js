@@ -2,6 +2,7 @@
 // what it tells of it.
 import * as THREE from "three";
 import { FREE } from "../scene/view.js";
+import { Assumed } from "./assumed.js";
 import { Drag } from "./drag.js";
 import { EditHand } from "./edit_hand.js";
 import { Glyphs } from "./glyphs.js";
@@ -18,6 +19,7 @@ export class Edit {
   constructor(scene, ask, notice, openScript) {
     Object.assign(this, { scene, ask, notice, openScriptFile: openScript });
     this.objects = new Objects();
+    this.assumed = new Assumed(this.objects);
     this.is = NOTHING; // of the scene as a whole
     this.selected = []; // handles, the last one last
     this.expected = new Set(); // selected, but not told yet
@@ -74,6 +76,7 @@ export class Edit {
 
   lost() {
     this.objects.clear();
+    this.assumed.clear();
     this.is = NOTHING;
     this.selected = [];
     for (const what of ["tree", "objects", "selection"]) this.emit(what);
@@ -88,6 +91,7 @@ export class Edit {
     if (changed === "missed") return void this.connected();
     const { objects, gone, version, since, ...is } = told;
     this.is = is;
+    this.assumed.told(is.revision);
     for (const one of [...this.expected]) if (this.objects.get(one)) this.expected.delete(one);
     const still = this.selected.filter((one) => this.objects.get(one) || this.expected.has(one));
     if (changed === "tree") this.emit("tree");
@@ -178,7 +182,7 @@ export class Edit {
   async doNow(operations, name, merge) {
     try {
       const { is } = this;
-      const answer = await this.ask("edit", { edit: operations, name, ...(merge ? { merge } : {}) });
+      const answer = await this.assumed.during(this.ask("edit", { edit: operations, name, ...(merge ? { merge } : {}) }));
       const first = answer.until_stop && !this.hasTold;
       if (first) this.notice.say("It flies: what you edit now is undone when it is stopped.");
       this.hasTold = Boolean(answer.until_stop) && is.state !== "stopped";
@@ -216,21 +220,13 @@ export class Edit {
 
   // Puts objects at places: matrices of the world, by handle.
   place(places, name = this.named("Move", [...places.keys()]), merge) {
-    this.assume(places);
+    for (const [handle, matrix] of places) this.assumed.put(handle, matrix);
+    this.glyphs.show(this.seen.bodiless());
     const operations = [...places].map(([object, matrix]) => {
       const pose = poseOf(matrix);
       return { do: "move", object, position: pose.slice(0, 3), quaternion: pose.slice(3), relative_to: "world" };
     });
     return this.do(operations, name, merge);
-  }
-
-  // Lets objects, and what hangs on them, be there until the node tells where they are.
-  assume(places) {
-    for (const [handle, matrix] of places) {
-      const way = matrix.clone().multiply(this.objects.get(handle).matrix.clone().invert());
-      for (const one of this.objects.withBelow(handle)) this.objects.get(one).matrix = way.clone().multiply(this.objects.get(one).matrix);
-    }
-    this.glyphs.show(this.seen.bodiless());
   }
 
   named(verb, handles = this.selected) {
@@ -248,6 +244,7 @@ export class Edit {
   }
 
   set(handles, values) {
+    for (const one of handles) this.assumed.set(one, values);
     return this.do(handles.map((object) => ({ do: "set", object, values })), this.named("Change", handles));
   }
 

@@ -3,6 +3,8 @@ import { create } from "../dom.js";
 import { numberField } from "./number_field.js";
 import { volumeOf } from "./volumes.js";
 
+// What is changed most comes first; all else as the node tells it.
+const FIRST = ["size", "color", "texture", "mass", "static", "respondable", "visible", "friction", "restitution", "script", "width", "height", "fov", "near", "far", "rate", "noise"];
 const FINE = { size: 0.1, mass: 0.1 }; // steps of the arrow keys
 const STEP = 0.1;
 const WHITE = [1, 1, 1, 1];
@@ -41,7 +43,9 @@ export class Properties {
   keys() {
     const lists = this.ones.map(({ type }) => this.types?.[type] ?? []);
     const [first = [], ...others] = lists.reverse();
-    return first.filter(({ key, kind }) => others.every((list) => list.some((one) => one.key === key && one.kind === kind)));
+    const common = first.filter(({ key, kind }) => others.every((list) => list.some((one) => one.key === key && one.kind === kind)));
+    const rank = ({ key }) => (FIRST.includes(key) ? FIRST.indexOf(key) : FIRST.length);
+    return common.sort((one, other) => rank(one) - rank(other));
   }
 
   show() {
@@ -120,15 +124,15 @@ export class Properties {
   }
 
   parameters({ values: { script_parameters: known = {} } }) {
-    const set = (name, value) => this.set("script_parameters", { [name]: value });
+    const now = () => this.ones.at(-1).values.script_parameters ?? {};
+    const set = (name, value) => this.set("script_parameters", { ...now(), [name]: value });
     const rows = Object.entries(known).map(([name, value]) => {
       const field = typeof value === "number"
         ? numberField(name, { take: (entered) => set(name, entered), wrong: (line) => this.edit.wrong(line), digits: 6 })
         : create("input", { type: "text", "aria-label": name, onchange: ({ target }) => set(name, target.value) });
-      this.fills.push((one) => {
-        const now = one.values.script_parameters?.[name];
-        if (field.fill) field.fill(now);
-        else if (document.activeElement !== field) field.value = now;
+      this.fills.push(() => {
+        if (field.fill) field.fill(now()[name]);
+        else if (document.activeElement !== field) field.value = now()[name] ?? "";
       });
       return this.line(name, `${name}: a parameter of its script`, field);
     });
