@@ -1,5 +1,6 @@
 // The shelf of models, with pictures: dragged into the scene one lands on what is under the mouse. So do files.
 import { create } from "../dom.js";
+import { askFor } from "./ask.js";
 import { isFree } from "./edit_hand.js";
 import { follow } from "./follow.js";
 import { onGrid } from "./handles.js";
@@ -15,7 +16,7 @@ export class Models {
     this.groups = [];
     this.landing = new Landing(edit.scene);
     find.oninput = () => this.show();
-    find.onkeydown = (event) => event.key === "Escape" && find.value && ((find.value = ""), this.show(), event.stopPropagation());
+    find.addEventListener("keydown", (event) => event.key === "Escape" && this.clear(event));
     shelf.addEventListener("pointerdown", (event) => this.down(event));
     shelf.addEventListener("keydown", (event) => this.key(event));
     window.addEventListener("keydown", (event) => event.key === "Escape" && this.end(), true);
@@ -28,6 +29,13 @@ export class Models {
       this.groups = groups;
       this.show();
     }, (error) => this.edit.wrong(error.message));
+  }
+
+  clear(event) {
+    if (!this.find.value) return;
+    event.stopPropagation();
+    this.find.value = "";
+    this.show();
   }
 
   show() {
@@ -108,7 +116,9 @@ export class Models {
   }
 
   put(op, title, position) {
-    return this.edit.make([{ ...op, position, yaw: op.yaw ?? 0 }], `Add ${title}`);
+    const add = (more) => this.edit.make([{ ...op, ...more, position, yaw: op.yaw ?? 0 }], `Add ${title}`);
+    if (op.text === undefined) return add();
+    askFor(title, [{ label: "Text", value: op.text }], "Put it there", ([text]) => add({ text }));
   }
 
   // ---- files

@@ -24,13 +24,24 @@ _MOST_SCRIPTS = 16
 _MOST_NAMES = 2000
 
 
+class _Newcomers(rospy.SubscribeListener):  # type: ignore[misc]
+    """Knows whether somebody has begun to listen: to count would miss one who comes as another goes."""
+
+    there = False
+
+    def peer_subscribe(self, *_: Any) -> None:
+        """Hear of one."""
+        self.there = True
+
+
 class LatchedText:
     """A latched topic of text, made anew only while somebody listens, and for everybody who begins to."""
 
     def __init__(self, topic: str, queue_size: int = 1):
         """Advertise it; so many messages wait for who listens, before the oldest is lost."""
-        self._publisher = rospy.Publisher(topic, String, queue_size=queue_size, latch=True)
-        self._listeners = 0
+        self._newcomers = _Newcomers()
+        more = {"subscriber_listener": self._newcomers, "queue_size": queue_size, "latch": True}
+        self._publisher = rospy.Publisher(topic, String, **more)
         self._said = ""
 
     @property
@@ -41,8 +52,8 @@ class LatchedText:
     @property
     def has_new_listeners(self) -> bool:
         """Whether somebody has begun to listen since this was last asked."""
-        before, self._listeners = self._listeners, self._publisher.get_num_connections()
-        return self._listeners > before
+        there, self._newcomers.there = self._newcomers.there, False
+        return there
 
     def say(self, value: Any) -> None:
         """Publish a value as JSON, unless that is what was said last."""

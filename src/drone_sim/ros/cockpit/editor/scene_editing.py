@@ -55,11 +55,13 @@ class SceneEditing:
 
     def _on_tree(self, message: Any) -> None:
         said = json.loads(message.data)
+        if said["since"] not in (None, self._said.get("version")):  # one is lost: who begins to listen gets the whole
+            self.listen(False)
+            self.listen(True)
+            return
         with self._lock:
             if said["since"] is None:
                 self._rows = {}
-            elif said["since"] != self._said.get("version"):
-                return  # the whole is on its way
             for handle in said["gone"]:
                 self._rows.pop(handle, None)
             self._rows.update((row["handle"], row) for row in said["objects"])
