@@ -8,7 +8,7 @@ import yaml
 
 pytest.importorskip("rospy", reason="needs ROS")
 
-from cockpit_page import STARTED, open_page, ready, wait_for, wait_until
+from cockpit_page import STARTED, Panel, open_page, ready, wait_for, wait_until
 from launched import launched
 from scene_builder import Builder
 
@@ -88,4 +88,5 @@ def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cock
         page.goto(again.address, wait_until="commit")
         ready(page)
         flies(page)
+        Panel(page).press("Stop", "stopped")  # which puts back what the script has unparented
         check(Builder(page))
