@@ -24,6 +24,7 @@ from drone_sim.run.player import Player
 from drone_sim.scripting.errors import ScriptError
 
 _PERIOD = 0.1  # s of real time, between two messages of the tree
+_WAITING = 50  # messages of the tree, each of which goes on with the one before
 _LONGEST = 8 << 20  # characters of a request
 _REFUSED = (ParameterError, ScriptError, ValueError, OSError, RuntimeError, RecursionError)
 
@@ -37,7 +38,7 @@ class SceneEditing:
         name = rospy.get_name().strip("/").replace("/", "_")
         self.editor = SceneEditor(player, Path(rospkg.get_ros_home()) / "drone_sim" / name)
         self._rows = SceneRows(self.editor.scene)
-        self._topic = LatchedText("~scene_objects")
+        self._topic = LatchedText("~scene_objects", queue_size=_WAITING)
         self._throttle = Throttle(_PERIOD)
         self._version = 0
         self._said: dict[str, Any] = {}
