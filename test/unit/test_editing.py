@@ -14,6 +14,7 @@ from living import KINDS, SCENE, picture, sizes
 from drone_sim.editing.changes import change_between
 from drone_sim.editing.editor import SceneEditor
 from drone_sim.files import yaml_files
+from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
@@ -295,6 +296,29 @@ def test_saved_as_another_file_it_is_that_scene(course, tmp_path):
     course.simulation.start()
     assert course.simulation.parameters.scene_file == str(other)
     course.simulation.stop()
+
+
+def test_in_flight_it_is_saved_as_it_stands_and_stays_the_scene_that_it_was(course):
+    course.simulation.start()
+    course.simulation.drone.body.move(Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)))
+    course.answer({"save": True})
+    file = course.document.file
+    was, now = changed_lines(COURSE, file.read_text(encoding="utf-8"))
+    assert (was, now) == (["drone: {position: [0, 0, 1.50]}"], ["drone: {position: [1, 2, 3], yaw: 0}"])
+    course.simulation.stop()
+    course.follow()
+    assert text_of(course) == COURSE
+
+
+def test_a_start_reads_what_somebody_has_written_since_it_was_saved(course):
+    edit(course, {"do": "move", "object": "Left", "position": [4, 1, 1]})
+    course.answer({"save": True})
+    file = course.document.file
+    file.write_text(COURSE.replace("[3, 1, 1]", "[5, 1, 1]"), encoding="utf-8")
+    os.utime(file, ns=(1, 1))
+    course.follow()
+    course.simulation.start()
+    assert place(course, "Left") == [5, 1, 1]
 
 
 def test_a_scene_of_the_package_is_copied(monkeypatch, tmp_path):

@@ -34,6 +34,7 @@ class SceneDocument:
         self._scene = scene
         self.file: Path | None = None
         self.base = yaml_text.YamlText("")
+        self._written: int | None = None  # when the file was written, as the disk says it
         self._entries: list[tuple[int, EntryParameters]] = []  # those of the text, with their handles
         self._scripts: list[AttachedScriptParameters] = []
 
@@ -48,7 +49,7 @@ class SceneDocument:
         """Take the file that the simulation has read its scene from."""
         parameters = self._scene.simulation.parameters
         file = parameters.scene_file
-        self.file = resolve(file) if file else None
+        self.file, self._written = (resolve(file) if file else None), None
         self._scene.folder = self.file.parent if self.file else HOME.expanduser()
         if self.file is None:
             self._take("", _settings_of(self._scene))
@@ -68,7 +69,7 @@ class SceneDocument:
         content = yaml_files.parse(_NEW)
         simulation.stop()
         simulation.arrange(simulation.parameters.with_content(content, folder).in_file(""))
-        self.file, self._scene.folder = None, folder
+        self.file, self._written, self._scene.folder = None, None, folder
         self._take(_NEW, _beside(content))
 
     def _take(self, text: str, settings: Settings) -> None:
@@ -111,10 +112,10 @@ class SceneDocument:
 
     def text(self) -> str:
         """Return what its file would say of the scene as it is now."""
-        said, kept = self._said(self._scene.folder)
+        said, kept = self._said(self._scene.folder, self._scene.settings)
         return self.base.rewritten(said, kept)
 
-    def _said(self, folder: Path) -> tuple[dict[str, Any], dict[str, list[int | None]]]:
+    def _said(self, folder: Path, settings: Settings) -> tuple[dict[str, Any], dict[str, list[int | None]]]:
         """Return what a file in a folder says of the scene, and which items of its lists the text had."""
         here = self._scene.folder
         now = self._scene.content()
@@ -131,7 +132,7 @@ class SceneDocument:
                 rest[handle] = entry
         new = [_ordered(models.plain(one, folder)) for one in rest.values()]
         new_scripts, kept_scripts = self._script_items(old.get("scripts") or [], now.scripts, folder)
-        said: dict[str, Any] = {**_moved_files(now.settings, here, folder), "objects": [*items, *new]}
+        said: dict[str, Any] = {**_moved_files(settings, here, folder), "objects": [*items, *new]}
         if new_scripts or "scripts" in old:
             said["scripts"] = new_scripts
         ordered = {key: said[key] for key in (*old, *said) if key in said}
@@ -155,10 +156,10 @@ class SceneDocument:
     def save(self, name: str | None) -> Path:
         """Write the scene's file, or another, which is its file then; return it. Raises ValueError and OSError.
 
-        One that nobody may write to is copied.
+        One that nobody may write to is copied. What flies is written as it stands; the scene's file stays the same.
         """
-        path = self._path(name)
-        said, kept = self._said(path.parent)
+        path, flies = self._path(name), self._scene.simulation.running
+        said, kept = self._said(path.parent, self._scene.settings_in_flight() if flies else self._scene.settings)
         text = self.base.rewritten(said, kept)
         text = text if yaml_text.says(text, said) else yaml_text.dumped(said)
         simulation = self._scene.simulation
@@ -171,12 +172,20 @@ class SceneDocument:
             with contextlib.suppress(FileNotFoundError), writing.replacing(f"{path}.bak", binary=True) as before:
                 before.write(path.read_bytes())
         writing.write(path, text)
+        if flies:
+            return path
         self.file = path
         settings = _moved_files(self._scene.settings, self._scene.folder, path.parent)
         self._scene.folder = simulation.operations.folder = path.parent
         simulation.arrange(simulation.parameters.in_file(str(path)), rebuild=False)
         self._take(text, settings)
+        self._written = _age(path)
         return path
+
+    @property
+    def is_changed_on_disk(self) -> bool:
+        """Whether somebody has written the file since this node did."""
+        return self.file is not None and self._written is not None and _age(self.file) != self._written
 
     def _path(self, name: str | None) -> Path:
         if name is not None:
@@ -202,6 +211,13 @@ class SceneDocument:
         path.parent.mkdir(parents=True, exist_ok=True)
         models.write(path, [base, *entries[1:]], [scripts[one.name] for one in entries if one.name in scripts])
         return path
+
+
+def _age(path: Path) -> int | None:
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return None
 
 
 def _is_kept(path: Path) -> bool:

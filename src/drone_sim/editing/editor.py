@@ -73,6 +73,8 @@ class SceneEditor:
             self.document.read()
             self._begin_anew()
         run = simulation.run if simulation.running else -1
+        if run == -1 and not self.is_modified and self.document.is_changed_on_disk:
+            simulation.read_at_start()
         if run != self._run:
             if self._run != -1:
                 self._stop()
@@ -188,6 +190,8 @@ class SceneEditor:
 
     def _save(self, request: records.Save) -> dict[str, Any]:
         path = self.document.save(None if request.save is True else str(request.save))
+        if self.simulation.running:
+            return self._answer(f"saved {path} as it stands in flight", file=str(path))
         self._saved = self.revision
         return self._answer(f"saved {path}", file=str(path))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_sim.editing.changes import SceneContent, Settings, content_of
-from drone_sim.editing.settings import PLACE
+from drone_sim.editing.settings import PLACE, vehicles_in, with_vehicles
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.object_tree import WORLD, ObjectTree
@@ -60,6 +60,21 @@ class SceneAccess:
         return vehicle is not None and self.tree[handle] is vehicle.object
 
     # ---- settings
+
+    def settings_in_flight(self) -> Settings:
+        """Return the settings with vehicles where they are, and the weather that there is."""
+        simulation = self.simulation
+        said = vehicles_in(self.settings, simulation.parameters)
+        for name, vehicle in simulation.vehicles.items():
+            roll, pitch, yaw = (round(one, 9) + 0.0 for one in frames.to_rpy(vehicle.body.matrix))
+            place = {"position": [round(one, 9) + 0.0 for one in frames.position(vehicle.body.matrix)], "yaw": yaw}
+            tilt = {"tilt": [roll, pitch]} if any(vehicle.parameters.tilt) else {}
+            said[name] = {**said.get(name, {}), **place, **tilt}
+        settings = dict(with_vehicles(self.settings, said, simulation.parameters))
+        weather = simulation.context.weather.now
+        if weather != simulation.parameters.weather:
+            settings["weather"] = weather.model_dump(mode="json")
+        return settings
 
     def checked(self, settings: Settings) -> Parameters:
         """Return the parameters of the same objects with other settings. Raises ParameterError."""

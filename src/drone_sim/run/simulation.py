@@ -268,6 +268,10 @@ class Simulation:
         was_running, self.running = self.running, False
         self._setup.end_scripts(clean_up=was_running)
 
+    def read_at_start(self) -> None:
+        """Have the next start read the scene file, whatever was made of the scene while it was stopped."""
+        self._is_arranged = self.scene.is_changed = False
+
     # ---- stepping
 
     @property

@@ -104,6 +104,7 @@ class Cockpit:
         if self._view is not None:
             self._view.meet(self._topics.vehicles)
             self._view.collect()
+            self._editing.listen(True)
             self._panel.follow(self._commands.vehicle)
             self._panel.plots.rest()
             self._cameras.show()
@@ -118,8 +119,8 @@ class Cockpit:
         self._listener = SimulatorListener(self._simulator.node, self._panel, self._socket) if namespace else None
         self._cameras.rest(not namespace)
         self._windows.listen(bool(namespace))
-        self._editing.listen(bool(namespace))
         if not namespace:
+            self._editing.listen(False)
             self._panel.follow("")
             self._panel.plots.rest()
 

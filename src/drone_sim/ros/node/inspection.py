@@ -24,14 +24,21 @@ _MOST_SCRIPTS = 16
 _MOST_NAMES = 2000
 
 
-class _Newcomers(rospy.SubscribeListener):  # type: ignore[misc]
-    """Knows whether somebody has begun to listen: to count would miss one who comes as another goes."""
+class _Newcomers(rospy.SubscribeListener):
+    """Whether somebody has begun to listen; who lets go and listens again has, too."""
 
-    there = False
+    def __init__(self) -> None:
+        super().__init__()
+        self._any = False
 
     def peer_subscribe(self, *_: Any) -> None:
-        """Hear of one."""
-        self.there = True
+        """Hear from a thread of rospy's."""
+        self._any = True
+
+    def take(self) -> bool:
+        """Tell, and forget."""
+        was, self._any = self._any, False
+        return was
 
 
 class LatchedText:
@@ -39,9 +46,8 @@ class LatchedText:
 
     def __init__(self, topic: str, queue_size: int = 1):
         """Advertise it; so many messages wait for who listens, before the oldest is lost."""
-        self._newcomers = _Newcomers()
-        more = {"subscriber_listener": self._newcomers, "queue_size": queue_size, "latch": True}
-        self._publisher = rospy.Publisher(topic, String, **more)
+        self._came = _Newcomers()
+        self._publisher = rospy.Publisher(topic, String, self._came, queue_size=queue_size, latch=True)
         self._said = ""
 
     @property
@@ -52,8 +58,7 @@ class LatchedText:
     @property
     def has_new_listeners(self) -> bool:
         """Whether somebody has begun to listen since this was last asked."""
-        there, self._newcomers.there = self._newcomers.there, False
-        return there
+        return self._came.take()
 
     def say(self, value: Any) -> None:
         """Publish a value as JSON, unless that is what was said last."""

@@ -26,7 +26,7 @@ from drone_sim.ros.core.simulator import FAILURES
 _Message = Mapping[str, Any]
 _Told = Callable[[_Message], None]
 _LINE = re.compile(r"\bline (\d+)\b")
-_TREE = "scene_objects"
+_TREE, _WAITING = "scene_objects", 50
 _UPLOADED = (".ttm", ".obj", ".stl", ".dae", ".urdf", ".yaml")
 _LARGEST = 6 << 20  # bytes of an uploaded model: of a message of 8 MiB
 
@@ -38,15 +38,20 @@ class SceneEditing:
         """Edit the scene of `node`; the user's scenes and models are in `folder`; `tell` sends to all browsers."""
         self._node, self._folder, self._tell = node, folder, tell
         self._listening: rospy.Subscriber | None = None
+        self._has_missed = False  # a message, without which the later ones say nothing
         self._lock = threading.Lock()
         self._rows: dict[int, _Message] = {}
         self._said: dict[str, Any] = {}
         self._models, self._recent = ModelList(folder), RecentScenes(folder)
 
     def listen(self, wanted: bool) -> None:
-        """Hear of the tree while a browser is open."""
+        """Hear of the tree while a browser is open; called again and again."""
+        if self._has_missed and self._listening is not None:
+            self._listening.unregister()
+            self._listening = None  # the node tells a new listener all
         if wanted and self._listening is None:
-            self._listening = rospy.Subscriber(f"{self._node}/{_TREE}", String, self._on_tree, queue_size=20)
+            self._has_missed = False
+            self._listening = rospy.Subscriber(f"{self._node}/{_TREE}", String, self._on_tree, queue_size=_WAITING)
         elif not wanted and self._listening is not None:
             self._listening.unregister()
             self._listening = None
@@ -55,13 +60,12 @@ class SceneEditing:
 
     def _on_tree(self, message: Any) -> None:
         said = json.loads(message.data)
-        if said["since"] not in (None, self._said.get("version")):  # one is lost: who begins to listen gets the whole
-            self.listen(False)
-            self.listen(True)
-            return
         with self._lock:
             if said["since"] is None:
                 self._rows = {}
+            elif said["since"] != self._said.get("version"):
+                self._has_missed = True
+                return
             for handle in said["gone"]:
                 self._rows.pop(handle, None)
             self._rows.update((row["handle"], row) for row in said["objects"])
