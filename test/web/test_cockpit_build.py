@@ -38,8 +38,9 @@ def build(builder, script):
     builder.set("size", 10)
     builder.rename(builder.drop("Quadricopter of V-REP", [0.5, 0.5, 0]), "Drone")
     builder.write(X=0, Y=0, Z=0.8)
-    builder.set("script", script)
     builder.unfold("Drone")
+    move_target(builder)
+    builder.set("script", script)
     for camera in ("Quadricopter_floorCamera", "Quadricopter_frontCamera"):
         builder.select(camera)
         builder.page.keyboard.press("Delete")
@@ -52,6 +53,18 @@ def build(builder, script):
     builder.hang("Track_base", "Quadricopter_base")
     builder.write("Parent", X=0, Y=0, Z=0)
     builder.hang("TrackCam", "Track_base")
+
+
+def move_target(builder):
+    """Start, and move the green sphere: the drone follows; stop puts both back."""
+    panel = Panel(builder.page)
+    panel.press("Start", "started")
+    builder.select("DronePosition")
+    builder.write(X=0.5)
+    builder.wait("Drone", lambda one: one["pose"][0] > 0.2)
+    panel.press("Stop", "stopped")
+    builder.select("Drone")
+    builder.wait("Drone", lambda one: near(one, (0, 0, 0.8)))
 
 
 def check(builder):
@@ -70,6 +83,13 @@ def flies(page):
     wait_until(page, lambda: window.locator("img").evaluate("one => one.naturalWidth") > 0)
 
 
+def load(cockpit, scene):
+    import rospy
+
+    rospy.set_param("/drone_sim/scene_file", scene)
+    cockpit.call("load_scene")
+
+
 def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cockpit, browser, monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", os.environ["ROS_MASTER_URI"])  # that of this process, afterwards
     cockpit.scripts.mkdir(exist_ok=True)
@@ -81,6 +101,7 @@ def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cock
         build(builder, str(script))
         check(builder)
         builder.save_as(scene.name)
+    load(cockpit, "")  # as it was launched
     said = yaml.safe_load(scene.read_text())
     assert [one["name"] for one in said["objects"]] == ["TrackCam", "Track_base"]
     with launched(f"scene:={scene}") as again, browser.new_page() as page:

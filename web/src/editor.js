@@ -24,15 +24,15 @@ export const colors = HighlightStyle.define([
   { tag: tags.invalid, color: "var(--error)" },
 ]);
 
-// Puts another text there, as one change; what is the same stays, and the cursor with it.
-export function fillWith(view, text) {
+// Puts another text there, as one change; what is the same stays, and the cursor with it. `annotations` are the change's.
+export function fillWith(view, text, annotations = []) {
   const before = view.state.doc.toString();
   const most = Math.min(text.length, before.length);
   let from = 0;
   while (from < most && text[from] === before[from]) from++;
   let end = 0;
   while (end < most - from && text[text.length - 1 - end] === before[before.length - 1 - end]) end++;
-  view.dispatch({ changes: { from, to: before.length - end, insert: text.slice(from, text.length - end) } });
+  view.dispatch({ changes: { from, to: before.length - end, insert: text.slice(from, text.length - end) }, annotations });
 }
 
 export const isLua = (script) => script.endsWith(".lua");

@@ -43,7 +43,7 @@ export class Arrange {
 
   duplicate(counts = [2, 1, 1], steps = [this.aside(), 0, 0]) {
     const objects = this.roots;
-    if (objects.length) return this.edit.make([{ do: "copy", objects, counts, steps }], this.edit.named("Duplicate", objects), counts.join() === "2,1,1");
+    if (objects.length) return this.edit.make([{ do: "copy", objects, counts, steps }], this.edit.named("Duplicate", objects), true);
   }
 
   copy() {
@@ -76,8 +76,9 @@ export class Arrange {
   }
 
   attachScript(language) {
-    const object = this.edit.last;
+    const { last: object, is } = this.edit;
     if (object === undefined) return;
+    if (!is.file || is.read_only) return this.edit.wrong("Save the scene first (Ctrl+S): the script becomes a file beside it.");
     return this.edit.do([{ do: "attach_script", object, language }], this.edit.named("Attach a script to", [object]));
   }
 

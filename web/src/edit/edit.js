@@ -12,6 +12,7 @@ import { Objects, WORLD } from "./objects.js";
 import { poseOf } from "./poses.js";
 import { Seen } from "./seen.js";
 
+const TARGET = "target"; // the alias of the green sphere: what of a vehicle is moved by itself
 const NOTHING = { file: "", modified: false, read_only: false, state: "", undo: "", redo: "", draft: null, revision: 0 };
 
 export class Edit {
@@ -158,7 +159,7 @@ export class Edit {
 
   mayMove(handle) {
     const one = this.objects.get(handle);
-    return Boolean(one) && one.of !== "floor" && (one.of === "scene" || one.root || one.type === "target");
+    return Boolean(one) && (one.of === "scene" || Boolean(one.root) || (one.of === "vehicle" && one.alias === TARGET));
   }
 
   mayRename({ of }) {

@@ -4,7 +4,7 @@ import { indentWithTab } from "@codemirror/commands";
 import { StreamLanguage, indentUnit, syntaxHighlighting } from "@codemirror/language";
 import { setDiagnostics } from "@codemirror/lint";
 import { yaml } from "@codemirror/legacy-modes/mode/yaml";
-import { EditorState } from "@codemirror/state";
+import { EditorState, Transaction } from "@codemirror/state";
 import { EditorView, keymap } from "@codemirror/view";
 import { create } from "../dom.js";
 import { colors, fillWith } from "../editor.js";
@@ -53,7 +53,7 @@ export class SceneText {
       this.parts.title.textContent = file.split("/").pop() || "not saved yet";
       this.parts.title.title = file;
       this.filling = true;
-      fillWith(this.view, text);
+      fillWith(this.view, text, Transaction.addToHistory.of(false)); // the scene has its own undo
       this.filling = false;
       this.say("");
     } catch (error) {
