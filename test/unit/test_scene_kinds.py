@@ -349,7 +349,7 @@ def test_the_examples_of_the_docs_load(simulate):
     vehicles = next(one["vehicles"] for one in said if "vehicles" in one)
     simulation = simulate(yaml.safe_dump({"objects": objects, "vehicles": vehicles}))
     names = set(simulation.context.objects.names)
-    assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way", "Ball", "Door", "Sphere"} <= names
+    assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way", "Ball", "Door", "Aim"} <= names
     assert "Quadricopter_floorCamera" not in names
     assert "floor" not in simulation.vehicles["drone"].cameras
     simulation.step()
