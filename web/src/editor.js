@@ -21,7 +21,7 @@ const colors = HighlightStyle.define([
   { tag: [tags.number, tags.bool, tags.null], color: "var(--code-number)" },
   { tag: [tags.function(tags.variableName), tags.function(tags.propertyName), tags.function(tags.definition(tags.variableName))], color: "var(--code-function)" },
   { tag: [tags.className, tags.definition(tags.className)], color: "var(--code-class)" },
-  { tag: tags.invalid, color: "var(--error)" },
+  { tag: tags.invalid, color: "var(--bad)" },
 ]);
 
 export const isLua = (script) => script.endsWith(".lua");
