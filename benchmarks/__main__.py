@@ -4,45 +4,18 @@ import argparse
 import json
 import platform
 import sys
-import tempfile
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cockpit, fleet, grade, loop, node, plot, remote, render
-from benchmarks.cores import one_core
+from benchmarks import plot
+from benchmarks.named import BENCHMARKS, Row, measured
 from drone_sim.files import writing
 from drone_sim.render.renderer import Renderer
 
-Row = dict[str, Any]
 PAGE = Path(__file__).parents[1] / "docs/benchmarks.md"
 RESULTS = Path(__file__).parent / "results.json"
-
-
-def _in_a_folder(measure: Callable[[Path], list[Row]]) -> Callable[[], list[Row]]:
-    def measured() -> list[Row]:
-        with tempfile.TemporaryDirectory() as folder, one_core():
-            return measure(Path(folder))
-
-    return measured
-
-
-BENCHMARKS: dict[str, Callable[[], list[Row]]] = {
-    "render": _in_a_folder(render.compare),
-    "growth": _in_a_folder(render.growth),
-    "loop": loop.compare,
-    "node": node.measure,
-    "fleet": fleet.measure,
-    "remote": remote.measure,
-    "grade": grade.measure,
-    "cockpit": cockpit.measure,
-}
-
-
-def _measured(name: str) -> list[Row]:
-    return BENCHMARKS[name]()
 
 
 def machine() -> str:
@@ -92,7 +65,7 @@ def main() -> int:
     for name in arguments.names or BENCHMARKS:
         print(f"measuring: {name} ...", file=sys.stderr, flush=True)
         with ProcessPoolExecutor(1, get_context("spawn")) as process:  # a process can be a ROS node but once
-            results[name] = process.submit(_measured, name).result()
+            results[name] = process.submit(measured, name).result()
         print(f"{name}\n{table(results[name])}\n", flush=True)
         writing.write(RESULTS, json.dumps(results, indent=1) + "\n")
     if arguments.plot:

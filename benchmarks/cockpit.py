@@ -112,6 +112,7 @@ def _watched(page: Any, seconds: float) -> list[Row]:
     from cockpit_page import switch_camera
 
     print(f"  front camera on, for {seconds:g} s of real time", file=sys.stderr, flush=True)
+    page.get_by_role("button", name="Just fly").click()
     switch_camera(page)
     with _diagnoses() as heard:
         page.wait_for_timeout(1e3 * SETTLED)

@@ -3,7 +3,7 @@
 import math
 
 import tutorial
-from tutorial import on_twist, sysCall_actuation, sysCall_cleanup, sysCall_init  # noqa: F401 -- called as they are
+from tutorial import on_twist, sysCall_actuation, sysCall_cleanup, sysCall_init  # called as they are
 
 REST, SPEED, RADIUS = 2.0, 0.5, 3.0  # s, m/s, m
 SWING, PERIOD = 0.1, 15.0  # m/s, s: up and down

@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 import tutorial
-from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
+from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # called as they are
 
 EVERY = 4  # steps from one picture to the next
 FOV = math.radians(60)

@@ -3,7 +3,7 @@
 import math
 
 import tutorial
-from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
+from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # called as they are
 
 PLACE, FASTEST = 0.6, 1.5  # (m/s) per m, m/s
 TURN = 1.0  # (rad/s) per rad

@@ -1,7 +1,7 @@
 """To begin with: the tutorial's controller, hovering, and where it should be beside its leader."""
 
 import tutorial
-from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
+from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # called as they are
 
 
 def sysCall_init():

@@ -3,7 +3,7 @@
 import math
 
 import tutorial
-from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
+from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # called as they are
 
 GATES = ("Red", "Orange", "Yellow", "Green", "Blue", "Violet")
 BEFORE, BEHIND = -1.0, 0.6  # m from the gate's middle, along the way through it

@@ -3,7 +3,7 @@
 import math
 
 import tutorial
-from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
+from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # called as they are
 
 PLACE, SUM = 0.6, 0.15  # (m/s) per m, (m/s) per m and second
 MOST = 1.0  # m/s

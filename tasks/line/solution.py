@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 import tutorial
-from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # noqa: F401 -- called as they are
+from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # called as they are
 
 EVERY = 2  # steps from one picture to the next
 SPEED = 0.5  # m/s, along the line

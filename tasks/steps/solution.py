@@ -1,7 +1,7 @@
 """Follow velocity commands as the tutorial's script does, with half the lag in the inner loop."""
 
 import tutorial
-from tutorial import on_twist, sysCall_actuation, sysCall_cleanup, sysCall_sensing  # noqa: F401 -- called as they are
+from tutorial import on_twist, sysCall_actuation, sysCall_cleanup, sysCall_sensing  # called as they are
 
 
 def sysCall_init():

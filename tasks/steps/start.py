@@ -1,6 +1,6 @@
 """To begin with: the tutorial's controller, which obeys what `on_twist` keeps; that is not much yet."""
 
-from tutorial import sysCall_actuation, sysCall_cleanup, sysCall_init, sysCall_sensing  # noqa: F401 -- as they are
+from tutorial import sysCall_actuation, sysCall_cleanup, sysCall_init, sysCall_sensing  # called as they are
 
 
 def on_twist(msg):

@@ -14,7 +14,6 @@ from drone_sim.hosting.tunable import tunables
 from drone_sim.ros.cockpit.editor.scene_files import SceneList
 from drone_sim.ros.cockpit.panel import tuning as tuning_module
 from drone_sim.ros.cockpit.panel.board import Board
-from drone_sim.ros.cockpit.panel.flown import FlownScript, listens_to_commands
 from drone_sim.ros.cockpit.panel.panel import Panel, SimulatorListener
 from drone_sim.ros.cockpit.panel.tuning import SpeedControl, VehicleTuning
 from drone_sim.ros.cockpit.topics import FoundTopics
@@ -33,38 +32,6 @@ def test_a_board_tells_what_changes_once_and_a_new_browser_everything():
     assert [one["panel"] for one in told[:2]] == [{"status": "flying"}, {"status": "paused"}]
     assert [one["version"] for one in told[:2]] == [1, 2]
     assert board.whole({}) == {"panel": {"status": "paused"}, "version": 2, "lines": ["x" * 600]}
-
-
-# ---- the script that flies
-
-
-@pytest.mark.parametrize(
-    "text, listens",
-    [
-        ('simROS.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist", 1)', True),
-        ("simROS.subscribe('/drone/cmd_vel', 'geometry_msgs/Twist', 'on_twist')", True),
-        ('sub = simROS.subscribe(f"/{name}/cmd_vel", kind, on_twist)', True),
-        ("simExtRosInterface_subscribe('/cmd_vel','geometry_msgs/Twist','f')", True),
-        ('# simROS.subscribe("cmd_vel", "geometry_msgs/Twist", "on_twist", 1)', False),
-        ("-- simROS.subscribe('cmd_vel', 'geometry_msgs/Twist', 'on_twist')", False),
-        ('simROS.subscribe("not_cmd_velocity", kind, f)', False),
-        ("print('cmd_vel')", False),
-    ],
-)
-def test_whether_a_script_listens_to_commands(text, listens):
-    assert listens_to_commands(text) is listens
-
-
-def test_what_a_script_imports_from_beside_it_counts(tmp_path):
-    flown = FlownScript()
-    assert flown.look("") == {"name": "pilot.py", "listens": True}
-    script = tmp_path / "mine.py"
-    script.write_text("import other\n")
-    assert flown.look(str(script)) == {"name": "mine.py", "listens": False}
-    (tmp_path / "other.py").write_text("import mine\nsimROS.subscribe('cmd_vel', 'x', 'y')\n")
-    script.write_text(script.read_text() + "\n")
-    assert flown.look(str(script))["listens"], "also of modules that import each other"
-    assert flown.look(str(tmp_path / "gone.py")) == {"name": "", "listens": True}
 
 
 # ---- parameters
@@ -181,7 +148,7 @@ def _told():
 @pytest.fixture(name="panel")
 def _panel(tmp_path, told):
     panel = Panel(Simulator(), Commands(), SceneList(tmp_path), told.append)
-    panel.offer(FoundTopics("", ("drone", "wing")), "", "pilot")
+    panel.offer(FoundTopics("", ("drone", "wing")), "")
     return panel
 
 

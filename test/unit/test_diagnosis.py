@@ -100,6 +100,18 @@ def test_the_pace_is_what_was_flown_in_real_time(looked):
     assert looked.look("simulation").message == "flying at 1.00 times real time"
 
 
+def test_who_holds_the_steps_up_is_told(looked):
+    looked.diagnosis = Diagnosis(
+        looked.player, looked.pacer, lambda: {"drone": looked.log}, False, looked.clock, held=lambda: True
+    )
+    looked.look("simulation")
+    looked.fly(2)
+    assert looked.look("simulation").level == OK, "every step was asked for"
+    looked.now += 1.0
+    found = looked.look("simulation")
+    assert found.level == WARN and "a client of the remote API has asked to trigger each" in found.message
+
+
 def test_what_was_counted_long_ago_says_nothing_of_now(looked):
     looked.look()
     looked.fly(1, step=100.0)

@@ -24,6 +24,7 @@ from legacy_client import (
 
 from drone_sim.remote.legacy import session
 from drone_sim.remote.legacy.server import LegacyServer
+from drone_sim.remote.legacy.wire import Packets
 from drone_sim.remote.servers import RemoteApiServers
 from drone_sim.run import parameters
 from drone_sim.run.player import Player
@@ -148,6 +149,16 @@ def test_a_message_of_many_packets_and_an_answer_of_many(stage):
     client.send_bytes(packets(message(0, command(SET_STRING, text("long"), long)), piece=200))
     assert client.received().answers == {(SET_STRING, text("long")): b""}
     assert client.call(GET_STRING, text("long")) == long
+
+
+def test_who_sends_check_sums_as_clients_of_3_1_did_gets_them_in_small_packets():
+    wire, content = Packets(), bytes(2) + b"123456789"
+    assert wire.of(content)[PACKET.size :] == content
+    wire.add(packets(b"\xc3\x31" + message(0)[2:]) + packets(message(1)))
+    assert wire.take() and wire.take(), "also one whose check sum happens to be 0"
+    assert wire.of(content)[PACKET.size :] == b"\xc3\x31123456789", "CRC-16/XMODEM's own check value"
+    sizes = struct.unpack_from("<hhh", wire.of(bytes(1000)))
+    assert sizes == (1, 244, 4), "their buffers have 250 bytes"
 
 
 def test_a_command_that_comes_in_pieces_is_carried_out_when_it_is_whole(stage):

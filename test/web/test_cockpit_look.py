@@ -30,9 +30,9 @@ LOOK = """([contrast, target]) => {
     };
     const isSeen = (one) => one.checkVisibility({ visibilityProperty: true }) && one.getBoundingClientRect().height;
     const wrong = [];
-    const left = "script, #scene *, .cm-editor *, canvas, option, optgroup";
+    const left = "script, #scene *, canvas, option, optgroup";
     for (const one of document.querySelectorAll(`body *:not(${left})`)) {
-        if (!isSeen(one) || one.closest(":disabled, svg, .stick, .u-legend")) continue;
+        if (!isSeen(one) || one.closest(":disabled, svg, .stick")) continue;
         const name = `${one.tagName}#${one.id}.${one.className} ${one.textContent.slice(0, 30)}`;
         const written = [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
         const text = written || one.matches("input, select");

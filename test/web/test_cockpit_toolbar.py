@@ -237,7 +237,7 @@ def test_only_what_the_script_reads_is_tuned_and_who_does_not_listen_says_so(coc
     rospy.set_param("/drone_sim/script", str(script))
     cockpit.call("restart")
     wait_until(page, lambda: page.locator("#deaf").is_visible())
-    wait_until(page, lambda: "deaf.py does not listen to commands" in page.inner_text("#deaf"))
+    wait_until(page, lambda: "This script does not listen to commands" in page.inner_text("#deaf"))
     wait_until(page, lambda: panel.field("Kzref (m/s) per m").count() == 0)
     assert panel.field("Dzref (m/s) per (m/s)").is_visible()
     cockpit.start_afresh()

@@ -21,7 +21,7 @@ export const colors = HighlightStyle.define([
   { tag: [tags.number, tags.bool, tags.null], color: "var(--code-number)" },
   { tag: [tags.function(tags.variableName), tags.function(tags.propertyName), tags.function(tags.definition(tags.variableName))], color: "var(--code-function)" },
   { tag: [tags.className, tags.definition(tags.className)], color: "var(--code-class)" },
-  { tag: tags.invalid, color: "var(--error)" },
+  { tag: tags.invalid, color: "var(--bad)" },
 ]);
 
 // Puts another text there, as one change; what is the same stays, and the cursor with it. `annotations` are the change's.

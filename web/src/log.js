@@ -2,17 +2,18 @@
 import { Console } from "./console.js";
 import { at, create } from "./dom.js";
 
+const DEAF = "This script does not listen to commands: its flight is in the script. Stage 6 of the tutorial does, and pilot.py.";
+
 export class Log {
   constructor(board) {
     this.lines = new Console(at("log-lines"));
     board.on("diagnosis", (all) => this.show(all));
-    board.on("flown", ({ name, listens }) => {
-      const said = listens ? "" : `${name} does not listen to commands: its flight is in the script. Stage 6 of the tutorial does, and pilot.py.`;
+    board.on("hears_commands", (hears) => {
       for (const id of ["deaf", "sheet-deaf"]) {
-        at(id).hidden = listens;
-        at(id).textContent = at(id).title = said;
+        at(id).hidden = hears;
+        at(id).textContent = at(id).title = hears ? "" : DEAF;
       }
-      document.body.classList.toggle("deaf", !listens);
+      document.body.classList.toggle("deaf", !hears);
     });
   }
 

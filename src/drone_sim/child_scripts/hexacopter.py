@@ -1,7 +1,7 @@
 """The pilot on six propellers: all of its states and commands, and a mixing of its own."""
 
 import pilot
-from pilot import (  # noqa: F401 -- phases and callbacks, called as they are
+from pilot import (  # called as they are
     on_goto,
     on_home,
     on_land,

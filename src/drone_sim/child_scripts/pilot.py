@@ -8,7 +8,7 @@ world); state (std_msgs/String) says which of the five states it is in.
 import math
 
 import tutorial
-from tutorial import sysCall_actuation  # noqa: F401 -- a phase, called as it is
+from tutorial import sysCall_actuation  # called as it is
 
 LANDED, TAKING_OFF, FLYING, LANDING, CRASHED = "landed", "taking off", "flying", "landing", "crashed"
 

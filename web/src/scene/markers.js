@@ -10,7 +10,7 @@ import { FOV } from "./view.js";
 
 const LABEL = 13; // px of the words on the drone's state
 const THINNEST = 0.002; // m
-const NEAR = 0.6; // the share of their width that lines about the drone have here: rviz looks from farther away
+const ABOUT = 2; // px, of lines about the drone: from close behind, one in metres would hide what it is about
 const TARGETS = "markers"; // the green spheres, in which a drone may be
 const CLEAR = 0.45;
 const FEW = 1000; // numbers, of a shape that is kept for others like it
@@ -76,7 +76,8 @@ function lines({ kind, color, scale, points, colors, layer }) {
   const shades = colors && (kind === "strip" ? pairs(colors, 4) : colors);
   const geometry = new LineSegmentsGeometry().setPositions(ends);
   if (shades) geometry.setColors(shades.filter((_, number) => number % 4 !== 3));
-  const look = { worldUnits: true, linewidth: Math.max(scale[0] * (layer.startsWith("view/") ? NEAR : 1), THINNEST), vertexColors: Boolean(shades) };
+  const width = layer.startsWith("view/") ? { linewidth: ABOUT } : { worldUnits: true, linewidth: Math.max(scale[0], THINNEST) };
+  const look = { ...width, vertexColors: Boolean(shades) };
   if (!shades) look.color = new THREE.Color(...color.slice(0, 3));
   const made = new LineSegments2(geometry, new LineMaterial({ ...look, opacity: color[3], transparent: color[3] < 1 }));
   made.raycast = () => {};

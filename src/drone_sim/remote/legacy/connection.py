@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from drone_sim.remote.legacy.wire import Packets, packets
+from drone_sim.remote.legacy.wire import Packets
 
 _AT_ONCE = 256 * 1024  # bytes that are read
 _DEAD_AFTER = (  # a machine that is lost: s of silence, s between questions, times, ms for what it does not take
@@ -64,7 +64,7 @@ class Connection:
 
     def send(self, message: bytes) -> None:
         """Send an answer, as far as the client reads it."""
-        self._out = memoryview(packets(message))
+        self._out = memoryview(self._packets.of(message))
         self.flush()
 
     def flush(self) -> None:

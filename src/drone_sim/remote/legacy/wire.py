@@ -8,6 +8,7 @@ comes back with what it returned. What comes behind a command's own header is it
 
 from __future__ import annotations
 
+import binascii
 import struct
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -16,8 +17,14 @@ LARGEST = 8 * 1024 * 1024  # bytes of a message
 VERSION = 11  # of the protocol
 _MOST_COMMANDS = 2000  # of a message
 _PACKET = struct.Struct("<hhh")
-_PIECE = 30_000  # bytes of a message in a packet that is sent
-_HEADER = struct.Struct("<HBiiiHB")  # check sum (unused), version, number, client's time, server's time, scene, state
+_PIECE, _OLD_PIECE = (
+    30_000,
+    244,
+)  # bytes of a message in a packet that is sent; V-REP 3.1's clients have room for no more
+_MOST_PACKETS = 2**15 - 1  # of a message
+_HEADER = struct.Struct(
+    "<HBiiiHB"
+)  # check sum (of V-REP 3.1's clients), version, number, client's time, server's time, scene, state
 _COMMAND = struct.Struct("<iiHiiHiBB")  # size, size of the whole, key's, shift, code and mode, delay, time, status, 0
 _FAILED = 1  # of a status
 _CODE = 0xFFFF
@@ -82,10 +89,11 @@ class Stamp(NamedTuple):
 
 
 class Packets:
-    """Puts the packets of a connection together again."""
+    """Puts the packets of a connection together again, and answers in such as its client reads."""
 
     def __init__(self) -> None:
         """Begin with nothing."""
+        self._is_old = False  # whether the client sends check sums, and drops what has none: V-REP 3.1's, and before
         self._bytes = bytearray()
         self._at = 0  # where the next packet begins
         self._message = bytearray()
@@ -110,8 +118,16 @@ class Packets:
             if not left:
                 message, self._left = bytes(self._message), None
                 self._message.clear()
+                self._is_old = self._is_old or any(message[:2])
                 return message
         return None
+
+    def of(self, answer: bytes) -> bytes:
+        """Return an answer in packets."""
+        if not self._is_old:
+            return packets(answer, _PIECE)
+        check_sum = struct.pack("<H", binascii.crc_hqx(answer[2:], 0))
+        return packets(check_sum + answer[2:], max(_OLD_PIECE, -(-len(answer) // _MOST_PACKETS)))
 
     def _check(self, first: int, size: int, left: int) -> None:
         if first != 1:
@@ -124,9 +140,9 @@ class Packets:
             raise ValueError(f"a message of more than {LARGEST} bytes")
 
 
-def packets(message: bytes) -> bytes:
-    """Return a message in packets."""
-    pieces = [message[start : start + _PIECE] for start in range(0, len(message), _PIECE)]
+def packets(message: bytes, piece: int) -> bytes:
+    """Return a message in packets, so many bytes of it in each."""
+    pieces = [message[start : start + piece] for start in range(0, len(message), piece)]
     left = len(pieces)
     return b"".join(_PACKET.pack(1, len(one), left - count) + one for count, one in enumerate(pieces, 1))
 

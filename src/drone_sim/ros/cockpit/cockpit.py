@@ -139,14 +139,14 @@ class Cockpit:
         try:
             below = rospy.get_namespace()  # another simulator may fly in another one
             self._topics = find_topics([one for one in rospy.get_published_topics() if one[0].startswith(below)])
-            scene, script = (str(self._simulator.parameter(name, "")) for name in ("scene_file", "script"))
+            scene = str(self._simulator.parameter("scene_file", ""))
             self._panel.board.show("master", True)
         except FAILURES:  # another master may come
-            self._topics, scene, script = FoundTopics(), "", ""
+            self._topics, scene = FoundTopics(), ""
             self._panel.board.show("master", False)
         if not self._topics.namespace:
             self._panel.show_status("no simulation")
-        self._panel.offer(self._topics, scene, script)
+        self._panel.offer(self._topics, scene)
         self._cameras.offer(self._topics.cameras, self._topics.vehicles)
 
 

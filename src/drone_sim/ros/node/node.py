@@ -110,6 +110,7 @@ class Node:
             self._topics.command_logs,
             self._time.simulated,
             frames_below=rospy.get_namespace().lstrip("/"),
+            held=lambda: self._outside.holds,
         )
         self._diagnostics = Diagnostics(diagnosis.look, self._time.stamp, self._inbox)
         self._beat = Beat(_SOON, _SELDOM)

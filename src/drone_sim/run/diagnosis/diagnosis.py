@@ -53,15 +53,20 @@ def _nominal(simulation: Simulation, vehicle: str, name: str, since: Since) -> f
     return parameters.real_time_factor / (parameters.time_step * every)
 
 
-def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool) -> Finding:
-    """Look at state, script errors, real-time factor and late steps; at `simulated_time`, whether /clock goes on."""
+def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool, held: bool) -> Finding:
+    """Look at state, script errors, real-time factor and late steps; at `simulated_time`, whether /clock goes on.
+
+    `held`: the next step waits for a client of the remote API.
+    """
     simulation = player.simulation
     asked = simulation.parameters.real_time_factor
     factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
     problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
     if simulated_time and not player.playing:
         problems.append(Problem(WARN, f"{player.state}: /clock stands still, and whoever sleeps in ROS time sleeps on"))
-    if factor is not None and asked and factor < _ENOUGH * asked:
+    if held and since and not since.steps:
+        problems.append(Problem(WARN, "no step: a client of the remote API has asked to trigger each, and does not"))
+    elif factor is not None and asked and factor < _ENOUGH * asked:
         problems.append(Problem(WARN, f"too slow: {factor:.2f} times real time, {asked:g} are asked for"))
     if since and since.late > _LATE * since.steps:
         problems.append(Problem(WARN, f"{since.late} of the last {since.steps} steps came late"))
@@ -104,12 +109,13 @@ class Diagnosis:
         simulated_time: bool,
         clock: Callable[[], float] = time.monotonic,
         frames_below: str = "",
+        held: Callable[[], bool] = lambda: False,
     ):
         """Take what plays and paces, what returns the commands that came in, by vehicle, and a monotonic clock (s).
 
-        The names of the vehicles' frames begin with `frames_below`.
+        The names of the vehicles' frames begin with `frames_below`; `held` tells whether a step waits for a client.
         """
-        self._frames_below = frames_below
+        self._frames_below, self._held = frames_below, held
         self._player, self._pacer, self._logs = player, pacer, logs
         self._simulated_time = simulated_time
         self._clock = clock
@@ -121,7 +127,7 @@ class Diagnosis:
         since, self._before = between(self._before, now), now
         logs = self._logs()
         return [
-            pace(self._player, self._pacer, since, self._simulated_time),
+            pace(self._player, self._pacer, since, self._simulated_time, self._held()),
             cameras(self._player.simulation, since),
             *(
                 VehicleDiagnosis(

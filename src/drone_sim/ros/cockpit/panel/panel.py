@@ -13,7 +13,6 @@ from std_msgs.msg import Bool, String
 
 from drone_sim.ros.cockpit.editor.scene_files import SceneList
 from drone_sim.ros.cockpit.panel.board import Board, one_of
-from drone_sim.ros.cockpit.panel.flown import FlownScript
 from drone_sim.ros.cockpit.panel.plots import Plots
 from drone_sim.ros.cockpit.panel.tuning import SpeedControl, VehicleTuning
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
@@ -39,12 +38,10 @@ class Panel:
         """Call `simulator`, send `commands`, offer `scenes`; `tell` sends a message to all browsers."""
         self._simulator, self._commands, self._scenes = simulator, commands, scenes
         self.board = Board(tell)
-        self.flown = FlownScript()
         self.plots = Plots(self.board)
         self.tuning = VehicleTuning(self.board)
         self.speed = SpeedControl(self.board, simulator.node)
         self._flight: list[rospy.Subscriber] = []
-        self._hears = False  # whether the vehicle's script listens to commands now, as its node says
         self._followed = ""
         self.show_status("no simulation")
 
@@ -91,15 +88,13 @@ class Panel:
         """Show what the simulation does."""
         self.board.show("status", status)
 
-    def offer(self, found: FoundTopics, scene: str, script: str) -> None:
-        """Offer vehicles and scenes that there are; `scene` and `script` are what the node's parameters say."""
+    def offer(self, found: FoundTopics, scene: str) -> None:
+        """Offer vehicles and scenes that there are; `scene` is what the node's parameter says."""
         if self._commands.vehicle not in found.vehicles:
             self._commands.choose(found.vehicles[0] if found.vehicles else "")
         self._show_vehicles(list(found.vehicles))
         self._show_scenes(scene)
         self.plots.offer(found.sensors)
-        self.flown.look(script)
-        self._show_flown()
 
     def _show_vehicles(self, vehicles: list[str]) -> None:
         self.board.show("vehicles", {"all": vehicles, "now": self._commands.vehicle})
@@ -118,20 +113,17 @@ class Panel:
         for one in self._flight:
             one.unregister()
         self.board.show("flight", "")
-        self._hears, self._flight = False, []
+        self._show_hears(Bool(True))  # until its node says otherwise
+        self._flight = []
         if vehicle:
             self._flight = [
                 rospy.Subscriber(f"/{vehicle}/state", String, lambda one: self.board.show("flight", one.data[:80])),
-                rospy.Subscriber(f"/{vehicle}/hears_commands", Bool, self._on_hears),
+                rospy.Subscriber(f"/{vehicle}/hears_commands", Bool, self._show_hears),
             ]
 
-    def _on_hears(self, message: Bool) -> None:
-        self._hears = message.data
-        self._show_flown()
-
-    def _show_flown(self) -> None:
-        listens = self._hears or self.flown.said["listens"]  # a script that is not loaded hears nothing yet
-        self.board.show("flown", {**self.flown.said, "listens": listens})
+    def _show_hears(self, message: Bool) -> None:
+        """Show whether the vehicle's script listens to commands."""
+        self.board.show("hears_commands", message.data)
 
 
 class SimulatorListener:

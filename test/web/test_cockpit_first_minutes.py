@@ -1,0 +1,115 @@
+"""A student's first minutes at the cockpit, by clicks and keys alone: from the address to a graded task."""
+
+import re
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_page import Panel, open_page, wait_until
+
+STAGES = ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera")
+GAIN = 'self.thrust = gain("thrust_gravity")'
+
+
+@pytest.fixture(name="student")
+def _student(cockpit, browser):
+    """A page that is opened for the first time; what is written there is gone in the end."""
+    before = {path.name for path in cockpit.scripts.glob("*")}
+    cockpit.start_afresh()
+    with open_page(cockpit, browser, started=False, viewport={"width": 1440, "height": 900}) as page:
+        yield page
+    cockpit.start_afresh()
+    for path in cockpit.scripts.glob("*"):
+        if path.name not in before:
+            path.unlink()
+
+
+def door(page, name):
+    if not page.get_by_role("dialog", name="drone_sim").is_visible():
+        page.click("#home")
+    page.get_by_role("dialog", name="drone_sim").get_by_role("button", name=name).click()
+
+
+def run(page, answer="started"):
+    page.click("#run")
+    wait_until(page, lambda: page.inner_text("#said").startswith(answer))
+
+
+def type_into(page, place, keys, words):
+    """Click into a line, press keys that lead to where one writes, and write."""
+    page.locator("#text .cm-line", has_text=place).click()
+    for key in keys:
+        page.keyboard.press(key)
+    page.keyboard.type(words)
+
+
+def test_from_the_address_to_a_gain_that_is_tuned(cockpit, student):
+    door(student, "Just fly")
+    wait_until(student, lambda: cockpit.drone.state == "flying")
+    student.keyboard.down("w")
+    wait_until(student, lambda: cockpit.drone.command[0] == 1.0)
+    student.keyboard.up("w")
+    wait_until(student, lambda: cockpit.drone.command[0] == 0.0)
+
+    door(student, "Tutorial")
+    wait_until(student, lambda: student.input_value("#script") == "tutorial/1_thrust.py")
+    student.select_option("#lesson", label="Stage 6: the twist topic")
+    wait_until(student, lambda: GAIN in student.inner_text("#text .cm-content"))
+    type_into(student, GAIN, ["End", "Enter"], "prnt('hello')")
+    run(student, "init, line 27: NameError")
+    wait_until(student, lambda: "prnt" in "".join(student.locator("#text .cm-lintRange-error").all_inner_texts()))
+    type_into(student, "prnt('hello')", ["End", "Shift+Home"], "sim.getObjectPosi")
+    options = student.locator(".cm-tooltip-autocomplete li")
+    wait_until(student, lambda: options.count() and options.first.inner_text().startswith("getObjectPosition"))
+    student.wait_for_timeout(200)  # in its first 75 ms, Enter begins a line
+    student.keyboard.press("Enter")
+    student.keyboard.press("Home")
+    student.keyboard.type("print('at', ")
+    student.keyboard.press("End")
+    student.keyboard.type("(self.d, -1)[2])")
+    run(student)
+    wait_until(student, lambda: re.search(r"at 0\.\d+", student.inner_text("#console")))
+    assert student.locator("#text .cm-lintRange-error").count() == 0
+
+    numbers = student.locator("#text .cm-lineNumbers .cm-gutterElement")
+    numbers.filter(has_text=re.compile("^27$")).click()
+    run(student, "paused at line 27")
+    row = student.locator("#variables tr", has=student.locator("th", has_text=re.compile("^thrust$")))
+    wait_until(student, lambda: row.count() and row.locator("td").first.inner_text() == "5.33")
+    numbers.filter(has_text=re.compile("^27$")).click()
+    student.locator("#toolbar").get_by_role("button", name="Start", exact=True).click()
+    wait_until(student, lambda: Panel(student).status == "flying")
+
+    panel = Panel(student)
+    panel.show("Tune")
+    field = panel.field("Kzref (m/s) per m")
+    field.click()
+    student.keyboard.press("Control+a")
+    student.keyboard.type("2.5")
+    student.keyboard.press("Enter")
+    panel.wait_for("Kzref = 2.5")
+    assert field.input_value() == "2.5"
+
+
+def test_each_stage_flies_when_one_goes_from_one_to_the_next(cockpit, student):
+    door(student, "Tutorial")
+    for stage in STAGES:
+        wait_until(student, lambda stage=stage: student.input_value("#script") == f"tutorial/{stage}.py")
+        assert "Run" in student.inner_text("#lesson-text")
+        run(student)
+        wait_until(student, lambda stage=stage: student.inner_text("#flown") == f"tutorial/{stage}.py")
+        wait_until(student, lambda: cockpit.drone.state == "flying" and Panel(student).status == "flying")
+        assert "error" not in student.inner_text("#console").lower()
+        student.click("#after")
+        if stage == "5_roll":  # the stability tests come between, with its script
+            wait_until(student, lambda: student.input_value("#lesson") == "stability-tests")
+            student.click("#after")
+
+
+def test_a_task_is_solved_and_graded(student):
+    door(student, "Tasks")
+    wait_until(student, lambda: student.input_value("#script").startswith("tasks/"))
+    student.click("#grade")
+    wait_until(student, lambda: student.locator("#graded tr").count() > 1, 120)
+    assert re.search(r"\d+(\.\d)? of \d+ points", student.inner_text("#graded"))
