@@ -17,10 +17,6 @@ export class SceneText {
     Object.assign(this, { parts, edit });
     this.revision = undefined;
     this.dirty = false;
-    const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && this.change());
-    const label = EditorView.contentAttributes.of({ "aria-label": "Text of the scene; Escape and then Tab leaves it" });
-    const extensions = [basicSetup, StreamLanguage.define(yaml), syntaxHighlighting(colors), keymap.of([indentWithTab]), indentUnit.of("  "), label, changed];
-    this.view = new EditorView({ parent: parts.text, state: EditorState.create({ extensions }) });
     edit.on("objects", () => this.follow());
   }
 
@@ -30,7 +26,15 @@ export class SceneText {
 
   show(on) {
     this.parts.part.hidden = !on;
+    if (on) this.view ??= this.begin();
     if (on) this.read();
+  }
+
+  begin() {
+    const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && this.change());
+    const label = EditorView.contentAttributes.of({ "aria-label": "Text of the scene; Escape and then Tab leaves it" });
+    const extensions = [basicSetup, StreamLanguage.define(yaml), syntaxHighlighting(colors), keymap.of([indentWithTab]), indentUnit.of("  "), label, changed];
+    return new EditorView({ parent: this.parts.text, state: EditorState.create({ extensions }) });
   }
 
   get text() {
