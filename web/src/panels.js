@@ -33,7 +33,8 @@ export class Panels {
     this.build = new Build(scene(), this.ask, this.notice, ofScript);
     this.side = new Side((panel) => {
       this.plots.show(panel === "plots");
-      this.build.turn(panel === "edit");
+      this.edits = panel === "edit";
+      if (this.isConnected) this.build.turn(this.edits); // else once it is
       if (panel === "view") this.view.list();
     });
     at("why").onclick = () => this.side.open("log");
@@ -90,6 +91,8 @@ export class Panels {
     const whole = await this.ask("panel");
     this.version = Math.max(this.version ?? 0, whole.version);
     this.board.take(whole);
+    this.isConnected = true;
+    this.build.turn(this.edits);
     this.build.edit.connected();
     this.start.load();
     this.log.begin(whole.lines);

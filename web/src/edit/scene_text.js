@@ -62,10 +62,11 @@ export class SceneText {
       this.say("");
     } catch (error) {
       this.say(error.message, true);
+      return;
     } finally {
       this.reading = false;
     }
-    this.follow();
+    if (this.edit.is.revision > this.revision) this.follow(); // it has changed meanwhile
   }
 
   // ---- to the scene
