@@ -9,6 +9,14 @@ OBJECT = """name => {
     const one = objects.named(name);
     return one && { ...one, matrix: null, above: objects.get(one.parent)?.name ?? "" };
 }"""
+# Half way along the arrow in the direction of y, in the world.
+ARROW = """() => {
+    const { taken, controls } = scene.editing.handles, { camera } = scene;
+    const at = taken.getWorldPosition(camera.position.clone());
+    const near = Math.min(1.9 * Math.tan((Math.PI * camera.fov) / 360), 7);
+    at.y += (at.distanceTo(camera.position) * near * controls.size) / 4 / 2;
+    return at.toArray();
+}"""
 
 
 class Builder:
@@ -61,6 +69,16 @@ class Builder:
         self.page.mouse.up()
         wait_until(self.page, lambda: self.page.evaluate(SELECTED) not in (before, None))
         return self.page.evaluate(SELECTED)
+
+    def pull(self, pixels):
+        """Drag what is selected by the arrow in the direction of y, so far to the right."""
+        wait_until(self.page, lambda: self.page.evaluate("Boolean(scene.editing.handles.controls.object)"))
+        x, y = self.page.evaluate(PROJECT, self.page.evaluate(ARROW))
+        self.page.mouse.move(x, y)
+        wait_until(self.page, lambda: self.page.evaluate("scene.editing.handles.controls.axis") == "Y")
+        self.page.mouse.down()
+        self.page.mouse.move(x + pixels, y, steps=5)
+        self.page.mouse.up()
 
     def write(self, relative="World", **numbers):
         """Write numbers of the position and orientation: X, Y, Z (m), Alpha, Beta, Gamma (degrees)."""

@@ -111,3 +111,32 @@ def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cock
         flies(page)
         Panel(page).press("Stop", "stopped")  # which puts back what the script has unparented
         check(Builder(page))
+
+
+def test_a_drag_is_one_step_of_undo_and_the_text_is_the_same_scene(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder = Builder(page)
+        builder.menu("Scene file", "New")
+        builder.row("Drone").wait_for(state="detached")
+        builder.drop("Cuboid", [1, 0, 0])
+        before = builder.wait("Cuboid", lambda one: one["position"][:2] == [1, 0])["position"]
+        builder.pull(60)
+        moved = builder.wait("Cuboid", lambda one: one["position"][1] < -0.05)["position"]
+        assert moved[0] == before[0] and moved[2] == before[2]
+        assert abs(moved[1] * 10 - round(moved[1] * 10)) < FAR, "in steps of 0.1 m"
+        wait_until(page, lambda: "Move Cuboid" in page.get_attribute("[data-edit=undo]", "title"))
+        page.keyboard.press("Control+z")
+        builder.wait("Cuboid", lambda one: one["position"] == before)
+        page.click("[data-edit=text]")
+        text = page.get_by_label("Text of the scene; Escape and then Tab leaves it")
+        wait_until(page, lambda: "name: Cuboid" in text.inner_text())
+        text.fill("floor: {size: 4}\nobjects:\n  - {name: Ball, shape: sphere, size: [0.2], position: [1, 1, 0.2]}\n")
+        builder.row("Ball").wait_for()
+        assert builder.object("Cuboid") is None
+        text.fill("floor: {size: 4}\nobjects:\n  - {name: Ball, shape: ball}\n")
+        wait_until(page, lambda: "line 3" in page.inner_text("#scene-text-said"))
+        assert builder.object("Ball")["position"] == [1, 1, 0.2], "what is wrong changes nothing"
+        page.reload()
+        ready(page)
+        builder.row("Ball").wait_for()
+    load(cockpit, "")

@@ -58,7 +58,7 @@ export class Drag {
     for (const [object] of this.shown) object.scale.setScalar(1);
     const { edit, roots } = this;
     const isMoved = this.isTold || change.matrix.elements.join() !== NOTHING;
-    const resize = { do: "scale", objects: roots, factors: change.factors?.toArray() };
+    const resize = { do: "scale", objects: roots, factors: change.factors?.toArray().map((one) => Number(one.toFixed(6))) };
     const done = this.isResize(change) ? await edit.do([resize], edit.named("Resize", roots)) : isMoved && (await this.tell(change));
     this.isOver = true;
     if (done === undefined) this.back();
