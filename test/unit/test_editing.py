@@ -383,6 +383,22 @@ def test_a_draft_outlives_the_node(tmp_path):
     second.simulation.close()
 
 
+def test_models_of_the_package_are_written_for_any_machine(editor):
+    pads = {"do": "add_model", "model": "landing_pad", "position": [1, 0, 0]}
+    edit(editor, pads, {"do": "add_model", "model": "pole", "position": [2, 0, 0]})
+    assert text_of(editor).splitlines()[-9:] == [
+        "objects:",
+        "  - {name: LandingPad, shape: box, size: [0.6, 0.6, 0.004], position: [1, 0, 0.002], respondable: false,",
+        "     texture: 'package://drone_sim/config/models/tag_7.png'}",
+        "  - name: Pole",
+        "    shape: compound",
+        "    position: [2, 0, 0]",
+        "    parts:",
+        "      - {shape: cylinder, size: [0.15, 0.04], position: [0, 0, 0.02], color: [0.25, 0.25, 0.27, 1]}",
+        "      - {shape: cylinder, size: [0.03, 2], position: [0, 0, 1.04], color: [0.95, 0.8, 0.1, 1]}",
+    ]
+
+
 # ---- many
 
 
