@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Everything a newcomer needs: ./dev.sh setup | run [roslaunch args] | test | test-web | lint | bench [NAME...] |
-#   docs-commands [--all] [PAGE...] | fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | recordings FOLDER | tasks [TASK...] | pythons [VERSION...] | deb
+# Everything a newcomer needs: ./dev.sh setup [--all] | run [roslaunch args] | test | test-web | lint | docs |
+#   bench [NAME...] | docs-commands [--all] [PAGE...] | fuzz [CASES] | soak [MINUTES] | soak-web [MINUTES] | two-hosts [--cut SECONDS] | recordings FOLDER | tasks [TASK...] | pythons [VERSION...] | deb
 #
 # Installs what is missing (Debian 12 and 13: their own ROS 1), keeps the pip packages in .venv, and builds into
 # build/ and devel/. What is there already is left alone, so a second run takes seconds. Where another ROS 1 has
@@ -41,6 +41,7 @@ venv_options=--system-site-packages
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim
 wheels=$cache/wheels
 PYTHONS="3.10 3.11 3.12 3.13"
+ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 
 # ros-environment is what lets setup.bash set ROS_PACKAGE_PATH, and python3-dev is for compiling PyBullet; on
 # Debian 12 other packages bring the first, and there is a wheel of the second. The package.xml without which `rosrun
@@ -151,7 +152,7 @@ make_pybullet() {
   locked "$wheels" compile_pybullet
 }
 
-# Of the wheel's 290 MB nothing here reads its robots and learning environments, nor the symbols for its debugger.
+# Of the wheel's 300 MB nothing here reads its robots and learning environments, nor the symbols for its debugger.
 slim_pybullet() {
   local folder library
   for folder in "$venv"/lib/python*/site-packages; do
@@ -225,14 +226,21 @@ lint_catkin() {
 }
 
 lint() {
-  make_venv requirements-dev.txt
+  make_venv "${ALL[@]}"
   local bin=$root/.venv/bin
   "$bin/ruff" check .
   "$bin/ruff" format --check .
   "$bin/mypy"
   PYTHONPATH=src:$PYTHONPATH "$bin/lint-imports"
-  "$bin/shellcheck" -e SC1091 dev.sh .ci/run packaging/*.sh docs/*.sh
+  "$bin/shellcheck" -e SC1091 dev.sh .ci/run packaging/*.sh docs/*.sh src/drone_sim/grading/autograder/files/*
   lint_catkin "$bin/catkin_lint"
+}
+
+# The site of README.md and docs, in docs/html: every link and anchor is checked, also of pages that have not changed.
+make_docs() {
+  make_venv requirements-docs.txt
+  "$venv/bin/python" -m sphinx -q -E -W --keep-going -j auto -c docs/site -d build/docs . docs/html
+  say "the manual is in $root/docs/html/index.html"
 }
 
 # ROS knows no passwords: without a word from the user, nobody outside this machine is let in.
@@ -251,7 +259,7 @@ hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
 }
 
 run_tests() {
-  make_venv requirements-dev.txt
+  make_venv "${ALL[@]}"
   say "left out: the tests in a browser (./dev.sh test-web), the commands of README and docs (./dev.sh docs-commands)"
   # Every core tests; tests with a master, each with its own, wait a third of their time: one more of them than cores.
   PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$(($(nproc) + 1))"
@@ -288,7 +296,7 @@ test_pythons() { # test_pythons VERSION...
     python=$(find_python "$version")
     [ -n "$python" ] || fail "no Python $version here"
     venv=$cache/python$version
-    make_venv requirements.txt requirements-dev.txt
+    make_venv "${ALL[@]}"
     say "the unit tests that need no ROS, on $("$python" --version)"
     "$venv/bin/python" -m pytest -n auto -rs test/unit
   done
@@ -296,25 +304,30 @@ test_pythons() { # test_pythons VERSION...
 
 command=${1:-help}
 shift || true
-case "$command" in test | test-web | lint | bench | fuzz | soak | soak-web | deb) writable "$root" ;; esac # for what they leave
+case "$command" in test | test-web | lint | docs | bench | fuzz | soak | soak-web | deb) writable "$root" ;; esac # for what they leave
 case "$command" in
-  setup) setup; make_venv requirements-dev.txt; say "ready: source $root/devel/setup.bash" ;;
+  setup)
+    case "$*" in "" | --all) ;; *) fail "setup $*: takes --all or nothing" ;; esac
+    setup
+    if [ $# = 1 ]; then make_venv "${ALL[@]}"; fi
+    say "ready: source $root/devel/setup.bash" ;;
   run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; PYTHONUNBUFFERED=1 exec roslaunch drone_sim drone.launch "$@" ;;
   test) setup; run_tests ;;
   test-web)
     install_packages chromium
     setup
-    make_venv requirements-dev.txt requirements-web.txt
+    make_venv "${ALL[@]}" requirements-web.txt
     exec .venv/bin/python -m pytest test/web "$@" ;;
   lint) install_packages git; setup; lint ;;
-  bench) setup; make_venv requirements-dev.txt; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
-  fuzz) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/fuzz/run.py "$@" ;;
-  docs-commands) setup; make_venv requirements-dev.txt; exec .venv/bin/python test/docs/run.py "$@" ;;
+  docs) install_packages python3-venv; make_docs ;;
+  bench) setup; make_venv "${ALL[@]}"; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
+  fuzz) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/fuzz/run.py "$@" ;;
+  docs-commands) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/docs/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
   soak-web) setup; exec .venv/bin/python test/soak/web.py "$@" ;;
   recordings)
     setup
-    make_venv requirements-dev.txt requirements-recordings.txt
+    make_venv "${ALL[@]}" requirements-recordings.txt
     cd "$here"
     exec "$venv/bin/python" "$root/test/recordings/run.py" "$@"
     ;;
@@ -324,7 +337,7 @@ case "$command" in
     install_packages $(packages)
     check_home
     test_pythons "$@" ;;
-  deb) install_packages python3-jinja2 python3-matplotlib python3-opencv python3-pil python3-scipy python3-tqdm python3-zmq
-    setup; TMPDIR=$cache packaging/deb.sh "$wheels" ;;
+  deb) install_packages python3-opencv python3-pil python3-scipy python3-tqdm python3-zmq
+    setup; make_docs; TMPDIR=$cache packaging/deb.sh "$wheels" ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;
 esac

@@ -8,6 +8,7 @@ setup(
         packages=find_packages("src"),
         package_dir={"": "src"},
         package_data={
+            "drone_sim.grading.autograder": ["files/*"],
             "drone_sim.grading.outputs.html": ["templates/*", "files/*"],
             "drone_sim.ros.cockpit": ["page/*.html", "page/*.css", "page/*.js"],
             "drone_sim.scripting.lua": ["*.lua"],

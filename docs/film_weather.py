@@ -13,7 +13,7 @@ from PIL import Image
 from drone_sim.mechanics import frames
 from drone_sim.offline import hud
 from drone_sim.offline.hud import HudState
-from drone_sim.offline.video import to_color
+from drone_sim.offline.pictures import to_color
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 

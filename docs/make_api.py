@@ -23,18 +23,18 @@ _INTRODUCTION = """\
 
 <!-- made by docs/make_api.py from the code: edit the docstrings there, and make it anew -->
 
-What a child script reaches as `sim`, `simROS`, `simUI` and `simRemoteApi`, in Lua and in Python, under the names of
-every generation of V-REP and CoppeliaSim. All names work at any time: `simGetObjectPosition` and
-`sim.getObjectPosition` are the same function. A name that is in none of these tables is an error that names near ones,
-where it is read; but `if simROS2 then` asks for a plugin, and is answered with nil.
+These are the functions of `sim`, `simROS`, `simUI` and `simRemoteApi` for child scripts, in Lua and in Python, with the
+names of every version of V-REP and CoppeliaSim. You may mix the names: `simGetObjectPosition` and
+`sim.getObjectPosition` are the same function. If you use a name that is in none of these tables, the error suggests
+similar names. (`if simROS2 then` asks for a plugin; it is nil, and no error.)
 
 - Positions are in m, angles in rad, forces in N. Orientations are Euler angles (alpha, beta, gamma; R = Rx Ry Rz) or
-  quaternions (x, y, z, w), matrices 12 numbers, poses 7. A relative name of a topic or parameter stands in the drone's
-  namespace: `pose` is `/drone/pose`, which differs from CoppeliaSim's: [scripts.md](scripts.md#where-this-differs).
-- A field of the type uint8[], such as a picture's, arrives as a string, and goes as a string or a table:
-  `string.byte(data, 1)` is its first byte.
-- `sim.` and a constant's name, or `sim_` and the name: both have CoppeliaSim's value (simConst.h).
-- An own function of drone_sim is marked so: CoppeliaSim has none of that name.
+  quaternions (x, y, z, w). A matrix has 12 numbers, a pose 7. A relative name of a topic or parameter is in the drone's
+  namespace: `pose` is `/drone/pose`. CoppeliaSim differs here: [scripts.md](scripts.md#where-this-differs).
+- In Lua, you get a field of the type uint8[], such as a picture, as a string: `string.byte(data, 1)` is its first byte.
+  You may send it as a string or a table.
+- A constant is `sim.` and its name, or `sim_` and its name. It has CoppeliaSim's value (simConst.h).
+- "drone_sim's own" functions do not exist in CoppeliaSim.
 """
 _HEAD = "| 3.x | 4.0 to 4.2 | 4.3 and later | what it does |\n|---|---|---|---|\n"
 _IGNORED_HEAD = "| 3.x | 4.0 to 4.2 | 4.3 and later | returns |\n|---|---|---|---|\n"

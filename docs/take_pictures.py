@@ -7,17 +7,19 @@ import itertools
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 from matplotlib import image
 
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline import hud
 from drone_sim.offline.hud import HudState
-from drone_sim.offline.video import to_color
+from drone_sim.offline.pictures import to_color
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
 DOCS = Path(__file__).resolve().parent
+GATES = {"Red": (255, 140, 40), "Green": (60, 220, 255)}  # the colors of their masks
 LEANING = (Twist(Vector3(2, 1.5, 0)), 0.45)  # m/s, s: the body leans forward and to the left
 
 
@@ -30,6 +32,7 @@ def main():
     on_body = parameters.read_yaml(DOCS / "tutorial" / "track_on_body.yaml")
     image.imsave(folder / "tutorial_track_body.png", leaning(on_body))
     image.imsave(folder / "tutorial_7_camera.png", published())
+    image.imsave(folder / "tutorial_8_gate.png", found())
     image.imsave(folder / "cameras.png", cameras())
     image.imsave(folder / "display.png", display())
 
@@ -82,6 +85,25 @@ def published():
     simulation.close()
     picture = backend.picture
     return np.frombuffer(picture.data, np.uint8).reshape(picture.height, picture.width, 3)
+
+
+def found():
+    """Return what stage 8 of the tutorial sees, where there is red in it, and whose each pixel is, with boxes."""
+    small = {"vehicles": {"drone": {"cameras": {"front": {"width": 320, "height": 240}}}}}
+    simulation = Simulation(parameters.load({"scene_file": str(DOCS / "tutorial" / "8_scene.yaml"), **small}))
+    fly(simulation, 0.5)
+    camera = simulation.drone.cameras["front"]
+    picture, truth = camera.take(), camera.truth()
+    red, green, blue = np.moveaxis(picture.astype(int), 2, 0)
+    is_red = np.repeat(255 * np.uint8((red > 2 * green) & (red > 2 * blue))[:, :, None], 3, axis=2)
+    masks = picture // 3
+    for one in truth.seen():
+        if one.identity.name in GATES:
+            masks[truth.output("instance") == one.number] = GATES[one.identity.name]
+            left, top, right, bottom = (round(float(edge)) for edge in one.visible)
+            cv2.rectangle(masks, (left, top), (right, bottom), GATES[one.identity.name])
+    simulation.close()
+    return np.hstack([picture, is_red, masks])
 
 
 def cameras():

@@ -8,11 +8,14 @@ import sys
 from collections.abc import Callable
 from typing import NoReturn
 
+from drone_sim.files.resources import package_path
 from drone_sim.message_text import printable
 from drone_sim.scripting.errors import ScriptError
 
 FAILED, SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
 EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
+# What single commands import, and only when they are asked for it: `./dev.sh setup` leaves it out.
+SEPARATE = ("av", "distributed", "jinja2", "matplotlib")
 
 
 class Parser(argparse.ArgumentParser):
@@ -41,9 +44,22 @@ def status_of(
         return SIGNALLED + signal.SIGINT
     except passed_on:
         raise
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in SEPARATE:
+            raise
+        said = f"this needs the Python package {package}: {installation_of(package)}"
     except EXPECTED as error:
-        print(f"{program}: {printable(format_error(error))}", file=sys.stderr, flush=True)
-        return wrong
+        said = printable(format_error(error))
+    print(f"{program}: {said}", file=sys.stderr, flush=True)
+    return wrong
+
+
+def installation_of(separate: str) -> str:
+    """Return how a package of SEPARATE is installed, in words."""
+    if (package_path() / "dev.sh").is_file():
+        return "`./dev.sh setup --all` installs it"
+    return f"`apt install python3-{separate}` installs it"
 
 
 def format_error(error: BaseException) -> str:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
+
+import numpy as np
 
 from drone_sim.config.types import DatumParameters
 from drone_sim.forces.weather import Weather
 from drone_sim.mechanics.frames import Vector
+from drone_sim.render.intrinsics import Lens
 from drone_sim.scripting import load
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.host import ScriptContext
+from drone_sim.scripting.api.vision import NO_OBJECT
 from drone_sim.sensors.camera import TurningBlades, Vision
 from drone_sim.world import World
 
@@ -65,6 +69,24 @@ class SimulationContext(ScriptContext):
         """Let another weather be where all are: keys of `weather`, as in YAML. Raises ParameterError."""
         self.weather.change(changes)
         self.tunings += 1
+
+    def picture(self, kind: str, lens: Lens, pose: np.ndarray, only: Collection[str] | None = None) -> np.ndarray:
+        """Return what is seen from a pose (4, 4), world from optical frame: "color" or "depth", as of Vision.picture.
+
+        Or "handles": (height, width) uint32, of the object that each pixel shows, NO_OBJECT for what is none of
+        scripts'. `only` are the names of the objects that there are; None is all. Raises ValueError where it needs
+        OpenGL, and there is none.
+        """
+        if kind != "handles" and only is None:
+            return self.vision.picture(kind, lens, pose)
+        names = [self.name_of(*place) for place in self.world.pictures.places()]
+        shown = None if only is None else np.array([name in only for name in names], dtype=bool)
+        if kind != "handles":
+            return self.vision.picture(kind, lens, pose, shown)
+        numbers = {name: number for number, name in enumerate(dict.fromkeys(names), 1)}
+        handles = [NO_OBJECT, *(self.objects.handle(one) if one in self.objects else NO_OBJECT for one in numbers)]
+        whose = np.array([numbers[name] for name in names], dtype=np.uint16)
+        return np.array(handles, dtype=np.uint32)[self.vision.numbers(lens, pose, whose, shown)]
 
     def name_of(self, body: int, link: int = -1) -> str:
         """Return what scripts call a body's link (-1: its root), '' for what they do not know."""

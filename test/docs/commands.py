@@ -19,6 +19,7 @@ WORKSPACE = "needs a catkin workspace and the network"
 INSTALLS = "installs packages"
 ANOTHER = "needs another package, or another machine"
 RECORDED = "needs the network, and nothing of that repository is kept here"
+CONTAINER = "needs Docker or WSL 2, which nobody here has tried"
 EXTENDING = "test/unit/test_docs_extending.py follows the page"
 
 NOT_RUN = {  # with the reason
@@ -29,13 +30,20 @@ NOT_RUN = {  # with the reason
     "rosrun image_view image_view image:=/drone/floor/image __name:=view2": DISPLAY,
     "cd my_ros_ws/src": WORKSPACE,
     "vcs import < drone_sim/drone_sim.rosinstall": WORKSPACE,
-    "drone_sim/dev.sh setup": WORKSPACE,
+    "drone_sim/dev.sh setup --all": WORKSPACE,
     "cd ..": WORKSPACE,
     "catkin_make": WORKSPACE,
+    "./dev.sh setup --all": "done: these commands run after it",
     "./dev.sh deb": "takes minutes: packaging is tried in bare chroots",
     "sudo apt install ./build/deb/ros-drone-sim_*.deb": INSTALLS,
     "client/bin/pip install coppeliasim-zmqremoteapi-client": INSTALLS,
     "client/bin/python": "test/unit/test_docs_remote.py types what comes after it",
+    "sudo apt update && sudo apt install -y git": CONTAINER,
+    "git clone URL-OF-DRONE_SIM drone_sim": CONTAINER,
+    "cd drone_sim": CONTAINER,
+    "docker build -f packaging/Dockerfile -t drone_sim .": CONTAINER,
+    "docker run --rm -p 127.0.0.1:8080:8080 --name drone_sim drone_sim": CONTAINER,
+    "docker exec -it drone_sim bash": CONTAINER,
     "git clone https://github.com/OBulun/Coppelia-Quad": RECORDED,
     "./dev.sh recordings Coppelia-Quad": RECORDED,
     "ssh -L 8080:localhost:8080 you@the-machine": ANOTHER,
@@ -46,6 +54,7 @@ NOT_RUN = {  # with the reason
     "rosrun drone_sim joy_teleop _config:=$PWD/my_pad.yaml": GAMEPAD,
     """rosservice call /drone_sim/edit_scene "'{\\"edit\\": [{\\"do\\": \\"add_model\\", \\"model\\": \\"gate\\", """
     """\\"position\\": [3, 0, 0]}]}'\"""": "test/ros/toolbar.test edits so; the numbers depend on what was done",
+    "rosrun stereo_image_proc stereo_image_proc __ns:=/drone/stereo": ANOTHER,
     "python3 try_cone.py": EXTENDING,
     "python3 try_temperature.py": EXTENDING,
     "python3 try_leash.py": EXTENDING,

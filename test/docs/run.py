@@ -19,6 +19,7 @@ import sys
 import tempfile
 import threading
 import time
+import zipfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -32,9 +33,12 @@ import vrep_quadricopter
 
 PATIENCE = 120.0  # s, for whatever does not end
 AT_ONCE = 4
-ENDLESS = ("rostopic echo ", "rosrun drone_sim view", "python3 $(rospack find drone_sim)/docs/fleet/follow.py")
+ENDLESS = (
+    *("rostopic echo ", "rosrun drone_sim view", "rosrun drone_sim record_truth"),
+    "python3 $(rospack find drone_sim)/docs/fleet/follow.py",
+)
 NEEDS_NONE = ("rosrun drone_sim ", "cat ", "source ", "rosbag info")  # a simulator
-NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim doctor")
+NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim record_truth", "rosrun drone_sim doctor")
 WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|\bERROR:")
 REFUSED = re.compile(rf"{WRONG.pattern}|refused")  # by the simulator, whatever the command has said
 FLYING = "commands on "
@@ -238,6 +242,9 @@ def prepare(page: Path, folder: Path) -> None:
         shutil.copy(built_in, folder / name)
     if "grade hover my.py" in text:  # in which one has to hold against the wind
         shutil.copy(ROOT / "tasks/hover/solution.py", folder / "my.py")
+    with zipfile.ZipFile(folder / "class.zip", "w") as file:
+        for number, name in enumerate(("Ada Lovelace", "Bo Ek")):
+            file.write(ROOT / "tasks/hover/solution.py", f"{name}_{number}_assignsubmission_file_/my.py")
     if "plot_flight flight.csv" in text:
         subprocess.run(FLIGHT, cwd=folder, stdout=subprocess.DEVNULL, timeout=PATIENCE, check=True)
     (folder / "Drone.ttt").write_bytes(vrep_encoder.file(*vrep_quadricopter.quadricopter()))

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A plan graded behind topics: a node that flies, a script as without ROS, and what cannot be graded there."""
 
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -32,6 +33,27 @@ criteria:
   - {kind: steady_error, of: vy, to: 0, at_most: 1}
   - {kind: attitude, at_most: 1}
 """
+SEEN = """
+duration: 2
+scene: room.yaml
+spread: {objects: {Ball: [1, 1, 0]}}
+timeline:
+  - {at: 1, object: {name: Ball, position: [2, 1, 1.5]}}
+criteria:
+  - {kind: signal, name: first, signal: x, equals: 3, until: 0.9}
+  - {kind: signal, name: then, signal: x, equals: 2}
+  - {kind: signal, signal: steps, equals: 40, tolerance: 2}
+"""
+SAYING = """
+def sysCall_init():
+    self.ball, self.steps = sim.getObjectHandle("Ball"), 0
+
+def sysCall_sensing():
+    self.steps += 1
+    sim.setInt32Signal("steps", self.steps)
+    sim.setFloatSignal("x", sim.getObjectPosition(self.ball, -1)[0])
+"""
+ROOM = "objects: [{name: Ball, shape: sphere, size: [0.1], position: [3, 3, 1]}]\n"
 STEP = 0.05  # s
 PATIENCE = 20  # s
 
@@ -75,28 +97,54 @@ class GradeLive(unittest.TestCase):
         there = np.interp(flown.times, rows[:, 0], rows[:, 1])
         self.assertLess(np.abs(there - flown.rows[:, 1]).max(), 5 * STEP * 1.3)
 
-    def test_3_what_cannot_be_graded_here_says_why(self):
+    def test_3_a_seed_moves_objects_a_timeline_too_and_signals_are_heard(self):
+        (Path(self.folder.name) / "room.yaml").write_text(ROOM)
+        script = Path(self.folder.name) / "saying.py"
+        script.write_text(SAYING)
+        plan = self.read(SEEN)
+        wanted = flight.grade(plan, str(script), 5)
+        before = rospy.get_param("/drone_sim/script")
+        rospy.set_param("/drone_sim/script", str(script))
+        try:
+            found, _ = grade(plan, 5, "", "drone_sim", PATIENCE)
+        finally:
+            rospy.set_param("/drone_sim/script", before)
+        self.assertIsNone(found.error)
+        first, then, steps = found.outcomes
+        self.assertAlmostEqual(first.value, wanted.outcomes[0].value, places=6)
+        self.assertNotAlmostEqual(first.value, 3, places=3)
+        self.assertEqual((then.value, then.passed, steps.passed), (2, True, True), found)
+
+    def test_4_who_moves_the_drone_gains_nothing_by_it(self):
+        pose = "{pose: {position: {x: 1.5, z: 2}, orientation: {w: 1}}}"
+        command = ["rostopic", "pub", "-r", "5", "/drone/set_pose", "geometry_msgs/PoseStamped", pose]
+        plan = self.read("duration: 3\ncriteria: [{kind: reach, places: [[1.5, 0, 2]], within: 0.3}]\n")
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as cheat:
+            try:
+                found, flown = grade(plan, 0, "", "drone_sim", PATIENCE)
+            finally:
+                cheat.terminate()
+        self.assertFalse(found.passed or found.points)
+        self.assertRegex(found.error, r"somebody moved the vehicle at \d\.\d\d s; the plan does not allow that")
+        self.assertRegex(found.tried[0], r"^tried to move drone at .* \(/drone/set_pose, by /rostopic_")
+        self.assertLess(np.abs(flown.rows[:, 1:4] - flown.rows[0, 1:4]).max(), 0.5)
+
+    def test_5_what_cannot_be_graded_here_says_why(self):
         for change, why in (
             ("config: {control: {Kzref: 3}}", r"control/Kzref = 5.0, the plan's is 3.0; see its config:="),
-            ("scene: room.yaml", r"this seed moves objects of the scene, which no topic does"),
             ("push", r"entry at 2 s: push.duration = 0.5: a push by topic lasts push/duration = 0.2 s"),
             ("no_contact", r"criterion no_contact: needs the sensor `contacts`"),
-            ("signal", r"criterion signal: asks for seen: a script's signals are heard by no topic"),
+            ("signal", r"criterion signal: asks for seen: of signals numbers alone are heard"),
         ):
             text = {
                 "push": PLAN.replace("duration: 0.2", "duration: 0.5"),
                 "no_contact": f"{PLAN}  - {{kind: no_contact}}\n",
-                "signal": f"{PLAN}  - {{kind: signal, signal: seen, equals: 1}}\n",
+                "signal": f"{PLAN}  - {{kind: signal, signal: seen, equals: done}}\n",
             }.get(change, f"{PLAN}{change}\n")
-            if change.startswith("scene"):
-                (Path(self.folder.name) / "room.yaml").write_text(
-                    "objects: [{name: Ball, shape: sphere, size: [0.1], position: [3, 3, 1]}]\n"
-                )
-                text = text.replace("yaw: 0.2", "yaw: 0.2, objects: {Ball: [1, 1, 0]}")
             with self.subTest(change), self.assertRaisesRegex(Mismatch, why):
                 grade(self.read(text), 1, "", "drone_sim", PATIENCE)
 
-    def test_3_a_node_that_never_comes_is_not_waited_for_for_ever(self):
+    def test_5_a_node_that_never_comes_is_not_waited_for_for_ever(self):
         with self.assertRaisesRegex(Mismatch, r"no node student \(waited for 2 s\)"):
             grade(self.read(PLAN), 0, "student", "drone_sim", 2)
 

@@ -39,7 +39,8 @@ ALONG_X = near(8e-6, 0, 0, 0, 9.04e-4, 0, 0, 0, 9.04e-4)  # kg m², of a drone w
 
 
 # Intensity, red, green and blue of the two pixels (3, 4, 5) and (0, 1, 2).
-DARKEST, LIGHTEST, MEAN = ([one / 255 for one in (g - 0.185, g - 1, g, g + 1)] for g in (1, 4, 2.5))
+DARKEST, LIGHTEST, MEAN = ([one / 255 for one in (g, g - 1, g, g + 1)] for g in (1, 4, 2.5))
+STATISTICS = approx([*DARKEST, 0.25, *LIGHTEST, 0.75, *MEAN, 0.5])
 BOX = [near(1, 1, 1), near(0.5, 0.5, 0.5, 0, 0, 0, 1)]
 
 
@@ -409,8 +410,10 @@ SIM: dict[str, list[Example]] = {
         Example("NAME(DEPTH)", [near(0.25, 0.75)]),
     ],
     "getVisionSensorResolution": [Example("NAME(CAMERA)", [[1, 2]])],
-    "handleVisionSensor": [Example("NAME(CAMERA)", [0])],
-    "readVisionSensor": [Example("NAME(DEPTH)", [0, approx([*DARKEST, 0.25, *LIGHTEST, 0.75, *MEAN, 0.5])])],
+    "handleVisionSensor": [Example("NAME(DEPTH)", [0, STATISTICS]), Example("NAME(sim.handle_all)", [0])],
+    "readVisionSensor": [Example("NAME(DEPTH)", [0, STATISTICS])],
+    "checkVisionSensor": [Example("NAME(DEPTH, FLOOR)", [1, STATISTICS])],
+    "checkVisionSensorEx": [Example("NAME(DEPTH, FLOOR, false)", [near(0.25, 0.75)])],
     "readProximitySensor": [Example("NAME(RANGE)", [-1, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "handleProximitySensor": [Example("NAME(FEELER)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],
     "checkProximitySensor": [Example("NAME(FEELER, FLOOR)", [0, 0, [0, 0, 0], -1, [0, 0, 0]])],

@@ -31,8 +31,8 @@ EXAMPLES = {"sim": SIM, "simROS": ROS, "simVision": VISION, "simRemoteApi": REMO
 COLORS = np.array([[[3, 4, 5]], [[0, 1, 2]]], np.uint8)  # the top row first
 DISTANCES = np.array([[2.0, 4.0]], np.float32)
 PICTURES = {
-    "FrontVision": lambda kind="color": COLORS if kind == "color" else DISTANCES,
-    "TrackCam": lambda kind="depth": DISTANCES if kind == "depth" else COLORS,
+    "FrontVision": lambda kind="color", only=None: COLORS if kind == "color" else DISTANCES,
+    "TrackCam": lambda kind="depth", only=None: DISTANCES if kind == "depth" else COLORS,
 }
 OBJECTS = {
     "DRONE": "/Quadcopter",

@@ -1,11 +1,15 @@
 """What a drone's camera knows to be true of its picture: names, categories, boxes, flow; and nothing for nobody."""
 
+import json
+
+import cv2
 import numpy as np
 import pytest
 import yaml
 from test_renderer_outputs import inner
 
 from drone_sim.mechanics.state import Pose
+from drone_sim.offline.fly import main as fly
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -99,6 +103,51 @@ def test_flow_is_that_of_reprojected_points(simulation):
     assert missed[known & inner(truth.output("instance"))].max() < 0.1, "apart from edges, between two things"
     assert np.linalg.norm(flow[known], axis=1).max() > 5
     assert (flow[~known] == 0).all()
+
+
+def test_a_flight_becomes_a_dataset_as_coco_has_it(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(yaml.safe_dump(SCENE))
+    folder, small = tmp_path / "seen", ["cameras.front.width=64", "cameras.front.height=48"]
+    assert fly(["--scene", str(scene), "--duration", "0.15", "--truth", str(folder), "--set", *small]) == 0
+    said = json.loads((folder / "annotations.json").read_text())
+    assert [one["file_name"] for one in said["images"]] == [f"color/{number:06}.png" for number in range(3)]
+    categories = {one["id"]: one["name"] for one in said["categories"]}
+    assert len({one["id"] for one in said["annotations"]}) == len(said["annotations"]) > 6
+    for one in said["annotations"]:
+        file = f"{one['image_id']:06}.png"
+        mask = cv2.imread(str(folder / "instances" / file), cv2.IMREAD_UNCHANGED) == one["number"]
+        counts = one["segmentation"]["counts"]  # of pixels that are out, in, out, ... column by column
+        runs = np.repeat(np.arange(len(counts)) % 2, counts).reshape(one["segmentation"]["size"][::-1]).T
+        assert (runs == mask).all() and one["area"] == mask.sum()
+        rows, columns = np.nonzero(mask)
+        assert one["bbox"] == [columns.min(), rows.min(), np.ptp(columns) + 1, np.ptp(rows) + 1]
+    assert {one["name"]: categories[one["category_id"]] for one in said["annotations"]}["Wall"] == "obstacle"
+    arrays = np.load(folder / "truth" / "000001.npz")
+    assert {name: one.shape for name, one in arrays.items()} == {
+        "depth": (48, 64), "normals": (48, 64, 3), "flow": (48, 64, 2), "flow_known": (48, 64),
+    }  # fmt: skip
+    assert arrays["flow_known"].any() and not np.load(folder / "truth" / "000000.npz")["flow_known"].any()
+    assert fly(["--duration", "0", "--truth", str(folder)]) == 1 == fly(["--duration", "0", "--truth", str(scene)])
+
+
+def test_messages_of_one_stamp_become_a_picture_of_the_dataset(tmp_path):
+    pytest.importorskip("rospy", reason="needs ROS")
+    from drone_sim.ros.tools import record_truth
+
+    moments = record_truth._Moments()
+    names = ["color", "boxes", *record_truth._IMAGES]
+    for name in names:
+        moments.take(name, 1.0500001, f"{name} 1")  # a stamp in JSON is rounded
+        moments.take(name, 1.1, f"{name} 2") if name != "flow" else None
+    assert moments.whole.get_nowait() == (1.05, {name: f"{name} 1" for name in names}) and moments.whole.empty()
+    for number in range(3):
+        for name in names:
+            moments.take(name, 2.0 + number, name)
+    assert moments.missed == 1, "two wait at a time"
+    for number in range(record_truth._MOST):
+        moments.take("color", 10.0 + number, "alone")
+    assert moments.missed == 2, "the oldest, whose flow has never come, makes room"
 
 
 def test_nothing_is_drawn_for_a_truth_that_nobody_asks(simulation, monkeypatch):

@@ -27,6 +27,7 @@ from drone_sim.ros.cockpit.scene.frames import FrameTree
 from drone_sim.ros.cockpit.scene.markers import MarkerTopic
 from drone_sim.ros.cockpit.scene.meshes import MeshStore, as_glb
 from drone_sim.ros.cockpit.server.access_control import SUBPROTOCOL, AccessControl
+from drone_sim.ros.cockpit.server.manual import Manual
 from drone_sim.ros.cockpit.server.page_server import PageServer, page_files
 from drone_sim.ros.cockpit.server.page_socket import PageSocket
 from drone_sim.ros.cockpit.teleop import HeldCommands, read_command
@@ -47,7 +48,8 @@ class Served:
         self.socket = PageSocket(self.flying, {"double": lambda message: {"twice": 2 * message["number"]}})
         self.loop = asyncio.new_event_loop()
         threading.Thread(target=self.loop.run_forever, daemon=True).start()
-        serving = AccessControl(TOKEN, page_files().get, self.socket.serve).serve("127.0.0.1", 0)
+        pages = {**page_files(), "/manual/search.html": ("text/html", b"")}
+        serving = AccessControl(TOKEN, pages.get, self.socket.serve).serve("127.0.0.1", 0)
         self.server = asyncio.run_coroutine_threadsafe(serving, self.loop).result(10)
         self.port = next(iter(self.server.sockets)).getsockname()[1]
         self.host = f"127.0.0.1:{self.port}"
@@ -100,7 +102,7 @@ def test_the_token_lets_in_and_leaves_the_address(served):
     assert served.get("/__init__.py", Cookie=served.cookie)[0] == 404
 
 
-@pytest.mark.parametrize("path", ["/", "/cockpit.js", "/nothing", "/?token=wrong"])
+@pytest.mark.parametrize("path", ["/", "/cockpit.js", "/nothing", "/?token=wrong", "/manual/search.html"])
 def test_every_answer_says_what_a_browser_may_do_with_it(served, path):
     cookie = {} if "wrong" in path else {"Cookie": served.cookie}
     _, answer, _ = served.get(path, **cookie)
@@ -108,7 +110,8 @@ def test_every_answer_says_what_a_browser_may_do_with_it(served, path):
     assert answer.headers["Referrer-Policy"] == "no-referrer" and answer.headers["Cache-Control"] == "no-store"
     assert answer.headers["X-Content-Type-Options"] == "nosniff"
     policy = dict(one.strip().partition(" ")[::2] for one in answer.headers["Content-Security-Policy"].split(";"))
-    assert policy["default-src"] == policy["base-uri"] == policy["form-action"] == "'none'"
+    assert policy["default-src"] == policy["base-uri"] == "'none'"
+    assert policy["form-action"] == ("'self'" if "manual" in path else "'none'"), "only the manual has a search"
     assert policy["frame-ancestors"] == "'self'"
     here = ("'self'", "blob:", f"ws://{served.host}", f"wss://{served.host}")
     assert set(policy.get("connect-src", "").split()) <= set(here)
@@ -481,6 +484,19 @@ def test_a_mesh_has_no_metal(tmp_path):
     length = int.from_bytes(content[12:16], "little")
     tree = json.loads(content[20 : 20 + length])
     assert [one["pbrMetallicRoughness"]["metallicFactor"] for one in tree["materials"]] == [0.0]
+
+
+def test_the_manual_is_served_where_it_was_built_and_nothing_beside_it(tmp_path):
+    (tmp_path / "html/_static").mkdir(parents=True)
+    (tmp_path / "html/_static/furo.css").write_text("p {}")
+    (tmp_path / "secret.css").write_text("p {}")
+    manual = Manual(tmp_path / "html")
+    assert manual.find("/manual/_static/furo.css") == ("text/css; charset=utf-8", b"p {}")
+    for path in ("/manual/../secret.css", "/manual/_static/../../secret.css", "/manual//etc/hosts", "/manual/"):
+        assert manual.find(path) is None
+    assert manual.find("/cockpit.js") is None
+    kind, content = Manual(tmp_path / "not_built").find("/manual/index.html")
+    assert kind.startswith("text/plain") and b"./dev.sh docs" in content
 
 
 def test_a_page_that_is_opened_early_is_answered_when_all_is_there():

@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("rospy", reason="needs ROS")
 
 import cv2
+import rospy
 from cv_bridge import CvBridge
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
@@ -18,6 +19,7 @@ from std_msgs.msg import String
 from drone_sim.ros.cockpit.panel import cameras as cameras_module
 from drone_sim.ros.cockpit.panel.board import Board
 from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, camera_name, packed
+from drone_sim.ros.cockpit.panel.overlays import color_of
 from drone_sim.ros.cockpit.server.page_socket import SendQueue
 from drone_sim.ros.cockpit.topics import ImageTopic, find_topics
 
@@ -126,9 +128,10 @@ def test_every_topic_of_pictures_is_offered_once():
         ("/drone/depth/image/compressedDepth", "sensor_msgs/CompressedImage"),
         ("/robot/eye/compressed", "sensor_msgs/CompressedImage"),
     ]
-    assert find_topics(topics).cameras == (
+    truth = [("/drone/front/truth/boxes", "std_msgs/String"), ("/drone/front/truth/categories", "sensor_msgs/Image")]
+    assert find_topics([*topics, *truth]).cameras == (
         ImageTopic("/drone/depth/image"),
-        ImageTopic("/drone/front", "/drone/front/compressed"),
+        ImageTopic("/drone/front", "/drone/front/compressed", has_truth=True),
         ImageTopic("/robot/eye", "/robot/eye/compressed"),
     )
 
@@ -202,6 +205,45 @@ def test_cameras_are_listened_to_while_they_are_shown_to_somebody(cameras, sent)
     assert Subscriber.there
     cameras.turn("/drone/front", False)
     assert not Subscriber.there and sent.told[-2:] == ["closed /drone/front", {"pictures": []}]
+
+
+def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
+    cameras.rest(False)
+    cameras.offer((ImageTopic("/drone/front", has_truth=True), ImageTopic("/drone/depth/image")))
+    cameras.turn("/drone/front", True)
+    for wrong in (
+        {"topic": "/drone/depth/image", "overlay": "mask", "on": True},
+        {"topic": "/drone/front", "on": True},
+    ):
+        with pytest.raises(ValueError, match="is none of those that there are"):
+            cameras.overlay_asked(wrong)
+    for kind in ("boxes", "mask"):
+        cameras.overlay_asked({"topic": "/drone/front", "overlay": kind, "on": True})
+    truth = {name: Subscriber.there[f"/drone/front/truth/{name}"] for name in ("labels", "boxes", "categories")}
+    truth["labels"](String(json.dumps({"categories": {"1": "Gate"}})))
+    mask = np.zeros((20, 30), np.uint16)
+    mask[5:10, 5:10] = 1
+    for at, name in ((0.05, "Before"), (0.1, "Now"), (0.15, "After")):
+        boxes = [{"name": one, "category": "Gate", "visible": [4.5, 4.5, 9.5, 9.5]} for one in (name, "Floor")]
+        truth["boxes"](String(json.dumps({"stamp": at, "objects": boxes})))
+        seen = message(mask if name == "Now" else 0 * mask, "mono16")
+        seen.header.stamp = rospy.Time.from_sec(at)
+        truth["categories"](seen)
+    truth["boxes"](String("no JSON"))
+    grey = message(np.full((20, 30, 3), 100, np.uint8), "rgb8")
+    grey.header.stamp = rospy.Time.from_sec(0.1)
+    Subscriber.there["/drone/front"](grey)
+    cameras.show()
+    (said, content) = sent.pictures[-1]
+    color = color_of(1)
+    assert said["boxes"] == [{"name": "Now", "box": [4.5, 4.5, 9.5, 9.5], "color": color}]
+    assert said["legend"] == [{"name": "Gate", "color": color}] and said["overlays"] == ["boxes", "mask"]
+    painted = picture(content)[7, 7].astype(int), picture(content)[15, 25].astype(int)
+    assert np.ptp(painted[0]) > 60 > 10 > np.ptp(painted[1])
+    cameras.overlay_asked({"topic": "/drone/front", "overlay": "mask", "on": False})
+    assert "/drone/front/truth/categories" not in Subscriber.there
+    cameras.turn("/drone/front", False)
+    assert not Subscriber.there
 
 
 def test_a_view_of_a_script_switches_its_camera(cameras):

@@ -44,7 +44,7 @@ class Machine:
         shutil.copytree(ROOT / "cmake", self.checkout / "cmake")
         for name in ("dev.sh", "CMakeLists.txt", "setup.py", "package.xml", "packaging/pybullet.sh"):
             shutil.copy(ROOT / name, self.checkout / name)
-        for name in ("requirements.txt", "requirements-dev.txt"):
+        for name in ("requirements.txt", "requirements-all.txt", "requirements-dev.txt"):
             (self.checkout / name).write_text("pybullet==1\n", encoding="utf-8")
         (folder / "ros/share/catkin/cmake").mkdir(parents=True)
         (folder / "ros/share/catkin/cmake/catkinConfig.cmake").touch()
@@ -108,26 +108,29 @@ def _machine():
 
 def test_set_up_once_is_set_up(machine):
     assert machine.run("setup")[0] == 0
-    assert machine.run("setup")[0] == 0
+    assert machine.asked("install -q --find-links") == 1
+    for _ in range(2):
+        assert machine.run("setup", "--all")[0] == 0
     assert machine.asked("-m venv") == 1
-    assert machine.asked("install -q --find-links") == 2
+    assert machine.asked("install -q --find-links") == 3
+    assert machine.run("setup", "-all") == (1, "[dev.sh] setup -all: takes --all or nothing\n")
 
 
 @pytest.mark.parametrize("moment", ["-m venv", "-r requirements.txt", "-r requirements-dev.txt"])
 def test_an_interrupted_environment_is_made_anew(machine, moment):
-    with machine.start("setup", env={"STOP_AT": moment}) as killed:
+    with machine.start("setup", "--all", env={"STOP_AT": moment}) as killed:
         machine.reached()
         os.killpg(killed.pid, signal.SIGKILL)
-    code, said = machine.run("setup")
+    code, said = machine.run("setup", "--all")
     assert code == 0, said
     assert machine.asked("-m venv") == 2
     assert machine.asked("-r requirements.txt") >= machine.asked("-r requirements-dev.txt") >= 1
 
 
 def test_other_requirements_are_installed_into_the_same_environment(machine):
-    assert machine.run("setup")[0] == 0
+    assert machine.run("setup", "--all")[0] == 0
     (machine.checkout / "requirements.txt").write_text("pybullet==2\n", encoding="utf-8")
-    assert machine.run("setup")[0] == 0
+    assert machine.run("setup", "--all")[0] == 0
     assert (machine.asked("-m venv"), machine.asked("-r requirements.txt")) == (1, 2)
     assert machine.asked("-r requirements-dev.txt") == 1
 
@@ -241,4 +244,4 @@ def test_what_a_change_must_pass_leaves_no_suite_out(machine):
     shutil.copy(ROOT / ".ci/run", machine.checkout / ".ci/run")
     machine.stub("checkout/dev.sh", '#!/bin/bash\necho "$1"\n')
     ran = subprocess.run([machine.checkout / ".ci/run"], stdout=subprocess.PIPE, text=True, check=True)
-    assert ran.stdout.split() == ["lint", "test", "test-web", "docs-commands", "pythons"]
+    assert ran.stdout.split() == ["lint", "docs", "test", "test-web", "docs-commands", "pythons"]

@@ -1,19 +1,22 @@
 """docs/tutorial.md: each stage flies as its text says, its commands print what it shows, its lines are the scripts'."""
 
 import ast
+import json
 import math
 import re
 import shlex
 import textwrap
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from recorder import Recorder
-from tutorial_flights import DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
+from tutorial_flights import CONTROLLERS, DOCS, STAGES, TEXT, at, fly, fly_timeline, flying
 
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.fly import main as fly_main
+from drone_sim.sensors.truth import described
 from drone_sim.vehicles.types.quadricopter import Quadricopter
 
 FORWARD_TURNING = Twist(Vector3(1, -0.3, 0.2), Vector3(0, 0, 0.5))
@@ -27,11 +30,11 @@ def blocks(language):
 # ---- the stages
 
 
-def test_there_are_seven_stages():
-    assert [name[0] for name in STAGES] == list("1234567")
+def test_there_are_eight_stages():
+    assert [name[0] for name in STAGES] == list("12345678")
 
 
-@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("stage", CONTROLLERS)
 def test_a_stage_has_the_phases_that_it_needs(stage):
     text = STAGES[stage].read_text()
     for phase in ("init", "actuation", "sensing"):
@@ -163,10 +166,26 @@ def test_the_camera_stage_draws_no_picture_that_nobody_gets(monkeypatch):
         fly(simulation, 0.15)
 
 
+@pytest.mark.parametrize("way", ["mask", "box"])  # by color: test_the_commands_print_what_the_text_shows
+def test_the_gate_is_found_by_mask_and_box_as_by_color(tmp_path, way):
+    script = tmp_path / "gate.py"
+    script.write_text(STAGES["8_gate"].read_text().replace('FIND = "color"', f'FIND = "{way}"'))
+    small = "cameras.front.width=160", "cameras.front.height=120"
+    with flying(str(script), *small, f"scene_file={DOCS / 'tutorial' / '8_scene.yaml'}") as simulation:
+        for _ in range(200):
+            simulation.step()
+            if way == "box":
+                boxes = {"objects": described(simulation.drone.cameras["front"].truth().seen())}
+                simulation.drone.bus.post("/drone/front/truth/boxes", SimpleNamespace(data=json.dumps(boxes)))
+            if simulation.drone.body.state.position[0] > 4:
+                break
+        assert simulation.drone.body.state.position[:2] == pytest.approx((4, 2), abs=0.1)
+
+
 READ = {"1": 1, "2": 4, "3": 5, "4": 10, "5": 10, "6": 10, "7": 10}  # parameters, by stage
 
 
-@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("stage", CONTROLLERS)
 def test_a_stage_reads_its_gains_from_parameters_that_can_be_tuned(stage):
     with flying(stage, "cameras.front.width=32", "cameras.front.height=24") as simulation:
         fly(simulation, 4)

@@ -12,7 +12,7 @@ from drone_sim.mechanics.state import Pose, Twist, Vector3
 def test_every_stage_tells_what_to_see():
     on_paper = re.sub(r"<!-- browser:.*?-->", "", TEXT, flags=re.DOTALL)
     stages = re.findall(r"^## Stage \d.*?(?=^## )", on_paper, re.MULTILINE | re.DOTALL)
-    assert len(stages) == 7
+    assert len(stages) == 8
     for stage in stages:
         watch = stage[stage.index("*Now watch it") :]
         assert "1$ roslaunch drone_sim drone.launch script:=" in watch

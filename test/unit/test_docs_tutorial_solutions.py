@@ -85,6 +85,12 @@ def test_solution_a_square_has_its_corners(name, rests):
     assert turned == pytest.approx(2 * math.pi if "turning" in name else 0, abs=0.01)
 
 
+def test_solution_the_green_gate_is_flown_through():
+    small = "cameras.front.width=160", "cameras.front.height=120"
+    flight = fly_solution("8_gate", None, *small, f"scene_file={DOCS / 'tutorial' / '8_scene.yaml'}", seconds=11)
+    assert np.hypot(flight.x - 4.5, flight.y + 1.5).min() < 0.1 and flight.x[-1] > 4.7
+
+
 def test_solution_the_guard_catches_the_fall():
     flight = fly_solution("5_guard", "fall.yaml", "drone.position=[0, 0, 5]", seconds=26)
     assert flight.z[-1] == pytest.approx(5, abs=0.01)

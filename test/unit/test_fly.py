@@ -202,7 +202,8 @@ def test_settings_are_what_is_flown(tmp_path):
         (["--video", "nowhere/out.mp4"], "nowhere/out.mp4"),
         (["--video", "out.mp4", "--camera", "trak"], "--camera 'trak': no such camera; near names are track"),
         (["--video", "out.mp4", "--set", "time_step=0.001", "sub_step=0.001"], "1000 pictures a second; at most 240"),
-        (["--camera", "track"], "--camera track: is of --video FILE.mp4, which is not given"),
+        (["--camera", "track"], "--camera track: is of --video or --truth, and neither is given"),
+        (["--truth", "nowhere/out"], "nowhere/out: no such folder"),
         (["--csv", "a.txt", "--plot", "./a.txt"], "--csv a.txt: is the file of --plot as well"),
     ],
 )
@@ -393,6 +394,20 @@ def test_it_needs_no_ros(tmp_path):
 
 
 # ---- plot
+
+
+@pytest.mark.parametrize("option, module", [("--plot", "matplotlib.axes"), ("--video", "av")])
+def test_a_package_that_few_need_is_named_before_the_flight(tmp_path, monkeypatch, capsys, option, module):
+    for ours in ("plot", "video"):
+        monkeypatch.delitem(sys.modules, f"drone_sim.offline.{ours}", raising=False)
+        monkeypatch.delattr(f"drone_sim.offline.{ours}", raising=False)
+    monkeypatch.setitem(sys.modules, module, None)
+    table = tmp_path / "out.csv"
+    ending = {"--plot": "png", "--video": "mp4"}[option]
+    assert main(["--duration", "1", "--csv", str(table), option, f"{tmp_path}/out.{ending}"]) == 1
+    name = module.partition(".")[0]
+    said = f"fly: this needs the Python package {name}: `./dev.sh setup --all` installs it\n"
+    assert capsys.readouterr().err == said and not table.exists()
 
 
 def test_plot_is_a_picture(tmp_path, commands):

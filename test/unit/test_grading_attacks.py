@@ -229,6 +229,60 @@ def python(body, folder, port=9):
     return PYTHON.replace("BODY", body)
 
 
+# A plan by which a script learns of the scene by its sensors alone, and what does not go round that.
+OWN = """
+duration: 0.3
+scene: package://drone_sim/tasks/gates_vision/scene.yaml
+reads: own
+criteria:
+  - {kind: signal, signal: found, equals: nothing}
+"""
+READS = """
+def attempts():
+    yield lambda: sim.getObjectPosition(gate, -1)
+    yield lambda: sim.getObjectPosition(drone, gate)
+    yield lambda: sim.getObjectMatrix(relativeTo=gate, handle=drone)
+    yield lambda: sim.getShapeBB(gate)
+    yield lambda: sim.checkDistance(drone)
+    yield lambda: sim.checkDistance(drone, sim.handle_all)
+    yield lambda: sim.checkDistance(drone, everything())
+    yield lambda: sim.checkVisionSensorEx(camera, gate, False)
+    yield lambda: sim.setObjectPosition(mark, gate, [0, 0, 0])
+    yield lambda: sim.setObjectParent(mark, gate, False)
+    yield lambda: sim.moveToPose({"object": mark, "relObject": gate, "targetPose": [0, 0, 0, 0, 0, 0, 1]})
+    yield lambda: sim.createVisionSensor(2, [9, 9, 0, 0], [0.1, 9, 1, 0.1, 0, 0, 0, 0, 0, 0, 0])
+
+def everything():
+    made = sim.createCollection()
+    sim.addItemToCollection(made, sim.handle_all, -1, 0)
+    return made
+
+def sysCall_init():
+    global drone, gate, camera, mark
+    drone, gate, camera = (sim.getObject(one) for one in ("/Quadcopter", "/Red", "/FrontVision"))
+    mark = sim.createDummy(0.01)
+
+def sysCall_sensing():
+    found = []
+    for number, attempt in enumerate(attempts()):
+        try:
+            found.append((number, attempt()))
+        except ValueError:
+            pass
+    assert sim.getObjectPosition(drone, -1) and sim.getObjectPosition(mark, drone)
+    sim.setStringSignal("found", repr(found) if found else "nothing")
+"""
+
+
+def test_who_may_read_of_his_own_alone_learns_nothing_of_the_scene(tmp_path):
+    path = tmp_path / "own.yaml"
+    path.write_text(OWN)
+    with contextlib.contextmanager(flying)(plans.read(path), tmp_path, False) as fly:
+        result = fly("reads.py", READS)
+    assert result.error is None and result.outcomes[0].passed, result.outcomes[0].said
+    assert "tried to read Red at 0.05 s (sim.getObjectPosition)" in result.tried and not result.passed
+
+
 def nothing_gained(result):
     """Whether no point was had for arriving, and what is said is one line."""
     return (

@@ -5,11 +5,13 @@ import itertools
 import json
 import os
 import resource
+import shutil
 import socket
 import subprocess
 import sys
 import threading
 import time
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -348,12 +350,14 @@ def test_a_script_of_any_name_is_flown_and_told(programs, folder, tmp_path, caps
 # ---- many
 
 
-def test_the_key_is_of_the_contents(plan, folder):
+def test_the_key_is_of_the_contents_wherever_they_lie(plan, folder, tmp_path):
     (folder / "helper.py").write_text("gain = 1\n")
     path = script(folder, "imports", "import helper")
     key = job_of(plan, path, 0).key
     assert job_of(plan, path, 0).key == key
     assert len({key, job_of(plan, path, 1).key, job_of(plan, path, 0, {"control": {"Kzref": 3}}).key}) == 3
+    moved = shutil.copytree(folder, tmp_path / "moved")
+    assert job_of(plan, str(moved / "imports.py"), 0).key == key
     (folder / "helper.py").write_text("gain = 2\n")
     assert job_of(plan, path, 0).key != key
 
@@ -468,6 +472,34 @@ def test_what_was_flown_is_not_flown_again(programs, folder, tmp_path, capsys, m
     assert "3 of 3 flights are known" in capsys.readouterr().err
     assert grade.main([*arguments, "--fresh"]) == 0
     assert "known" not in capsys.readouterr().err
+
+
+def test_a_class_is_graded_to_the_same_marks_after_a_kill(programs, folder, tmp_path, capsys):
+    scripts = {"Good": "pass", "Ends": HOSTILE["leaves"][0], "Pushes": "sim.addForce(0, [0] * 3, [0] * 3)"}
+    with zipfile.ZipFile(tmp_path / "class.zip", "w") as file:
+        for number, (name, body) in enumerate(scripts.items()):
+            file.writestr(f"{name}_{number}_assignsubmission_file_/my.py", f"def sysCall_init():\n    {body}\n")
+        file.writestr("None_9_assignsubmission_file_/notes.txt", "")
+    arguments = [str(folder / "hold.yaml"), str(tmp_path / "class.zip"), "--jobs", "1", "--seeds", "2"]
+    assert grade.main([*arguments, "--results", str(tmp_path / "whole"), "--marks", str(tmp_path / "whole.csv")]) == 1
+    killed = tmp_path / "killed"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(SOURCE), os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, "-m", "drone_sim.grading.grade", *arguments, "--results", str(killed)]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        while process.poll() is None and not any(b"key" in one.read_bytes() for one in killed.glob("*.jsonl")):
+            time.sleep(0.01)
+        process.kill()
+    capsys.readouterr()
+    outputs = ["--results", str(killed), "--marks", str(tmp_path / "again.csv"), "--json", str(tmp_path / "o.json")]
+    assert grade.main([*arguments, *outputs]) == 1
+    assert " flights are known" in capsys.readouterr().err
+    marks = (tmp_path / "again.csv").read_text()
+    assert marks == (tmp_path / "whole.csv").read_text()
+    assert "Participant 0,Good,,,1,1,-,2 of 2 flights passed\n" in marks
+    assert "Participant 9,None,,,0,1,-,0 of 2 flights passed; failed: no_contact in 2; ended by an error: 2\n" in marks
+    assert "tried to push" in marks
+    assert grade.main(["--verify", str(tmp_path / "o.json"), "--jobs", "1"]) == 0
+    assert "8 of 8 flights are what the file says" in capsys.readouterr().out
 
 
 @contextlib.contextmanager

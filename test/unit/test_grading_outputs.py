@@ -1,5 +1,6 @@
 """What is made of results for a terminal, for programs, and for CI systems."""
 
+import csv
 import io
 import json
 import random
@@ -9,8 +10,9 @@ from xml.etree import ElementTree
 import pytest
 from graded import EVIL, PLAN, read_plan, result
 
-from drone_sim.grading.outputs import as_json, gradescope, junit, table
+from drone_sim.grading.outputs import as_json, gradescope, junit, marks, table
 from drone_sim.grading.outputs.by_script import by_script
+from drone_sim.grading.submissions.submission import Person, Submission, names_of
 
 
 @pytest.fixture(name="plan", scope="module")
@@ -127,6 +129,92 @@ def test_gradescope_grades_one_script(plan, tmp_path):
     with pytest.raises(ValueError, match=r"is of one script; these results are of 2"):
         gradescope.write(plan, [result("a.py"), result("b.py")], tmp_path / "r.json")
     assert not (tmp_path / "r.json").exists()
+
+
+# Gradescope's autograder specifications, "Output format": what each key holds. Its harness refuses other values.
+VISIBILITY = {"hidden", "after_due_date", "after_published", "visible"}
+FORMATS = {"text", "html", "simple_format", "md", "ansi"}
+OF_A_TEST = {
+    "score": float,
+    "max_score": float,
+    "status": {"passed", "failed"},
+    "name": str,
+    "name_format": FORMATS,
+    "number": str,
+    "output": str,
+    "output_format": FORMATS,
+    "tags": list,
+    "visibility": VISIBILITY,
+    "extra_data": dict,
+}
+OF_ALL = {
+    "score": float,
+    "execution_time": float,
+    "output": str,
+    **dict.fromkeys(("output_format", "test_output_format", "test_name_format"), FORMATS),
+    **dict.fromkeys(("visibility", "stdout_visibility"), VISIBILITY),
+    "extra_data": dict,
+    "tests": list,
+    "leaderboard": list,
+}
+
+
+def check_keys(said, known):
+    assert said.keys() <= known.keys()
+    for key, value in said.items():
+        kind = known[key]
+        assert value in kind if isinstance(kind, set) else isinstance(value, (int, float) if kind is float else kind)
+
+
+def test_gradescopes_file_is_as_its_specification_says(plan):
+    said = gradescope.content(plan, [result(seed=0), result(seed=1, passed=(False, False), error=EVIL)])
+    check_keys(said, OF_ALL)
+    for one in said["tests"]:
+        check_keys(one, OF_A_TEST)
+        assert 0 <= one["score"] <= one["max_score"]
+    assert "score" in said and len(said["tests"]) == 2
+
+
+# Jenkins' schema of JUnit's XML (xunit-plugin, junit-10.xsd): attributes, those that must be there, elements inside.
+OF_A_SUITE = "name tests failures errors group time skipped timestamp hostname id package file log url"
+JUNIT = {
+    "testsuites": ("name time tests failures errors", "", "testsuite"),
+    "testsuite": (OF_A_SUITE, "name tests failures errors", "testsuite properties testcase system-out system-err"),
+    "testcase": ("name time classname group", "name", "skipped error failure system-out system-err"),
+    "error": ("type message", "", ""),
+    "failure": ("type message", "", ""),
+}
+
+
+def test_junits_file_is_as_the_schema_says(plan):
+    flights = [result(seed=0), result(seed=1, passed=(True, False)), result("b.py", error=EVIL, passed=(False,))]
+    flights.append(result("c.py").with_tried(["tried to move Drone at 1.00 s (sim.setObjectPosition)"]))
+    root = ElementTree.fromstring(junit.text(plan, flights))
+    assert root.tag == "testsuites" and {one.tag for one in root.iter()} == {*JUNIT}
+    for one in root.iter():
+        known, needed, inside = (words.split() for words in JUNIT[one.tag])
+        assert {*needed} <= one.attrib.keys() <= {*known} and {child.tag for child in one} <= {*inside}
+        if "time" in one.attrib:
+            assert re.fullmatch(r"\d*(\.\d*)?", one.get("time"))
+
+
+def test_marks_are_as_moodle_reads_them(tmp_path):
+    submissions = [
+        Submission("a.py", (Person("Ada Lovelace", "7"),)),
+        Submission("b.py", (Person("=Bo", id="8", email="b@x"), Person("Che"))),
+        Submission("c.py"),
+        Submission("not flown.py"),
+    ]
+    names = names_of(submissions)
+    flights = [result("a.py"), result("b.py", passed=(True, False)), result("b.py", 1), result("c.py", error="a\nb")]
+    marks.write(submissions, by_script(flights, names), tmp_path / "m.csv")
+    ada, bo, che, script = csv.DictReader((tmp_path / "m.csv").read_text().splitlines())
+    # What Moodle's worksheet must have, by its importer: Identifier, Grade, Last modified (grade).
+    assert (ada["Identifier"], ada["Grade"], ada["Last modified (grade)"]) == ("Participant 7", "3", "-")
+    assert (bo["Full name"], bo["ID number"], bo["Email address"], bo["Grade"]) == ("'=Bo", "8", "b@x", "2.5")
+    assert bo["Maximum Grade"] == "3" and bo["Feedback comments"] == "1 of 2 flights passed; failed: no_contact in 1"
+    assert (che["Full name"], che["Grade"], script["Full name"]) == ("Che", "2.5", "c.py")
+    assert script["Feedback comments"] == "0 of 1 flights passed; ended by an error: 1"
 
 
 def test_a_plan_without_a_title_goes_by_its_name(tmp_path):

@@ -41,7 +41,7 @@ def _report(tmp_path_factory):
 
 
 def test_every_link_leads_somewhere_in_the_folder(report):
-    pages = [*report.glob("*.html"), *report.glob("scripts/*.html")]
+    pages = [*report.glob("*.html"), *report.glob("scripts/*/*.html")]
     assert len(pages) == 3
     for page in pages:
         for link in Page(page).links:
@@ -50,7 +50,7 @@ def test_every_link_leads_somewhere_in_the_folder(report):
 
 
 def test_names_and_errors_are_text(report):
-    pages = {report / "index.html": 1, **dict.fromkeys(report.glob("scripts/*.html"), 6)}
+    pages = {report / "index.html": 1, **dict.fromkeys(report.glob("scripts/*/*.html"), 6)}
     for page, scripts in pages.items():
         tags = Page(page).tags
         assert (tags.count("script"), tags.count("img")) == (scripts, 0)
@@ -58,16 +58,16 @@ def test_names_and_errors_are_text(report):
 
 
 def test_a_flights_figures_are_those_of_its_table(report):
-    (file,) = report.glob("flights/*.js")
+    (file,) = report.glob("scripts/*/flights/*.js")
     name, _, figures = file.read_text().partition(" = ")
-    assert name == 'report.flights["01-0"]'
+    assert name == 'report.flights["0"]'
     figures = json.loads(figures.rstrip(";\n"))
     assert figures["marks"] == [{"name": "no_contact", "at": 1.5}]
     assert (figures["t"][20], *(figures[axis][20] for axis in "xyz")) == pytest.approx((1, *place(1)), abs=1e-4)
 
 
 def test_objects_stand_as_boxes_where_the_scene_has_them(report):
-    scene = json.loads((report / "files/scene.js").read_text().partition(" = ")[2].rstrip(";\n"))
+    scene = json.loads(next(report.glob("scripts/*/files/scene.js")).read_text().partition(" = ")[2].rstrip(";\n"))
     gate, pole = scene["boxes"]
     assert gate["name"] == "<i>Gate</i>"
     assert gate["corners"][0] == pytest.approx([1.9, -0.5, 0])
@@ -75,11 +75,26 @@ def test_objects_stand_as_boxes_where_the_scene_has_them(report):
     assert pole["corners"][7][2] == pytest.approx(2.5)
 
 
+def test_the_teachers_page_ranks_counts_and_holds_similar_scripts_side_by_side(tmp_path):
+    text = "\n".join(f"x = sim.getObjectPosition(h, -1)[0]{' * x + 1' * number}" for number in range(20))
+    scripts = {"a.py": text, "b.py": "# <b>\n" + text.replace("x", "y"), "c.py": "def sysCall_init(): pass"}
+    results = [result("a.py"), result("b.py", passed=(False, True)), result("c.py", passed=(False, False))]
+    report.write(read_plan(tmp_path), results, lambda _: None, tmp_path / "out", {"b.py": "Ada"}, scripts)
+    index = Page(tmp_path / "out/index.html")
+    text = "".join(index.text.split())
+    assert all(said in text for said in ("1a.py1/1", "2Ada0/1", "3c.py0/1"))  # rank, script, passed
+    assert all(said in text for said in ("2.7to31", "0.9to1.21", "0to0.31"))  # points, scripts
+    assert "similar/1.html" in index.links
+    beside = Page(tmp_path / "out/similar/1.html")
+    assert beside.tags.count("pre") == 2 and beside.tags.count("b") == 0 and beside.tags.count("span") == 41
+    assert "# <b>\ny = sim.getObjectPosition" in beside.text
+
+
 def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
     plan = read_plan(tmp_path)
     report.write(plan, [result("a.py"), result("b.py")], lambda _: None, tmp_path / "out")
     report.write(plan, [result("c.py")], lambda _: None, tmp_path / "out")
-    assert [one.name for one in (tmp_path / "out/scripts").iterdir()] == ["01-c.html"]
+    assert [one.name for one in (tmp_path / "out/scripts").iterdir()] == ["01-c"]
     with pytest.raises(ValueError, match="holds other files"):
         report.check(tmp_path)
     with pytest.raises(ValueError, match="is a file"):
@@ -101,13 +116,13 @@ def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
 def test_a_table_that_shows_nothing_is_told_of(tmp_path, text, said):
     (tmp_path / "t.csv").write_text(text)
     report.write(read_plan(tmp_path), [result()], lambda _: tmp_path / "t.csv", tmp_path / "out")
-    (page,) = (tmp_path / "out/scripts").iterdir()
+    (page,) = tmp_path.glob("out/scripts/*/index.html")
     assert said in page.read_text()
 
 
 def test_a_long_flight_is_thinned(tmp_path):
     table = write_table(tmp_path / "t.csv", 301)
     report.write(read_plan(tmp_path), [result()], lambda _: table, tmp_path / "out")
-    (page,), (figures,) = (tmp_path / "out/scripts").iterdir(), (tmp_path / "out/flights").iterdir()
+    (page,), (figures,) = tmp_path.glob("out/scripts/*/index.html"), tmp_path.glob("out/scripts/*/flights/*")
     assert "one row in 2 is shown" in page.read_text()
     assert json.loads(figures.read_text().partition(" = ")[2].rstrip(";\n"))["t"][:3] == [0, 0.1, 0.2]

@@ -1,10 +1,31 @@
-"""What a folder of submissions holds."""
+"""What a class hands in: folders, zips of Moodle and Gradescope, tables; hostile ones; who is alike."""
+
+import stat
+import zipfile
+from pathlib import Path
 
 import pytest
+from graded import read_plan
 
-from drone_sim.grading.submissions import scripts_of
+from drone_sim.grading import tasks
+from drone_sim.grading.submissions import archive, similarity
+from drone_sim.grading.submissions.folders import submissions_of
+from drone_sim.grading.submissions.submission import Person, Submission, names_of
 
 SCRIPT = "def sysCall_init():\n    pass\n"
+METADATA = """---
+submission_11:
+  :submitters:
+  - :name: Ada Lovelace
+    :sid: '007'
+    :email: ada@x.org
+  - :name: Bo Ek
+  :created_at: 2026-11-01 10:00:00.0 Z
+  :results: !ruby/object:Thing {a: 1}
+submission_12:
+  :submitters:
+  - :name: Che Li
+"""
 
 
 def laid(folder, **files):
@@ -14,28 +35,195 @@ def laid(folder, **files):
         path.write_text(text)
 
 
+def zipped(path, members):
+    """Write a zip of texts, bytes and ready ZipInfos by their names."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, content in members.items():
+            file.writestr(name, content)
+    return path
+
+
+def moodle(name, number, file=""):
+    return f"{name}_{number}_assignsubmission_file_{file}"
+
+
+def found(given, tmp_path):
+    """Return what was found, by what its name ends with below the folder of the unpacked."""
+    return {one.name or Path(one.script).name: one for one in submissions_of(str(given), tmp_path / "store")}
+
+
 def test_a_folder_holds_scripts_and_folders_with_one(tmp_path):
+    folder = tmp_path / "class"
     laid(
-        tmp_path,
+        folder,
         alice_dot_py=SCRIPT,
         bob__deep__main_dot_lua="function sysCall_init() end\n",
         bob__pid_dot_py="x = 1\n",
     )
-    laid(tmp_path, helper_dot_py="x = 1\n", notes_dot_txt=SCRIPT, empty__notes_dot_txt="")
-    (tmp_path / ".git").mkdir()
-    (tmp_path / ".git" / "hook.py").write_text(SCRIPT)
-    (tmp_path / "carol.py").symlink_to("nowhere.py")
-    named = [one.removeprefix(f"{tmp_path}/") for one in scripts_of(str(tmp_path))]
-    assert named == ["alice.py", "bob/deep/main.lua", "carol.py"]
+    laid(folder, helper_dot_py="x = 1\n", notes_dot_txt=SCRIPT, empty__notes_dot_txt="")
+    laid(folder, **{".git__hook_dot_py": SCRIPT})
+    (folder / "carol.py").symlink_to("nowhere.py")
+    zipped(folder / "dave.zip", {"mine/main.py": SCRIPT, "mine/pid.py": "x = 1\n"})
+    submissions = submissions_of(str(folder), tmp_path / "store")
+    named = [one.script.removeprefix(f"{folder}/") for one in submissions]
+    assert named[:3] == ["alice.py", "bob/deep/main.lua", "carol.py"] and named[3].endswith("/mine/main.py")
+    assert not any(one.error or one.people for one in submissions) and len(named) == 4
 
 
 def test_a_script_is_itself_whatever_it_is(tmp_path):
-    assert scripts_of("pilot") == ["pilot"] and scripts_of(str(tmp_path / "none.py")) == [str(tmp_path / "none.py")]
+    for given in ("pilot", str(tmp_path / "none.py")):
+        assert submissions_of(given, tmp_path) == [Submission(given)]
 
 
-def test_folders_that_say_nothing_get_a_line(tmp_path):
-    with pytest.raises(ValueError, match="no submission is in this folder"):
-        scripts_of(str(tmp_path))
-    laid(tmp_path, dave__one_dot_py=SCRIPT, dave__two_dot_py=SCRIPT)
-    with pytest.raises(ValueError, match=r"holds 2 child scripts \(one.py, two.py\); one is to be graded"):
-        scripts_of(str(tmp_path))
+def test_folders_that_say_nothing_get_a_line_and_who_hands_in_too_much_pays_alone(tmp_path):
+    folder = tmp_path / "class"
+    folder.mkdir()
+    with pytest.raises(ValueError, match="no submission is in it"):
+        submissions_of(str(folder), tmp_path)
+    laid(folder, dave__one_dot_py=SCRIPT, dave__two_dot_py=SCRIPT, eve__notes_dot_txt="", fay__my_dot_py=SCRIPT)
+    dave, eve, fay = submissions_of(str(folder), tmp_path)
+    assert dave.error == "'dave': holds 2 child scripts (one.py, two.py); one is to be graded"
+    assert eve.error == "'eve': holds no child script (a file with a sysCall_ function)" and not fay.error
+
+
+def test_moodles_zip_with_and_without_folders(tmp_path):
+    inner = zipped(tmp_path / "inner.zip", {"project/main.py": SCRIPT, "project/pid.py": ""}).read_bytes()
+    path = zipped(
+        tmp_path / "Hover-42.zip",
+        {
+            f"{moodle('Ada Lovelace', 7)}/my.py": SCRIPT,
+            f"{moodle('Ada Lovelace', 7)}/gains/pid.py": "x = 1\n",
+            "Ada Lovelace_7_assignsubmission_onlinetext_/onlinetext.html": "hello",
+            moodle("Bo Ek", 8, "main.py"): SCRIPT,
+            moodle("Bo Ek", 8, "helper_1.py"): "x = 1\n",
+            moodle("Che_Li", 9, "all.zip"): inner,
+            moodle("Bo Ek", 10, "notes.pdf"): b"%PDF",
+        },
+    )
+    submissions = submissions_of(str(path), tmp_path / "store")
+    people = [one.people for one in submissions]
+    numbers = {"Ada Lovelace": "7", "Bo Ek": "10"}, {"Bo Ek": "8", "Che_Li": "9"}
+    assert people == [(Person(name, number),) for some in numbers for name, number in some.items()]
+    ada, none, bo, che = submissions
+    assert Path(ada.script).name == "my.py" and (Path(ada.script).parent / "gains/pid.py").is_file()
+    assert Path(bo.script).name == "main.py" and (Path(bo.script).parent / "helper_1.py").is_file()
+    assert che.script.endswith("/project/main.py") and "holds no child script" in none.error
+    assert names_of(submissions)[bo.script] == "Bo Ek (8)" and names_of(submissions)[ada.script] == "Ada Lovelace"
+    assert [one.script for one in submissions_of(str(path), tmp_path / "store")] == [one.script for one in submissions]
+
+
+def test_gradescopes_zip_and_its_unpacked_folder(tmp_path):
+    members = {
+        "assignment_1_export/submission_metadata.yml": METADATA,
+        "assignment_1_export/submission_11/my.py": SCRIPT,
+        "assignment_1_export/submission_12/a.py": SCRIPT,
+        "assignment_1_export/submission_12/b.py": SCRIPT,
+    }
+    both, che = submissions_of(str(zipped(tmp_path / "export.zip", members)), tmp_path / "store")
+    assert both.people == (Person("Ada Lovelace", id="007", email="ada@x.org"), Person("Bo Ek"))
+    assert (che.name, "holds 2 child scripts" in che.error) == ("Che Li", True)
+    folder = Path(both.script).parents[1]
+    assert [one.people for one in submissions_of(str(folder), tmp_path / "store")] == [both.people, che.people]
+    (folder / "submission_metadata.yml").write_text("- what\n")
+    with pytest.raises(ValueError, match=r"submission_metadata.yml: does not say who the `:submitters:` are"):
+        submissions_of(str(folder), tmp_path / "store")
+
+
+def test_a_table_of_names_and_paths(tmp_path):
+    laid(tmp_path, one__my_dot_py=SCRIPT, two_dot_py=SCRIPT)
+    (tmp_path / "class.csv").write_text(
+        "\ufeffName;Path;ID\nAda;one;7\nBo;two.py;8\nChe;three.py;9\nDu;two.py;10\n", encoding="utf-8"
+    )
+    ada, bo, che = submissions_of(str(tmp_path / "class.csv"), tmp_path / "store")
+    assert (ada.script, ada.people) == (str(tmp_path / "one/my.py"), (Person("Ada", id="7"),))
+    assert (bo.script, bo.name) == (str(tmp_path / "two.py"), "Bo, Du")
+    assert che.error == f"{tmp_path}/three.py: no such file"
+    for text, said in (
+        ("a,b\n1,2\n", r"line 1: must name the columns name, path \(and may id, email\), not 'a,b'"),
+        ("name,path\nAda,\n", "line 2: must have a name and a path"),
+        ("", "line 1: must name the columns"),
+    ):
+        (tmp_path / "class.csv").write_text(text)
+        with pytest.raises(ValueError, match=said):
+            submissions_of(str(tmp_path / "class.csv"), tmp_path / "store")
+
+
+def _link():
+    info = zipfile.ZipInfo("link.py")
+    info.external_attr = (stat.S_IFLNK | 0o777) << 16
+    return info
+
+
+HOSTILE = {  # what a student's zip holds, and what is said of it
+    "a bomb": ({"a.bin": bytes(2**20), "my.py": SCRIPT}, "holds more than 1 MiB"),
+    "many files": ({f"{number}.txt": "" for number in range(1001)}, "holds more than 1000 files"),
+    "a path outside": ({"../../evil.py": SCRIPT}, "holds a path that leads out of it: '../../evil.py'"),
+    "an absolute path": ({"/tmp/evil.py": SCRIPT}, "holds a path that leads out of it: '/tmp/evil.py'"),
+    "a link": ({_link(): "/etc/passwd"}, "holds what is no regular file: 'link.py'"),
+    "too long a name": ({"x" * 300: ""}, "cannot be unpacked: File name too long"),
+    "a file that is a folder": ({"a": "", "a/b": ""}, "cannot be unpacked: "),
+    "no zip": (b"PK\x03\x04 and nothing more", "is no zip that can be read: File is not a zip file"),
+}
+
+
+def test_hostile_zips_cost_their_own_marks_and_leave_nothing_outside(tmp_path, monkeypatch):
+    monkeypatch.setattr(archive, "LARGEST", 2**20)
+    members = {f"{moodle('Good', 1)}/my.py": SCRIPT}
+    for number, (what, (content, _)) in enumerate(HOSTILE.items(), start=2):
+        raw = content if isinstance(content, bytes) else zipped(tmp_path / "s.zip", content).read_bytes()
+        members[moodle(what, number, "s.zip")] = raw
+    whole = zipped(tmp_path / "class.zip", {**members, f"{moodle('Bad', 99)}/../../../evil.py": SCRIPT})
+    before = {*tmp_path.iterdir()}
+    submissions = found(whole, tmp_path)
+    assert submissions.pop("Good").error == ""
+    assert "holds a path that leads out of it" in submissions.pop("Bad").error
+    assert [what for what, (_, said) in HOSTILE.items() if said not in submissions[what].error] == []
+    assert not any("\n" in one.error for one in submissions.values())
+    assert {*tmp_path.iterdir()} - before == {tmp_path / "store"}
+    (tmp_path / "broken.zip").write_bytes(whole.read_bytes()[:-30])
+    with pytest.raises(ValueError, match=r"broken.zip': is no zip that can be read"):
+        submissions_of(str(tmp_path / "broken.zip"), tmp_path / "store")
+
+
+def test_a_zip_that_lies_about_its_sizes_is_refused(tmp_path):
+    path = zipped(tmp_path / "lies.zip", {"my.py": SCRIPT * 100})
+    content = path.read_bytes()
+    path.write_bytes(content.replace(len(SCRIPT * 100).to_bytes(4, "little"), bytes(4)))
+    with pytest.raises(archive.Refused):
+        archive.unpack_whole(path, tmp_path / "store")
+
+
+# ---- who is alike
+
+
+def solution(task):
+    return (tasks.folder() / task / "solution.py").read_text()
+
+
+def test_renamed_and_reordered_copies_are_found_and_own_work_is_not(tmp_path):
+    original = solution("hover")
+    copy = original.replace("self.", "me.").replace("self", "me").replace("0.", "1.").replace("home", "start")
+    copy = "".join(f"{line}  # mine\n" for line in copy.splitlines() if line)
+    sources = {"hover.py": original, "copy.py": copy, "line.py": solution("line"), "pad.py": solution("pad")}
+    given = similarity.given_by(read_plan(tmp_path))
+    (pair,) = similarity.similar(sources, given)
+    assert (pair.first, pair.second) == ("hover.py", "copy.py") and pair.share > 0.9
+    marked = [original.splitlines()[line - 1] for line in pair.lines[0]]
+    assert len(marked) > 10
+
+
+def test_what_was_given_or_most_have_is_no_copy():
+    text = solution("hover")
+    assert similarity.similar({"a.py": text, "b.py": text}, {}) and not similarity.similar(
+        {"a.py": text, "b.py": text}, {"start.py": text}
+    )
+    assert not similarity.similar({f"{number}.py": text for number in range(6)}, {})
+
+
+def test_lua_is_compared_as_lua_and_no_text_takes_long():
+    lines = [f"local v = sim.getObjectPosition(h, -1)[3]{' * v + 1' * number}" for number in range(20)]
+    other = ["-- [[ mine ]]", *(line.replace(" v", " mine") for line in lines)]
+    (pair,) = similarity.similar({"a.lua": "\n".join(lines), "b.lua": "\n".join(other)}, {})
+    assert pair.share == 1.0 and min(pair.lines[1]) == 2
+    for hostile in ("--[[ " * 20_000, '"' * 9_999, "'''" * 9_999, "x" * 99_999, "\0" * 4_000):
+        assert not similarity.similar({"a.lua": hostile, "b.py": hostile, "c.py": ""}, {})[1:]

@@ -1,7 +1,9 @@
-"""What is imported is declared: in package.xml for rosdep, in requirements.txt for pip; what is there is installed."""
+"""What is imported is declared: in package.xml for rosdep, in requirements*.txt for pip; what is there is installed."""
 
 import ast
+import os
 import re
+import subprocess
 import sys
 import sysconfig
 from pathlib import Path
@@ -10,6 +12,7 @@ from xml.etree import ElementTree as Xml
 import pytest
 import yaml
 
+from drone_sim.command_line import SEPARATE
 from drone_sim.files import resources
 from drone_sim.files.resources import package_path, python_path
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
@@ -61,13 +64,40 @@ def test_every_module_has_its_key_in_package_xml():
 
 
 def test_rosdep_and_pip_take_the_same_versions():
-    listed = (ROOT / "requirements.txt").read_text(encoding="utf-8")
+    listed = "".join((ROOT / name).read_text(encoding="utf-8") for name in ("requirements.txt", "requirements-all.txt"))
     required = re.findall(r"^([a-z0-9]+)([^;\n]*)", listed, re.MULTILINE)
     versions = {name: f"{name}{version.strip()}" for name, version in required}
     rosdep = yaml.safe_load((ROOT / "rosdep.yaml").read_text(encoding="utf-8"))
     for key, systems in rosdep.items():
         name = key.removeprefix("python3-").removesuffix("-pip")
         assert {one["pip"]["packages"][0] for one in systems.values()} == {versions[name]}
+
+
+@pytest.mark.ros
+def test_the_node_imports_neither_what_takes_long_nor_what_setup_leaves_out():
+    program = (
+        "import sys, drone_sim.ros.node.node\n"
+        "from drone_sim.run import parameters, simulation\n"
+        "flown = simulation.Simulation(parameters.load())\n"
+        "flown.step()\n"
+        "flown.drone.cameras['front'].take()\n"
+        "print(*sys.modules)\n"
+        "flown.close()\n"
+    )
+    ours = {"PYTHONPATH": python_path(os.environ.get("PYTHONPATH", ""))}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | ours,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+        timeout=100,
+    )
+    imported_by_then = {name.partition(".")[0] for name in done.stdout.split()}
+    assert "pybullet" in imported_by_then
+    slow = {"collada", "cv_bridge", "lxml", "scipy", "trimesh", "cbor2", "zmq"}
+    assert not imported_by_then & {*slow, *SEPARATE, "tkinter"}
+    assert "drone_sim.importing.scene_folder" not in done.stdout.split()
 
 
 def test_every_file_of_the_package_is_installed():

@@ -196,6 +196,28 @@ def test_a_vision_sensor_of_the_scene_sees(simulate):
     assert (abs(plan - 1.45) < 0.01).sum() == 4, "0.1 m at 20 px/m, of the larger side"
 
 
+def test_a_vision_sensor_sees_one_entity_alone_or_handles(simulate):
+    simulation = simulate(SCENE)
+    sim, objects = sim_of(simulation), simulation.context.objects
+    eye, finger, floor = (objects.handle(name) for name in ("Eye", "Finger", "Floor"))
+    depths = np.reshape(sim.checkVisionSensorEx(eye, finger, False), (24, 32))
+    whole = found(simulation, "Eye").picture("depth")[::-1]
+    assert (depths < 1).sum() == 4 and whole[depths < 1] == pytest.approx(1.45, abs=0.01)
+    result, statistics = sim.checkVisionSensor(eye, finger)
+    assert result == 1 and statistics[6] > 0.5 and statistics[14] == pytest.approx(depths.mean())
+    assert sim.checkVisionSensor(eye, objects.handle("Quadricopter_base"))[0] == 0, "it is elsewhere"
+
+    sim.setObjectInt32Param(eye, sim.visionintparam_render_mode, 2)
+    image = np.frombuffer(sim.getVisionSensorImg(eye)[0], np.uint8).reshape(24, 32, 3).astype(int) @ (1, 256, 65536)
+    assert ((image == finger) == (depths < 1)).all() and {*np.unique(image)} == {finger, floor, 0xFFFFFF}, (
+        "white: nothing"
+    )
+    assert sim.readVisionSensor(eye) == (0, sorted([finger, floor]))
+    sim.setObjectInt32Param(eye, sim.visionintparam_entity_to_render, finger)
+    assert sim.readVisionSensor(eye)[1] == [finger]
+    assert sim.getObjectInt32Param(eye, sim.visionintparam_entity_to_render) == finger
+
+
 def test_it_begins_anew_is_saved_and_comes_back_with_a_snapshot(simulate, tmp_path):
     simulation = simulate(SCENE)
     sim, objects = sim_of(simulation), simulation.context.objects

@@ -12,7 +12,7 @@ from drone_sim.grading import flight, tasks
 from drone_sim.grading import plan as plans
 from drone_sim.run.simulation import Simulation
 
-ALL = ("chase", "count", "formation", "gates", "hover", "line", "pad", "stability", "steps")
+ALL = ("chase", "count", "formation", "gates", "gates_vision", "hover", "line", "pad", "stability", "steps")
 SEED = 3
 NOTHING = str(package_path() / "test" / "tasks" / "scripts" / "nothing.py")
 STAGE_6 = str(package_path() / "docs" / "tutorial" / "6_ros.py")
@@ -58,7 +58,7 @@ def test_every_task_has_a_text_with_a_picture_and_a_line_in_the_list():
         assert plans.read(folder / "plan.yaml").name == name
 
 
-@pytest.mark.parametrize("task", ["count", "formation", "gates", "hover", "pad", "stability", "steps"])
+@pytest.mark.parametrize("task", ["count", "formation", "gates", "gates_vision", "hover", "pad", "stability", "steps"])
 def test_a_solution_passes(task):
     assert failed(task) == set()
 

@@ -10,6 +10,7 @@ import pytest
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.offline import hud, video
 from drone_sim.offline.fly import main
+from drone_sim.offline.pictures import to_color
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
@@ -104,8 +105,8 @@ def test_any_size_can_be_played(tmp_path, shape, made):
 
 
 def test_depth_is_grey_and_colours_are_what_they_are():
-    assert video.to_color(np.array([[0.0, 3.0, np.nan]], np.float32))[0, :, 0].tolist() == [255, 127, 0]
-    assert video.to_color(np.full((1, 1, 3), (1, 2, 3), np.uint8)).tolist() == [[[3, 2, 1]]]
+    assert to_color(np.array([[0.0, 3.0, np.nan]], np.float32))[0, :, 0].tolist() == [255, 127, 0]
+    assert to_color(np.full((1, 1, 3), (1, 2, 3), np.uint8)).tolist() == [[[3, 2, 1]]]
 
 
 def test_a_film_that_cannot_be_written_whole_is_told(tmp_path):

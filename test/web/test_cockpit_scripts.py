@@ -111,9 +111,13 @@ def test_the_mark_of_an_error_goes_when_its_line_is_mended(cockpit, desk):
     assert not desk.locator(".cm-lintRange-error").count()
 
 
-def test_a_question_mark_shows_all_keys(desk):
+def test_a_question_mark_shows_all_keys_and_leads_to_the_manual(desk):
     desk.click("#help-open")
     assert "forward, back" in desk.inner_text("#sheet") and "find, replace" in desk.inner_text("#sheet")
+    with desk.expect_popup() as opened:
+        desk.click("#sheet a")
+    assert "/manual/" in opened.value.url and "manual" in opened.value.inner_text("body")
+    opened.value.close()
     desk.get_by_role("button", name="Close").click()
     assert not desk.is_visible("#sheet")
 

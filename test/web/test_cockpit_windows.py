@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS")
 
+import rospy
 from cockpit_page import switch_camera, wait_for, wait_until
 from dynamic_reconfigure.client import Client
 
@@ -68,6 +69,26 @@ def test_the_pace_is_changed_and_follows(cockpit, opened):
     wait_until(opened, lambda: field.input_value() == "3")
     node.update_configuration({"real_time_factor": 1.0})
     node.close()
+
+
+def test_boxes_and_a_mask_lie_over_the_picture_of_a_camera_with_truth(cockpit, opened):
+    rospy.set_param("/drone_sim/scene_file", str(Path(__file__).parents[2] / "docs/tutorial/8_scene.yaml"))
+    cockpit.call("load_scene")
+    try:
+        switch_camera(opened)
+        for kind in ("Boxes", "Mask"):
+            opened.get_by_role("button", name=f"{kind} over /drone/front").click()
+        window = opened.locator(".picture")
+        wait_until(opened, lambda: set(window.locator("svg text").all_text_contents()) == {"Red", "Green"})
+        wait_until(opened, lambda: {"Red", "Green"} <= set(window.locator(".legend span").all_text_contents()))
+        image, rect = (window.locator(one).first.bounding_box() for one in ("img", ".boxes-over rect"))
+        assert image["x"] - 2 < rect["x"] < rect["x"] + rect["width"] < image["x"] + image["width"] + 2
+        opened.get_by_role("button", name="Boxes over /drone/front").click()
+        wait_until(opened, lambda: window.locator("svg text").count() == 0)
+    finally:
+        switch_camera(opened)
+        rospy.set_param("/drone_sim/scene_file", "")
+        cockpit.call("load_scene")
 
 
 def test_a_camera_is_recorded_and_the_films_name_says_which(cockpit, opened):

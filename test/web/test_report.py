@@ -1,6 +1,7 @@
 """The report in a browser: opened from a file, played, scrubbed, and seen to show what the table says."""
 
 import io
+import shutil
 
 import numpy as np
 import pytest
@@ -114,7 +115,7 @@ def test_names_and_errors_are_text_and_a_flight_without_a_table_says_so(page, re
 
 def test_a_click_on_a_heading_sorts_the_scripts(page, report):
     page.goto((report / "index.html").as_uri())
-    names = page.locator("#scripts tbody td:first-child")
+    names = page.locator("#scripts tbody td.script")
     page.click("th:has-text('points')")
     assert names.all_inner_texts()[0] == "bad.py"
     page.click("th:has-text('points')")
@@ -122,3 +123,11 @@ def test_a_click_on_a_heading_sorts_the_scripts(page, report):
     page.click("th:has-text('script')")
     assert names.all_inner_texts() == ["bad.py", "evil.py", "good.py"]
     assert page.troubles == []
+
+
+def test_a_students_folder_needs_nothing_beside_it(page, report, tmp_path):
+    (folder,) = (report / "scripts").glob("*-good")
+    shutil.copytree(folder, tmp_path / "handed on")
+    page.goto((tmp_path / "handed on/index.html").as_uri())
+    page.wait_for_selector("#stage[data-shown='0']")
+    assert page.locator("#plots svg").count() and page.troubles == []

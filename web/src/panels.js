@@ -76,7 +76,9 @@ export class Panels {
   keys() {
     at("help-open").onclick = () => at("sheet").showModal();
     at("help-close").onclick = () => at("sheet").close();
-    at("sheet").onclick = (event) => event.target === at("sheet") && at("sheet").close();
+    at("sheet").onclick = (event) => {
+      if (event.target === at("sheet")) at("sheet").close();
+    };
     window.addEventListener("keydown", (event) => {
       if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.target.closest?.("input, textarea, select, [contenteditable], dialog")) return;

@@ -1,5 +1,6 @@
 // What floats over the scene: pictures of cameras, and what scripts open: views, dialogs, consoles. All text is text.
 import { create, icon } from "./dom.js";
+import { Overlay } from "./overlay.js";
 import { Recorder } from "./recorder.js";
 
 export class Windows {
@@ -97,10 +98,12 @@ export class Windows {
     const note = create("p");
     const name = topic.replace(/\W+/g, "_").replace(/^_/, "");
     const film = create("button", { className: "plain", title: "Record a video of this camera", "aria-label": `Record ${topic}` }, icon("video"));
-    const made = { element, image, note, title: element.querySelector("span") };
+    const turn = (overlay, on) => this.socket.ask("overlay", { topic, overlay, on }).catch((error) => this.notice.say(error.message, true));
+    const over = new Overlay(topic, turn);
+    const made = { element, image, note, over, title: element.querySelector("span") };
     new Recorder(film, () => this.film(made), name, this.notice, () => (made.canvas = null));
-    element.querySelector("header button").before(film);
-    element.append(image, note);
+    element.querySelector("header button").before(...over.buttons, film);
+    element.append(create("div", { className: "seen" }, image, over.svg), note, over.legend);
     return made;
   }
 
@@ -121,6 +124,7 @@ export class Windows {
       const { canvas } = there;
       canvas?.getContext("2d").drawImage(there.image, 0, 0, canvas.width, canvas.height);
       URL.revokeObjectURL(address);
+      there.over.show(said, there.image);
       shown();
     };
     there.image.src = address;

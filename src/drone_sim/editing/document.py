@@ -261,7 +261,8 @@ def _ordered(said: Mapping[str, Any]) -> dict[str, Any]:
     """Return an entry in the order in which a person writes it: what it is, where, and the rest."""
     own = [key for key in ("size", "file", "width", "height", "fov") if key in said]
     keys = dict.fromkeys([*_FIRST, *own, *_PLACE, *said])
-    return {key: said[key] for key in keys if key in said}
+    parts = {"parts": [_ordered(one) for one in said["parts"]]} if "parts" in said else {}
+    return {**{key: said[key] for key in keys if key in said}, **parts}
 
 
 def _moved_files(settings: Settings, here: Path, there: Path) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -40,7 +41,7 @@ class EditOperations:
             records.Reparent: self._reparent,
             records.Set: self._set,
             records.Scale: lambda one: self._objects.scale(self._handles(one.objects), one.factors),
-            records.Copy: self._objects.copy,
+            records.Copy: self._copy,
             records.Group: lambda one: self._objects.group(self._handles(one.objects), one.name, one.as_),
             records.Ungroup: lambda one: self._objects.ungroup(self._scene.handle(one.object)),
             records.AttachScript: self._attach_script,
@@ -69,6 +70,15 @@ class EditOperations:
                 self._vehicles.remove(one)
         return []
 
+    def _copy(self, op: records.Copy) -> list[int]:
+        handles = self._handles(op.objects)
+        counted = [*itertools.product(*map(range, op.counts))][1:] or [(0, 0, 0)]
+        (dx, dy, dz) = op.steps
+        places = [(x * dx, y * dy, z * dz) for x, y, z in counted]
+        own = [one for one in handles if self._is_of_scene(one)]
+        made = self._objects.copy(own, places) if own else []
+        return made + [new for one in handles if one not in own for new in self._vehicles.copy(one, places)]
+
     def _move(self, op: records.Move) -> None:
         tree, handle = self._scene.tree, self._scene.handle(op.object)
         words = {"world": WORLD, "parent": PARENT}
@@ -87,7 +97,7 @@ class EditOperations:
 
     def _reparent(self, op: records.Reparent) -> None:
         parent = WORLD if op.parent == WORLD else self._scene.handle(op.parent)
-        for one in self._handles(op.objects):
+        for one in self._scene.tops(self._handles(op.objects)):
             edits = self._objects if self._is_of_scene(one) else self._vehicles
             edits.reparent(one, parent, op.keep)
 

@@ -62,8 +62,8 @@ class History:
         return self._done[-1]
 
     def clear(self) -> None:
-        """Forget everything: it is of another scene, or others have changed this one."""
-        self.__init__()  # type: ignore[misc]
+        """Forget everything: it is of another scene."""
+        self._done, self._undone, self._kept = [], [], None
 
     def start(self) -> None:
         """Know that stop takes back what comes from now on."""

@@ -12,7 +12,7 @@ from drone_sim.editing import records, scripts
 from drone_sim.editing.library import model_said
 from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import numbered
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.scene import models, scene_parameters
@@ -78,20 +78,18 @@ class ObjectEdits:
         operations.remove([*going])
         return []
 
-    def copy(self, said: records.Copy) -> list[int]:
-        """Copy objects with what hangs on them, into a row or a grid."""
-        scene = self._scene
-        handles = [scene.handle(one) for one in said.objects]
-        whole = [*dict.fromkeys(part for one in handles for part in scene.operations.model(one))]
-        places = [*itertools.product(*map(range, said.counts))][1:]
+    def copy(self, handles: Sequence[int], places: Sequence[Vector]) -> list[int]:
+        """Copy objects with what hangs on them, each so far (m, world) from the original."""
+        operations = self._scene.operations
+        whole = [*dict.fromkeys(part for one in handles for part in operations.model(one))]
         if len(places) * len(whole) > scene_parameters.MAX_OBJECTS:
             raise ValueError(f"{len(places) * len(whole)} copies: a scene has at most {scene_parameters.MAX_OBJECTS}")
         made = []
-        for place in places or [(0, 0, 0)]:
-            new = dict(zip(whole, scene.operations.copy(whole)))
-            for one in handles:
-                self._shift(new[one], one, [count * step for count, step in zip(place, said.steps)])
-                made.append(new[one])
+        for place in places:
+            new = dict(zip(whole, operations.copy(whole)))
+            for one in self._scene.tops(handles):
+                self._shift(new[one], one, place)
+            made += [new[one] for one in handles]
         return made
 
     def _shift(self, copied: int, original: int, by: Sequence[float]) -> None:
@@ -165,6 +163,7 @@ class ObjectEdits:
         if as_ == "shape":
             made = operations.group(handles)
             return self.rename(made, operations.free_name(name)) if name else [made]
+        handles = self._scene.tops(handles)
         places = [self._scene.tree.matrix(one) for one in handles]
         middle = [sum(one[axis] for one in places) / len(places) for axis in (3, 7)]
         said = {

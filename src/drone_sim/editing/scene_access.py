@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +58,11 @@ class SceneAccess:
         """Tell whether an object is the root of a vehicle."""
         vehicle = self.vehicle_of(handle)
         return vehicle is not None and self.tree[handle] is vehicle.object
+
+    def tops(self, handles: Sequence[int]) -> list[int]:
+        """Return those of some objects that hang on none of the others."""
+        tree = self.tree
+        return [one for one in handles if not any(tree[one].hangs_on(tree[other]) for other in handles)]
 
     # ---- settings
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +12,7 @@ from drone_sim.editing import records
 from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.settings import keep_names, vehicles_in, with_floor, with_vehicles
 from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.object_tree import PARENT, WORLD
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE
@@ -47,12 +49,26 @@ class VehicleEdits:
         if op.type not in TYPES:
             raise ParameterError(f"type = '{op.type}': must be one of {', '.join(TYPES)}")
         said = self._said()
-        wanted = op.name or op.type
-        name = next(one for one in (wanted, *(f"{wanted}{n}" for n in range(2, 1000))) if one not in said)
+        name = _free(op.name or op.type, said)
         x, y, z = op.position
         place = {"position": _rounded([x, y, z + op.height]), **({"yaw": op.yaw} if op.yaw else {})}
         self._say({**said, name: merged({**TYPES[op.type], **place}, op.values)})
         return [self.root(self._scene.simulation.vehicles[name])]
+
+    def copy(self, handle: int, places: Sequence[Vector]) -> list[int]:
+        """Add vehicles like one, each so far (m, world) from it; what hangs on it is not copied."""
+        if not self._scene.is_root(handle):
+            raise ValueError(f"'{self._scene.tree[handle].name}' is a part of a vehicle: copy that")
+        name, said = self._vehicle(handle).name, self._said()
+        like = {key: value for key, value in said[name].items() if key not in ("suffix", "objects")}
+        made = []
+        for place in places:
+            new = _free(name, said)
+            moved = [one + by for one, by in zip(like["position"], place)]
+            said[new] = {**copy.deepcopy(like), "position": _rounded(moved)}
+            made.append(new)
+        self._say(said)
+        return [self.root(self._scene.simulation.vehicles[one]) for one in made]
 
     def root(self, vehicle: Vehicle) -> int:
         """Return the handle of a vehicle's root."""
@@ -165,6 +181,12 @@ class VehicleEdits:
         if found is None:
             raise ValueError(f"'{self._scene.tree[handle].name}' is the floor: its size can be changed, and no more")
         return found
+
+
+def _free(wanted: str, said: Mapping[str, Any]) -> str:
+    """Return a name that no vehicle has: drone, drone2, drone3, ..."""
+    names = itertools.chain([wanted], (f"{wanted}{number}" for number in itertools.count(2)))
+    return next(one for one in names if one not in said)
 
 
 def _rounded(numbers: Sequence[float]) -> list[float]:

@@ -1,56 +1,13 @@
-"""Meshes from files, read once by trimesh for whoever needs them: the renderer draws them, the world makes bodies."""
+"""Meshes from files, read once for whoever needs them: the renderer draws them, the world makes bodies."""
 
 from __future__ import annotations
 
-import io
-import re
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any, NamedTuple
-
 import numpy as np
-import trimesh
-from PIL import Image
-from trimesh.resolvers import Resolver
 
-from drone_sim.files import images
-from drone_sim.files.resources import MEBIBYTE, FileCache, ReadFile, read_bytes
+from drone_sim.files.mesh_part import MeshPart
+from drone_sim.files.resources import MEBIBYTE, FileCache, ReadFile
 
-KINDS = (".obj", ".stl", ".dae")
-MAX_SIZE = 32 * MEBIBYTE  # bytes of a file, and of each that it names
-MAX_TRIANGLES = 200_000  # of a file
-MAX_PARTS = 256  # materials, or nodes of a COLLADA scene
-MAX_COORDINATE = 1e6  # m from the mesh's origin
-WHITE = (1.0, 1.0, 1.0, 1.0)
-# How often a word may stand in a file; each <instance_node> may double what is drawn.
-_MOST = {
-    ".obj": {"usemtl": (rb"usemtl", MAX_PARTS), "f": (rb"\nf", MAX_TRIANGLES)},
-    ".dae": {
-        "instance_node": (rb"<(?:\w+:)?instance_node", 16),
-        "instance_geometry": (rb"<(?:\w+:)?instance_geometry", MAX_PARTS),
-    },
-}
 _HULL = 256  # corners that a hull may have
-_Colour = tuple[float, float, float, float]
-
-
-class MeshPart(NamedTuple):
-    """One material's triangles, in metres.
-
-    vertices: (n, 3) float64; faces: (m, 3); uv: (n, 2), v upwards, or None; rgba: 0..1; texture: (h, w, 3 or 4)
-    uint8, top row first, or None.
-    """
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    uv: np.ndarray | None
-    rgba: _Colour
-    texture: np.ndarray | None
-
-    @property
-    def nbytes(self) -> int:
-        """Memory that it takes."""
-        return sum(one.nbytes for one in (self.vertices, self.faces, self.uv, self.texture) if one is not None)
 
 
 def read(path: str) -> tuple[MeshPart, ...]:
@@ -94,175 +51,17 @@ def _hull(corners: np.ndarray) -> np.ndarray:
     points = np.unique(corners.reshape(-1, 3), axis=0) if len(corners) < 20_000 else corners.reshape(-1, 3)
     if len(points) <= _HULL:
         return corners
+    import trimesh  # which has read the file
+
     directions = trimesh.creation.icosphere(subdivisions=2).vertices
     farthest = np.unique([np.argmax(points @ direction) for direction in directions])
     return np.resize(points[farthest], (-(-len(farthest) // 3), 3, 3))
 
 
-class _Beside(Resolver):
-    """Gives trimesh the files that a mesh names: regular ones, of a size that can be meant."""
-
-    def __init__(self, folder: Path):
-        """Take the mesh's folder."""
-        self._folder = folder
-        self.files: list[str] = []
-        self.problem = ""
-
-    def get(self, key: str) -> bytes:
-        """Return what is in a file. One that is missing is no problem: the mesh is white."""
-        path = self._folder / key.strip().strip('"')
-        self.files.append(str(path))
-        try:
-            content = read_bytes(path, MAX_SIZE)
-            try:
-                images.check(content)
-            except Image.UnidentifiedImageError:  # a list of materials
-                content = _utf8(content)
-        except FileNotFoundError:
-            raise
-        except Exception as error:  # kept, for trimesh goes on without the file
-            self.problem = f"{key:.100}: {getattr(error, 'strerror', None) or error}"
-            raise
-        return content
-
-    def write(self, name: str, data: Any) -> None:
-        """Refuse: reading writes nothing."""
-        raise NotImplementedError
-
-    def namespaced(self, namespace: str) -> Resolver:
-        """Return the resolver of a folder below."""
-        raise NotImplementedError
-
-    def keys(self) -> list[str]:
-        """Return nothing: files are asked for by name."""
-        return []
-
-
 def _read(path: str) -> ReadFile:
-    kind = Path(path).suffix.lower()
-    if kind not in KINDS:
-        raise ValueError(f"mesh {path}: must be one of {', '.join(KINDS)}")
-    beside = _Beside(Path(path).parent)
-    try:
-        content = read_bytes(path, MAX_SIZE)
-        _check_text(content, kind)
-        if kind == ".obj":
-            content = _utf8(content)
-        loaded = trimesh.load(io.BytesIO(content), file_type=kind[1:], resolver=beside, process=False)
-        parts = tuple(_part(one) for one in _placed(loaded))
-        if beside.problem:
-            raise ValueError(beside.problem)
-        _check(parts)
-    except (MemoryError, RecursionError):
-        raise ValueError(f"mesh {path}: cannot be read (too large)") from None
-    except Exception as error:  # trimesh's readers raise whatever their parser raised
-        said = str(getattr(error, "strerror", None) or error)
-        if not isinstance(error, (ValueError, OSError, IndexError)):
-            said = "it is broken"
-        raise ValueError(f"mesh {path}: cannot be read ({' '.join(said.split()):.200})") from error
-    return ReadFile(parts, sum(part.nbytes for part in parts), beside.files)
+    from drone_sim.files import mesh_reader  # trimesh
 
-
-def _utf8(text: bytes) -> bytes:
-    """Return a text that trimesh reads without guessing at its encoding: names may be in any, numbers are not."""
-    return text.decode("utf-8", errors="replace").encode()
-
-
-def _check_text(content: bytes, kind: str) -> None:
-    """Refuse what would keep trimesh busy before it can be counted."""
-    if kind == ".dae":
-        if not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") or b"\0" in content:
-            raise ValueError("must be XML in UTF-8")
-        if b"<!DOCTYPE" in content:
-            raise ValueError("must have no DOCTYPE")
-    for word, (pattern, most) in _MOST.get(kind, {}).items():
-        if len(re.findall(pattern, content)) > most:
-            raise ValueError(f"more than {most} times `{word}`")
-
-
-def _placed(loaded: Any) -> Iterator[trimesh.Trimesh]:
-    """The file's meshes, placed as its scene graph says."""
-    if isinstance(loaded, trimesh.Trimesh):
-        if len(loaded.faces):
-            yield loaded
-        return
-    if not isinstance(loaded, trimesh.Scene):
-        return  # points or lines: nothing that covers a pixel
-    metres = trimesh.units.unit_conversion(loaded.units, "meters") if loaded.units else 1.0  # COLLADA has units
-    nodes = loaded.graph.nodes_geometry
-    if len(nodes) > MAX_PARTS:
-        raise ValueError(f"{len(nodes)} parts; at most {MAX_PARTS} are allowed")
-    for node in nodes:
-        transform, name = loaded.graph[node]
-        part = loaded.geometry[name]
-        if isinstance(part, trimesh.Trimesh) and len(part.faces):
-            part = part.copy()
-            part.apply_transform(transform)
-            part.apply_scale(metres)
-            yield part
-
-
-def _part(mesh: trimesh.Trimesh) -> MeshPart:
-    vertices = np.array(mesh.vertices, dtype=np.float64)
-    faces = np.array(mesh.faces)
-    if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
-        raise ValueError("a vertex must have 3 numbers, and a face 3 corners or 4")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise ValueError("a face names a vertex that there is not")
-    if not np.isfinite(vertices).all():
-        raise ValueError("a vertex is not finite")
-    uv, rgba, texture = _material(mesh)
-    if uv is not None and (uv.shape != (len(vertices), 2) or not np.isfinite(uv).all()):
-        uv = None
-    for array in (vertices, faces, uv, texture):
-        if array is not None:
-            array.setflags(write=False)
-    return MeshPart(vertices, faces, uv, rgba, None if uv is None else texture)
-
-
-def _check(parts: tuple[MeshPart, ...]) -> None:
-    count = sum(len(part.faces) for part in parts)
-    if not count:
-        raise ValueError("holds no triangles")
-    if count > MAX_TRIANGLES:
-        raise ValueError(f"{count} triangles; at most {MAX_TRIANGLES} are allowed")
-    if max(np.abs(part.vertices).max() for part in parts) > MAX_COORDINATE:
-        raise ValueError(f"a vertex is more than {MAX_COORDINATE:g} m from the origin")
-
-
-def _material(part: Any) -> tuple[np.ndarray | None, _Colour, np.ndarray | None]:
-    """Vertex uv (n, 2) or None, base colour and texture of a trimesh part, as far as it has them."""
-    kind = getattr(part.visual, "kind", None)
-    if kind in ("vertex", "face"):
-        return None, _colour(part.visual.main_color), None
-    if kind != "texture":
-        return None, WHITE, None
-    uv = part.visual.uv
-    uv = None if uv is None else np.array(uv, dtype=np.float64)[:, :2]
-    material = part.visual.material
-    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    if image is None or uv is None:
-        return uv, _base_colour(material), None
-    return uv, _base_colour(material), np.array(image.convert("RGBA" if "A" in image.getbands() else "RGB"))
-
-
-def _base_colour(material: Any) -> _Colour:
-    factor = getattr(material, "baseColorFactor", None)
-    if factor is None:
-        factor = getattr(material, "diffuse", None)
-    if factor is None:
-        return WHITE
-    red, green, blue, alpha = _colour(factor)
-    own: dict[str, Any] = getattr(material, "kwargs", None) or {}
-    opacity = own.get("d")  # MTL's dissolve; trimesh leaves it unread
-    return (red, green, blue, min(1.0, max(0.0, float(opacity[0]))) if opacity else alpha)
-
-
-def _colour(values: Any) -> _Colour:
-    values = np.asarray(values)
-    scaled = values / 255.0 if values.dtype == np.uint8 else np.clip(np.nan_to_num(values.astype(float)), 0, 1)
-    red, green, blue, alpha = (float(value) for value in scaled[:4])
-    return (red, green, blue, alpha)
+    return mesh_reader.read(path)
 
 
 _CACHE: FileCache[tuple[MeshPart, ...]] = FileCache(_read, 256 * MEBIBYTE)

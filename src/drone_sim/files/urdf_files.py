@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as Xml
 
-from drone_sim.files.mesh_files import KINDS
+from drone_sim.files.mesh_part import KINDS
 from drone_sim.files.resources import MEBIBYTE, is_file, locate, read_bytes
 from drone_sim.message_text import MAX_NAME, shown
 

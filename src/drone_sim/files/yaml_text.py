@@ -246,10 +246,15 @@ def _line(key: str, value: Any, indent: str) -> str:
     return _wrapped(f"{indent}{_flow(key)}: ", value, indent + "  ") + "\n"
 
 
+def _is_list_of_entries(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
+
+
 def _item(value: Any, indent: str) -> str:
     """Return an item of a list: in braces, or, where that is long, in lines."""
     text = _wrapped(f"{indent}- ", value, indent + "   ")
-    if not isinstance(value, Mapping) or text.count("\n") < _MOST_LINES:
+    is_flat = not isinstance(value, Mapping) or not any(map(_is_list_of_entries, value.values()))
+    if is_flat and text.count("\n") < _MOST_LINES:
         return text + "\n"
     lines = "".join(_line(key, one, indent + "  ") for key, one in value.items())
     return f"{indent}- {lines[len(indent) + 2 :]}"

@@ -7,7 +7,6 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -57,6 +56,11 @@ def add_to(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def results_folder(options: argparse.Namespace) -> Path:
+    """Return where results are kept."""
+    return Path(options.results) if options.results else default_folder()
+
+
 class Runner:
     """Flies jobs as the options say, keeps their results, and takes those that are there already."""
 
@@ -67,7 +71,7 @@ class Runner:
         """
         numbers = settings.load()
         self._options = options
-        folder = Path(options.results) if options.results else default_folder()
+        folder = results_folder(options)
         self.store = ResultStore(folder, plan)
         if not options.results:
             forget_old(folder, numbers.results.kept)
@@ -104,7 +108,7 @@ class Runner:
                     yield job, ungraded(self._plan, job.script, job.seed, job.changes, job.error)
                 elif job.key in known:
                     bar.update()
-                    yield job, replace(known[job.key], script=job.script)
+                    yield job, known[job.key].of_script(job.script)
                 else:
                     waiting.append(job)
             for flight in self._flights(waiting):

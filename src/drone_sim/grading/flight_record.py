@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from drone_sim.offline.recording import COLUMNS
+
+_FARTHEST = 2.0  # times as far as its speed says: a vehicle that got farther between two rows was put there
+_ALWAYS = 0.01  # m, that are no jump
 
 
 class ContactEvent(NamedTuple):
@@ -50,6 +53,19 @@ class FlightRecord:
     def times(self) -> np.ndarray:
         """Simulated time of each row in s, (N,)."""
         return self.rows[:, 0]
+
+    @property
+    def puts(self) -> np.ndarray:
+        """The rows (M,) in which the vehicle is farther from the one before than its speed says: it was put there."""
+        ways = np.linalg.norm(np.diff(self.rows[:, 1:4], axis=0), axis=1)
+        speeds = self.columns["speed"]
+        could = _ALWAYS + _FARTHEST * np.maximum(speeds[:-1], speeds[1:]) * np.diff(self.times)
+        return np.flatnonzero(ways > could) + 1
+
+    def until(self, row: int) -> FlightRecord:
+        """Return the flight as it was before a row, which is not its first."""
+        others = {name: poses[:row] for name, poses in self.other_poses.items()}
+        return replace(self, rows=self.rows[:row], is_whole=False, other_poses=others)
 
     @property
     def end(self) -> float:

@@ -10,6 +10,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from tqdm import tqdm
@@ -17,14 +18,27 @@ from tqdm import tqdm
 from drone_sim.files import writing
 from drone_sim.grading import evidence, tasks, verify
 from drone_sim.grading import plan as plans
-from drone_sim.grading.arguments import WRONG, GradingParser, Runner, add_to, all_done, on_standard_output, status_of
+from drone_sim.grading.arguments import (
+    WRONG,
+    GradingParser,
+    Runner,
+    add_to,
+    all_done,
+    on_standard_output,
+    results_folder,
+    status_of,
+)
+from drone_sim.grading.autograder import archive as autograder
+from drone_sim.grading.jobs import files
 from drone_sim.grading.jobs.files import Unreadable, given_script, read
-from drone_sim.grading.jobs.job import Job, contents_of, key_of
-from drone_sim.grading.outputs import as_json, gradescope, junit, table
+from drone_sim.grading.jobs.job import Job, contents_of, key_of, unpacked
+from drone_sim.grading.outputs import as_json, gradescope, junit, marks, table
 from drone_sim.grading.outputs.by_script import by_script
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
-from drone_sim.grading.submissions import scripts_of
+from drone_sim.grading.submissions.folders import submissions_of
+from drone_sim.grading.submissions.similarity import source_of
+from drone_sim.grading.submissions.submission import Submission, names_of
 from drone_sim.message_text import printable, shown
 from drone_sim.run.guardian import Guardian
 
@@ -44,7 +58,17 @@ def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = Non
     if verify.asks_for_it(given):
         return verify.main(given, guardian)
     options = _parser().parse_intermixed_args(given)
+    if options.autograder:
+        return status_of(PROGRAM, lambda: _write_autograder(options), None)
     return status_of(PROGRAM, lambda: _Grading(options, guardian).run(), guardian)
+
+
+def _write_autograder(options: argparse.Namespace) -> int:
+    if options.script or options.secret:
+        raise ValueError("--autograder: takes a plan and --seeds alone; who hands in can read whatever is in the zip")
+    plan = plans.read(tasks.find(options.plan))
+    autograder.write(plan, options.seeds or plan.seeds, options.autograder)
+    return 0
 
 
 class _Grading:
@@ -55,10 +79,13 @@ class _Grading:
         self._options = options
         self._guardian = guardian
         self._plan = plans.read(tasks.find(options.plan))
-        scripts = [one for given in options.script for one in scripts_of(given)]
-        self._jobs = jobs_of(self._plan, scripts, seeds_of(options.seeds or self._plan.seeds, options.secret))
-        self._scripts = len({job.script for job in self._jobs})
-        _check_outputs(options, self._scripts)
+        store = unpacked(results_folder(options))
+        given = [one for name in options.script for one in submissions_of(name, store)]
+        seeds = seeds_of(options.seeds or self._plan.seeds, options.secret)
+        jobs = jobs_of(self._plan, given or [Submission(self._plan.script_of(None))], seeds)
+        self._submissions, self._names = list(jobs), names_of(jobs)
+        self._jobs = [job for some in jobs.values() for job in some]
+        _check_outputs(options, len(jobs))
         self._key = evidence.key_in(options.key) if options.key else None
         self._runner = Runner(PROGRAM, options, self._plan, tables=bool(options.html))
         self._results: dict[Job, Result] = {}
@@ -88,15 +115,14 @@ class _Grading:
         for job, result in self._runner.fly(self._jobs):
             self._results[job] = result
             left[job.script] -= 1
-            if not left[job.script] and self._scripts > 1:
+            if not left[job.script] and len(self._submissions) > 1:
                 self._say(job.script)
 
     def _say(self, script: str) -> None:
         """Tell how a script has done, as soon as it is known."""
-        (one,) = by_script(result for job, result in self._results.items() if job.script == script)
-        name = printable(Path(script).name) or one.label
-        points = f"{one.points:.4g} of {one.of:.4g} points"
-        tqdm.write(f"{name}: {one.passed} of {len(one.flights)} flights passed, {points}", file=sys.stderr)
+        (one,) = by_script((result for job, result in self._results.items() if job.script == script), self._names)
+        said = f"{one.passed} of {len(one.flights)} flights passed, {one.points:.4g} of {one.of:.4g} points"
+        tqdm.write(f"{printable(one.label)}: {said}", file=sys.stderr)
 
     def _report(self) -> bool:
         """Show and write everything that can be; return whether all of it was."""
@@ -106,23 +132,30 @@ class _Grading:
         outputs: list[Callable[[], None]] = [lambda: self._show(results)]
         for option, write in _WRITERS.items():
             if path := getattr(self._options, option):
-                signed = {"key": self._key} if option == "json" else {}
+                signed = {"key": self._key, "names": self._names} if option == "json" else {}
                 outputs.append(functools.partial(write, self._plan, results, path, **signed))
+        if path := self._options.marks:
+            outputs.append(lambda: marks.write(self._submissions, by_script(results, self._names), path))
         if self._options.html:
             outputs.append(lambda: self._write_html(results))
         return all_done(PROGRAM, outputs)
 
     def _show(self, results: Sequence[Result]) -> None:
         with on_standard_output():
-            table.show(self._plan, results)
+            table.show(self._plan, results, names=self._names)
 
     def _write_html(self, results: Sequence[Result]) -> None:
         from drone_sim.grading.outputs.html import report
 
         keys = {(job.script, job.seed): job.key for job in self._jobs}
-        report.write(
-            self._plan, results, lambda one: self._runner.store.table(keys[one.script, one.seed]), self._options.html
-        )
+        tables = lambda one: self._runner.store.table(keys[one.script, one.seed])  # noqa: E731
+        flown = {one.script for one in results}
+        sources = {
+            one.script: source_of(files.of_script(self._plan, one.script))
+            for one in self._submissions
+            if one.script in flown and not one.error
+        }
+        report.write(self._plan, results, tables, self._options.html, self._names, sources)
         with on_standard_output():
             print(f"wrote {Path(self._options.html) / 'index.html'}")
 
@@ -145,26 +178,31 @@ def seeds_of(count: int, secret: str | None) -> list[int]:
     return list(found)
 
 
-def jobs_of(plan: Plan, scripts: Sequence[str], seeds: Sequence[int]) -> list[Job]:
-    """Return the flights of scripts (none: the plan's own), script by script. Raises ScriptError and OSError.
+def jobs_of(plan: Plan, submissions: Sequence[Submission], seeds: Sequence[int]) -> dict[Submission, list[Job]]:
+    """Return the flights of each submission, whose script is a whole path then. Raises ScriptError and OSError.
 
     A script that is there, and cannot be read, is an error of its own flights.
     """
-    jobs = []
-    for given in dict.fromkeys(plan.script_of(one) for one in (scripts or (None,))):
-        script, contents, error = given, given, ""
-        try:
-            script = given_script(given)
-            contents = contents_of(plan, script)
-        except Unreadable as why:
-            script, error = os.path.abspath(script), str(why)
-        jobs += [Job(str(plan.path), script, seed, {}, key_of(contents, seed, {}), error) for seed in seeds]
-    return jobs
+    found: dict[str, tuple[Submission, str]] = {}
+    for one in submissions:
+        contents = script = one.script
+        if not one.error:
+            try:
+                script = given_script(script)
+                contents = contents_of(plan, script)
+            except Unreadable as why:
+                script = os.path.abspath(script)
+                one = replace(one, error=str(why))
+        found.setdefault(script, (replace(one, script=script), contents))
+    return {
+        one: [Job(str(plan.path), one.script, seed, {}, key_of(contents, seed, {}), one.error) for seed in seeds]
+        for one, contents in found.values()
+    }
 
 
 def _check_outputs(options: argparse.Namespace, scripts: int) -> None:
     """Raise ValueError or OSError for what cannot be written, before anything is flown."""
-    for option in _WRITERS:
+    for option in (*_WRITERS, "marks"):
         if path := getattr(options, option):
             writing.check(path)
     if options.gradescope and scripts > 1:
@@ -185,14 +223,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar="SCRIPT",
         nargs="*",
         default=[],
-        help="child scripts, or folders of them (default: the plan's, or the built-in one)",
+        help="child scripts; folders, zips or CSVs of a class (default: the plan's own, or the built-in one)",
     )
+    parser.add_argument("--marks", metavar="OUT.csv", help="write the class's marks, as Moodle imports them")
     parser.add_argument("--secret", metavar="FILE", help="fly seeds that follow from a file which only the teacher has")
     parser.add_argument("--junit", metavar="OUT.xml", help="write results as JUnit's XML")
     parser.add_argument("--json", metavar="OUT.json", help="write all results and figures")
     parser.add_argument("--key", metavar="FILE", help="sign what --json writes")
     parser.add_argument("--verify", metavar="RESULTS.json", help="fly what --json wrote once more, and compare")
     parser.add_argument("--gradescope", metavar="results.json", help="write one script's results for Gradescope")
+    parser.add_argument("--autograder", metavar="OUT.zip", help="fly nothing: write an autograder for Gradescope")
     parser.add_argument("--html", metavar="DIR", help="write a report with plots and a replay of every flight")
     return parser
 

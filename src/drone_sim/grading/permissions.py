@@ -10,6 +10,7 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from drone_sim.grading.own_objects import OwnObjects
 from drone_sim.grading.plan import Plan
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.run.simulation import Simulation
@@ -39,7 +40,7 @@ from drone_sim.scripting.api.constants import CONSTANTS, bare
 from drone_sim.scripting.api.ignored import MODULES
 from drone_sim.scripting.api.simulation import SimulationFunctions
 
-MOVE, PUSH, CHANGE, NEVER = "move", "push", "change", ""
+MOVE, PUSH, CHANGE, NEVER, READ = "move", "push", "change", "", "read"
 MOST_TRIED = 20  # that a result tells of
 _FREE_CLASSES: tuple[type, ...] = (
     custom_data.CustomDataFunctions,
@@ -138,6 +139,7 @@ class Permissions:
             if script_of(one.parameters, simulation.parameters, submission) == submission
         ]
         self._own = {one.object_name for one in own}  # whose scripts are the submission
+        self._readable = OwnObjects(simulation, self._own) if plan.reads == "own" else None
         self._propellers = {name for one in own for name in one.propulsion.script_parameters}
         self._marks: set[int] = set()  # handles that are known to be marks'
         self._settable: set[tuple[int, str]] = set()  # parameters that are known to be free
@@ -156,14 +158,16 @@ class Permissions:
         look = self._looks.get(function)
         action = look(arguments) if look is not None else _action_of(function)
         if action is not None and action not in self._allowed:
-            self._refuse(function, action, arguments)
+            what = "the scene" if _is_of_scene(function) else self._name(arguments)
+            self._refuse(function, action or "write", what, f" (allowed: [{action}] would)" if action else "")
+        other = self._readable.other_in(function, arguments) if self._readable is not None else None
+        if other is not None:
+            self._refuse(function, READ, other, " (reads: all would)")
 
-    def _refuse(self, function: str, action: str, arguments: list[Any]) -> None:
-        verb, what = action or "write", "the scene" if _is_of_scene(function) else self._name(arguments)
+    def _refuse(self, function: str, verb: str, what: str, would: str) -> None:
         if (verb, what) not in self._known and len(self.tried) < MOST_TRIED:
             self._known.add((verb, what))
             self.tried.append(f"tried to {verb} {what} at {self._simulation.time:.2f} s ({function})")
-        would = f" (allowed: [{action}] would)" if action else ""
         raise Forbidden(f"the plan does not allow a script to {verb} {what}{would}")
 
     def _name(self, arguments: list[Any]) -> str:

@@ -72,6 +72,7 @@ class Plan(Checked):
     allowed: Annotated[list[Literal["move", "push", "change"]], Field(max_length=3)] = Field(
         default_factory=list
     )  # see `rules`
+    reads: Literal["all", "own"] = "all"  # what a submission may ask about: all objects, or its own vehicle's alone
     criteria: Annotated[list[AnyCriterion], Field(min_length=1, max_length=MAX_CRITERIA)]
 
     _path: str = PrivateAttr(default="")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
@@ -43,6 +44,12 @@ class Result:
     def with_tried(self, tried: Sequence[str]) -> Result:
         """Return it with what the script tried; such a flight is not passed."""
         return replace(self, tried=tuple(tried), passed=self.passed and not tried)
+
+    def of_script(self, script: str) -> Result:
+        """Return it as of a script in another place, with the same contents."""
+        before, folder = os.path.dirname(self.script), os.path.dirname(script)
+        error = self.error.replace(before, folder) if self.error and before else self.error
+        return replace(self, script=script, error=error)
 
     @property
     def troubles(self) -> list[str]:

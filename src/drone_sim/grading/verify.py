@@ -13,8 +13,9 @@ from typing import Any
 from drone_sim.grading import evidence
 from drone_sim.grading import plan as plans
 from drone_sim.grading.arguments import GradingParser, is_sandboxed, status_of
+from drone_sim.grading.flight import ungraded
 from drone_sim.grading.jobs import pool, settings
-from drone_sim.grading.jobs.files import read
+from drone_sim.grading.jobs.files import Unreadable, given_script, read
 from drone_sim.grading.jobs.job import Job, contents_of, key_of
 from drone_sim.grading.jobs.pool import FlightOptions
 from drone_sim.grading.outputs import as_json
@@ -22,6 +23,7 @@ from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
 from drone_sim.message_text import printable, shown
 from drone_sim.run.guardian import Guardian
+from drone_sim.scripting.errors import ScriptError
 
 PROGRAM = "grade"
 DIFFERENT = 1
@@ -88,10 +90,24 @@ def _changes(plan: Plan, content: Mapping[str, Any]) -> Iterator[str]:
 def _flown(plan: Plan, said: Sequence[Result], options: argparse.Namespace) -> dict[tuple[str, int], Result]:
     numbers = settings.load()
     how = FlightOptions(numbers.limits, numbers.batches, is_sandboxed(PROGRAM, options.sandbox))
-    contents = {script: contents_of(plan, script) for script in {one.script for one in said}}
-    jobs = [Job(str(plan.path), one.script, one.seed, {}, key_of(contents[one.script], one.seed, {})) for one in said]
+    contents = {script: _contents(plan, script) for script in {one.script for one in said}}
+    found = {(one.script, one.seed): ungraded(plan, one.script, one.seed, {}, one.error or "") for one in said}
+    jobs = [
+        Job(str(plan.path), one.script, one.seed, {}, key_of(contents[one.script], one.seed, {}))
+        for one in said
+        if contents[one.script]
+    ]
     with pool.opened(how, max(1, min(options.jobs, len(jobs)))) as fly:
-        return {(one.job.script, one.job.seed): one.result for one in fly(jobs)}
+        found.update({(one.job.script, one.job.seed): one.result for one in fly(jobs)})
+    return found
+
+
+def _contents(plan: Plan, script: str) -> str:
+    """Return what contents_of does; '' for what cannot be flown, such as a zip that was refused."""
+    try:
+        return contents_of(plan, given_script(script))
+    except (Unreadable, ScriptError):
+        return ""
 
 
 def asks_for_it(arguments: Sequence[str]) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from drone_sim.context import SimulationContext
-from drone_sim.hosting.picture_filters import filter_picture, filters_pictures
+from drone_sim.hosting.picture_filters import eye_of, filter_picture, filters_pictures
 from drone_sim.hosting.tuning import Tuning
 from drone_sim.mechanics.frames import Vector
 from drone_sim.mechanics.saved_state import Restore, in_turn
@@ -323,7 +323,7 @@ def surroundings(
         for name, one in vehicle.parameters.cameras.items()
     ]
     return Surroundings(
-        pictures={name: camera.look for name, _, camera in cameras},
+        pictures={name: eye_of(context, camera) for name, _, camera in cameras},
         planes={name: (own.near, own.far) for name, own, _ in cameras},
         operations=operations,
         outside=limit.outside,

@@ -1,8 +1,11 @@
-"""What the script of a vision sensor is told of every picture, and what it finds there (sysCall_vision)."""
+"""What scripts see: a vehicle's cameras; and what a vision sensor's own is told of every picture (sysCall_vision)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from typing import Any
+
+import numpy as np
 
 from drone_sim.context import SimulationContext
 from drone_sim.scripting.api.packing import as_bytes
@@ -11,8 +14,21 @@ from drone_sim.scripting.api.vision import Detected, Eye
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import Script
 from drone_sim.scripting.phase_names import VISION
+from drone_sim.sensors.camera import Camera
 
 _MOST = 100  # packets
+
+
+def eye_of(context: SimulationContext, camera: Camera) -> Callable[..., np.ndarray]:
+    """Return what gives a picture of a vehicle's camera: of a kind or its own, of `only` some objects or of all."""
+
+    def look(kind: str = "", only: Collection[str] | None = None) -> np.ndarray:
+        if only is None or camera.failure == "silent":
+            return camera.look(kind)
+        pose = np.reshape((*camera.pose(), 0, 0, 0, 1), (4, 4))
+        return context.picture(kind or camera.kind, camera.intrinsics, pose, only)
+
+    return look
 
 
 def filters_pictures(context: SimulationContext, name: str, script: Script) -> bool:

@@ -14,8 +14,6 @@ from pathlib import Path
 
 from drone_sim.files.resources import cache_path, read_bytes
 from drone_sim.importing.folder import word
-from drone_sim.importing.scene_folder import LIST, SCENE, import_file
-from drone_sim.importing.scripts import renew
 from drone_sim.vrep_files.container import MAX_SIZE
 from drone_sim.vrep_files.model import VrepFileError
 
@@ -26,6 +24,9 @@ _FORM = b"7"  # of what is written: another one, and files are imported anew
 
 def imported_scene(path: Path) -> Path:
     """Return the scene file that a file of V-REP's was made into, now or before. Raises VrepFileError and OSError."""
+    from drone_sim.importing.scene_folder import LIST, SCENE  # which reads and makes all kinds of things
+    from drone_sim.importing.scripts import renew
+
     folder = _folder(path)
     if not (folder / SCENE).is_file():
         _import_into(path, folder)
@@ -54,6 +55,8 @@ def _folder(path: Path) -> Path:
 
 def _import_into(path: Path, folder: Path) -> None:
     """Import beside the folder, and give it its name when all is there: another process may be at it, too."""
+    from drone_sim.importing.scene_folder import SCENE, import_file
+
     folder.parent.mkdir(parents=True, exist_ok=True)
     unfinished = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
     try:

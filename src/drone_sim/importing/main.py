@@ -9,8 +9,7 @@ from pathlib import Path
 
 from drone_sim.command_line import Parser, status_of
 from drone_sim.importing.scene_folder import LIST, Imported, import_file
-from drone_sim.vrep_files.model import VrepFileError
-from drone_sim.vrep_files.reading import SUFFIXES
+from drone_sim.vrep_files.model import SUFFIXES, VrepFileError
 
 _NAME = "import_scene"
 

@@ -12,8 +12,9 @@ import os
 import sys
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
@@ -22,8 +23,8 @@ from drone_sim.config.types import ParameterError, nested
 from drone_sim.files import writing, yaml_files
 from drone_sim.mechanics.frames import to_euler
 from drone_sim.message_text import near_names, shown
+from drone_sim.offline import dataset
 from drone_sim.offline import timeline as timeline_module
-from drone_sim.offline import video
 from drone_sim.offline.recording import OutputError, Recording
 from drone_sim.offline.timeline import MAX_TIME, Timeline, first_step
 from drone_sim.run import parameters as parameters_module
@@ -32,13 +33,19 @@ from drone_sim.run.parameters import Parameters
 from drone_sim.run.simulation import Simulation
 from drone_sim.scripting.api.control import STOP
 from drone_sim.scripting.script_log import LOG as SCRIPT_LOG
-from drone_sim.vrep_files.reading import SUFFIXES
+from drone_sim.vehicles.parameters import EquipmentParameters
+from drone_sim.vrep_files.model import SUFFIXES
+
+if TYPE_CHECKING:
+    from drone_sim.offline.video import CameraRecorder
+
+    _Film = CameraRecorder | dataset.TruthRecorder
 
 _AFTER = 5.0  # s flown on after the last command
 _WITHOUT_COMMANDS = 10.0  # s
 _PLOTTED = 500_000  # steps
 _BAR_AFTER = 2.0  # s of real time; a shorter flight shows no progress bar
-_YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot", "video")
+_YAML, _OUTPUTS = (".yaml", ".yml"), ("csv", "plot", "video", "truth")
 _FILES = ("script", "scene", "config", "commands", *_OUTPUTS)
 _ENDINGS = {
     "scene": (*_YAML, *SUFFIXES),
@@ -91,26 +98,19 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     if options.commands:
         timeline = timeline_module.read(options.commands, parameters)
     steps = first_step(_duration(options, timeline), parameters.time_step)
-    if options.plot:
-        from drone_sim.offline import plot  # matplotlib takes as long to import as a short flight
-
-        plot.check(options.plot)
-        if steps > _PLOTTED:
-            raise ValueError(f"--plot: {steps} steps; at most {_PLOTTED} are drawn")
     camera = _camera(options, parameters, recorded)
-    for output in filter(None, (options.csv, options.video)):
-        writing.check(output)
+    _check_outputs(options, steps)
     simulation = Simulation(parameters, script=options.script or parameters.script, gui=parameters.gui)
     began = time.perf_counter()
     try:
         with contextlib.ExitStack() as written:
             file = written.enter_context(writing.replacing(options.csv)) if options.csv else None
-            filming = video.filming(options.video, simulation, recorded, camera) if options.video else None
-            films = [written.enter_context(filming)] if filming else []
+            made = _films(options, simulation, recorded, camera)
+            films = {name: written.enter_context(film) for name, film in made.items()}
             recording = Recording(file, keep=bool(options.plot), vehicle=recorded)
             flown = status_of(
                 "fly",
-                lambda: _fly(simulation, timeline, steps, (recording, *films), guardian),
+                lambda: _fly(simulation, timeline, steps, (recording, *films.values()), guardian),
                 passed_on=OutputError,  # which ends the writing of the file, which then says so
             )
             took = time.perf_counter() - began
@@ -121,12 +121,32 @@ def _run(options: argparse.Namespace, guardian: Guardian | None) -> int:
     if guardian is not None:
         guardian.stand_down()  # no script runs any more, and a plot takes its time
     print(_summary(recording, took), flush=True)
-    for film in films:
-        print(f"wrote {options.video}: {film}", flush=True)
+    for name, film in films.items():
+        print(f"wrote {name}: {film}", flush=True)
     drawn = 0
     if options.plot and recording.rows:
-        drawn = status_of("fly", lambda: plot.save(options.plot, recording, timeline.of(recorded)))
+        drawn = status_of("fly", lambda: _draw(options.plot, recording, timeline.of(recorded)))
     return flown or closed or drawn
+
+
+def _check_outputs(options: argparse.Namespace, steps: int) -> None:
+    """Raise OSError or ValueError for what cannot be written."""
+    if options.plot:
+        from drone_sim.offline import plot  # matplotlib takes as long to import as a short flight
+
+        plot.check(options.plot)
+        if steps > _PLOTTED:
+            raise ValueError(f"--plot: {steps} steps; at most {_PLOTTED} are drawn")
+    for output in filter(None, (options.csv, options.video)):
+        writing.check(output)
+    if options.truth:
+        dataset.check(options.truth)
+
+
+def _draw(path: str, recording: Recording, timeline: Timeline) -> None:
+    from drone_sim.offline import plot
+
+    plot.save(path, recording, timeline)
 
 
 def _check_names(options: argparse.Namespace) -> None:
@@ -150,15 +170,43 @@ def _vehicle(name: str | None, parameters: Parameters) -> str:
 
 
 def _camera(options: argparse.Namespace, parameters: Parameters, vehicle: str) -> str:
-    """Return the camera whose pictures the video shows, '' without one. Raises ValueError."""
-    if not options.video:
+    """Return the camera of video and truth, '' without one. Raises ValueError."""
+    asked = "--video" if options.video else "--truth"
+    if not (options.video or options.truth):
         if options.camera is not None:
-            raise ValueError(f"--camera {_shown(options.camera)}: is of --video FILE.mp4, which is not given")
+            raise ValueError(f"--camera {_shown(options.camera)}: is of --video or --truth, and neither is given")
         return ""
     own = next(one for one in parameters.fleet if one.name == vehicle)
-    camera = video.camera_of(own, options.camera)
-    video.rate_of(own.cameras[camera], parameters.time_step)
+    camera = _camera_of(own, options.camera, asked)
+    if options.video:
+        from drone_sim.offline import video  # PyAV, which few have
+
+        video.rate_of(own.cameras[camera], parameters.time_step)
     return camera
+
+
+def _camera_of(vehicle: EquipmentParameters, name: str | None, asked: str) -> str:
+    """Return the name of a vehicle's camera, by default of its first one. Raises ValueError."""
+    cameras = vehicle.cameras
+    if not cameras:
+        raise ValueError(f"{asked}: the vehicle has no camera")
+    if name is not None and name not in cameras:
+        raise ValueError(f"--camera {shown(name)}: no such camera; {near_names(name, cameras)}")
+    return next(iter(cameras)) if name is None else name
+
+
+def _films(
+    options: argparse.Namespace, simulation: Simulation, vehicle: str, camera: str
+) -> dict[str, AbstractContextManager[_Film]]:
+    """Return what writes the camera's pictures, by the names of what is written."""
+    films: dict[str, AbstractContextManager[_Film]] = {}
+    if options.video:
+        from drone_sim.offline import video
+
+        films[options.video] = video.filming(options.video, simulation, vehicle, camera)
+    if options.truth:
+        films[options.truth] = dataset.recording_to(options.truth, simulation, vehicle, camera)
+    return films
 
 
 @contextlib.contextmanager
@@ -184,7 +232,7 @@ def _fly(
     simulation: Simulation,
     timeline: Timeline,
     steps: int,
-    observers: Iterable[Recording | video.CameraRecorder],
+    observers: Iterable[Recording | _Film],
     guardian: Guardian | None,
 ) -> int:
     for observer in observers:
@@ -245,7 +293,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--csv", metavar="OUT.csv", help="write a row per step: state, command, propellers")
     parser.add_argument("--plot", metavar="OUT.png", help="draw path, velocities, height, attitude and propellers")
     parser.add_argument("--video", metavar="OUT.mp4", help="film what a camera sees, with a head-up display")
-    parser.add_argument("--camera", metavar="NAME", help="the camera of --video, such as track (default: the first)")
+    parser.add_argument("--truth", metavar="DIR", help="what a camera saw: pictures, masks, depth, boxes (COCO)")
+    parser.add_argument(
+        "--camera", metavar="NAME", help="the camera of --video and --truth, such as track (default: the first)"
+    )
     return parser
 
 

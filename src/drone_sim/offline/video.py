@@ -13,12 +13,11 @@ import cv2
 import numpy as np
 
 from drone_sim.files import writing
-from drone_sim.message_text import near_names, shown
 from drone_sim.offline import hud
+from drone_sim.offline.pictures import to_color
 from drone_sim.offline.recording import OutputError
 from drone_sim.run.simulation import Simulation
 from drone_sim.sensors.camera_parameters import CameraParameters
-from drone_sim.vehicles.parameters import EquipmentParameters
 from drone_sim.vehicles.situation import doing
 
 _CODEC: Final = "libx264"
@@ -30,7 +29,6 @@ _INDEX_FIRST = {"movflags": "faststart"}  # a browser then need not have all of 
 _FINEST = 1000  # of a rate's denominator
 _SMALLEST = 240  # px, of width and height; smaller pictures are enlarged, or nobody could read the display
 _LARGEST = 4096  # px, that it makes of their sides
-_HALF = 3.0  # m, at which depth is shown half as bright as right in front
 MAX_RATE = 240.0  # pictures per second
 
 
@@ -120,20 +118,6 @@ def writing_to(path: str, rate: float) -> Iterator[Video]:
         video.finish()
 
 
-def to_color(picture: np.ndarray) -> np.ndarray:
-    """Return a camera's picture, RGB or depth (m), as BGR; depth is the darker the farther, black where it is none."""
-    if picture.ndim == 3:
-        return cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
-    return depth_to_grey(picture)
-
-
-def depth_to_grey(depth: np.ndarray) -> np.ndarray:
-    """Return depth (height, width) in m as a grey picture, BGR: the darker the farther, black where there is none."""
-    with np.errstate(invalid="ignore"):
-        grey = 255 / (1 + np.maximum(np.nan_to_num(depth.astype(float), nan=np.inf), 0) / _HALF)
-    return cv2.cvtColor(grey.astype(np.uint8), cv2.COLOR_GRAY2BGR)
-
-
 def _enlarged(picture: np.ndarray) -> np.ndarray:
     """Return a copy, a whole number of times as large where it is small, and with even sides, as codecs want them."""
     shortest, longest = sorted(picture.shape[:2])
@@ -153,16 +137,6 @@ def _ffmpeg_errors() -> Iterator[None]:
 
 
 # ---- of a flight without ROS: what one camera of a vehicle sees, as its topic would show it
-
-
-def camera_of(vehicle: EquipmentParameters, name: str | None) -> str:
-    """Return the name of a vehicle's camera, by default of its first one. Raises ValueError."""
-    cameras = vehicle.cameras
-    if not cameras:
-        raise ValueError("--video: the vehicle has no camera")
-    if name is not None and name not in cameras:
-        raise ValueError(f"--camera {shown(name)}: no such camera; {near_names(name, cameras)}")
-    return next(iter(cameras)) if name is None else name
 
 
 def rate_of(camera: CameraParameters, time_step: float) -> float:

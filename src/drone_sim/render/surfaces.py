@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 
 from drone_sim.files import images
-from drone_sim.files.mesh_files import WHITE
+from drone_sim.files.mesh_part import WHITE
 from drone_sim.shapes.shape import Rgba, Triangles
 from drone_sim.shapes.visual import Visual
 
@@ -64,7 +63,8 @@ def _assemble(part: Triangles) -> Surface:
     else:
         table.append(uv.reshape(-1, 2))
         alike.append(_numbered(uv.reshape(-1, 2)))
-    first, inverse = trimesh.grouping.unique_rows(np.column_stack(alike))
+    inverse = _numbered(np.column_stack(alike), digits=0)
+    first = np.unique(inverse, return_index=True)[1]
     merged = [np.ascontiguousarray(column[first], dtype=np.float32) for column in table]
     return Surface(
         vertices=merged[0],
@@ -124,8 +124,12 @@ def _points(corners: np.ndarray) -> np.ndarray:
 
 def _numbered(rows: np.ndarray, digits: int = 5) -> np.ndarray:
     """A number (n,) for each row of numbers, the same for rows that agree to so many digits."""
-    numbers: np.ndarray = trimesh.grouping.unique_rows(rows, digits=digits)[1]
-    return numbers.ravel()
+    whole = np.round(rows * 10.0**digits).astype(np.int64)
+    order = np.lexsort(whole.T)
+    starts = np.any(np.diff(whole[order], axis=0), axis=1)
+    numbers = np.zeros(len(rows), dtype=np.int64)
+    numbers[order[1:]] = np.cumsum(starts)
+    return numbers
 
 
 def is_closed(corners: np.ndarray) -> bool:
@@ -136,6 +140,10 @@ def is_closed(corners: np.ndarray) -> bool:
     """
     point = _points(corners)
     point = point[(point != np.roll(point, 1, axis=1)).all(axis=1)]  # slivers have no area to see
-    watertight, alike = trimesh.graph.is_watertight(trimesh.geometry.faces_to_edges(point)) if len(point) else (0, 0)
+    if not len(point):
+        return False
+    start, end = point.ravel(), np.roll(point, -1, axis=1).ravel()
+    most = point.max() + 1
+    edges, back = np.sort(start * most + end), np.sort(end * most + start)
     volume = np.einsum("ij,ij->", corners[:, 0] - corners[0, 0], _areas(corners))
-    return bool(watertight and alike and volume > 0)
+    return bool((np.diff(edges) > 0).all() and (edges == back).all() and volume > 0)

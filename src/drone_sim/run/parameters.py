@@ -41,8 +41,7 @@ from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import SceneParameters
 from drone_sim.sensors.validation import check_rates
 from drone_sim.vehicles.parameters import DroneParameters, EquipmentParameters, VehicleParameters, laid_over
-from drone_sim.vrep_files.model import VrepFileError
-from drone_sim.vrep_files.reading import SUFFIXES
+from drone_sim.vrep_files.model import SUFFIXES, VrepFileError
 
 MAX_SUB_STEPS = 1000
 MAX_VEHICLES = 256

@@ -155,5 +155,5 @@ class Player:
 
     def _say_that_the_clock_stands(self, state: str) -> None:
         if self._simulated_time:
-            state += ": /clock stands still, and whoever waits on simulated time waits with it"
+            state += ": /clock stands still, and nodes that use simulated time wait"
         _LOG.info(state)

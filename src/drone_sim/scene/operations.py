@@ -157,8 +157,9 @@ class SceneOperations:
             names.append(next(name for name in free if name not in tree and name not in names))
             new.setdefault(one.name, names[-1])
         made = [
-            one.model_copy(update={"name": name, "alias": one.shown, "parent": new.get(one.parent, one.parent)})
+            one.model_copy(update={"name": name, "alias": alias, "parent": new.get(one.parent, one.parent)})
             for one, name in zip(entries, names)
+            for alias in ["" if one.shown == name else one.shown]
         ]
         on = [one.model_copy(update={"object": new[one.object]}) for one in scripts if new.get(one.object)]
         return self.add(made, on)

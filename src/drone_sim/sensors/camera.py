@@ -22,6 +22,7 @@ from drone_sim.shapes.visual import Visual
 
 _LOG = logging.getLogger(__name__)
 TINY = "TinyRenderer"
+_OUT_OF_SIGHT = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -1e9], [0, 0, 0, 1]])
 
 
 class Subject(Protocol):
@@ -73,27 +74,50 @@ class Vision:
         self._subject, self._blades, self._identify = subject, blades, identify
         self._shown = -1  # the subject's changes, when its blades were turned
 
-    def picture(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
+    def picture(self, kind: str, intrinsics: Lens, pose: np.ndarray, shown: np.ndarray | None = None) -> np.ndarray:
         """Return the picture from `pose` (4, 4), world from optical frame.
 
         `kind` "color": (height, width, 3) uint8 RGB. "depth": (height, width) float32, metres along the
-        optical z, NaN beyond the far plane. Raises ValueError for an orthographic one where there is no OpenGL.
+        optical z, NaN beyond the far plane. `shown` (N,) says which visuals there are, None: all. Raises ValueError for
+        an orthographic one, or one of some visuals, where there is no OpenGL.
         """
         if self._renderer is None and not self._fallback:
             self._open()
         began = time.perf_counter()
         self._turn_blades()
-        taken = self._drawn(kind, intrinsics, pose)
+        taken = self._drawn(kind, intrinsics, pose, shown)
         self.pictures += 1
         self.seconds += time.perf_counter() - began
         return taken
 
-    def _drawn(self, kind: str, intrinsics: Lens, pose: np.ndarray) -> np.ndarray:
+    def _drawn(self, kind: str, intrinsics: Lens, pose: np.ndarray, shown: np.ndarray | None) -> np.ndarray:
         if self._renderer is None:
+            if shown is not None:
+                raise ValueError("a picture of some objects alone needs OpenGL, and there is no EGL here")
             return self._tiny_picture(kind, intrinsics, pose)
         self._renderer.set_visuals(self._subject.visuals())
         render = self._renderer.render if kind == "color" else self._renderer.render_depth
-        return render(intrinsics, pose, self._subject.visual_poses())
+        return render(intrinsics, pose, self._poses(shown))
+
+    def _poses(self, shown: np.ndarray | None) -> np.ndarray:
+        poses = self._subject.visual_poses()
+        return poses if shown is None else np.where(shown[:, None, None], poses, _OUT_OF_SIGHT)
+
+    def numbers(
+        self, intrinsics: Lens, pose: np.ndarray, numbers: np.ndarray, shown: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return for each pixel whose it is, (height, width) uint16, 0 for nobody's: of `numbers`, one for each visual.
+
+        `shown` as for `picture`. Raises ValueError where there is no OpenGL.
+        """
+        if self._renderer is None and not self._fallback:
+            self._open()
+        if self._renderer is None:
+            raise ValueError("a picture of whose each pixel is needs OpenGL, and there is no EGL here")
+        self._turn_blades()
+        self._renderer.set_visuals(self._subject.visuals())
+        drawn = self._renderer.render_outputs(("instance",), intrinsics, pose, self._poses(shown), instances=numbers)
+        return drawn["instance"]
 
     def truth(self, intrinsics: Intrinsics, pose: np.ndarray, before: Moment | None) -> PictureTruth | None:
         """Return what is true of the picture from `pose`, since the one `before`; None where there is no OpenGL."""

@@ -47,6 +47,7 @@ class CameraParameters(Checked):
     lens: LensParameters | None = None
     near: Annotated[Finite, Within(1e-4, 1e4)]
     far: Annotated[Finite, Within(1e-3, 1e5)]
+    baseline: Annotated[Finite, Within(0, 100)] = 0.0  # m to the right of the camera whose frame is its own, too
     truth: Switch = False  # whether it publishes what is behind its pictures, too
 
     @model_validator(mode="after")

@@ -9,10 +9,11 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from drone_sim.mechanics.frames import to_quaternion
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Moment
 from drone_sim.shapes.shape import DrawnShape
@@ -199,6 +200,27 @@ class PictureTruth:
         return Box2D(
             min(left, visible.left), min(top, visible.top), max(right, visible.right), max(bottom, visible.bottom)
         )
+
+
+def described(objects: Sequence[Seen]) -> list[dict[str, Any]]:
+    """Return objects as JSON has them: px, m, and the pose of each box in the optical frame, quaternions xyzw."""
+    return [
+        {
+            "number": one.number, **one.identity._asdict(), "pixels": one.pixels,
+            "visible": [round(float(value), 2) for value in one.visible],
+            "full": [round(float(value), 2) for value in one.full],
+            "occlusion": round(one.occlusion, 4), "truncation": round(one.truncation, 4),
+            "position": one.pose[:3, 3].round(5).tolist(),
+            "orientation": [round(value, 6) for value in quaternion_of(one)],
+            "size": one.size.round(5).tolist(),
+        }
+        for one in objects
+    ]  # fmt: skip
+
+
+def quaternion_of(one: Seen) -> tuple[float, ...]:
+    """Return how an object's box is turned in the optical frame, xyzw."""
+    return tuple(map(float, to_quaternion(tuple(one.pose[:3].ravel()))))
 
 
 @lru_cache(maxsize=1024)

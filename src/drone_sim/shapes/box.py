@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Annotated
 
 import numpy as np
-import trimesh
 from pydantic import Field
 
 from drone_sim.config.types import Length
-from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles, corners_of
+from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles
 
 
 def _unit_box() -> tuple[np.ndarray, np.ndarray]:
     """Return corners (12, 3, 3) and uv (12, 3, 2); each side shows the picture upright (z up) from outside."""
-    corners = corners_of(trimesh.creation.box(extents=(1.0, 1.0, 1.0)))
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # counter-clockwise
+    sides = [
+        np.roll(np.insert(square[::sign], 0, sign / 2, axis=1), axis, axis=1)
+        for axis, sign in product(range(3), (1, -1))
+    ]
+    corners = np.array([side[list(half)] for side in sides for half in ((0, 1, 2), (0, 2, 3))])
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     axis = np.abs(normals).argmax(axis=1)
     sign = np.sign(normals[np.arange(len(normals)), axis])

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import trimesh
 from pydantic import Field
 
 from drone_sim.config.types import Length
 from drone_sim.mechanics.frames import from_rpy
 from drone_sim.shapes.cylinder import Cylinder
-from drone_sim.shapes.shape import SECTIONS, DrawnShape, Primitive, Triangles, corners_of, outer
+from drone_sim.shapes.shape import DrawnShape, Primitive, Triangles, half_circle, outer, turned
 from drone_sim.shapes.solid import Solid, round_solid
 
 
@@ -28,8 +27,7 @@ class Capsule(Cylinder):
     def triangles(self) -> tuple[Triangles]:
         """Return as many sections along the caps as around them."""
         radius, length = self.size
-        capsule = trimesh.creation.capsule(length, outer(radius), count=[SECTIONS, SECTIONS])
-        return (Triangles(corners_of(capsule)),)
+        return (Triangles(turned(half_circle(outer(radius), length))),)
 
     def solid(self) -> Solid:
         """Return a cylinder and two half balls, whose centroids are 3/8 of the radius away from their flat sides."""

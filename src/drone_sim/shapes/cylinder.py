@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import trimesh
 from pydantic import Field
 
 from drone_sim.config.types import Length
 from drone_sim.shapes.shape import (
-    SECTIONS,
     DrawnShape,
     Files,
     Geometry,
@@ -20,8 +18,8 @@ from drone_sim.shapes.shape import (
     ReportedShape,
     SceneShape,
     Triangles,
-    corners_of,
     outer,
+    turned,
 )
 from drone_sim.shapes.solid import Solid, round_solid
 
@@ -49,7 +47,8 @@ class Cylinder(SceneShape, ReportedShape):
     def triangles(self) -> tuple[Triangles]:
         """Return a prism."""
         radius, length = self.size
-        return (Triangles(corners_of(trimesh.creation.cylinder(outer(radius), length, sections=SECTIONS))),)
+        wide, high = outer(radius), length / 2
+        return (Triangles(turned([(0, -high), (wide, -high), (wide, high), (0, high)])),)
 
     def solid(self) -> Solid:
         """Return the round cylinder."""

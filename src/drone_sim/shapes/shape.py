@@ -11,15 +11,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol
 from xml.etree import ElementTree as Xml
 
 import numpy as np
-import trimesh
 
-from drone_sim.files.mesh_files import WHITE
+from drone_sim.files.mesh_part import WHITE
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.shapes.solid import Solid, hull_of
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 class Files(Protocol):
@@ -99,6 +101,26 @@ class Triangles(NamedTuple):
 def corners_of(mesh: trimesh.Trimesh) -> np.ndarray:
     """Return the corners (m, 3, 3) of a mesh's triangles."""
     return np.asarray(mesh.vertices, dtype=np.float64)[np.asarray(mesh.faces)]
+
+
+def turned(profile: Sequence[tuple[float, float]], sections: int = SECTIONS) -> np.ndarray:
+    """Return the corners (m, 3, 3) of what a line of points (radius, z), upwards, makes as it turns about z."""
+    angles = 2 * np.pi / sections * np.arange(sections)
+    round_ = np.column_stack([np.cos(angles), np.sin(angles), np.ones(sections)])
+    rings = np.array([round_ * (radius, radius, z) for radius, z in profile])
+    low, high = rings[:-1], rings[1:]
+    next_low, next_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
+    both = np.stack([np.stack([low, next_low, next_high], axis=2), np.stack([low, next_high, high], axis=2)], axis=2)
+    corners = both.reshape(-1, 3, 3)
+    meet = (corners == np.roll(corners, 1, axis=1)).all(axis=2).any(axis=1)  # on the axis
+    return corners[~meet]
+
+
+def half_circle(radius: float, length: float = 0.0) -> list[tuple[float, float]]:
+    """Return points (radius, z) of half a circle, upwards, whose upper half is shifted away by a length."""
+    angles = np.linspace(0, np.pi / 2, SECTIONS // 4 + 1)[:-1]
+    upper = [*zip(radius * np.cos(angles), radius * np.sin(angles) + length / 2), (0.0, radius + length / 2)]
+    return [*((wide, -z) for wide, z in reversed(upper)), *upper]
 
 
 def outer(radius: float) -> float:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import trimesh
 
 _THIN = 1e-9  # of the bounds' volume: what has less is taken for a box of its bounds
 _THICKNESS = 1e-4  # m, of that box where the bounds are flat
@@ -27,6 +26,8 @@ def round_solid(volume: float, xx: float, zz: float) -> Solid:
 
 def hull_of(corners: Sequence[np.ndarray]) -> Solid:
     """Return the convex hull of triangles (m, 3, 3) each, as a solid; of what is flat, a thin box of its bounds."""
+    import trimesh  # takes, with SciPy, longer to import than all else
+
     points = np.concatenate(corners).reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
     extents = np.maximum(high - low, _THICKNESS)

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import trimesh
 from pydantic import Field
 
 from drone_sim.config.types import Length
-from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles, corners_of
+from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles, half_circle, turned
 from drone_sim.shapes.solid import Solid, round_solid
 
-_OUTER = 1.0029  # radius of the polyhedron of 1280 faces that has the volume of the unit sphere
+_CORNERS = turned(half_circle(1.0))
+_CORNERS *= np.cbrt(4 / 3 * np.pi / (np.linalg.det(_CORNERS).sum() / 6))  # the volume of the unit sphere
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Sphere(SceneShape, ReportedShape):
         return cls((dimensions[0],))
 
     def triangles(self) -> tuple[Triangles]:
-        """Return an icosahedron, three times refined."""
-        return (Triangles(corners_of(trimesh.creation.icosphere(subdivisions=3, radius=_OUTER * self.size[0]))),)
+        """Return slices of rings."""
+        return (Triangles(_CORNERS * self.size[0]),)
 
     def solid(self) -> Solid:
         """Return the ball."""

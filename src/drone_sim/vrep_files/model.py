@@ -10,6 +10,8 @@ import numpy as np
 
 from drone_sim.mechanics.state import Pose
 
+SUFFIXES = (".ttt", ".ttm")
+
 
 class VrepFileError(ValueError):
     """A V-REP file is refused; the message is one line that says what is wrong, and where."""

@@ -64,7 +64,6 @@ def with_dynamics(settings: VrepSettings, data: bytes) -> VrepSettings:
     return replace(settings, engine=engine, gravity=(gravity[0], gravity[1], gravity[2]), dynamics_step=seconds)
 
 
-SUFFIXES = (".ttt", ".ttm")
 MAX_OBJECTS = 20_000
 _DEEPEST = 200  # objects below each other
 _SETTINGS = {"SIM": with_simulation, "DYN": with_dynamics}

@@ -14,9 +14,9 @@ from drone_sim.shapes.shape import Geometry, SceneShape, UrdfFile
 from drone_sim.shapes.visual import GROUND
 from drone_sim.world.bullet_files import BulletFiles
 
-_TILE = 2.0  # m covered by one texture
+TILE = 2.0  # m covered by one texture
 _THICKNESS = 0.1  # m, below z = 0
-_GROUND_REACH = 2000.0  # m from the origin, along either axis
+GROUND_REACH = 2000.0  # m from the origin, along either axis
 _BELOW = 1e-3  # m that the ground is drawn below the floor, for PyBullet's own renderer to tell them apart
 
 
@@ -102,7 +102,7 @@ def create_floor(client: int, files: BulletFiles, size: float, ground: bool) -> 
     boxes = [(half, half, 0.0, 0.0)]  # half lengths in x and y, and centre
     seen = [(_mesh(size), (1.0, 1.0, 1.0, 1.0), 0.0)]
     if ground:
-        reach, wide = _GROUND_REACH, (_GROUND_REACH - half) / 2
+        reach, wide = GROUND_REACH, (GROUND_REACH - half) / 2
         boxes += [(reach, wide, 0.0, half + wide), (reach, wide, 0.0, -half - wide)]
         boxes += [(wide, half, half + wide, 0.0), (wide, half, -half - wide, 0.0)]
         seen.append((_mesh(2 * reach), (*GROUND, 1.0), -_BELOW))
@@ -123,8 +123,8 @@ def create_floor(client: int, files: BulletFiles, size: float, ground: bool) -> 
 
 
 def _mesh(size: float) -> bytes:
-    """Return a square whose texture repeats every _TILE metres, centred, as an OBJ file."""
-    half, reach = size / 2, size / 2 / _TILE
+    """Return a square whose texture repeats every TILE metres, centred, as an OBJ file."""
+    half, reach = size / 2, size / 2 / TILE
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     lines = [f"v {x * half} {y * half} 0" for x, y in corners]
     lines += [f"vt {x * reach} {y * reach}" for x, y in corners]

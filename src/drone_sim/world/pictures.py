@@ -56,10 +56,10 @@ class Pictures:
         """Take new pictures from now on: something may be elsewhere, or look different."""
         self.changes = next(_changes)
 
-    def set_floor(self, body: int, texture: str) -> None:
-        """Say which body is the floor, which receives the shadows, and its texture; its second visual is the ground."""
+    def set_floor(self, body: int, looks: Sequence[tuple[DrawnShape, str]]) -> None:
+        """Say which body is the floor, which receives the shadows, and its looks, of which the second is the ground."""
         self._floor = body
-        self.set_texture(body, texture)
+        self.set_looks(body, {-1: looks})
 
     def set_looks(self, body: int, looks: Mapping[int, Sequence[tuple[DrawnShape, str]]]) -> None:
         """Say of which shapes a body's links (-1: the root) are, in their order, and what image covers each, or ''.
@@ -180,7 +180,6 @@ class Pictures:
     def _part(self, key: tuple[int, int], row: Sequence[Any], shape: DrawnShape, texture: str) -> _Placed:
         link, position, orientation, rgba = row[1], *row[5:8]
         floor, ground = key == (self._floor, 0), key == (self._floor, 1)
-        texture = "" if ground else texture
         visual = Visual(
             key=key,
             shape=shape,

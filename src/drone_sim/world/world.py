@@ -17,6 +17,7 @@ from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.shapes.compound import parts_of
 from drone_sim.shapes.mass import inertia_of
+from drone_sim.shapes.plane import Plane
 from drone_sim.shapes.shape import WHITE, DrawnShape, Rgba, SceneShape
 from drone_sim.shapes.urdf import Urdf
 from drone_sim.world import assemblies, bodies
@@ -110,7 +111,8 @@ class World:
         self.pictures.cover(body, texture, visual=0)
         self._know(body)
         self.set_material(body, -1, friction=1.0, restitution=1.0)  # of two that touch, what falls on it has the say
-        self.pictures.set_floor(body, texture)
+        seen = [(Plane(size, bodies.TILE), texture), (Plane(2 * bodies.GROUND_REACH, bodies.TILE), "")]
+        self.pictures.set_floor(body, seen if ground else seen[:1])
         return body
 
     def add_object(

@@ -3,32 +3,48 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PlainValidator, TypeAdapter, ValidationError
 
-from drone_sim.config.types import Point, Switch
+from drone_sim.config.types import Label, Point, Switch
 from drone_sim.grading.criteria.criterion import Bound, Criterion, FlightPart, figure
 from drone_sim.grading.result import Outcome
 
 MAX_PLACES = 200
-_FARTHEST = 2.0  # times as far as its speed says: a vehicle that got farther between two rows was put there
-_ALWAYS = 0.01  # m, that are no jump
+
+
+def _place(value: Any) -> Any:
+    if isinstance(value, str):
+        return TypeAdapter(Label).validate_python(value)
+    try:
+        return TypeAdapter(Point).validate_python(value)
+    except ValidationError:
+        raise ValueError("must be 3 numbers, [x, y, z] in m, or the name of an object or vehicle") from None
+
+
+_Place = Annotated[tuple[float, float, float] | str, PlainValidator(_place)]
 
 
 class Reach(Criterion):
     """`places` [x, y, z] (m) are to be reached in this order, `within` so many metres, before `until`.
 
-    With `partial` every place that is reached in order gives its share of the points.
+    The name of an object or vehicle is where that is at the end of the part. With `partial` every place that is reached
+    in order gives its share of the points.
     """
 
     kind: Literal["reach"]
-    places: Annotated[list[Point], Field(min_length=1, max_length=MAX_PLACES)]
+    places: Annotated[list[_Place], Field(min_length=1, max_length=MAX_PLACES)]
     within: Bound
     partial: Switch = False
 
     is_lasting = False
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """What it asks for."""
+        return tuple({one: None for one in self.places if isinstance(one, str)})
 
     @property
     def allowed(self) -> str:
@@ -39,7 +55,8 @@ class Reach(Criterion):
         way, here = _way(part), _Here(0, 0.0, 0.0)
         last: float | None = None
         for number, place in enumerate(self.places):
-            here = _first_within(way, here, np.array(place), self.within)
+            there = part.poses(place)[-1, :3] if isinstance(place, str) else np.array(place)
+            here = _first_within(way, here, there, self.within)
             if here.distance > self.within:
                 return self._short(number, last, here.distance)
             last = way.time(here)
@@ -81,13 +98,13 @@ class _FlownWay(NamedTuple):
 
 def _way(part: FlightPart) -> _FlownWay:
     """Return the way in a part of a flight; where the vehicle was put elsewhere, it stays until it is there."""
-    places, times, speeds = part.places(), part.times, part.flight.columns["speed"][part.rows]
+    places = part.places()
     steps = np.zeros_like(places)
     steps[:-1] = np.diff(places, axis=0)
-    could = _ALWAYS + _FARTHEST * np.maximum(speeds[:-1], speeds[1:]) * np.diff(times)
-    jumps = np.linalg.norm(steps[:-1], axis=1) > could
-    steps[:-1][jumps] = 0
-    return _FlownWay(times, places, steps, np.flatnonzero(jumps) + 1)
+    puts = part.flight.puts - np.arange(len(part.flight.rows))[part.rows][0]
+    puts = puts[(puts > 0) & (puts < len(places))]
+    steps[puts - 1] = 0
+    return _FlownWay(part.times, places, steps, puts)
 
 
 def _first_within(way: _FlownWay, here: _Here, place: np.ndarray, radius: float) -> _Here:

@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import platform
+import shutil
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -68,16 +69,18 @@ def key_of(contents: str, seed: int, changes: Mapping[str, Any]) -> str:
 def contents_of(plan: Plan, script: str) -> str:
     """Return a digest of all that a flight depends on beside seed and changes: its files, this package, its engine.
 
-    Of the files it is the contents that counts, and where each lies beside the one that names it. Raises OSError,
-    ScriptError for a script that is not there, and Unreadable for one that cannot be read.
+    Of the files it is the contents that counts, and where each lies beside the one that names it: a script that was
+    moved is the same. Raises OSError, ScriptError for one that is not there, Unreadable for one that cannot be read.
     """
     flown = files.of_script(plan, script)
-    digests = {path: _digest(path) for path in files.of_plan(plan, {})}
-    digests |= {path: hashlib.sha256(files.read(path)).hexdigest() for path in flown}
     digest = hashlib.sha256(f"{version()}\0{flown[0].name if flown else script}".encode(errors="surrogateescape"))
-    folder = os.path.commonpath([path.parent for path in digests])
-    for path in sorted(digests):
-        digest.update(f"\0{os.path.relpath(path, folder)}\0{digests[path]}".encode(errors="surrogateescape"))
+    own = {path: hashlib.sha256(files.read(path)).hexdigest() for path in flown}
+    for folder, digests in (
+        (plan.folder, {path: _digest(path) for path in files.of_plan(plan, {})}),
+        (flown[0].parent if flown else plan.folder, own),
+    ):
+        for name, said in sorted((os.path.relpath(path, folder), said) for path, said in digests.items()):
+            digest.update(f"\0{name}\0{said}".encode(errors="surrogateescape"))
     return digest.hexdigest()
 
 
@@ -110,6 +113,11 @@ def version() -> str:
 def default_folder() -> Path:
     """Return where results lie if nobody says where: the user's cache."""
     return cache_path() / "grading"
+
+
+def unpacked(folder: Path) -> Path:
+    """Return where, in the folder of results, the zips are laid out that a class has handed in."""
+    return folder / "submissions"
 
 
 class ResultStore:
@@ -181,10 +189,10 @@ class ResultStore:
 def forget_old(folder: Path, days: float) -> None:
     """Remove files that nothing has been added to for so long; as far as that is allowed."""
     oldest = time.time() - days * _DAY
-    for path in (*folder.glob("*.jsonl"), *folder.glob("*-tables/*")):
+    for path in (*folder.glob("*.jsonl"), *folder.glob("*-tables/*"), *unpacked(folder).glob("*")):
         with contextlib.suppress(OSError):
             if path.stat().st_mtime < oldest:
-                path.unlink()
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def _read(line: str) -> tuple[str, Result | None]:

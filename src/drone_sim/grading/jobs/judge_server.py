@@ -20,7 +20,7 @@ from drone_sim.files.resources import FileCache, ReadFile
 from drone_sim.grading import plan as plans
 from drone_sim.grading.flight import Flight, grade, ungraded, write_to
 from drone_sim.grading.jobs.limited_process import LimitedProcess, stay_on_one_processor
-from drone_sim.grading.jobs.server import Requests
+from drone_sim.grading.jobs.server import GONE, Requests
 from drone_sim.grading.plan import Plan, PlanError
 from drone_sim.scripting.door.simulation_end import SimulationEnd
 from drone_sim.world import connect_ahead
@@ -36,8 +36,9 @@ def main() -> None:
         importlib.import_module(module)
     requests = Requests()
     known: FileCache[Plan] = FileCache(_read_plan, _MOST_PLANS)
-    for request, door in requests:
-        requests.reply(*_answer(request, door, requests, known))
+    with contextlib.suppress(*GONE):
+        for request, door in requests:
+            requests.reply(*_answer(request, door, requests, known))
 
 
 def _answer(request: dict[str, Any], door: int, requests: Requests, known: FileCache[Plan]) -> tuple[bytes, bytes]:

@@ -7,6 +7,7 @@ is only a thread here costs nothing, and it starts in no time. What a lost worke
 from __future__ import annotations
 
 import contextlib
+import logging
 import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -111,6 +112,8 @@ def _connected(address: str, patience: float) -> Iterator[Any]:
     """Give a client of a scheduler that has a worker. Raises PoolError."""
     from distributed import Client  # takes as long to import as five flights
 
+    for name in [one for one in logging.root.manager.loggerDict if one.startswith("distributed")]:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # a lost scheduler would be told by tracebacks
     try:
         client = Client(address, timeout=_CONNECTING)
     except (OSError, ValueError, ImportError) as error:

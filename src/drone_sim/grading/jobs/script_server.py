@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from drone_sim.grading.jobs.limited_process import LimitedProcess, open_to_itself
-from drone_sim.grading.jobs.server import HANDED_IN, Requests
+from drone_sim.grading.jobs.server import GONE, HANDED_IN, Requests
 from drone_sim.scripting.door import script_process
 
 DOOR = 3  # its descriptor, beside which nothing is open
@@ -37,7 +37,7 @@ def main() -> None:
     script_process.import_all()
     requests = Requests()
     folders = [tempfile.gettempdir(), *([HANDED_IN] if is_alone else [])]
-    with contextlib.suppress(EOFError):  # nobody wants it any more
+    with contextlib.suppress(*GONE):
         for request, door in requests:
             for path in request["handed_in"]:
                 _lay(f"{HANDED_IN}{path}", requests.receive())

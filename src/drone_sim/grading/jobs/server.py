@@ -20,6 +20,7 @@ from drone_sim.grading.jobs.limited_process import guard
 
 HANDED_IN = "/handed_in"  # below which the files of a script are laid in a sandbox, each under its whole path
 READY = b"ready"  # said once, after the imports
+GONE = (EOFError, ConnectionError)  # raised once nobody wants anything any more, however they ended
 _IDLE = 120.0  # s
 
 
@@ -39,8 +40,8 @@ class Requests:
         """Say that it is ready, and give each request, with one end of the connection between judge and script."""
         gc.collect()
         gc.freeze()  # a fork that counts references copies fewer pages
-        self._connection.send_bytes(READY)
-        with contextlib.suppress(EOFError):  # the input has ended
+        with contextlib.suppress(*GONE):
+            self._connection.send_bytes(READY)
             while self._connection.poll(_IDLE):
                 request = json.loads(self._connection.recv_bytes())
                 door = recv_handle(self._connection)

@@ -18,18 +18,25 @@ FORMAT = "drone_sim grades"
 VERSION = 1  # of the format: another one where a key is renamed or means something else, not where one comes
 
 
-def write(plan: Plan, results: Sequence[Result], path: str | Path, key: bytes | None = None) -> None:
+def write(
+    plan: Plan,
+    results: Sequence[Result],
+    path: str | Path,
+    key: bytes | None = None,
+    names: Mapping[str, str] | None = None,
+) -> None:
     """Write the file, signed by a key if there is one. Raises OSError, in one line that names it."""
-    said = content(plan, results)
+    said = content(plan, results, names)
     said = said if key is None else evidence.signed(said, key)
     writing.write(path, json.dumps(said, indent=1, allow_nan=False) + "\n")
 
 
-def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
+def content(plan: Plan, results: Sequence[Result], names: Mapping[str, str] | None = None) -> dict[str, Any]:
     """Return what the file holds; a figure that is no finite number is null."""
     scripts = [
         {
             "script": one.script,
+            "name": one.label,
             "flights": len(one.flights),
             "passed": one.passed,
             "points": one.points,
@@ -38,7 +45,7 @@ def content(plan: Plan, results: Sequence[Result]) -> dict[str, Any]:
             "failed": dict(one.failures),
             "hashes": evidence.hashes_of(plan, one.script),
         }
-        for one in by_script(results)
+        for one in by_script(results, names)
     ]
     return finite(
         {

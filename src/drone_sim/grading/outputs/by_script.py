@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
@@ -18,7 +18,7 @@ class ScriptResults:
     """All flights of one script, at least one, by seed."""
 
     script: str  # as the results name it, '' is the built-in one
-    label: str  # its name for people, which no other script of these results has
+    label: str  # its name for people, which no other script of these results has: whose it is, if that is known
     flights: tuple[Result, ...]
 
     @property
@@ -53,18 +53,27 @@ class ScriptResults:
         return Counter(name for name, outcome in named if not outcome.passed).most_common()
 
     @property
+    def has_passed(self) -> bool:
+        """Whether every flight passed."""
+        return self.passed == len(self.flights)
+
+    @property
     def errors(self) -> list[str]:
         """What went wrong in the flights beside criteria, each once, with the script's name instead of its path."""
         errors = (trouble for one in self.flights for trouble in one.troubles)
-        return list(dict.fromkeys(one.replace(self.script, self.label) if self.script else one for one in errors))
+        name = PurePath(self.script).name
+        return list(dict.fromkeys(one.replace(self.script, name) if self.script else one for one in errors))
 
 
-def by_script(results: Iterable[Result]) -> list[ScriptResults]:
-    """Return results by script, in the order in which the scripts first come; flights by seed, then as they come."""
+def by_script(results: Iterable[Result], names: Mapping[str, str] | None = None) -> list[ScriptResults]:
+    """Return results by script, in the order in which the scripts first come; flights by seed, then as they come.
+
+    `names` are those of the people whose scripts they are, as far as they are known.
+    """
     flights: dict[str, list[Result]] = {}
     for one in results:
         flights.setdefault(one.script, []).append(one)
-    labels = _labels(list(flights))
+    labels = {**_labels(list(flights)), **(names or {})}
     return [
         ScriptResults(script, labels[script], tuple(sorted(some, key=lambda one: one.seed)))
         for script, some in flights.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TextIO
 
 from drone_sim.grading.outputs.by_script import (
@@ -27,21 +27,29 @@ _GREEN, _RED, _BOLD, _PLAIN = "\033[32m", "\033[31m", "\033[1m", "\033[0m"
 _NARROWEST, _SENTENCE = 40, 12  # columns
 
 
-def show(plan: Plan, results: Sequence[Result], file: TextIO | None = None) -> None:
-    """Print the table; in colour, and as wide as it is, on a terminal."""
+def show(
+    plan: Plan, results: Sequence[Result], file: TextIO | None = None, names: Mapping[str, str] | None = None
+) -> None:
+    """Print the table; in colour, and as wide as it is, on a terminal. `names` are as in by_script."""
     file = file or sys.stdout
     terminal = file.isatty()
     width = shutil.get_terminal_size((WIDTH, 24)).columns if terminal else WIDTH
-    print(text(plan, results, max(_NARROWEST, width), terminal), file=file, flush=True)
+    print(text(plan, results, max(_NARROWEST, width), terminal, names), file=file, flush=True)
 
 
-def text(plan: Plan, results: Sequence[Result], width: int = WIDTH, colour: bool = False) -> str:
+def text(
+    plan: Plan,
+    results: Sequence[Result],
+    width: int = WIDTH,
+    colour: bool = False,
+    names: Mapping[str, str] | None = None,
+) -> str:
     """Return the table, lines of at most `width` columns."""
     paint = _Paint(colour)
     lines = [paint(_cut(plan.title or plan.name, width), _BOLD)]
-    scripts = by_script(results)
+    scripts = by_script(results, names)
     if len(scripts) == 1:
-        lines += _flight_lines(scripts[0].worst, len(scripts[0].flights), width, paint)
+        lines += _flight_lines(scripts[0], width, paint)
     if len(scripts) != 1 or len(scripts[0].flights) > 1:
         lines += _script_lines(scripts, width, paint)
     return "\n".join(lines)
@@ -70,8 +78,8 @@ def _script_lines(scripts: Sequence[ScriptResults], width: int, paint: _Paint) -
     lines = [paint(_cut(f"{heads}  failed in (flights)", width), _BOLD)]
     for one, start in zip(scripts, starts):
         line = _cut(f"{start}  {_trouble(one)}".rstrip(), width)
-        lines.append(paint.verdict(line, one.passed == len(one.flights)))
-    done = sum(one.passed == len(one.flights) for one in scripts)
+        lines.append(paint.verdict(line, one.has_passed))
+    done = sum(one.has_passed for one in scripts)
     if len(scripts) > 1:
         lines.append(f"{done} of {len(scripts)} scripts passed every flight")
     return lines
@@ -95,9 +103,10 @@ def _trouble(one: ScriptResults) -> str:
 # ---- a row per criterion
 
 
-def _flight_lines(result: Result, flights: int, width: int, paint: _Paint) -> list[str]:
+def _flight_lines(script: ScriptResults, width: int, paint: _Paint) -> list[str]:
+    result, flights = script.worst, len(script.flights)
     worst = f", the worst of {flights}" if flights > 1 else ""
-    lines = [_cut(f"{by_script([result])[0].label}, {flight_label(result)}{worst}", width)]
+    lines = [_cut(f"{script.label}, {flight_label(result)}{worst}", width)]
     for trouble in result.troubles:
         wrapped = textwrap.wrap(printable(f"error: {trouble}"), width)
         lines += [paint.verdict(line, False) for line in wrapped]

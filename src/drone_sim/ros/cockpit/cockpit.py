@@ -24,6 +24,7 @@ from drone_sim.ros.cockpit.scene.meshes import MeshStore
 from drone_sim.ros.cockpit.scene.scene_state import SceneState
 from drone_sim.ros.cockpit.scene.scene_view import SceneView
 from drone_sim.ros.cockpit.server.access_control import Content
+from drone_sim.ros.cockpit.server.manual import Manual
 from drone_sim.ros.cockpit.server.page_server import PageServer
 from drone_sim.ros.cockpit.server.page_socket import PageSocket
 from drone_sim.ros.cockpit.teleop import CommandPublisher, HeldCommands
@@ -48,7 +49,7 @@ class Cockpit:
         self._listener: SimulatorListener | None = None
         self._asked = 0.0
         self._commands = CommandPublisher()
-        self._state, self._meshes = SceneState(), MeshStore()
+        self._state, self._meshes, self._manual = SceneState(), MeshStore(), Manual()
         held = HeldCommands(self._commands.send)
         store, self._lessons = ScriptStore(scripts), Lessons()
         editor = EditorBackend(store, self._lessons, self._simulator, TimelinePlayer(self._simulator.node))
@@ -125,7 +126,8 @@ class Cockpit:
             self._panel.plots.rest()
 
     def _find(self, path: str) -> Content:
-        return self._meshes.find(path) or self._lessons.picture(path) or self._editing.picture(path)
+        content = self._meshes.find(path) or self._lessons.picture(path) or self._manual.find(path)
+        return content or self._editing.picture(path)
 
     def _drag(self, browser: int, message: Mapping[str, Any]) -> None:
         if self._view is not None:

@@ -13,15 +13,16 @@ from drone_sim.ros.core.message_conversion import xyz
 
 _VIEW, _ODOMETRY = "/view/bodies", "/odom"
 _PICTURES, _COMPRESSED = "sensor_msgs/Image", "sensor_msgs/CompressedImage"
-_TRANSPORT = "/compressed"
+_TRANSPORT, _TRUTH = "/compressed", "/truth/"
 _COMMANDS = ("/push", "/set_wind")  # by this page, too: no sensors
 
 
 class ImageTopic(NamedTuple):
-    """A topic of pictures, and where they come compressed, '' where they do not."""
+    """A topic of pictures, where they come compressed, '' where they do not, and whether there is truth behind them."""
 
     topic: str
     compressed: str = ""
+    has_truth: bool = False
 
 
 class FoundTopics(NamedTuple):
@@ -59,7 +60,8 @@ def _cameras(kinds: Mapping[str, str]) -> Iterator[ImageTopic]:
     }
     plain = {name for name, kind in kinds.items() if kind == _PICTURES}
     for name in sorted(packed.keys() | plain):
-        yield ImageTopic(name, packed.get(name, ""))
+        if _TRUTH not in name:  # which is shown over the picture that it is of
+            yield ImageTopic(name, packed.get(name, ""), f"{name}{_TRUTH}boxes" in kinds)
 
 
 class PlottedMessage(NamedTuple):

@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import genpy
+import numpy as np
 import roslib.message
 import rospkg
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, TwistStamped, Vector3
 from geometry_msgs.msg import Twist as TwistMessage
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import CameraInfo, JointState
+from sensor_msgs.msg import CameraInfo, Image, JointState
 from std_msgs.msg import Float32MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 
 from drone_sim.mechanics import frames
@@ -72,12 +74,22 @@ def pose(matrix: Matrix) -> Pose:
     return Pose(Point(*frames.position(matrix)), Quaternion(*frames.to_quaternion(matrix)))
 
 
-def camera_info(intrinsics: Intrinsics, frame: str) -> CameraInfo:
-    """Return the camera's model, without a stamp."""
+def image(picture: np.ndarray, encoding: str, header: Header | None = None) -> Image:
+    """Return a picture (height, width) or (height, width, channels), of the type that `encoding` says.
+
+    As cv_bridge does, which takes an eighth of a second to import.
+    """
+    height, width = picture.shape[:2]
+    is_big = sys.byteorder == "big"
+    return Image(header or Header(), height, width, encoding, is_big, picture[0].nbytes, picture.tobytes())
+
+
+def camera_info(intrinsics: Intrinsics, frame: str, baseline: float = 0.0) -> CameraInfo:
+    """Return the camera's model, without a stamp; `baseline` (m) is how far to the right of `frame` it is."""
     size = {"width": intrinsics.width, "height": intrinsics.height}
     message = CameraInfo(header=Header(frame_id=frame), **size)
     message.distortion_model, message.D = intrinsics.distortion
-    message.K, message.P = intrinsics.K, intrinsics.P
+    message.K, message.P = intrinsics.K, (*intrinsics.P[:3], -intrinsics.P[0] * baseline, *intrinsics.P[4:])
     message.R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     return message
 

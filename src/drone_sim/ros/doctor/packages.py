@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from xml.etree import ElementTree as Xml
 
+from drone_sim.command_line import SEPARATE, installation_of
 from drone_sim.files.resources import package_path, python_path
 from drone_sim.ros.doctor import HINT, OK, WRONG, Line
 from drone_sim.ros.doctor.probe import FLIGHT, RENDERER
@@ -17,7 +18,10 @@ _MODULES = {"python3-opencv": "cv2", "python3-pil": "PIL", "python3-pycollada-pi
 _NO_MODULES = {"rviz"}
 _WITHOUT = {  # what still works where a module is missing
     "tkinter": "`view` writes files instead of opening a window",
-    "matplotlib": "`fly --plot` does not work",
+    "matplotlib": "nothing draws plots",
+    "av": "nothing makes videos",
+    "jinja2": "`grade --html` writes no report",
+    "distributed": "`--scheduler` finds no other machines",
     "tqdm": "`fly` does not work",
 }
 _SLOW = "pictures will come from PyBullet's TinyRenderer, at a few frames per second"
@@ -52,6 +56,8 @@ def _missing(module: str, key: str, why: str) -> Line:
     here = (package_path() / "dev.sh").is_file()
     debian = key if key.startswith("python3-") else f"python3-{key.replace('_', '-')}"
     cure = "`./dev.sh setup` installs it" if here else f"`apt install {debian}`, or install drone_sim anew"
+    if module in SEPARATE:
+        cure = installation_of(module)
     if module in _WITHOUT:
         return Line(HINT, "packages", f"no {module} ({why}): {_WITHOUT[module]}; {cure}")
     return Line(WRONG, "packages", f"{module} cannot be imported ({why}): {cure}")

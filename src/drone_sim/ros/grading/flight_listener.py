@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -31,8 +32,8 @@ class FlightListener:
     The time of what has no stamp (flight state, a script's topics) is that of the last odometry.
     """
 
-    def __init__(self, plan: Plan, parameters: Parameters, follow: Callable[[float], None]):
-        """Subscribe to what `plan` asks for of the vehicles in `parameters`. Raises Mismatch.
+    def __init__(self, plan: Plan, parameters: Parameters, simulator: str, follow: Callable[[float], None]):
+        """Subscribe to what `plan` asks for of the node `simulator` and the vehicles in `parameters`. Raises Mismatch.
 
         `follow` is called with the time (s) of each step, after it.
         """
@@ -45,12 +46,16 @@ class FlightListener:
         self._subscribe(f"/{self._vehicle}/command", TwistStamped, self._on_command)
         self._subscribe(f"/{self._vehicle}/propellers", Float32MultiArray, self._on_propellers)
         self._subscribe_for_criteria(plan, parameters)
+        self._signals = {name for one in plan.criteria for name in one.signals}
+        if self._signals:
+            self._subscribe(f"{simulator}/signals", String, self._on_signals)
 
     def _subscribe_for_criteria(self, plan: Plan, parameters: Parameters) -> None:
         names = [one.name for one in parameters.fleet]
         self._topics: dict[str, str] = {}  # those of a kind that is not known yet, by the plan's names
         for one in plan.criteria:
-            _refuse(one.called, one.signals, "a script's signals are heard by no topic; let it publish")
+            if one.signals and not isinstance(getattr(one, "equals", 0), (int, float)):
+                _refuse(one.called, one.signals, "of signals numbers alone are heard; let the script publish others")
             _refuse(one.called, [other for other in one.others if other not in names], "objects have no topic")
             for other in one.others:
                 self._subscribe(f"/{other}/odom", Odometry, partial(self._on_other, other))
@@ -118,6 +123,14 @@ class FlightListener:
         with self._lock:
             for marker in message.markers:
                 self._touches[ContactEvent(_stamp(marker), marker.ns)] = None
+
+    def _on_signals(self, message: String) -> None:
+        said = json.loads(message.data)
+        with self._lock:
+            for name in self._signals:
+                values, value = self._said.setdefault(name, []), said["signals"].get(name)
+                if (values[-1].value if values else None) != value:
+                    values.append(ValueChange(said["time"], value))
 
     def _say(self, name: str, value: Any) -> None:
         with self._lock:

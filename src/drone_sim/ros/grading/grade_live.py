@@ -27,13 +27,16 @@ from drone_sim.grading import plan as plans
 from drone_sim.grading.flight_record import FlightRecord
 from drone_sim.grading.outputs import as_json, gradescope, junit, table
 from drone_sim.grading.outputs.html import report
+from drone_sim.grading.permissions import CHANGE, MOVE
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result, result_of
 from drone_sim.ros.core.shutdown import end_on_signals
 from drone_sim.ros.core.startup import from_shell, init_node, reported
+from drone_sim.ros.grading import seeds
 from drone_sim.ros.grading.flight_listener import FlightListener
+from drone_sim.ros.grading.rules import LiveRules
 from drone_sim.ros.grading.simulator import GradedSimulator, Mismatch, lookup
-from drone_sim.ros.grading.timeline_sender import TimelineSender, entries_of, steps_late
+from drone_sim.ros.grading.timeline_sender import TimelineSender, is_put, steps_late
 from drone_sim.run.parameters import Parameters
 from drone_sim.scene.scene_parameters import find_files_beside
 
@@ -42,6 +45,7 @@ _XML = "--gtest_output=xml:"  # by which rostest says where it looks for the res
 _SILENT, _STANDS = 1.0, 10.0  # s of real time without a step: what is stopped has ended, whatever else waits longer
 _LOOK, _LAST = 0.05, 0.3  # s of real time, between two looks; for the last messages to come
 _PATIENCE = 30.0  # s of real time
+_IN_TIME, _LATE = 1e-6, 2.0  # s of simulated time: the timeline's own puts come some steps late on a busy machine
 
 
 def main() -> int:
@@ -101,7 +105,7 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     """
     there = GradedSimulator(simulator, patience)
     parameters = there.fit(plan)
-    live = _Live(plan, seed, there, parameters)
+    live = _Live(plan, seed, there, parameters)  # which is heard from now on
     there.wait(live.is_connected, f"{there.node} lacks topics of the plan's vehicles: launch it in the plan's scene")
     if node:
         there.wait(lambda: lookup("lookupNode", rospy.resolve_name(f"/{node.strip('/')}")), f"no node {node}")
@@ -113,9 +117,11 @@ def grade(plan: Plan, seed: int, node: str, simulator: str, patience: float) -> 
     late = steps_late(plan.timeline_of(parameters).of(plan.vehicle_of(parameters)), flown.rows, parameters.time_step)
     if late:
         rospy.logwarn(f"the timeline came up to {late} steps late: a lower real_time_factor gives it more time")
+    flown, put = live.within_rules(flown)
     outcomes = tuple(one.judge(flown) for one in plan.criteria)
     digest = flight.digest_of(flown.rows)
-    return result_of(plan.name, script, seed, {}, outcomes, flown.end, error or None, digest), flown
+    result = result_of(plan.name, script, seed, {}, outcomes, flown.end, put or error or None, digest)
+    return result.with_tried(live.rules.tried), flown
 
 
 class _Live:
@@ -123,12 +129,17 @@ class _Live:
 
     def __init__(self, plan: Plan, seed: int, simulator: GradedSimulator, parameters: Parameters):
         """Advertise and subscribe. Raises Mismatch."""
-        self._simulator, self._duration, self._scene = simulator, plan.duration, parameters.scene_file
+        self._simulator, self._plan = simulator, plan
+        self._duration, self._scene = plan.duration, seeds.scene_file(plan, seed)
         self._over = threading.Event()
         self._started = False
         wanted = plan.parameters(seed)
-        self._sender = TimelineSender(entries_of(plan.timeline_of(wanted), wanted, parameters), parameters)
-        self.listener = FlightListener(plan, parameters, self._follow)
+        simulator.check_seed(wanted, self._scene)
+        self._timeline = plan.timeline_of(wanted)
+        self._sender = TimelineSender(self._timeline.entries, parameters, simulator.node)
+        self.listener = FlightListener(plan, parameters, simulator.node, self._follow)
+        names = [one.name for one in parameters.fleet]
+        self.rules = LiveRules(plan, simulator.node, names, lambda: self.listener.time)
 
     def is_connected(self) -> bool:
         """Whether the simulator hears all that is said, and the other way round."""
@@ -147,6 +158,7 @@ class _Live:
             self._simulator.stop()
             time.sleep(_LAST)  # what was sent before is not of this flight
             self.listener.clear()
+            self.rules.clear()
             self._started = True
             self._simulator.start(self._scene)
             ended = self._wait()
@@ -174,9 +186,23 @@ class _Live:
                 return "somebody else has started the simulation anew"
             if self._simulator.state == "stopped" and waited > _SILENT:  # it may be told late that it flies
                 return self._simulator.error or f"the simulation was stopped at {now:.2f} s"
+            if self._simulator.state == "paused" and CHANGE not in self._plan.allowed:
+                return f"somebody has paused the simulation at {now:.2f} s; the plan does not allow that"
             if waited > _STANDS:
                 return f"the simulation stands still at {now:.2f} s, {self._simulator.state}"
         return ""
+
+    def within_rules(self, flown: FlightRecord) -> tuple[FlightRecord, str]:
+        """Return a flight up to where somebody has put the vehicle elsewhere, if so, and what there is to say of it."""
+        if MOVE in self._plan.allowed:
+            return flown, ""
+        own = [one.at for one in self._timeline.entries if is_put(one)]
+        for row in flown.puts:
+            at = flown.times[row]
+            if not any(-_IN_TIME <= at - one <= _LATE for one in own):
+                said = f"somebody moved the vehicle at {at:.2f} s; the plan does not allow that"
+                return flown.until(int(row)), f"{said} (allowed: [move] would)"
+        return flown, ""
 
 
 # ---- arguments

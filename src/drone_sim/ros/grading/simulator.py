@@ -73,6 +73,12 @@ class GradedSimulator(Simulator):
             raise Mismatch(f"the simulator flies with other parameters than the plan: {told}{more}; see its config:=")
         return running
 
+    def check_seed(self, wanted: Parameters, scene_file: str) -> None:
+        """Raise Mismatch where a scene file would not bring about what a flight is to begin with."""
+        there = parameters_of(self.node, scene_file=scene_file, vehicles=0)
+        for found in _differences(_beginning(wanted), _beginning(there), ()):
+            raise Mismatch(f"the simulator cannot fly this seed of the plan: {found}")
+
     def _factor(self) -> float:
         """Return the real-time factor in force, which the parameters of its start do not know. Raises Mismatch."""
         try:
@@ -106,6 +112,12 @@ class GradedSimulator(Simulator):
     def _on_log(self, message: Log) -> None:
         if message.name == self.node and message.msg.startswith(_SCRIPT_ERROR):
             self.error = self.error or message.msg.removeprefix(_SCRIPT_ERROR)
+
+
+def _beginning(parameters: Parameters) -> dict[str, Any]:
+    """Return what a seed may change."""
+    vehicles = {one.name: one.model_dump() for one in parameters.fleet}
+    return {**parameters.model_dump(include={"scene", "weather"}), "vehicles": vehicles}
 
 
 def lookup(call: str, name: str) -> str:

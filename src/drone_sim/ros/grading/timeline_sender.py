@@ -9,7 +9,16 @@ import numpy as np
 import rospy
 import yaml
 from diagnostic_msgs.msg import KeyValue
-from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3, Wrench, WrenchStamped
+from geometry_msgs.msg import (
+    Point,
+    PoseStamped,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Vector3,
+    Wrench,
+    WrenchStamped,
+)
 from geometry_msgs.msg import Pose as PoseMessage
 from std_msgs.msg import Empty, Header
 
@@ -19,10 +28,9 @@ from drone_sim.mechanics.state import Pose, Twist
 from drone_sim.offline.timeline import (
     CHANGES,
     Entry,
-    ParameterChange,
+    ObjectMove,
     ScriptRequest,
     Timeline,
-    WeatherChange,
     first_step,
 )
 from drone_sim.ros.core.message_conversion import WORLD_FRAME, twist
@@ -37,8 +45,8 @@ _DEEPEST = 4  # keys that a message on `weather` or `faults` may name
 class TimelineSender:
     """Sends what is due, each entry once, in order."""
 
-    def __init__(self, entries: list[Entry], parameters: Parameters):
-        """Advertise what `entries` need, by the `parameters` that are flown with.
+    def __init__(self, entries: list[Entry], parameters: Parameters, simulator: str):
+        """Advertise what `entries` need of the node `simulator`, by the `parameters` that are flown with.
 
         Raises Mismatch for an entry that no topic can ask for.
         """
@@ -49,7 +57,7 @@ class TimelineSender:
         publishers: dict[str, rospy.Publisher] = {}
         for entry in entries:
             for topic, message in _messages(entry, push):
-                name = f"/{entry.vehicle or self._first}/{topic}"
+                name = f"/{entry.vehicle or self._first}/{topic}" if topic else f"{simulator}/set_object_pose"
                 if name not in publishers:
                     publishers[name] = rospy.Publisher(name, type(message), queue_size=100, tcp_nodelay=True)
                 self._left.append((entry.at, publishers[name], message))
@@ -73,21 +81,9 @@ class TimelineSender:
             one.unregister()
 
 
-def entries_of(timeline: Timeline, wanted: Parameters, there: Parameters) -> list[Entry]:
-    """Return what brings a seed's places and wind about at the beginning, and then the timeline's entries.
-
-    Raises Mismatch where the seed moves objects.
-    """
-    if wanted.scene != there.scene:
-        raise Mismatch("this seed moves objects of the scene, which no topic does; seed 0 moves none")
-    first = []
-    for own, given in zip(wanted.fleet, there.fleet):
-        if (own.position, own.yaw) != (given.position, given.yaw):
-            turn = to_quaternion(from_rpy((0, 0, 0), (0, 0, own.yaw)))
-            first.append(Entry(0.0, Pose(own.position, turn), own.name))
-    if wanted.weather.wind != there.weather.wind:
-        first.append(Entry(0.0, WeatherChange({"wind": list(wanted.weather.wind)})))
-    return [*first, *timeline.entries]
+def is_put(entry: Entry) -> bool:
+    """Tell whether an entry puts a vehicle elsewhere."""
+    return isinstance(entry.action, Pose) or (isinstance(entry.action, ScriptRequest) and entry.action.topic == "reset")
 
 
 def steps_late(timeline: Timeline, rows: np.ndarray, time_step: float) -> int:
@@ -108,9 +104,12 @@ def steps_late(timeline: Timeline, rows: np.ndarray, time_step: float) -> int:
 
 
 def _messages(entry: Entry, push: float) -> Iterator[tuple[str, Any]]:
-    """Yield topic and message of what an entry does; `push` is how long a push by topic lasts, in s."""
+    """Yield topic ('': not a vehicle's) and message of what an entry does; a push by topic lasts `push` s."""
     action = entry.action
-    if isinstance(action, Twist):
+    if isinstance(action, ObjectMove):
+        turn = Quaternion(*to_quaternion(from_rpy((0, 0, 0), action.rpy))) if action.rpy else Quaternion()
+        yield "", TransformStamped(_IN_WORLD, action.name, Transform(Vector3(*action.position), turn))
+    elif isinstance(action, Twist):
         yield "cmd_vel", twist(action.linear, action.angular)
     elif isinstance(action, Pose):
         yield "set_pose", _pose(action)
@@ -121,12 +120,10 @@ def _messages(entry: Entry, push: float) -> Iterator[tuple[str, Any]]:
             said = f"push.duration = {action.duration:g}: a push by topic lasts push/duration = {push:g} s"
             raise Mismatch(f"the timeline's entry at {entry.at:g} s: {said}; put that into the plan's config")
         yield "push", WrenchStamped(_IN_WORLD, Wrench(Vector3(*action.force), Vector3(*action.torque)))
-    elif isinstance(action, ParameterChange):
+    else:
         topic = next(name for name, kind in CHANGES.items() if isinstance(action, kind))
         for key, value in _flat(action.changes):
             yield topic, KeyValue(key, yaml.safe_dump(value, default_flow_style=True).removesuffix("\n...\n"))
-    else:
-        raise Mismatch(f"the timeline's entry at {entry.at:g} s: there is no topic that does so")
 
 
 def _flat(changes: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

@@ -27,6 +27,7 @@ from drone_sim.ros.core.startup import init_node, release_name, reported
 from drone_sim.ros.core.validation import parameters_of, use_sim_time
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.inspection import InspectionTopics
+from drone_sim.ros.node.object_poses import ObjectPoses
 from drone_sim.ros.node.scene_editing import SceneEditing
 from drone_sim.ros.node.services import Services
 from drone_sim.ros.node.signals import SignalTopic
@@ -89,6 +90,7 @@ class Node:
         self._editing = SceneEditing(self.player, self._inbox, self._services)
         self._windows = WindowTopics(self.simulation, self._inbox)
         self._signals = SignalTopic(self.simulation)
+        self._object_poses = ObjectPoses(self.simulation, self._inbox)
         self._inspection = InspectionTopics(self.player, self._inbox)
         self._meshes = RvizMeshes()
         self._rviz = (  # each is made only while somebody listens to it

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import rospy
-from cv_bridge import CvBridge
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Vector
+from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.publishing import Stamp
 from drone_sim.run.pacing import Throttle
@@ -82,7 +82,6 @@ class ViewPictures:
     def __init__(self, simulation: Simulation):
         """Take the simulation whose cameras and sensors are shown; begin without views."""
         self._simulation = simulation
-        self._bridge = CvBridge()
         self._throttle = Throttle(_PICTURE_PERIOD)
         self._publishers: dict[str, rospy.Publisher] = {}  # of sensors of the scene, by name
 
@@ -103,7 +102,7 @@ class ViewPictures:
         for name in watched:
             eye = self._eye(name)
             if eye is not None:
-                message = self._bridge.cv2_to_imgmsg(eye.picture("color"), "rgb8")
+                message = message_conversion.image(eye.picture("color"), "rgb8")
                 message.header.stamp = stamp()
                 self._publishers[name].publish(message)
 

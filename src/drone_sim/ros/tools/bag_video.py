@@ -10,7 +10,6 @@ from contextlib import closing
 import numpy as np
 
 from drone_sim.command_line import Parser, status_of
-from drone_sim.offline import video
 from drone_sim.offline.hud import HudState
 from drone_sim.ros.tools import pictures
 from drone_sim.ros.tools.bags import ODOMETRY, STATE, Bag, BagFlight, RecordedMessage
@@ -33,12 +32,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _film(options: argparse.Namespace) -> None:
+    from drone_sim.offline import video  # PyAV, which few have
+
     video.check(options.video)
     with closing(Bag(options.bag)) as bag:
         topic = bag.named(options.topic, bag.topics(*_IMAGES), "image topic")
         vehicle = topic.split("/")[1]  # in whose namespace the pictures are
         flight = _FlightOverlay(bag, vehicle) if f"/{vehicle}/odom" in bag.topics(ODOMETRY) else None
-        rate = _rate(bag, topic)
+        rate = min(_rate(bag, topic), video.MAX_RATE)
         damaged: list[str] = []
         with video.writing_to(options.video, rate) as made:
             for stamp, picture, times in _timed(bag, topic, rate, damaged):
@@ -76,7 +77,7 @@ def _rate(bag: Bag, topic: str) -> float:
     steps = np.diff([_stamp(one) for one in itertools.islice(bag.read(topic, bag.kinds[topic]), _SAMPLE)])
     steps = steps[steps > 0]
     rate = 1 / float(np.median(steps)) if len(steps) else _SLOWEST
-    return round(min(max(rate, _SLOWEST), video.MAX_RATE), 2)
+    return round(max(rate, _SLOWEST), 2)
 
 
 def _timed(bag: Bag, topic: str, rate: float, damaged: list[str]) -> Iterator[tuple[float, np.ndarray, int]]:

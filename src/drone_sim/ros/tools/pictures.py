@@ -11,7 +11,7 @@ from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 
 from drone_sim.files import images
-from drone_sim.offline.video import depth_to_grey
+from drone_sim.offline.pictures import depth_to_grey
 
 _GREY, _WHITE = (60, 60, 60), (255, 255, 255)
 _EMPTY = (240, 320)  # px, height and width of what is not there yet

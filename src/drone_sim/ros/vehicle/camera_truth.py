@@ -9,16 +9,15 @@ from typing import Any
 import genpy
 import numpy as np
 import rospy
-from cv_bridge import CvBridge
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from drone_sim.mechanics.frames import to_quaternion
+from drone_sim.ros.core.message_conversion import image
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.sensors.camera import Camera
-from drone_sim.sensors.truth import PictureTruth, Seen
+from drone_sim.sensors.truth import PictureTruth, Seen, described, quaternion_of
 
 try:
     from vision_msgs.msg import (
@@ -33,9 +32,9 @@ try:
 except ImportError:  # Debian has no package of it
     Detection2DArray = Detection3DArray = None
 
+_FLOOR = "Floor"  # whose box is around everything
 _LINE = 0.01  # m, of the boxes in rviz
 _COLOR = ColorRGBA(1.0, 0.55, 0.1, 0.35)
-_bridge = CvBridge()
 
 
 class TruthOutput:
@@ -48,12 +47,12 @@ class TruthOutput:
         self._labels = rospy.Publisher(f"{topic}/truth/labels", String, queue_size=1, latch=True)
         self._labelled = ""
         kinds: dict[str, tuple[type[genpy.Message], Callable[[PictureTruth, Header], genpy.Message]]] = {
-            "instances": (Image, lambda truth, header: _image(truth.output("instance"), "mono16", header)),
-            "categories": (Image, lambda truth, header: _image(truth.categories, "mono16", header)),
-            "depth": (Image, lambda truth, header: _image(truth.output("depth"), "32FC1", header)),
-            "normals": (Image, lambda truth, header: _image(truth.output("normal"), "32FC3", header)),
+            "instances": (Image, lambda truth, header: image(truth.output("instance"), "mono16", header)),
+            "categories": (Image, lambda truth, header: image(truth.categories, "mono16", header)),
+            "depth": (Image, lambda truth, header: image(truth.output("depth"), "32FC1", header)),
+            "normals": (Image, lambda truth, header: image(truth.output("normal"), "32FC3", header)),
             "points": (PointCloud2, lambda truth, header: _cloud(truth.points, header)),
-            "boxes": (String, lambda truth, header: String(json.dumps(described(truth.seen(), header)))),
+            "boxes": (String, lambda truth, header: _boxes(truth.seen(), header)),
             "box_markers": (MarkerArray, lambda truth, header: _markers(truth.seen(), header)),
         }
         if Detection2DArray is not None:
@@ -105,17 +104,13 @@ class TruthOutput:
         if self._depth_before is None:  # there is no picture before
             known[:] = False
         self._depth_before = truth.output("depth")
-        self._flow.publish(_image(flow, "32FC2", header))
-        self._flow_known.publish(_image(255 * known.astype(np.uint8), "mono8", header))
+        self._flow.publish(image(flow, "32FC2", header))
+        self._flow_known.publish(image(255 * known.astype(np.uint8), "mono8", header))
 
     def close(self) -> None:
         """Advertise no more."""
         for one in self._publishers:
             one.unregister()
-
-
-def _image(picture: np.ndarray, encoding: str, header: Header) -> Image:
-    return _bridge.cv2_to_imgmsg(np.ascontiguousarray(picture), encoding, header)
 
 
 def _cloud(points: np.ndarray, header: Header) -> PointCloud2:
@@ -125,35 +120,19 @@ def _cloud(points: np.ndarray, header: Header) -> PointCloud2:
     return PointCloud2(header=header, fields=fields, is_dense=False, data=points.tobytes(), **size)
 
 
-def described(objects: list[Seen], header: Header | None = None) -> dict[str, Any]:
-    """Return boxes as JSON has them: px, m, and the optical frame's pose of each box in space."""
-    stamp = {} if header is None else {"stamp": header.stamp.to_sec(), "frame": header.frame_id}
-    return {**stamp, "objects": [
-        {
-            "number": one.number, **one.identity._asdict(), "pixels": one.pixels,
-            "visible": [round(float(value), 2) for value in one.visible],
-            "full": [round(float(value), 2) for value in one.full],
-            "occlusion": round(one.occlusion, 4), "truncation": round(one.truncation, 4),
-            "position": one.pose[:3, 3].round(5).tolist(),
-            "orientation": [round(value, 6) for value in _quaternion(one)],
-            "size": one.size.round(5).tolist(),
-        }
-        for one in objects
-    ]}  # fmt: skip
-
-
-def _quaternion(one: Seen) -> tuple[float, ...]:
-    return tuple(map(float, to_quaternion(tuple(one.pose[:3].ravel()))))
+def _boxes(objects: list[Seen], header: Header) -> String:
+    said = {"stamp": header.stamp.to_sec(), "frame": header.frame_id, "objects": described(objects)}
+    return String(json.dumps(said))
 
 
 def _pose(one: Seen) -> Pose:
-    return Pose(Point(*one.pose[:3, 3]), Quaternion(*_quaternion(one)))
+    return Pose(Point(*one.pose[:3, 3]), Quaternion(*quaternion_of(one)))
 
 
 def _markers(objects: list[Seen], header: Header) -> MarkerArray:
-    """Return the boxes in space for rviz, each with its name; those of the picture before go."""
+    """Return the boxes in space for rviz, each with its name, but the floor's; those of the picture before go."""
     made = [Marker(header=header, action=Marker.DELETEALL)]
-    for one in objects:
+    for one in (each for each in objects if each.identity.name != _FLOOR):
         shared = {"header": header, "id": one.number, "pose": _pose(one)}
         made.append(Marker(ns="boxes", type=Marker.CUBE, scale=Vector3(*(one.size + _LINE)), color=_COLOR, **shared))
         text = {"text": one.identity.name, "color": ColorRGBA(1, 1, 1, 1), "scale": Vector3(0, 0, 0.1)}

@@ -9,7 +9,6 @@ from typing import Any
 import cv2
 import numpy as np
 import rospy
-from cv_bridge import CvBridge
 from dynamic_reconfigure.server import Server
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
@@ -45,10 +44,10 @@ class CameraOutput:
         topic = f"{vehicle.name}/{parameters.topic}"
         self._frame = message_conversion.frame(vehicle, parameters.frame)
         info_topic = topic.rpartition("/")[0] + "/camera_info"  # image_transport's rule
-        self._bridge = CvBridge()
         self._image = rospy.Publisher(topic, Image, subscriber_listener=new_subscribers, queue_size=1)
         self._compressed = CompressedPublisher(topic, new_subscribers) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
+        self._baseline = parameters.baseline
         self._truth = TruthOutput(topic, self._frame, new_subscribers) if parameters.truth else None
         self.follow(camera)
 
@@ -60,7 +59,7 @@ class CameraOutput:
 
     def _describe(self) -> None:
         self._intrinsics = self._camera.intrinsics
-        self._info = message_conversion.camera_info(self._intrinsics, self._frame)
+        self._info = message_conversion.camera_info(self._intrinsics, self._frame, self._baseline)
 
     def close(self) -> None:
         """Advertise no more."""
@@ -93,7 +92,7 @@ class CameraOutput:
             return
         header = Header(stamp=stamp(camera.age), frame_id=self._frame)
         if self._image.get_num_connections():
-            self._image.publish(self._bridge.cv2_to_imgmsg(camera.image, _ENCODINGS[camera.kind], header))
+            self._image.publish(message_conversion.image(camera.image, _ENCODINGS[camera.kind], header))
         if self._compressed is not None:
             self._compressed.publish(header, camera.image)
 

@@ -67,8 +67,8 @@ def _moving(now: rospy.Time, vehicle: Vehicle) -> list[TransformStamped]:
     places = {
         BASE_LINK: vehicle.body.matrix,
         TRACK_BASE: vehicle.track.matrix(),
-        # The URDF does not know cameras with a mount.
-        **{one.frame: vehicle.optical(one) for one in own.cameras.values() if one.mount is not None},
+        # The URDF does not know cameras with a mount; the frame of a stereo pair is its left camera's.
+        **{one.frame: vehicle.optical(one) for one in own.cameras.values() if one.mount and not one.baseline},
         **{name: matrix() for name, matrix in vehicle.instruments.moving_frames.items()},
     }
     return [transform(now, WORLD_FRAME, frame(own, name), matrix) for name, matrix in places.items()]

@@ -63,7 +63,7 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
     factor = since.steps * simulation.parameters.time_step / since.seconds if since else None
     problems = [Problem(ERROR, f"stopped: {player.why_stopped}")] if player.why_stopped and not player.playing else []
     if simulated_time and not player.playing:
-        problems.append(Problem(WARN, f"{player.state}: /clock stands still, and whoever sleeps in ROS time sleeps on"))
+        problems.append(Problem(WARN, f"{player.state}: /clock stands still, and nodes that use simulated time wait"))
     if held and since and not since.steps:
         problems.append(Problem(WARN, "no step: a client of the remote API has asked to trigger each, and does not"))
     elif factor is not None and asked and factor < _ENOUGH * asked:

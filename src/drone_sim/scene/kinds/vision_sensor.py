@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
 from drone_sim.scene.kinds.kind import KindParameters, Place
+from drone_sim.scripting.api.sensors import EVERYTHING
 from drone_sim.scripting.api.vision import Detected
 
 MAX_SIDE = 2048  # px
@@ -56,17 +58,19 @@ class VisionSensor(SceneObject):
         self.angle = parameters.fov  # rad, of the larger side
         self.orthographic_size = parameters.size  # m, of the larger side; None where it is perspective
         self.detected = Detected()
+        self.entity = EVERYTHING
+        self.color_coded = False
         self._context = context
 
     def save_state(self) -> Restore:
         """Return a function that brings back where it is, and what its script has found."""
-        return in_turn(super().save_state(), saved(self, "detected"))
+        return in_turn(super().save_state(), saved(self, "detected", "entity", "color_coded"))
 
-    def picture(self, kind: str = "color") -> np.ndarray:
-        """Return what it sees: "color" or "depth", as sensors.camera.Vision has it. Raises ValueError."""
+    def picture(self, kind: str = "color", only: Collection[str] | None = None) -> np.ndarray:
+        """Return what it sees, of `only` these objects or of all: "color", "depth" or "handles". Raises ValueError."""
         self._context.carried.follow()
         pose = np.reshape((*frames.multiply(self.matrix(), _OPTICAL), 0, 0, 0, 1), (4, 4))
-        return self._context.vision.picture(kind, self._lens(), pose)
+        return self._context.picture(kind, self._lens(), pose, only)
 
     def _lens(self) -> Lens:
         larger = max(self.width, self.height)

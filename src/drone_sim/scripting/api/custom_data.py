@@ -68,7 +68,7 @@ class CustomData:
 
 
 class CustomDataFunctions:
-    """Custom data, strings and tables under a name that scripts leave on objects, and properties (4.7)."""
+    """Custom data: named strings and tables of objects, and properties (4.7)."""
 
     def __init__(self, objects: ObjectTree, data: CustomData):
         """`data` is what scripts have left on the `objects`."""

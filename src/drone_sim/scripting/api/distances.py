@@ -32,7 +32,7 @@ MeasureWay = Callable[[Sequence[SceneObject], Sequence[SceneObject] | None, floa
 
 
 class DistanceFunctions:
-    """Distances and collisions between objects, measured when they are asked for."""
+    """Distances and collisions between objects."""
 
     def __init__(self, objects: ObjectTree, collections: Collections, nearest: MeasureWay):
         """`nearest` measures between the `objects`, of which there may be `collections`."""

@@ -180,7 +180,7 @@ def _copied(objects: dict[int, DrawingObject]) -> dict[int, DrawingObject]:
 
 
 class DrawingFunctions:
-    """Drawing objects, which rviz shows; where nobody shows them they are accepted and ignored, said once."""
+    """Drawing objects, for rviz and the cockpit; without ROS they are accepted and ignored."""
 
     def __init__(self, drawings: Drawings, objects: ObjectTree, ignored: Ignored):
         """`drawings` is where to draw, `objects` may carry it; `ignored` says that something is ignored."""

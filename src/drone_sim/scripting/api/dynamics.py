@@ -28,6 +28,7 @@ Getters = Mapping[str, Callable[[], float]]
 Setters = Mapping[str, Callable[[float], None]]
 _NONE = Inertia((0.0,) * 9, frames.IDENTITY)
 _EVERYTHING = (CONSTANTS["handle_all"], CONSTANTS["handle_scene"])
+_COLOR_CODED = 2  # a render mode: colours are handles
 _WHOLE = ("objintparam_", "shapeintparam_", "jointintparam_", "visionintparam_", "proxintparam_")
 _FLOAT = ("objfloatparam_", "shapefloatparam_", "jointfloatparam_", "visionfloatparam_")
 
@@ -58,6 +59,9 @@ def readable(found: SceneObject) -> Getters:
         return {
             "visionintparam_resolution_x": lambda: found.width,
             "visionintparam_resolution_y": lambda: found.height,
+            "visionintparam_render_mode": lambda: _COLOR_CODED if found.color_coded else 0,
+            "visionintparam_entity_to_render": lambda: found.entity,
+            "visionintparam_perspective_operation": lambda: found.orthographic_size is None,
             "visionfloatparam_near_clipping": lambda: found.near,
             "visionfloatparam_far_clipping": lambda: found.far,
             "visionfloatparam_perspective_angle": lambda: found.angle,
@@ -91,7 +95,7 @@ class Massive(Protocol):
 
 
 class Dynamics(Functions):
-    """What the dynamics know of an object: masses, whether it moves, and parameters that say so."""
+    """Dynamics of an object: its mass, whether it moves, and parameters for that."""
 
     @sim("345")
     def resetDynamicObject(self, handle: Handle) -> None:
@@ -241,6 +245,9 @@ class Dynamics(Functions):
             known["shapeintparam_respondable"] = lambda on: operations.change(handle, respondable=bool(on))
         if isinstance(found, Detector):
             known["proxintparam_entity_to_detect"] = lambda entity: self._look_for(found, int(entity))
+        if isinstance(found, Eye):
+            known["visionintparam_entity_to_render"] = lambda entity: self._look_for(found, int(entity))
+            known["visionintparam_render_mode"] = functools.partial(_render, found)
         for name in names:
             if name in known:
                 known[name](*numbers((value,), 1))
@@ -248,10 +255,14 @@ class Dynamics(Functions):
         self._ignored.say(function, f"{names[0]} is accepted and ignored")
         return 1
 
-    def _look_for(self, sensor: Detector, entity: int) -> None:
+    def _look_for(self, sensor: Detector | Eye, entity: int) -> None:
         if entity != EVERYTHING:
             members(entity, self._objects, self._context.collections)  # or there is none
         sensor.entity = entity
+
+
+def _render(sensor: Eye, mode: float) -> None:
+    sensor.color_coded = mode == _COLOR_CODED  # all other modes are ways to draw the same picture
 
 
 def _carrier(found: SceneObject | None) -> SceneObject | None:

@@ -70,7 +70,7 @@ class Graphs:
 
 
 class GraphFunctions:
-    """Graphs, numbers to be plotted: the cockpit draws them. Any object may stand for a graph, of which there are none.
+    """Graphs: numbers that the cockpit plots. Any object may take the place of a graph object.
 
     Colours, units and ranges are accepted and ignored.
     """

@@ -24,7 +24,7 @@ _UNIT = 1e-3  # by how much a rotation may miss
 
 
 class JointFunctions(Functions):
-    """Joints. Revolute ones in rad, rad/s and N m, prismatic ones in m, m/s and N."""
+    """Joints: revolute ones in rad, rad/s and N m, prismatic ones in m, m/s and N."""
 
     # ---- where they are
 

@@ -28,7 +28,7 @@ _WITHOUT_ROOT, _CHILDREN_ALONE = 1, 2  # options of getObjectsInTree
 
 
 class Objects(Functions):
-    """The objects of the scene, where they are, how they move, the forces on them.
+    """Objects: where they are, how they move, the forces on them.
 
     Relative to a joint is relative to what hangs on it; sim.handleflag_reljointbaseframe, added to the handle of the
     object, makes it relative to the joint's own frame, which does not turn.
@@ -207,7 +207,7 @@ def _vector(values: Sequence[float]) -> frames.Vector:
 
 
 class ObjectKinds(Functions):
-    """What objects are, and how they hang together."""
+    """Kinds of objects, and the tree of objects."""
 
     @sim("345")
     def getObjectType(self, handle: Handle) -> int:

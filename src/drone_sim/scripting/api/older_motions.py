@@ -36,7 +36,7 @@ _WAYS: tuple[Callable[[float, float], float], ...] = (  # by sim.distcalcmethod_
 
 
 class OlderMotions(Functions):
-    """Motions in threads, as 3.x has them."""
+    """Motions in threads (3.x)."""
 
     def __init__(self, motions: MotionFunctions, *seen: Any):
         """`motions` are those of 4.x."""

@@ -26,7 +26,7 @@ _MASK = 0xFFFFFFFF
 
 
 class Packing:
-    """Values in a string, as signals and custom data carry them: little endian, one after the other."""
+    """Values packed into strings for signals and custom data, little endian."""
 
     @sim("345")
     def packTable(self, table: Any, _scheme: int = 0) -> bytes:

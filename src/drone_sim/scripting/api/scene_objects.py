@@ -32,7 +32,7 @@ _VOLUMES = {
 
 
 class SceneObjects:
-    """Objects of the scene that a script makes, copies, names, and takes away; models of them in files."""
+    """Objects of the scene: making, copying, naming and removing them; models in files."""
 
     def __init__(self, surroundings: Surroundings):
         """Take what may be done to the scene, and how something is done whole."""
@@ -227,7 +227,7 @@ class SceneObjects:
 
 
 class Shapes:
-    """How shapes of the scene look, what they weigh, how large they are, and what they are made of."""
+    """Shapes of the scene: their looks, masses, sizes and meshes."""
 
     def __init__(self, surroundings: Surroundings):
         """Take what may be done to the scene, and how something is done whole."""

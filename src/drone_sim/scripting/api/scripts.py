@@ -230,7 +230,7 @@ def _from_text(text: str) -> Any:
 
 
 class ScriptCalls(_OnScripts):
-    """From one script to another."""
+    """Calls from one script to another."""
 
     @sim("5")
     def getScript(self, scriptType: int, object: Handle | Name = _SELF, _name: Name = "") -> int:

@@ -19,7 +19,7 @@ from drone_sim.scripting.api.host import Functions, Readable
 from drone_sim.scripting.api.types import Handle, Number, WrongValue
 
 _NOT_YET, _NOTHING, _DETECTED = -1, 0, 1  # detection states of CoppeliaSim
-_EVERY_SENSOR = (CONSTANTS["handle_all"], CONSTANTS["handle_all_except_explicit"])
+EVERY_SENSOR = (CONSTANTS["handle_all"], CONSTANTS["handle_all_except_explicit"])
 EVERYTHING = CONSTANTS["handle_all"]
 _Detection = tuple[int, float, list[float], int, list[float]]
 
@@ -32,7 +32,7 @@ class _ForceSensor(Protocol):
 
 
 class Sensors(Functions):
-    """What force sensors of the scene read, and a vehicle's instruments."""
+    """Force sensors of the scene, and sensors of a vehicle."""
 
     @sim("345")
     def readForceSensor(self, handle: Handle) -> tuple[int, list[float], list[float]]:
@@ -94,7 +94,7 @@ class ProximitySensors(Functions):
     @sim("345")
     def handleProximitySensor(self, handle: Handle) -> _Detection:
         """Return what readProximitySensor does; of sim.handle_all, and _all_except_explicit, the nearest of all."""
-        if handle not in _EVERY_SENSOR:
+        if handle not in EVERY_SENSOR:
             return self.readProximitySensor(handle)
         every = [self._objects[one] for one in self._objects]
         seen = [self._detected(one) for one in every if isinstance(one, Detector)]
@@ -119,7 +119,7 @@ class ProximitySensors(Functions):
     @sim("345")
     def resetProximitySensor(self, handle: Handle) -> None:
         """Forget what a sensor has read: there is nothing to forget, it looks when it is read."""
-        if handle not in _EVERY_SENSOR:
+        if handle not in EVERY_SENSOR:
             self._objects[handle]
 
     def _detected(self, sensor: Detector, entity: int | None = None) -> FoundObject | None:

@@ -25,7 +25,7 @@ _PRIMITIVES = {
 
 
 class ShapeMasses(Functions):
-    """How the mass of a shape of the scene lies in it, and of what form it is."""
+    """Mass and inertia of shapes of the scene, and their forms."""
 
     @sim("345")
     def setShapeMassAndInertia(

@@ -79,7 +79,7 @@ class Signals:
 
 
 class SignalFunctions:
-    """Signals, values under a name that one script leaves for another, or for itself."""
+    """Signals: named values that scripts share."""
 
     def __init__(self, signals: Signals):
         """Take the signals of the simulation."""
@@ -183,7 +183,7 @@ class Tubes:
 
 
 class TubeFunctions:
-    """Tubes, two-way pipes between two scripts, which V-REP 3.x's sensors send their readings through."""
+    """Tubes: two-way pipes between two scripts, which sensors of V-REP 3.x use."""
 
     def __init__(self, tubes: Tubes):
         """Take the tubes of the simulation."""

@@ -3,23 +3,27 @@
 An image is a string of width · height · 3 bytes, red, green, blue, **the bottom row first**, as V-REP
 gives it (OpenGL's order); simROS.imageTransportPublish turns it over. It shows the scene as of the last
 step, or as of now where nobody has looked since. Depth is in m along the sensor's z, and infinite beyond the far plane.
-Every sensor has both, whichever of them it publishes.
+Every sensor has both, whichever of them it publishes. A sensor of the scene may see handles in the place of colours
+(sim.visionintparam_render_mode 2), and one object or collection alone (sim.visionintparam_entity_to_render).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from drone_sim.mechanics.object_collections import members
 from drone_sim.scripting.api.calls import sim
 from drone_sim.scripting.api.constants import CODED, GREYSCALE, METRES, bare, has
 from drone_sim.scripting.api.host import Functions
+from drone_sim.scripting.api.sensors import EVERY_SENSOR, EVERYTHING
 from drone_sim.scripting.api.types import Handle, Number, WrongValue, numbers
 
 _GREY, _DEPTH_IN_METRES = 1, 1  # options of 4.x
 _ALL = (0, 0)  # the corner and size of a whole picture
+NO_OBJECT = 0xFFFFFF  # the handle where a picture of handles shows nothing: white, as in V-REP
 _LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)  # ITU-R BT.601
 
 
@@ -41,13 +45,18 @@ class Eye(Protocol):
     angle: float
     orthographic_size: float | None  # m, of its larger side, where it is orthographic
     detected: Detected
+    entity: int  # handle of the object or collection that it sees alone, or EVERYTHING
+    color_coded: bool  # whether its colours are handles: red + 256 green + 65536 blue
 
-    def picture(self, kind: str = "color") -> np.ndarray:
-        """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane."""
+    def picture(self, kind: str = "color", only: Collection[str] | None = None) -> np.ndarray:
+        """Return what it sees: "color", (h, w, 3) uint8, or "depth", (h, w) in m, NaN beyond the far plane.
+
+        Or "handles", (h, w) uint32, NO_OBJECT where there is none; of `only` the objects of these names, or of all.
+        """
 
 
 class VisionSensors(Functions):
-    """What vision sensors see."""
+    """Vision sensors."""
 
     @sim("345")
     def getVisionSensorCharImage(
@@ -111,51 +120,108 @@ class VisionSensors(Functions):
 
     @sim("345")
     def handleVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
-        """Take the picture; return whether the sensor's own script triggers, 1 or 0, and what it found: its packets."""
-        self._picture(handle)
-        detected = self._detected(handle)
-        return int(detected.trigger), *(np.frombuffer(one, "<f4").tolist() for one in detected.packets)
+        """Return what readVisionSensor does; of sim.handle_all, and _all_except_explicit, how many sensors trigger."""
+        if handle not in EVERY_SENSOR:
+            return self.readVisionSensor(handle)
+        every = [self._objects[one] for one in self._objects]
+        return (sum(one.detected.trigger for one in every if isinstance(one, Eye)),)
 
     @sim("345")
     def readVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
         """Return whether the sensor's own script triggers, 1 or 0, 15 numbers, and what that script found: its packets.
 
         They are intensity, red, green, blue and depth (0 to 1): the least, the largest, and the mean of each. Depth is
-        0 at the near plane, and 1 at the far one.
+        0 at the near plane, and 1 at the far one. Where colours are handles, the numbers are those of what is seen.
         """
-        colors = self._colors(handle).reshape(-1, 3) / np.float32(255)
-        depths = self._depths(bare(handle))[::-1].ravel()
-        channels = np.column_stack([colors @ _LUMINANCE, colors, depths])
-        trigger, *packets = self.handleVisionSensor(handle)
-        return trigger, [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()], *packets
+        detected = self._detected(handle)
+        packets = (np.frombuffer(one, "<f4").tolist() for one in detected.packets)
+        return int(detected.trigger), self._statistics(handle), *packets
+
+    @sim("345")
+    def checkVisionSensor(self, handle: Handle, entity: Handle) -> tuple[int, list[float]]:
+        """Return whether a sensor would see an object or collection if there were nothing else, 1 or 0, and 15 numbers.
+
+        They are those of readVisionSensor, of that picture. The sensor's script is not asked: V-REP's is, and triggers.
+        """
+        only = self._names(entity)
+        is_seen = np.isfinite(self._picture(handle, "depth", only)).any()
+        return int(is_seen), self._statistics(handle, only)
+
+    @sim("345")
+    def checkVisionSensorEx(self, handle: Handle, entity: Handle, returnImage: bool) -> list[float]:
+        """Return the image (0 to 1), or else the depths (0 to 1), of an object or collection as if it were alone.
+
+        The bottom row comes first. A depth of 1 is where it is not: the others are its mask.
+        """
+        only = self._names(entity)
+        if not returnImage:
+            return self._depths(bare(handle), only=only).ravel().tolist()
+        return (self._colors(handle, only=only)[::-1] / np.float32(255)).ravel().tolist()
+
+    def _names(self, entity: int) -> set[str] | None:
+        """Return the names of the objects that an entity is, None for all."""
+        if entity == EVERYTHING:
+            return None
+        found = members(entity, self._objects, self._context.collections)
+        return {name for one in found for name in self._objects[one].names}
+
+    def _statistics(self, handle: int, only: Collection[str] | None = None) -> list[float]:
+        """Return the first packet of a picture."""
+        colors, found = self._colors(handle, only=only).reshape(-1, 3), self._objects[bare(handle)]
+        if isinstance(found, Eye) and found.color_coded:
+            handles = np.unique(colors @ (1, 256, 65536))
+            return [float(one) for one in handles if one != NO_OBJECT]
+        shares, depths = colors / np.float32(255), self._depths(bare(handle), only=only)[::-1].ravel()
+        channels = np.column_stack([shares.mean(1), shares, depths])
+        return [*channels.min(0).tolist(), *channels.max(0).tolist(), *channels.mean(0).tolist()]
 
     def _detected(self, handle: int) -> Detected:
         found = self._objects[bare(handle)]
         return found.detected if isinstance(found, Eye) else Detected()
 
-    def _colors(self, handle: int, pos: Sequence[float] = _ALL, size: Sequence[float] = _ALL) -> np.ndarray:
+    def _colors(
+        self,
+        handle: int,
+        pos: Sequence[float] = _ALL,
+        size: Sequence[float] = _ALL,
+        only: Collection[str] | None = None,
+    ) -> np.ndarray:
         """Return colours (height, width, 3)."""
-        return _part(self._picture(handle, "color"), pos, size)
+        found = self._objects[bare(handle)]
+        if isinstance(found, Eye) and found.color_coded:
+            handles = self._picture(handle, "handles", only).astype("<u4")
+            channels = handles.view(np.uint8).reshape(*handles.shape, 4)
+            return _part(np.ascontiguousarray(channels[:, :, :3]), pos, size)
+        return _part(self._picture(handle, "color", only), pos, size)
 
-    def _depths(self, handle: int, pos: Sequence[float] = _ALL, size: Sequence[float] = _ALL) -> np.ndarray:
+    def _depths(
+        self,
+        handle: int,
+        pos: Sequence[float] = _ALL,
+        size: Sequence[float] = _ALL,
+        only: Collection[str] | None = None,
+    ) -> np.ndarray:
         """Return depths (height, width), the bottom row first."""
-        picture, found = self._picture(handle, "depth"), self._objects[bare(handle)]
+        picture, found = self._picture(handle, "depth", only), self._objects[bare(handle)]
         depths = np.nan_to_num(_part(picture, pos, size)[::-1].astype("<f4"), nan=np.inf)
         if has(handle, METRES):
             return depths
         near, far = (found.near, found.far) if isinstance(found, Eye) else self._surroundings.planes[found.name]
         return np.clip((depths - near) / max(far - near, 1e-9), 0.0, 1.0).astype("<f4")
 
-    def _picture(self, handle: int, *kind: str) -> np.ndarray:
-        """Return what a sensor sees: "color" or "depth", and without a kind what it is made for."""
+    def _picture(self, handle: int, kind: str = "", only: Collection[str] | None = None) -> np.ndarray:
+        """Return what a sensor sees, of `only` these objects or of all: without a `kind` what it is made for."""
         found, pictures = self._objects[bare(handle)], self._surroundings.pictures
+        if isinstance(found, Eye) and only is None:
+            only = self._names(found.entity)
         take = found.picture if isinstance(found, Eye) else pictures.get(found.name)
         if take is None:
             eyes = [one.name for one in map(self._objects.__getitem__, self._objects) if isinstance(one, Eye)]
             known = ", ".join([*pictures, *eyes]) or "none"
             raise WrongValue(f"'{found.name}' is not a vision sensor; there are: {known}")
         # Not the script's time: the first picture compiles shaders.
-        return self._surroundings.outside(lambda: take(*kind))
+        given = (kind, only) if only is not None else (kind,) if kind else ()
+        return self._surroundings.outside(lambda: take(*given))
 
 
 def _two(values: Any) -> tuple[float, ...]:

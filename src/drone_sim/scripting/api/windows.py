@@ -192,7 +192,7 @@ def _said(buttons: tuple[str, ...]) -> str:
 
 
 class Dialogs:
-    """Dialogs and consoles. What they say goes to the log, and to whoever shows `Windows`.
+    """Dialogs and consoles, in the log and in the cockpit.
 
     Nothing waits: a modal dialog is shown, and counts as answered."""
 
@@ -273,7 +273,7 @@ def _text(value: Any) -> str:
 
 
 class Views:
-    """Floating views. Whoever shows `Windows` shows what the sensor sees; where it stands is theirs to say."""
+    """Floating views, in the cockpit."""
 
     def __init__(self, windows: Windows, new_handle: Callable[[], int], objects: ObjectTree):
         """`windows`: what is open; `new_handle` gives a handle that nothing else has; `objects` are to be seen."""

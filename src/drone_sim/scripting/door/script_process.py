@@ -21,6 +21,7 @@ from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import TimeLimit
 
 _MOST_WAITING = 2**18  # characters, about, of items that wait for the next message
+_FIRST = "pilot"  # that is loaded, once, before any other
 _MOST_FUNCTIONS = 100_000  # that a script has handed over
 
 
@@ -192,3 +193,6 @@ def import_all() -> None:
     for name in ("drone_sim.scripting.lua.script", "drone_sim.scripting.python.thread"):
         importlib.import_module(name)
     stand_ins.prepare()
+    here, there = socket.socketpair()
+    with here, there:  # what the first script of a process reads and compiles, forks have
+        ScriptEnd(Channel(there), _FIRST).obey(("go", 1, "load", [0.0, None], NO_ANSWERS, False))

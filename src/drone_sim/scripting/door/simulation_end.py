@@ -34,6 +34,7 @@ _MOST_WAITS = 1000
 _MOST_EXPECTED = 200  # reads that are expected, at a time, and lists of them
 _MOST_FUNCTIONS = 100_000
 _ALL_PLAIN = frozenset((float, int, bool, str, type(None))).issuperset
+_PLACED = f"sim.{effects.PLACED[-1]}"  # which reads all of an object's place
 _NOTHING: tuple[list[Any], list[int]] = ([], [])
 _LONGEST = 1000  # characters of a text that says what went wrong
 Permit = Callable[[str, list[Any]], None]
@@ -364,8 +365,17 @@ class ScriptThere:
                 raise NoMessage("no read")
             if one[0] not in effects.READS or one[0] not in self._functions:
                 raise NoMessage("no read")
-            reads.append((self._functions[one[0]], [self._value(argument) for argument in one[1:]]))
-        self._expected[item[1][:_LONGEST], item[2]] = reads, item[4]
+            arguments = [self._value(argument) for argument in one[1:]]
+            reads.append((self._functions[one[0]] if self._may(one[0], arguments) else _refused, arguments))
+        handles = [one for one in item[4] if self._may(_PLACED, [one])]
+        self._expected[item[1][:_LONGEST], item[2]] = reads, handles
+
+    def _may(self, name: str, arguments: list[Any]) -> bool:
+        try:
+            self._door.permit(name, arguments)
+        except ValueError:
+            return False
+        return True
 
     def _reads(self, phase: str, stretch: int) -> tuple[list[Any], list[Place]]:
         """Return the answers to what is expected, Ellipsis for what cannot be answered, and where objects are."""
@@ -408,6 +418,10 @@ class ScriptThere:
             self._waits.pop(number, None)
             raise
         return ("call", asked.callback, asked.arguments) if asked else ("wait",)
+
+
+def _refused(*_: Any) -> NoReturn:
+    raise ValueError("the script may not read that")
 
 
 def _named(pairs: list[Any]) -> dict[str, Any]:

@@ -1,9 +1,11 @@
-"""The report's folder: index.html, a page per script, a file of figures per flight, and the files that all share.
+"""The report's folder: the teacher's page, a folder per script, and a page for each two scripts that are alike.
 
-    index.html  scripts/01-alice.html ...  flights/01-0.js ...  files/report.css, replay.js, ..., scene.js
+    index.html  files/report.css, replay.js, ...  similar/1.html ...
+    scripts/01-alice/index.html  scripts/01-alice/flights/0.js ...  scripts/01-alice/files/report.css, ..., scene.js
 
-Figures lie in JavaScript files, because a page from file:// may load those and no others; a page loads a flight's when
-it is looked at. All text is escaped by the templates, or set as text.
+A script's folder is whole: it can be given to whoever wrote it. Figures lie in JavaScript files, because a page from
+file:// may load those and no others; a page loads a flight's when it is looked at. All text is escaped by the
+templates, or set as text.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import json
 import math
 import re
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,14 +30,16 @@ from drone_sim.grading.outputs.by_script import ScriptResults, by_script, criter
 from drone_sim.grading.outputs.html.scene import scene_of
 from drone_sim.grading.plan import Plan
 from drone_sim.grading.result import Result
+from drone_sim.grading.submissions.similarity import given_by, similar
 from drone_sim.offline import recording
 from drone_sim.offline.recording import COLUMNS
 
 _HERE = Path(__file__).parent
 _SHARED = ("replay.js", "report.css", "view.js", "plots.js", "page.js", "index.js")  # first what makes it a report
 _OURS = Path("files", "replay.js")  # a folder that has this holds a report
-_MADE_ANEW = ("scripts", "flights", "files")
-_SLUG = 40  # characters of a page's name
+_MADE_ANEW = ("scripts", "similar", "files")
+_SLUG = 40  # characters of a folder's name
+_BARS = 10
 _MOST_ROWS = 6000  # five minutes of the usual step; longer flights are thinned
 _DIGITS = 4  # after the point: 0.1 mm
 _COLUMNS = (
@@ -63,6 +67,23 @@ class ScriptPage(NamedTuple):
     file: str
     script: ScriptResults
     flights: tuple[FlightEntry, ...]
+    rank: int  # from 1; of as many points the same
+
+
+class Alike(NamedTuple):
+    """Two scripts side by side."""
+
+    file: str
+    share: float
+    pages: tuple[ScriptPage, ScriptPage]
+    lines: tuple[list[tuple[str, bool]], list[tuple[str, bool]]]  # of each, and whether the other has it, too
+
+
+class Bar(NamedTuple):
+    """How many scripts have so many points."""
+
+    said: str
+    scripts: int
 
 
 def check(folder: str | Path) -> None:
@@ -79,26 +100,74 @@ def check(folder: str | Path) -> None:
         raise FileNotFoundError(f"{folder}: no such folder: {path.absolute().parent}")
 
 
-def write(plan: Plan, results: Sequence[Result], tables: Tables, folder: str | Path) -> None:
+def write(
+    plan: Plan,
+    results: Sequence[Result],
+    tables: Tables,
+    folder: str | Path,
+    names: Mapping[str, str] | None = None,
+    sources: Mapping[str, str] | None = None,
+) -> None:
     """Write the report; one that is there already is replaced.
 
-    `tables` returns the table of a result's flight, as `fly --csv` writes it, or None where none was kept.
-    Raises ValueError and OSError, in one line.
+    `tables` returns the table of a result's flight, as `fly --csv` writes it, or None where none was kept. `names` are
+    as in by_script; `sources` what the scripts hold, which are held against each other. Raises ValueError and OSError,
+    in one line.
     """
     check(folder)
     path = Path(folder)
     for name in _MADE_ANEW:
         shutil.rmtree(path / name, ignore_errors=True)
         (path / name).mkdir(parents=True)
-    for name in _SHARED:
-        _write(path / "files" / name, (_HERE / "files" / name).read_text(encoding="utf-8"))
-    _write(path / "files" / "scene.js", _assignment("scene", scene_of(plan.parameters().scene)))
+    _lay_shared(path / "files")
+    scene = _assignment("scene", scene_of(plan.parameters().scene))
     draw = _Drawing(plan, tables, path)
-    pages = [draw.page(number, script) for number, script in enumerate(by_script(results), start=1)]
+    scripts = by_script(results, names)
+    pages = [draw.page(number, script, scripts) for number, script in enumerate(scripts, start=1)]
     templates = _templates()
     for page in pages:
-        _render(templates, "script.html", path / page.file, plan=plan, page=page)
-    _render(templates, "index.html", path / "index.html", plan=plan, pages=pages, criteria=criteria_of(results))
+        own = (path / page.file).parent
+        _lay_shared(own / "files")
+        _write(own / "files" / "scene.js", scene)
+        _render(templates, "script.html", own / "index.html", plan=plan, page=page)
+    alike = _alike(plan, pages, sources or {})
+    for pair in alike:
+        _render(templates, "similar.html", path / pair.file, plan=plan, pair=pair)
+    made = {
+        "pages": sorted(pages, key=lambda one: one.rank),
+        "criteria": criteria_of(results),
+        "bars": _distribution(scripts),
+        "alike": alike,
+    }
+    _render(templates, "index.html", path / "index.html", plan=plan, **made)
+
+
+def _lay_shared(folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    for name in _SHARED:
+        _write(folder / name, (_HERE / "files" / name).read_text(encoding="utf-8"))
+
+
+def _distribution(scripts: Sequence[ScriptResults]) -> list[Bar]:
+    """Return how the points of a class are distributed, in tenths of what can be had."""
+    most = max((one.of for one in scripts), default=0.0) or 1.0
+    tenths = [min(_BARS - 1, int(_BARS * one.points / most)) for one in scripts]
+    bounds = [naming.points(most * tenth / _BARS) for tenth in range(_BARS + 1)]
+    return [Bar(f"{bounds[tenth]} to {bounds[tenth + 1]}", tenths.count(tenth)) for tenth in range(_BARS)]
+
+
+def _alike(plan: Plan, pages: Sequence[ScriptPage], sources: Mapping[str, str]) -> list[Alike]:
+    by_name = {one.script.script: one for one in pages}
+    found = []
+    for number, pair in enumerate(similar(sources, given_by(plan)), start=1):
+        both = pair.first, pair.second
+        lines = [
+            [(text, line in marked) for line, text in enumerate(sources[name].splitlines(), start=1)]
+            for name, marked in zip(both, pair.lines)
+        ]
+        first, second = (by_name[name] for name in both)
+        found.append(Alike(f"similar/{number}.html", pair.share, (first, second), (lines[0], lines[1])))
+    return found
 
 
 class _Drawing:
@@ -108,13 +177,16 @@ class _Drawing:
         """Draw flights of a `plan`, each from what `tables` returns for it, into the report's `folder`."""
         self._plan, self._tables, self._folder = plan, tables, folder
 
-    def page(self, number: int, script: ScriptResults) -> ScriptPage:
-        """Return a script's page; `number` is from 1."""
-        flights = tuple(self._flight(f"{number:02}-{place}", result) for place, result in enumerate(script.flights))
+    def page(self, number: int, script: ScriptResults, scripts: Sequence[ScriptResults]) -> ScriptPage:
+        """Return a script's page; `number` is from 1 among all `scripts`."""
         slug = re.sub("[^A-Za-z0-9_-]+", "_", Path(script.label).stem)[:_SLUG]
-        return ScriptPage(f"scripts/{number:02}-{slug}.html", script, flights)
+        own = f"scripts/{number:02}-{slug}"
+        (self._folder / own / "flights").mkdir(parents=True)
+        flights = tuple(self._flight(own, str(place), result) for place, result in enumerate(script.flights))
+        rank = 1 + sum(one.points > script.points for one in scripts)
+        return ScriptPage(f"{own}/index.html", script, flights, rank)
 
-    def _flight(self, key: str, result: Result) -> FlightEntry:
+    def _flight(self, own: str, key: str, result: Result) -> FlightEntry:
         label, table = naming.flight_label(result), self._tables(result)
         figures = figures_of(table) if table is not None else Figures({}, "no table of this flight was kept")
         if not figures.columns:
@@ -126,7 +198,7 @@ class _Drawing:
         ]
         content = {**figures.columns, **self._own_scene(result), "marks": marks}
         file = f"flights/{key}.js"
-        _write(self._folder / file, _assignment(f'flights["{key}"]', content))
+        _write(self._folder / own / file, _assignment(f'flights["{key}"]', content))
         return FlightEntry(key, label, result, file, figures.note)
 
     def _own_scene(self, result: Result) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from drone_sim.files import writing
 from drone_sim.files.resources import package_path
-from drone_sim.vrep_files.reading import SUFFIXES
+from drone_sim.vrep_files.model import SUFFIXES
 
 _LIST = ".recent_scenes.json"
 _MOST = 10

@@ -21,7 +21,7 @@ from drone_sim.ros.core.simulator import Simulator, script_failure
 from drone_sim.scene import scene_parameters
 from drone_sim.scene.scene_parameters import BESIDE
 from drone_sim.vehicles.parameters import EquipmentParameters
-from drone_sim.vrep_files.reading import SUFFIXES
+from drone_sim.vrep_files.model import SUFFIXES
 
 _TASK_SCENES = Path("~/.ros/drone_sim/tasks")
 _DRONE = "drone"

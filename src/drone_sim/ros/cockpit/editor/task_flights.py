@@ -20,7 +20,7 @@ from std_msgs.msg import String
 
 from drone_sim.grading.plan import Plan
 from drone_sim.ros.cockpit.editor.script_store import ScriptStoreError
-from drone_sim.ros.grading.timeline_sender import TimelineSender, entries_of
+from drone_sim.ros.grading.timeline_sender import TimelineSender
 
 _QUEUE = 1000  # messages; every one counts
 _STOPPED = "stopped"
@@ -49,10 +49,10 @@ class TimelinePlayer:
         if plan is None or not plan.timeline:
             return
         parameters = plan.parameters()
-        entries = entries_of(plan.timeline_of(parameters), parameters, parameters)
+        entries = plan.timeline_of(parameters).entries
         self._step, self._first = parameters.time_step, parameters.first.name
         self._last = max(one.at for one in entries)
-        self._sender = TimelineSender(entries, parameters)
+        self._sender = TimelineSender(entries, parameters, self._node)
 
     def begin(self) -> None:
         """Send what has been prepared, from the flight's first step on."""

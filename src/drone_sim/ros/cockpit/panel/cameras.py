@@ -18,6 +18,7 @@ from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
 from drone_sim.message_text import shown
+from drone_sim.ros.cockpit.panel import overlays
 from drone_sim.ros.cockpit.panel.board import Board, one_of
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.topics import ImageTopic
@@ -62,13 +63,24 @@ class CameraSwitches:
                 self.turn(topic, False)
             for topic in self._views & (self._sources.keys() - before):
                 self.turn(topic, True)
+            for topic, camera in self._shown.items():
+                if camera.source != self._sources[topic]:  # another scene: there is truth now, or none any more
+                    camera.listen(False)
+                    self._shown[topic] = following = _CameraListener(self._sources[topic])
+                    following.listen(not self._resting)
 
     def turn_asked(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Turn a switch, as a browser asks. Raises ValueError for a topic that there is not."""
         topic = one_of(message, "topic", [*self._sources, *self._shown])
-        if not isinstance(message.get("on"), bool):
-            raise ValueError(f"on = {shown(message.get('on'))}: must be true or false")
-        self.turn(topic, message["on"])
+        self.turn(topic, _switch(message))
+        return {}
+
+    def overlay_asked(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Show boxes or a mask over a camera's picture, or no more. Raises ValueError for one that is not shown."""
+        topic = one_of(message, "topic", [one for one in self._shown if self._sources[one].has_truth])
+        kind = one_of(message, "overlay", overlays.KINDS)
+        with self._lock:
+            self._shown[topic].show_over(kind, _switch(message))
         return {}
 
     def follow_views(self, topics: frozenset[str]) -> None:
@@ -105,7 +117,10 @@ class CameraSwitches:
                 rospy.logwarn_throttle(10, f"{topic} is not shown: {error}")
                 continue
             name = self._names.get(topic, topic)
-            self._socket.show_picture({"picture": topic, "name": name, "note": caption}, picture)
+            stamp = message.header.stamp.to_sec()
+            over = {"step": _step(message), **camera.overlay.said(stamp)} if camera.overlay else {}
+            said = {"picture": topic, "name": name, "note": caption, **over}
+            self._socket.show_picture(said, camera.overlay.painted(picture, stamp) if camera.overlay else picture)
 
     def rest(self, resting: bool) -> None:
         """Listen to nobody while no browser is open, and to those that were switched on again afterwards."""
@@ -117,12 +132,20 @@ class CameraSwitches:
 
 class _CameraListener:
     def __init__(self, source: ImageTopic):
-        self._source = source
+        self.source = source
         self._latest: deque[Any] = deque(maxlen=1)
         self._subscriber: rospy.Subscriber | None = None
+        self.overlay = overlays.Overlay(source.topic) if source.has_truth else None
+
+    def show_over(self, kind: str, on: bool) -> None:
+        if self.overlay is not None:
+            self.overlay.show(self.overlay.kinds | {kind} if on else self.overlay.kinds - {kind})
+            self.overlay.listen(self._subscriber is not None)
 
     def listen(self, on: bool) -> None:
-        source = self._source
+        source = self.source
+        if self.overlay is not None:
+            self.overlay.listen(on)
         if on and self._subscriber is None:
             kind = CompressedImage if source.compressed else Image
             topic = source.compressed or source.topic
@@ -154,6 +177,7 @@ class ScriptWindows:
             "windows": lambda _: {"windows": self._state, "pictures": self._cameras.shown},
             "answer": self._answer,
             "camera": self._cameras.turn_asked,
+            "overlay": self._cameras.overlay_asked,
         }
 
     def listen(self, on: bool) -> None:
@@ -200,6 +224,21 @@ def camera_name(topic: str, vehicles: Sequence[str] = ()) -> str:
     return f"{vehicle}, {known}" if vehicle and len(vehicles) > 1 else known
 
 
+def _switch(message: Mapping[str, Any]) -> bool:
+    """Return whether a browser asks for on. Raises ValueError."""
+    if not isinstance(message.get("on"), bool):
+        raise ValueError(f"on = {shown(message.get('on'))}: must be true or false")
+    return bool(message["on"])
+
+
+def _step(message: CompressedImage | Image) -> int:
+    """Return of how many pixels one is shown, along each side."""
+    if isinstance(message, CompressedImage):
+        return 1
+    has_bytes = "8" in message.encoding  # rgb8, mono8, 8UC3; all others are depths
+    return int(-(-message.width // (_WIDEST if has_bytes else _WIDEST_DEPTHS)))
+
+
 def packed(message: CompressedImage | Image) -> tuple[bytes, str]:
     """Return a picture as a browser shows it, and a caption. Raises ValueError for one of an unknown kind."""
     if isinstance(message, CompressedImage):
@@ -210,10 +249,9 @@ def packed(message: CompressedImage | Image) -> tuple[bytes, str]:
         raise ValueError(f"encoding '{message.encoding[:40]}': {error}") from None
     if not image.size:
         raise ValueError("has no pixels")
-    is_depth = image.ndim == 2 and image.dtype != np.uint8
-    step = -(-image.shape[1] // (_WIDEST_DEPTHS if is_depth else _WIDEST))
+    step = _step(message)
     image = image[::step, ::step]
-    if is_depth:
+    if image.ndim == 2 and image.dtype != np.uint8:
         return _depths(image.astype(np.float32) * (1e-3 if message.encoding == _MILLIMETRES else 1.0))
     return _encoded(_as_bgr(image, message.encoding)), ""
 

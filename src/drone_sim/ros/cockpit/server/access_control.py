@@ -34,8 +34,9 @@ _SAFE = {
 _POLICY = (
     "default-src 'none'; script-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
     "connect-src 'self' blob: {sockets}; "
-    "frame-ancestors 'self'; base-uri 'none'; form-action 'none'"
+    "frame-ancestors 'self'; base-uri 'none'; form-action {forms}"
 )
+MANUAL = "/manual/"  # whose search is a form
 _ONCE = ("Host", "Cookie", "Origin", "Upgrade", "Accept-Encoding")  # of what is read here
 _HOST = re.compile(r"[\w.:\[\]-]+", re.ASCII)
 
@@ -89,7 +90,7 @@ class AccessControl:
         found = self._page(path)
         if found is None:
             return _response(http.HTTPStatus.NOT_FOUND, "There is no such page.")
-        return _page(*found, host, _takes_gzip(request))
+        return _page(*found, host, _takes_gzip(request), "'self'" if path.startswith(MANUAL) else "'none'")
 
     def _let_in(self, request: Request) -> Response:
         """Remember the token in a cookie, and take it out of the address, which people send to each other."""
@@ -141,9 +142,9 @@ def _takes_gzip(request: Request) -> bool:
     return "gzip" in (one.partition(";")[0].strip() for one in request.headers.get("Accept-Encoding", "").split(","))
 
 
-def _page(kind: str, content: bytes, host: str, takes_gzip: bool) -> Response:
+def _page(kind: str, content: bytes, host: str, takes_gzip: bool, forms: str) -> Response:
     is_packed = takes_gzip and kind.startswith(_PACKED)
-    response = _response(http.HTTPStatus.OK, _packed(content) if is_packed else content, kind, host)
+    response = _response(http.HTTPStatus.OK, _packed(content) if is_packed else content, kind, host, forms)
     if is_packed:
         response.headers["Content-Encoding"] = "gzip"
     return response
@@ -155,12 +156,16 @@ def _packed(content: bytes) -> bytes:
 
 
 def _response(
-    status: http.HTTPStatus, content: str | bytes, kind: str = "text/plain; charset=utf-8", host: str = ""
+    status: http.HTTPStatus,
+    content: str | bytes,
+    kind: str = "text/plain; charset=utf-8",
+    host: str = "",
+    forms: str = "'none'",
 ) -> Response:
     """Return an answer with what keeps a browser from doing something else with it."""
     body = content if isinstance(content, bytes) else content.encode()
     # Older browsers take 'self' for our pages alone, not for our sockets.
-    policy = _POLICY.format(sockets=f"ws://{host} wss://{host}" if host else "")
+    policy = _POLICY.format(sockets=f"ws://{host} wss://{host}" if host else "", forms=forms)
     headers = {"Content-Type": kind, "Content-Length": str(len(body)), **_SAFE, "Content-Security-Policy": policy}
     return Response(status.value, status.phrase, Headers(headers), body)
 
