@@ -133,7 +133,7 @@ fill_venv() { # fill_venv REQUIREMENTS...
     if grep -qxF "$(cksum "$list")" "$before"; then continue; fi
     if [ "$list" = requirements.txt ]; then make_pybullet; fi
     say "installing the python packages of $list (a minute, once)"
-    pip install -q --find-links "$wheels" -r "$list" >&2
+    pip install -q --find-links "$wheels" -c requirements.txt -r "$list" >&2 # no list may bring another numpy
     if [ "$list" = requirements.txt ]; then slim_pybullet; fi
     sed -i "/ $list\$/d" "$before"
     cksum "$list" >>"$before"
