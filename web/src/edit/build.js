@@ -179,8 +179,9 @@ export class Build {
     at("pose").hidden = !one || one.of === "floor";
     at("nothing").hidden = Boolean(one);
     at("align").hidden = count < 2;
-    at("attached").hidden = !one || count > 1 || one.of === "floor";
+    at("attached").hidden = count !== 1 || !(one?.of === "scene" || one?.root);
     at("attached-none").hidden = Boolean(one?.script);
+    at("detach").hidden = Boolean(one?.root); // a vehicle has always one
     at("attached-one").hidden = !one?.script;
     at("attached-open").onclick = () => edit.openScript(one);
     at("attached-open").textContent = `Open ${one?.script?.split("/").pop() ?? ""}`;

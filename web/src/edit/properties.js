@@ -60,11 +60,13 @@ export class Properties {
 
   build(one) {
     this.fills = [];
-    const keys = one ? this.keys() : [];
+    const isPart = this.ones.some(({ of, root }) => of === "vehicle" && !root);
+    const keys = one && !isPart ? this.keys() : [];
     const rows = keys.map((said) => this.row(said));
     if (one && this.ones.length === 1) rows.unshift(...this.names(one));
     if (one && keys.some(({ key }) => key === "mass")) rows.splice(rows.findIndex(({ dataset }) => dataset.key === "mass") + 1, 0, this.density());
     if (one?.script && this.ones.length === 1) rows.push(this.parameters(one));
+    if (isPart) rows.push(create("p", { textContent: "A part of a vehicle: what it is like stands at the vehicle, in the text." }));
     this.element.replaceChildren(...rows.filter(Boolean));
   }
 
