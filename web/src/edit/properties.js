@@ -68,6 +68,7 @@ export class Properties {
     if (one?.script && this.ones.length === 1) rows.push(this.parameters(one));
     if (isPart) rows.push(create("p", { textContent: "A part of a vehicle: what it is like stands at the vehicle, in the text." }));
     this.element.replaceChildren(...rows.filter(Boolean));
+    this.element.parentElement.scrollTop = 0;
   }
 
   line(key, hint, ...parts) {
@@ -109,7 +110,6 @@ export class Properties {
 
   // Of what has a volume that is known: kg/m³, which sets the mass.
   density() {
-    const { one } = { one: this.ones.at(-1) };
     if (!this.ones.every((each) => volumeOf(this.whole(each)))) return null;
     const take = (value) => {
       const operations = this.ones.map((each) => ({ do: "set", object: each.handle, values: { mass: value * volumeOf(this.whole(each)) } }));
@@ -117,7 +117,7 @@ export class Properties {
     };
     const field = numberField("density", { take, wrong: (line) => this.edit.wrong(line), low: 0, step: 100, digits: 2 });
     this.fills.push((each) => field.fill((each.values.mass ?? 0) / volumeOf(this.whole(each))));
-    return one && this.line("density", "kg/m³: another one sets the mass", field);
+    return this.line("density", "kg/m³: another one sets the mass", field);
   }
 
   whole(one) {
@@ -125,20 +125,33 @@ export class Properties {
     return { type: one.type, size: one.values.size ?? size };
   }
 
+  // Of the script on an object: those that have a value, and a line for another one.
   parameters({ values: { script_parameters: known = {} } }) {
-    const now = () => this.ones.at(-1).values.script_parameters ?? {};
-    const set = (name, value) => this.set("script_parameters", { ...now(), [name]: value });
-    const rows = Object.entries(known).map(([name, value]) => {
-      const field = typeof value === "number"
-        ? numberField(name, { take: (entered) => set(name, entered), wrong: (line) => this.edit.wrong(line), digits: 6 })
-        : create("input", { type: "text", "aria-label": name, onchange: ({ target }) => set(name, target.value) });
-      this.fills.push(() => {
-        if (field.fill) field.fill(now()[name]);
-        else if (document.activeElement !== field) field.value = now()[name] ?? "";
-      });
-      return this.line(name, `${name}: a parameter of its script`, field);
-    });
-    return create("div", { className: "parameters" }, create("h3", { textContent: "Script parameters" }), ...(rows.length ? rows : ["None."]));
+    const set = (name, value) => this.set("script_parameters", { ...this.given, [name]: value });
+    const rows = Object.keys(known).map((name) => this.line(name, `${name}: a parameter of its script`, this.parameter(name, known[name], set)));
+    const more = create("input", { type: "text", placeholder: "name = value", "aria-label": "Another script parameter", spellcheck: false });
+    more.onchange = () => {
+      const [, name, text] = /^\s*([A-Za-z_]\w*)\s*=\s*(.+?)\s*$/.exec(more.value) ?? [];
+      if (!name) return this.edit.wrong(`${more.value.slice(0, 40)}: must be a name, = and a value, such as speed = 2`);
+      more.value = "";
+      return set(name, Number.isFinite(Number(text)) ? Number(text) : text);
+    };
+    return create("div", { className: "parameters" }, create("h3", { textContent: "Script parameters" }), ...rows, this.line("another one", "", more));
+  }
+
+  get given() {
+    return this.ones.at(-1)?.values.script_parameters ?? {};
+  }
+
+  parameter(name, value, set) {
+    if (typeof value === "number") {
+      const field = numberField(name, { take: (entered) => set(name, entered), wrong: (line) => this.edit.wrong(line), digits: 6 });
+      this.fills.push(() => field.fill(this.given[name]));
+      return field;
+    }
+    const field = create("input", { type: "text", "aria-label": name, onchange: () => set(name, field.value) });
+    this.fills.push(() => document.activeElement === field || (field.value = this.given[name] ?? ""));
+    return field;
   }
 }
 
