@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import yaml
@@ -27,8 +28,12 @@ class YamlText:
         """Read it. Raises YamlError."""
         found = yaml_files.parse(text)
         self.text = text
-        self.values: Mapping[str, Any] = found if isinstance(found, dict) else {}
-        self._root = yaml_files.compose(text) if self.values else None
+        self.is_mapping = isinstance(found, dict)
+        self.values: Mapping[str, Any] = found if self.is_mapping else {}
+
+    @cached_property
+    def _root(self) -> Any:
+        return yaml_files.compose(self.text) if self.values else None
 
     def rewritten(self, new: Mapping[str, Any], kept: _Kept) -> str:
         """Return a text that says something new.
