@@ -12,8 +12,9 @@ from drone_sim.config.types import FoundFile, ParameterError
 from drone_sim.editing.changes import SceneContent, Settings
 from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.editing.settings import vehicles_in, with_vehicles
-from drone_sim.files import writing, yaml_files, yaml_text
+from drone_sim.files import writing, yaml_files
 from drone_sim.files.resources import cache_path, locate, package_path, resolve
+from drone_sim.files.yaml_text import YamlText, dumped, says
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.run.parameters import load
 from drone_sim.scene import models, scene_parameters
@@ -33,7 +34,7 @@ class SceneDocument:
         """Take the scene; `read` is due."""
         self._scene = scene
         self.file: Path | None = None
-        self.base = yaml_text.YamlText("")
+        self.base = YamlText("")
         self._written: int | None = None  # when the file was written, as the disk says it
         self._entries: list[tuple[int, EntryParameters]] = []  # those of the text, with their handles
         self._scripts: list[AttachedScriptParameters] = []
@@ -74,11 +75,11 @@ class SceneDocument:
 
     def _take(self, text: str, settings: Settings) -> None:
         self._scene.settings = settings
-        self.take_text(text)
+        self.take_text(YamlText(text))
 
-    def take_text(self, text: str) -> None:
+    def take_text(self, text: YamlText) -> None:
         """Know that a text says what the scene is now."""
-        self.base = yaml_text.YamlText(text)
+        self.base = text
         scene, tree = self._scene.simulation.scene, self._scene.tree
         said = self.base.values
         now = [(tree.handle(one.name), scene.entry_now(index)) for index, one in scene.entries.items()]
@@ -93,13 +94,17 @@ class SceneDocument:
         scene_parameters.name_shapes(entries)
         return entries
 
-    def content_of(self, text: str) -> SceneContent:
-        """Return the scene that a text says. Raises ParameterError and YamlError, with the line."""
-        said = yaml_files.parse(text)
-        if not isinstance(said, dict):
+    def content_of(self, text: YamlText) -> SceneContent:
+        """Return the scene that a text says. Raises ParameterError, with the line."""
+        said = text.values
+        if not text.is_mapping:
             raise ParameterError("line 1: must hold `key: value` lines such as `objects: []`")
         scene = self._scene
-        found = scene.simulation.parameters.with_content(said, scene.folder, yaml_files.YamlLines(text)).scene
+        parameters = scene.simulation.parameters
+        try:
+            found = parameters.with_content(said, scene.folder).scene
+        except ParameterError:  # once more, with the lines, which take their time
+            found = parameters.with_content(said, scene.folder, yaml_files.YamlLines(text.text)).scene
         tree, entries = scene.tree, {}
         own = {tree.handle(one.name) for one in scene.simulation.scene.entries.values()}
         for number, one in enumerate(found.objects):
@@ -161,7 +166,7 @@ class SceneDocument:
         path, flies = self._path(name), self._scene.simulation.running
         said, kept = self._said(path.parent, self._scene.settings_in_flight() if flies else self._scene.settings)
         text = self.base.rewritten(said, kept)
-        text = text if yaml_text.says(text, said) else yaml_text.dumped(said)
+        text = text if says(text, said) else dumped(said)
         simulation = self._scene.simulation
         try:
             simulation.parameters.with_content(yaml_files.parse(text), path.parent)

@@ -15,6 +15,7 @@ from drone_sim.editing.drafts import Drafts
 from drone_sim.editing.edit_operations import EditOperations
 from drone_sim.editing.history import History, Step
 from drone_sim.editing.scene_access import SceneAccess
+from drone_sim.files.yaml_text import YamlText
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
 
@@ -169,7 +170,8 @@ class SceneEditor:
             raise ValueError(f"the scene has changed meanwhile (revision {self.revision}): look at its text again")
         return self._take_text(request.write)
 
-    def _take_text(self, text: str) -> dict[str, Any]:
+    def _take_text(self, written: str) -> dict[str, Any]:
+        text = YamlText(written)
         wanted = self.document.content_of(text)
 
         def change() -> list[int]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import yaml
@@ -12,6 +13,7 @@ import yaml
 from drone_sim.files import yaml_files
 
 _WIDTH = 120
+_MERGE = "<<"  # the key of what is merged from elsewhere
 _LONG = 1e15  # with which a number gets an exponent
 _MOST_LINES = 4  # of an entry in braces
 _ALIAS = re.compile(r"\s*\*[^\s,\]}]+")
@@ -26,8 +28,12 @@ class YamlText:
         """Read it. Raises YamlError."""
         found = yaml_files.parse(text)
         self.text = text
-        self.values: Mapping[str, Any] = found if isinstance(found, dict) else {}
-        self._root = yaml_files.compose(text) if self.values else None
+        self.is_mapping = isinstance(found, dict)
+        self.values: Mapping[str, Any] = found if self.is_mapping else {}
+
+    @cached_property
+    def _root(self) -> Any:
+        return yaml_files.compose(self.text) if self.values else None
 
     def rewritten(self, new: Mapping[str, Any], kept: _Kept) -> str:
         """Return a text that says something new.
@@ -77,21 +83,32 @@ class _Rewriting:
     ) -> None:
         """Let a mapping say something else."""
         values = {key.value: (key, value) for key, value in node.value}
-        for key in old.keys() - new.keys():
-            self._remove_key(node, *values[key])
+        for key, value in self._gone(node, new):
+            self._remove_key(node, key, value)
         last = None
         for key, value in new.items():
-            if key not in old:
-                self._add_key(node, key, value, last)
+            if key not in values:  # new, or merged from elsewhere
+                if key not in old or old[key] != value:
+                    self._add_key(node, key, value, last)
                 continue
             last = values[key]
             if old[key] != value:
                 self._change(node, *last, old[key], value, key if top else "")
 
+    def _gone(self, node: Any, new: Collection[str]) -> list[tuple[Any, Any]]:
+        """Return keys that are to be taken out, with their values; those behind the dash of an item are taken out."""
+        pairs, new = list(node.value), {*new, _MERGE}
+        if node.flow_style or self._is_first_of_line(pairs[0][0].start_mark.index):
+            return [pair for pair in pairs if pair[0].value not in new]
+        first = next(index for index, (key, _) in enumerate(pairs) if key.value in new)
+        if first:
+            self._parts.append((pairs[0][0].start_mark.index, pairs[first][0].start_mark.index, ""))
+        return [pair for pair in pairs[first:] if pair[0].value not in new]
+
     def _change(self, above: Any, key: Any, node: Any, old: Any, new: Any, name: str) -> None:
         start, end = self._span(key, node)
         is_own = start == node.start_mark.index
-        if is_own and isinstance(node, yaml.MappingNode) and isinstance(new, Mapping) and new and old:
+        if is_own and isinstance(node, yaml.MappingNode) and _have_common_keys(old, new):
             self._update(node, old, new)
         elif is_own and name in self._kept and not node.flow_style and new:
             self._update_list(node, old, new, self._kept[name])
@@ -122,7 +139,7 @@ class _Rewriting:
             self._parts.append((end, end, added))
 
     def _update_item(self, node: Any, old: Any, new: Any) -> None:
-        if isinstance(node, yaml.MappingNode) and isinstance(new, Mapping):
+        if isinstance(node, yaml.MappingNode) and _have_common_keys(old, new):
             self._update(node, old, new)
         else:
             self._parts.append((node.start_mark.index, _end(node), _flow(new)))
@@ -130,12 +147,7 @@ class _Rewriting:
     def _remove_key(self, node: yaml.MappingNode, key: Any, value: Any) -> None:
         start, end = key.start_mark.index, self._span(key, value)[1]
         if not node.flow_style:
-            if key is node.value[0][0] and not self._is_first_of_line(start):  # of an item, behind its dash
-                following = self._line_end(end)
-                rest = re.match(r"[ \t]*", self._text[following:])
-                self._parts.append((start, following + (rest.end() if rest else 0), ""))
-            else:
-                self._parts.append((self._line_start(start), self._line_end(end), ""))
+            self._parts.append((self._line_start(start), self._line_end(end), ""))
             return
         behind = re.match(r"\s*,\s*", self._text[end:])
         if behind:
@@ -199,6 +211,10 @@ class _Rewriting:
         return not self._text[self._line_start(at) : at].strip()
 
 
+def _have_common_keys(old: Any, new: Any) -> bool:
+    return isinstance(old, Mapping) and isinstance(new, Mapping) and bool(old.keys() & new.keys())
+
+
 def _end(node: Any) -> int:
     """Return where a node's last character is, comments behind it not counted."""
     if isinstance(node, yaml.ScalarNode) or node.flow_style or not node.value:
@@ -234,12 +250,7 @@ def _indent(key: Any) -> str:
 
 def _line(key: str, value: Any, indent: str) -> str:
     """Return a key with its value, in lines."""
-    if (
-        isinstance(value, Sequence)
-        and not isinstance(value, str)
-        and value
-        and all(isinstance(one, Mapping) for one in value)
-    ):
+    if _is_list_of_entries(value):
         return f"{indent}{_flow(key)}:\n" + "".join(_item(one, indent + "  ") for one in value)
     if isinstance(value, Mapping) and any(isinstance(one, Mapping) for one in value.values()):
         return f"{indent}{_flow(key)}:\n" + "".join(_line(one, inner, indent + "  ") for one, inner in value.items())
