@@ -10,6 +10,7 @@ from drone_sim.editing.settings import PLACE, vehicles_in
 from drone_sim.editing.vehicle_edits import FLOOR
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, place_of
 
 Row = dict[str, Any]
@@ -54,7 +55,7 @@ class SceneRows:
                 self._known[handle] = made_of
                 if entry is not None:
                     own = scene.simulation.scene.entry_now(index)
-                self.rows[handle] = row = _row(handle, one, parent, own, script.script if script else "")
+                self.rows[handle] = row = _row(handle, one, parent, own, script)
                 row["vehicle"] = vehicle.name if vehicle else ""
                 row["of"] = "vehicle" if vehicle else "scene" if entry is not None else "floor"
                 if vehicle is not None and one is vehicle.object:
@@ -66,13 +67,15 @@ class SceneRows:
         return changed, gone
 
 
-def _row(handle: int, one: SceneObject, parent: int, own: Any, script: str) -> Row:
+def _row(handle: int, one: SceneObject, parent: int, own: Any, script: AttachedScriptParameters | None) -> Row:
     place = place_of(one)
     values: Mapping[str, Any] = own or {}
     if isinstance(own, EntryParameters):
         said = own.model_dump(mode="json", exclude_defaults=True)
         values = {key: value for key, value in said.items() if key not in _ASIDE}
         place = {key: list(getattr(own, key)) for key in ("position", "rpy")}
+    if script is not None and script.parameters:
+        values = {**values, "script_parameters": dict(script.parameters)}
     matrix = one.matrix()
     return {
         "handle": handle,
@@ -82,7 +85,7 @@ def _row(handle: int, one: SceneObject, parent: int, own: Any, script: str) -> R
         "type": getattr(own, "shape", "") or getattr(own, "kind", "") or ("floor" if one.name == FLOOR else one.kind),
         "parent": parent,
         "model": one.is_model,
-        "script": script,
+        "script": script.script if script else "",
         "pose": [round(value, 6) for value in (*frames.position(matrix), *frames.to_quaternion(matrix))],
         "position": place["position"],
         "rpy": place["rpy"],
