@@ -133,7 +133,7 @@ fill_venv() { # fill_venv REQUIREMENTS...
     if grep -qxF "$(cksum "$list")" "$before"; then continue; fi
     if [ "$list" = requirements.txt ]; then make_pybullet; fi
     say "installing the python packages of $list (a minute, once)"
-    pip install -q --find-links "$wheels" -r "$list" >&2
+    pip install -q --find-links "$wheels" -c requirements.txt -r "$list" >&2 # no list may bring another numpy
     if [ "$list" = requirements.txt ]; then slim_pybullet; fi
     sed -i "/ $list\$/d" "$before"
     cksum "$list" >>"$before"
@@ -220,7 +220,7 @@ lint_catkin() {
   copy=$(mktemp -d)
   # shellcheck disable=SC2064 # as it is now
   trap "rm -rf '$copy'" EXIT
-  mkdir "$copy/drone_sim"
+  mkdir -p "$copy/drone_sim/docs/html" # which ./dev.sh docs makes
   git ls-files -co --exclude-standard | grep -v '^dev.sh$' | tar -cT - | tar -xC "$copy/drone_sim"
   "$1" -q -W2 --strict --ignore uninstalled_script "$copy/drone_sim"
 }
@@ -324,7 +324,11 @@ case "$command" in
   fuzz) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/fuzz/run.py "$@" ;;
   docs-commands) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/docs/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
-  soak-web) setup; exec .venv/bin/python test/soak/web.py "$@" ;;
+  soak-web)
+    install_packages chromium
+    setup
+    make_venv "${ALL[@]}" requirements-web.txt
+    exec .venv/bin/python test/soak/web.py "$@" ;;
   recordings)
     setup
     make_venv "${ALL[@]}" requirements-recordings.txt

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes every picture of README.md and docs/: docs/make_pictures.sh [SECTION...]   (default: all sections)
 #
-# Needs what ./dev.sh setup installs; section rviz also the packages xvfb, imagemagick and xdotool.
+# Needs what ./dev.sh setup --all installs; section rviz also the packages xvfb, imagemagick and xdotool.
 # A section is a function below, named in `sections`.
 set -eo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

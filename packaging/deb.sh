@@ -40,7 +40,7 @@ rm -rf "$site"/pybullet_{data,envs,examples,utils,robots} "$site"/eglRenderer* "
 find "$site" -name '*.so' -exec strip --strip-unneeded {} +
 find "$stage$own/bin" -type f -delete
 find "$stage" -name __pycache__ -prune -exec rm -rf {} +
-programs=(simulator key_teleop joy_teleop view show fly grade grade_live sweep record plot_flight bag_commands
+programs=(simulator key_teleop joy_teleop view show fly grade grade_live sweep record record_truth plot_flight bag_commands
   video import_scene doctor cockpit)
 sed -i "1s:.*:#!$own/bin/python:" "${programs[@]/#/$stage/usr/lib/drone_sim/}"
 

@@ -38,7 +38,7 @@ def by_color():
 
 def by_mask():
     """Return where the gate is, by what the simulator knows: rows x columns."""
-    w, h = sim.getVisionSensorResolution(self.frontImage)
+    w, h = sim.getVisionSensorRes(self.frontImage)
     depths = sim.checkVisionSensorEx(self.frontImage, self.gate, False)  # 1 where it is not
     return np.reshape(depths, (h, w))[::-1] < 1
 
@@ -54,7 +54,7 @@ def box_around(mask):
 
 def by_box():
     """Return the same of the box that the camera publishes (`truth: true`)."""
-    w, h = sim.getVisionSensorResolution(self.frontImage)
+    w, h = sim.getVisionSensorRes(self.frontImage)
     for one in self.boxes:
         if one["name"] == "Red":
             left, top, right, bottom = one["visible"]

@@ -16,7 +16,7 @@ from drone_sim.scripting import load
 from drone_sim.scripting.api.backend import Backend
 from drone_sim.scripting.api.host import ScriptContext
 from drone_sim.scripting.api.vision import NO_OBJECT
-from drone_sim.sensors.camera import TurningBlades, Vision
+from drone_sim.sensors.vision import TurningBlades, Vision
 from drone_sim.world import World
 
 NOBODY = ("", "")

@@ -54,7 +54,8 @@ NOT_RUN = {  # with the reason
     "rosrun drone_sim joy_teleop _config:=$PWD/my_pad.yaml": GAMEPAD,
     """rosservice call /drone_sim/edit_scene "'{\\"edit\\": [{\\"do\\": \\"add_model\\", \\"model\\": \\"gate\\", """
     """\\"position\\": [3, 0, 0]}]}'\"""": "test/ros/toolbar.test edits so; the numbers depend on what was done",
-    "rosrun stereo_image_proc stereo_image_proc __ns:=/drone/stereo": ANOTHER,
+    "ROS_NAMESPACE=/drone/stereo rosrun stereo_image_proc stereo_image_proc": ANOTHER,
+    "rostopic hz /drone/stereo/points2": ANOTHER,
     "python3 try_cone.py": EXTENDING,
     "python3 try_temperature.py": EXTENDING,
     "python3 try_leash.py": EXTENDING,

@@ -160,3 +160,23 @@ def test_nothing_is_drawn_for_a_truth_that_nobody_asks(simulation, monkeypatch):
     camera.look()
     assert drawn == []
     assert picture.shape == (480, 640, 3)
+
+
+def test_what_was_asked_of_the_last_picture_is_drawn_with_the_next(simulation, monkeypatch):
+    camera = simulation.drone.cameras["front"]
+    camera.take()
+    camera.truth().want(("depth", "instance"))
+    simulation.step()
+    taken = simulation.vision.pictures
+    picture = camera.look()
+    assert simulation.vision.pictures == taken + 1
+    renderer, drawn = simulation.vision._renderer, []
+    with monkeypatch.context() as patched:
+        patched.setattr(renderer, "render_outputs", lambda *_, **__: drawn.append(1))
+        found = camera.truth()
+        depth, mask = found.output("depth"), found.output("instance")
+    assert drawn == []
+    np.testing.assert_array_equal(picture, camera.take())
+    fresh = camera.truth()
+    np.testing.assert_array_equal(depth, fresh.output("depth"))
+    np.testing.assert_array_equal(mask, fresh.output("instance"))

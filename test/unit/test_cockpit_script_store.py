@@ -16,7 +16,8 @@ from drone_sim.ros.cockpit.editor.lessons import Lessons
 from drone_sim.ros.cockpit.editor.script_store import LARGEST, ScriptStore, ScriptStoreError
 
 STAGES = [
-    f"tutorial/{name}.py" for name in ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera")
+    f"tutorial/{name}.py"
+    for name in ("1_thrust", "2_elevation", "3_yaw", "4_pitch", "5_roll", "6_ros", "7_camera", "8_gate")
 ]
 
 

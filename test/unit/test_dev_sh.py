@@ -112,7 +112,7 @@ def test_set_up_once_is_set_up(machine):
     for _ in range(2):
         assert machine.run("setup", "--all")[0] == 0
     assert machine.asked("-m venv") == 1
-    assert machine.asked("install -q --find-links") == 3
+    assert machine.asked("install -q --find-links") == machine.asked("-c requirements.txt") == 3
     assert machine.run("setup", "-all") == (1, "[dev.sh] setup -all: takes --all or nothing\n")
 
 

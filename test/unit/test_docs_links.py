@@ -27,7 +27,7 @@ def broken(page):
         file = page.parent / name if name else page
         if link.startswith("https://"):
             continue
-        if not file.exists() or (anchor and anchor not in anchors(file.read_text(encoding="utf-8"))):
+        if not file.is_file() or (anchor and anchor not in anchors(file.read_text(encoding="utf-8"))):
             yield link
 
 
@@ -38,5 +38,5 @@ def test_every_link_of_a_page_leads_somewhere(page):
 
 def test_a_link_to_nowhere_is_found(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("# Here\n[a](page.md#here) [b](#there) [c](gone.md) [d](https://example.org)\n")
-    assert list(broken(page)) == ["#there", "gone.md"]
+    page.write_text("# Here\n[a](page.md#here) [b](#there) [c](gone.md) [d](https://example.org) [e](.)\n")
+    assert list(broken(page)) == ["#there", "gone.md", "."]  # a folder is no page of the site

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from graded import read_plan
 
-from drone_sim.grading import tasks
+from drone_sim.grading import grade, tasks
 from drone_sim.grading.submissions import archive, similarity
 from drone_sim.grading.submissions.folders import submissions_of
 from drone_sim.grading.submissions.submission import Person, Submission, names_of
@@ -227,3 +227,27 @@ def test_lua_is_compared_as_lua_and_no_text_takes_long():
     assert pair.share == 1.0 and min(pair.lines[1]) == 2
     for hostile in ("--[[ " * 20_000, '"' * 9_999, "'''" * 9_999, "x" * 99_999, "\0" * 4_000):
         assert not similarity.similar({"a.lua": hostile, "b.py": hostile, "c.py": ""}, {})[1:]
+
+
+# ---- Gradescope's autograder
+
+
+def test_an_autograder_has_what_gradescope_runs_and_no_solution(tmp_path, capsys):
+    path = tmp_path / "hover.zip"
+    assert grade.main(["hover", "--seeds", "3", "--autograder", str(path)]) == 0
+    with zipfile.ZipFile(path) as file:
+        found = {one.filename: one.external_attr >> 16 for one in file.infolist()}
+        assert file.read("seeds") == b"3\n" and file.read("plan/plan.yaml").startswith(b"# Hold the place")
+    assert {"setup.sh", "run_autograder", "requirements.txt", "drone_sim/package.xml"} <= found.keys()
+    assert found["setup.sh"] & found["run_autograder"] & stat.S_IXOTH
+    assert not [name for name in found if "solution" in name or "__pycache__" in name or "tasks/" in name]
+    first = path.read_bytes()
+    assert grade.main(["hover", "--seeds", "3", "--autograder", str(path)]) == 0 and path.read_bytes() == first
+    (tmp_path / "room.yaml").write_text("objects: []\n")
+    laid(tmp_path, own__plan_dot_yaml=f"scene: {tmp_path}/room.yaml\nduration: 1\ncriteria: [{{kind: no_contact}}]\n")
+    for arguments, said in (
+        (["hover", "my.py"], "takes a plan and --seeds alone"),
+        ([str(tmp_path / "own/plan.yaml")], "room.yaml: the plan needs it, and it does not lie in the plan's folder"),
+    ):
+        assert grade.main([*arguments, "--autograder", str(path)]) == 2
+        assert said in capsys.readouterr().err

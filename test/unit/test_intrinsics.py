@@ -62,3 +62,12 @@ def test_impossible_cameras_are_refused(wrong):
     values = {"width": 640, "height": 480, "horizontal_fov": 1.0, "near": 0.02, "far": 100.0}
     with pytest.raises(ValueError):
         Intrinsics(**{**values, **wrong})
+
+
+def test_the_right_camera_of_a_pair_says_how_far_apart_they_are():
+    pytest.importorskip("rospy", reason="needs ROS")
+    from drone_sim.ros.core.message_conversion import camera_info
+
+    left, right = camera_info(CAMERA, "left_optical"), camera_info(CAMERA, "left_optical", 0.12)
+    assert left.P[3] == 0 and right.P[3] == pytest.approx(-CAMERA.fx * 0.12)
+    assert (*left.P[:3], *left.P[4:]) == (*right.P[:3], *right.P[4:])

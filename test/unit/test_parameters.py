@@ -94,8 +94,8 @@ def test_every_wrong_key_of_a_config_file_is_named_with_its_line(tmp_path):
         "3: parameter control/Kzreff: unknown key; known are Kzref, Dzref",
         "4: parameter control/thrust_limits = [1]: must be 2 numbers, [lowest, highest] in m/s, or none",
         "6: parameter cameras/9x = '9x': must be a letter and then letters, digits or _",
-        "6: parameter cameras/9x = 5: must hold `key: value` lines with object, topic, kind, frame, mount, "
-        "every, width, height, horizontal_fov, lens, near, far, baseline, truth",
+        "6: parameter cameras/9x = 5: must hold `key: value` lines with shutter, vignette, exposure, noise, object, "
+        "topic, kind, frame, mount, every, width, height, horizontal_fov, lens, near, far, baseline, truth",
         "7: parameter cameras/rear/topic = '/a': must be like rear/image: "
         "letters, digits and _, a letter first, parted by /",
         "7: parameter cameras/rear/mount = 3: must hold `key: value` lines with parent, position, rpy",

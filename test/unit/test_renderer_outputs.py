@@ -3,7 +3,7 @@
 import numpy as np
 import pybullet
 import pytest
-from drawing import AHEAD, CAMERA, GREY, RED, at, box, looking
+from drawing import AHEAD, CAMERA, FLOOR, GREY, RED, at, box, looking
 
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.renderer import Moment
@@ -153,13 +153,18 @@ def test_where_a_point_was_before_is_known_to_the_picture(renderer):
 
 
 def test_outputs_are_the_same_alone_and_together(renderer):
-    renderer.set_visuals([box("a", (0.5, 0.5, 0.5)), box("glass", (0.1, 0.5, 2), (1, 1, 1, 0.3))])
-    poses = np.array([at(3, 0, 1), at(2, 0.6, 1)])
-    given = {"instances": np.array([7, 60000]), "before": Moment(AHEAD, poses)}
+    ground = Visual("ground", Box((90.0, 90.0, 0.1)), GREY, ground=True)
+    glass = box("glass", (0.1, 0.5, 2), (1, 1, 1, 0.3))
+    renderer.set_visuals([box("a", (0.5, 0.5, 0.5)), glass, FLOOR, ground])
+    poses = np.array([at(3, 0, 1), at(2, 0.6, 1), at(0, 0, 0.01), at(0, 0, -0.1)])
+    given = {"instances": np.array([7, 60000, 8, 9]), "before": Moment(AHEAD, poses)}
     together = renderer.render_outputs(EVERYTHING, CAMERA, AHEAD, poses, **given)
+    colored = renderer.render_outputs((*EVERYTHING, "color"), CAMERA, AHEAD, poses, **given)
+    np.testing.assert_array_equal(colored["color"], renderer.render(CAMERA, AHEAD, poses))
     for name in EVERYTHING:
         alone = renderer.render_outputs((name,), CAMERA, AHEAD, poses, **given)[name]
         np.testing.assert_array_equal(alone, together[name])
-    assert set(np.unique(together["instance"])) == {0, 7, 60000}, "what one can see through is there, too"
+        np.testing.assert_array_equal(alone, colored[name])
+    assert set(np.unique(together["instance"])) >= {0, 7, 60000}, "what one can see through is there, too"
     with pytest.raises(ValueError, match="needs the moment before"):
         renderer.render_outputs(("before",), CAMERA, AHEAD, poses)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -40,8 +41,8 @@ class OwnObjects:
         return next(filter(None, map(self._other, _entities(function, arguments))), None)
 
     def _other(self, value: Any) -> str | None:
-        if type(value) not in (int, float):
-            return None
+        if not isinstance(value, (int, float)) or not math.isfinite(value):
+            return None  # which is no handle of anything
         if value in EVERY_SENSOR:
             return "all objects"
         handle = bare(int(value))

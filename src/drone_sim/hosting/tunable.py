@@ -15,6 +15,7 @@ from drone_sim.config.fields import ParameterField, comments, fields_of
 from drone_sim.config.types import Checked, Key
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.sensors.camera_parameters import CameraParameters
+from drone_sim.sensors.imperfections import Imperfections
 from drone_sim.sensors.sensor import Failure
 from drone_sim.vehicles.parameters import ControlParameters, EquipmentParameters, FaultParameters, VehicleParameters
 
@@ -30,9 +31,9 @@ def tunables(vehicle: VehicleParameters, declared: Mapping[str, Any]) -> dict[st
     """Return what may be changed, by name. `declared` has the parameters that its script has beside the vehicle's."""
     found = [
         _explained(one)
-        for name in vehicle.cameras
+        for name, camera in vehicle.cameras.items()
         for one in fields_of(CameraParameters, ("cameras", name))
-        if one.location[-1] in _OF_CAMERAS
+        if one.location[-1] in _OF_CAMERAS or (camera.kind == "color" and _is_imperfection(one))
     ]
     for name, sensor in vehicle.sensors.items():
         kind: type[Checked] = type(sensor)
@@ -44,6 +45,10 @@ def tunables(vehicle: VehicleParameters, declared: Mapping[str, Any]) -> dict[st
         found.append(ParameterField(location, str, choices=get_args(Failure), said="whether and how it fails"))
     script = _of_script({**vehicle.script_parameters, **declared})
     return {**common(), **{one.name: one for one in found}, **script}
+
+
+def _is_imperfection(field: ParameterField) -> bool:
+    return field.location[2] in Imperfections.model_fields and field.location[-1] not in _LEFT_OUT
 
 
 @lru_cache(maxsize=1)

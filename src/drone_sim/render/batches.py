@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from drone_sim.files.mesh_part import WHITE
 from drone_sim.render import surfaces
+from drone_sim.render.programs import Role
 from drone_sim.render.surfaces import Surface
 from drone_sim.shapes.visual import Visual
 
@@ -21,8 +22,6 @@ FIXED_LAYOUT = (("paint", "4f", 16),)
 IDENTITY_LAYOUT = (("identity", "1f", 4),)
 BEFORE_LAYOUT = (("before0", "4f", 16), ("before1", "4f", 16), ("before2", "4f", 16))
 ANISOTROPY = 8.0
-
-Programs = dict[str, Any]  # moderngl.Program by role
 
 
 @dataclass
@@ -55,11 +54,16 @@ class Batch:
     transparent: bool = False
     ground: bool = False
     first: int = 0  # record
-    arrays: dict[str, moderngl.VertexArray] = field(default_factory=dict)
+    arrays: dict[Role, moderngl.VertexArray] = field(default_factory=dict)
 
-    def draw(self, role: str) -> None:
-        """Draw with the program of this role: surface, shadow, or one that `DrawBatches.link` has linked."""
-        if role == "surface" and self.surface.texture is not None:
+    @property
+    def look(self) -> str:
+        """Which of the programs of a role draws it."""
+        return "plain" if self.surface.texture is None else "floor" if self.floor else "textured"
+
+    def draw(self, role: Role) -> None:
+        """Draw in a role that `DrawBatches.link` has linked."""
+        if role.kind == "surface" and self.surface.texture is not None:
             self.surface.texture.use(0)
         self.arrays[role].render(instances=len(self.members))
 
@@ -67,11 +71,11 @@ class Batch:
 class DrawBatches:
     """The visuals as batches; must be used with its context current."""
 
-    def __init__(self, context: moderngl.Context, programs: Programs, software: bool) -> None:
-        """Empty. programs: by name: plain, textured, floor, shadow; software: whether the CPU draws."""
+    def __init__(self, context: moderngl.Context, software: bool) -> None:
+        """Empty. software: whether the CPU draws."""
         self._context = context
-        self._programs = programs
         self._software = software
+        self._linked: set[Role] = set()
         self._surfaces: dict[Visual, tuple[CardSurface, ...]] = {}
         self._buffers: list[moderngl.Buffer] = []
         self._members: np.ndarray = np.zeros(0, dtype=np.intp)
@@ -80,7 +84,7 @@ class DrawBatches:
         self.all: list[Batch] = []
         self.solids: list[Batch] = []
         self.floors: list[Batch] = []
-        self.has_ground = False  # which the picture is cleared to; it has a depth, too
+        self.ground: list[Batch] = []  # which the picture is cleared to; it has a depth, too
         self.glass: list[Batch] = []
 
     def update(self, visuals: Sequence[Visual]) -> None:
@@ -100,11 +104,11 @@ class DrawBatches:
         self.all = self._sort(visuals, [form for form, _ in shared])
         self.solids = [batch for batch in self.all if not (batch.floor or batch.transparent or batch.ground)]
         self.floors = [batch for batch in self.all if batch.floor]
-        self.has_ground = any(batch.ground for batch in self.all)
+        self.ground = [batch for batch in self.all if batch.ground]
         self.glass = [batch for batch in self.all if batch.transparent]
         self._members = np.array([i for batch in self.all for i in batch.members], dtype=np.intp)
         self._scales = np.array([shared[i][1] for i in self._members]).reshape(-1, 1, 3)
-        self._link()
+        self._reserve()
 
     def move(self, origin: np.ndarray, poses: np.ndarray) -> None:
         """Write the instances' matrices, world-from-visual (N, 4, 4), relative to `origin` (3,), metres.
@@ -122,11 +126,12 @@ class DrawBatches:
         rows[:, :, :3] *= self._scales
         return np.asarray(rows, dtype=np.float32)
 
-    def link(self, role: str, program: Any) -> None:
-        """Let the batches be drawn with another program, in this role."""
-        for batch in self.all:
-            if role not in batch.arrays:
-                batch.arrays[role] = self._array(batch, program)
+    def link(self, role: Role, programs: Mapping[str, Any]) -> None:
+        """Let the batches be drawn in a role, with its programs by their look."""
+        if role not in self._linked:
+            self._linked.add(role)
+            for batch in self.all:
+                batch.arrays[role] = self._array(batch, programs[batch.look])
 
     def identify(self, instances: np.ndarray) -> None:
         """Write whose each visual is, (N,), for outputs that show it."""
@@ -169,7 +174,8 @@ class DrawBatches:
         for buffer in self._buffers:
             buffer.release()
         self._buffers, self.all, self.visuals = [], [], ()
-        self.solids, self.floors, self.glass = [], [], []
+        self._linked.clear()
+        self.solids, self.floors, self.ground, self.glass = [], [], [], []
 
     def _upload(self, one: Surface) -> CardSurface:
         uv = np.zeros((len(one.vertices), 2), dtype=np.float32) if one.uv is None else one.uv
@@ -220,8 +226,8 @@ class DrawBatches:
             first += len(batch.members)
         return batches
 
-    def _link(self) -> None:
-        """Make the record buffers and the vertex arrays that read them."""
+    def _reserve(self) -> None:
+        """Make the record buffers."""
         if not self.all:
             return
         records = [self._paint(batch, index) for batch in self.all for index in batch.members]
@@ -230,10 +236,6 @@ class DrawBatches:
         identity = self._context.buffer(reserve=4 * len(records), dynamic=True)
         before = self._context.buffer(reserve=48 * len(records), dynamic=True)
         self._buffers = [moving, fixed, identity, before]
-        for batch in self.all:
-            look = "plain" if batch.surface.texture is None else "floor" if batch.floor else "textured"
-            for role, name in (("surface", look), ("shadow", "shadow")):
-                batch.arrays[role] = self._array(batch, self._programs[name])
 
     def _paint(self, batch: Batch, index: int) -> tuple[float, ...]:
         red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.surface.rgba)

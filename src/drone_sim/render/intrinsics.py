@@ -8,7 +8,7 @@ centres, as in OpenCV and image_geometry: the top left pixel's centre is (0, 0),
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +18,8 @@ import numpy as np
 class Intrinsics:
     """A camera without distortion and with square pixels.
 
-    width, height: pixels; horizontal_fov: rad; near, far: metres along the optical z.
+    width, height: pixels; horizontal_fov: rad; near, far: metres along the optical z. baseline: m, how far to the right
+    of the left camera of a pair it sits; 0 for any other.
     Raises ValueError for a size, angle or range with which no picture can be made.
     """
 
@@ -27,6 +28,7 @@ class Intrinsics:
     horizontal_fov: float
     near: float
     far: float
+    baseline: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
         """Refuse what no camera can be."""
@@ -64,8 +66,8 @@ class Intrinsics:
 
     @property
     def P(self) -> tuple[float, ...]:
-        """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo."""
-        return (self.fx, 0.0, self.cx, 0.0, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
+        """Projection matrix, 3 x 4 row-major, as in sensor_msgs/CameraInfo: of points in the left camera's frame."""
+        return (self.fx, 0.0, self.cx, 0.0 - self.fx * self.baseline, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
 
     @property
     def distortion(self) -> tuple[str, tuple[float, ...]]:

@@ -12,32 +12,22 @@ import threading
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import cv2
 import moderngl
 import numpy as np
 
-from drone_sim.render import context, shaders, sky
-from drone_sim.render.batches import SHADE, Batch, DrawBatches, Programs
+from drone_sim.render import context, counting
+from drone_sim.render.batches import SHADE, Batch, DrawBatches
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
-from drone_sim.render.lens_view import LensView
-from drone_sim.render.outputs import ALONE_FRAGMENT, ALONE_VERTEX, OUTPUTS, finished, sources
+from drone_sim.render.lens_view import LensView, PinholeView
+from drone_sim.render.outputs import COLOR
+from drone_sim.render.programs import ALONE, SHADOW, SKY, SURFACE, Programs, Role
+from drone_sim.render.sky import dome
+from drone_sim.render.target import Box, Target
 from drone_sim.shapes.visual import Visual
 
 _MOST_LENSES = 16
-_ALONE = "alone"  # the role of what draws one object
-TO_SUN = (-0.34, 0.30, 0.89)  # world frame, about 27 degrees from the vertical
-
-
-class _Target:
-    """What is drawn into, for one picture size."""
-
-    def __init__(self, gl: moderngl.Context, size: tuple[int, int], samples: int) -> None:
-        self.framebuffer = gl.framebuffer(
-            [gl.renderbuffer(size, 4, samples=samples)], gl.depth_renderbuffer(size, samples=samples)
-        )
-        self.resolved = gl.framebuffer([gl.renderbuffer(size, 4)]) if samples else self.framebuffer
-        self.rgba = np.empty((size[1], size[0], 4), dtype=np.uint8)
+_ROWS = 16  # the fewest that are drawn of a picture
 
 
 class Moment(NamedTuple):
@@ -45,6 +35,17 @@ class Moment(NamedTuple):
 
     camera_pose: np.ndarray
     poses: np.ndarray
+
+
+class _View(NamedTuple):
+    """What is to be drawn, as `Renderer.render_outputs` is asked for it."""
+
+    intrinsics: Lens
+    camera_pose: np.ndarray
+    poses: np.ndarray
+    instances: np.ndarray | None = None
+    before: Moment | None = None
+    box: Box | None = None  # which alone is drawn of the picture
 
 
 class Renderer:
@@ -56,7 +57,7 @@ class Renderer:
     """
 
     def __init__(self, *, samples: int = 0, device_index: int = 0) -> None:
-        """Make the context and the shaders; there is nothing to draw yet."""
+        """Make the context; there is nothing to draw yet."""
         self._thread = threading.get_ident()
         self._gl: moderngl.Context | None = context.create(device_index)
         with self._gl as gl:
@@ -66,14 +67,11 @@ class Renderer:
             gl.front_face = "cw"  # the flipped rows turn what is counter-clockwise
             self._samples = samples
             self.description: str = gl.info["GL_RENDERER"]
-            self._programs = _programs(gl)
-            self._batches = DrawBatches(gl, self._programs, context.is_software(gl))
-            self._sky = gl.vertex_array(
-                self._programs["sky"],
-                [(gl.buffer(sky.dome()), "3f 3f", "direction", "tint")],
-            )
-            self._targets: dict[tuple[int, int], _Target] = {}
-            self._output_targets: dict[tuple[Any, ...], moderngl.Framebuffer] = {}
+            self._programs = Programs(gl)
+            self._batches = DrawBatches(gl, context.is_software(gl))
+            vertices = gl.buffer(dome())
+            self._sky = gl.vertex_array(self._programs.one(SKY), [(vertices, "3f 3f", "direction", "tint")])
+            self._targets: dict[tuple[Any, ...], Target] = {}
             self._lens_views: dict[Distorted, LensView] = {}
 
     def set_visuals(self, visuals: Sequence[Visual]) -> None:
@@ -92,36 +90,29 @@ class Renderer:
         camera_pose: world-from-optical (4, 4); poses: world-from-visual (N, 4, 4), in the visuals' order.
         Where rays are parallel, there is haze in the place of the sky; where a lens sees nothing, it is black.
         """
-        size = (intrinsics.width, intrinsics.height)
-        out = _output(out, (size[1], size[0], 3), np.uint8)
-        if isinstance(intrinsics, Distorted):
-            lens = self._lens_view(intrinsics)
-            stack = lens.stack((3,), np.uint8)
-            for view, part in zip(lens.views, lens.parts(stack)):
-                self.render(view.intrinsics, camera_pose @ view.turn, poses, part)
-            return lens.colors(stack, out)
-        poses = np.asarray(poses, dtype=np.float64)
-        with self._current() as gl:
-            target = self._targets.get(size)
-            if target is None:
-                target = self._targets[size] = _Target(gl, size, self._samples)
-            self._prepare(intrinsics, camera_pose, poses)
-            target.framebuffer.use()
-            target.framebuffer.clear(*sky.HAZE, SHADE if self._batches.has_ground else 1.0)
-            self._paint(gl, camera_pose, poses, with_sky=isinstance(intrinsics, Intrinsics))
-            if self._samples:
-                gl.copy_framebuffer(target.resolved, target.framebuffer)
-            target.resolved.read_into(target.rgba, components=4)
-        return cv2.cvtColor(target.rgba, cv2.COLOR_RGBA2RGB, dst=out)
+        return self._draw((COLOR,), _View(intrinsics, camera_pose, poses), out)[COLOR]
 
-    def render_depth(
-        self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray, out: np.ndarray | None = None
+    def render_rows(
+        self, intrinsics: Intrinsics, camera_pose: np.ndarray, poses: np.ndarray, rows: tuple[int, int]
     ) -> np.ndarray:
+        """Rows of the picture that `render` returns: from the first to the one before the second of `rows`.
+
+        Through a lens they take as long as the whole picture.
+        """
+        first, end = rows
+        if isinstance(intrinsics, Distorted):
+            return self.render(intrinsics, camera_pose, poses)[first:end]
+        high = min(max(_ROWS, 1 << (end - first - 1).bit_length()), intrinsics.height)  # so that there are few targets
+        box = Box(0, first, intrinsics.width, high)
+        view = _View(intrinsics, camera_pose, poses, box=box)
+        return self._draw((COLOR,), view, None)[COLOR][: end - first]
+
+    def render_depth(self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray) -> np.ndarray:
         """Depth (height, width) float32, metres along the optical z; NaN where nothing is within `far`.
 
         Transparent things count as solid. Arguments as for `render`.
         """
-        return self.render_outputs(("depth",), intrinsics, camera_pose, poses, out=out)["depth"]
+        return self._draw(("depth",), _View(intrinsics, camera_pose, poses), None)["depth"]
 
     def render_outputs(
         self,
@@ -132,7 +123,6 @@ class Renderer:
         *,
         instances: np.ndarray | None = None,
         before: Moment | None = None,
-        out: np.ndarray | None = None,
     ) -> dict[str, np.ndarray]:
         """Some of `outputs.OUTPUTS`, by name, in one pass; transparent things count as solid.
 
@@ -140,97 +130,33 @@ class Renderer:
         nothing is. "instance": (height, width) uint16, of `instances` (N,), which says whose each visual is; 0 where
         nothing is. "normal": (height, width, 3) float32, of unit length in the optical frame, towards the camera; 0
         where nothing is. "before": (height, width, 3) float32, where what is seen was at the moment `before`, in the
-        optical frame of then, m; NaN where nothing is. `out` is for a depth alone.
+        optical frame of then, m; NaN where nothing is. "color" is the picture that `render` returns.
         """
-        names = tuple(names)
-        if isinstance(intrinsics, Distorted):
-            return self._gathered(names, intrinsics, camera_pose, poses, instances, before)
-        poses = np.asarray(poses, dtype=np.float64)
-        with self._current() as gl:
-            program = self._output_program(names)
-            target = self._output_target(names, (intrinsics.width, intrinsics.height))
-            self._batches.link(_role(names), program)
-            self._prepare(intrinsics, camera_pose, poses)
-            self._send(program, intrinsics, camera_pose, instances, before)
-            target.use()
-            target.clear()
-            gl.enable_only(gl.DEPTH_TEST)
-            _draw(gl, self._batches.all, _role(names))
-            return {name: finished(name, _read(target, place, name, out)) for place, name in enumerate(names)}
+        return self._draw(tuple(names), _View(intrinsics, camera_pose, poses, instances, before), None)
 
     def count_alone(
         self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray, instances: np.ndarray
     ) -> np.ndarray:
         """How many pixels each of `instances` (N,) would have if it were alone, by its number, (largest + 1,)."""
-        counts = np.zeros(int(instances.max(initial=0)) + 1, dtype=np.int64)
         if isinstance(intrinsics, Distorted):
-            return self._count_through(intrinsics, camera_pose, poses, instances, counts)
+            return counting.pixels(
+                instances, poses, lambda own, there: self.render_outputs(
+                    ("instance",), intrinsics, camera_pose, there, instances=own
+                )["instance"],
+            )  # fmt: skip
         with self._current() as gl:
-            if _ALONE not in self._programs:
-                self._programs[_ALONE] = gl.program(vertex_shader=ALONE_VERTEX.lstrip(), fragment_shader=ALONE_FRAGMENT)
-            program = self._programs[_ALONE]
-            target = self._output_target(("depth",), (intrinsics.width, intrinsics.height))
-            self._batches.link(_ALONE, program)
-            self._prepare(intrinsics, camera_pose, np.asarray(poses, dtype=np.float64))
-            self._batches.identify(instances)
-            target.use()
+            view = _View(intrinsics, camera_pose, np.asarray(poses, dtype=np.float64), instances)
+            self._place(("instance",), view)
+            self._aim(ALONE, view)
+            only = self._programs.one(ALONE)["only"]
+            self._cleared(("depth",), view, 0.0)
             gl.enable_only(gl.DEPTH_TEST)
-            query = gl.query(samples=True)
-            for number in np.unique(instances):
-                program["only"] = float(number)
-                target.clear()
-                _draw(gl, self._batches.all, _ALONE)  # first, so that only what is nearest counts
-                gl.depth_func = "=="
-                with query:
-                    _draw(gl, self._batches.all, _ALONE)
-                gl.depth_func = "<="
-                counts[number] = query.samples
-        return counts
 
-    def _count_through(
-        self,
-        lens: Distorted,
-        camera_pose: np.ndarray,
-        poses: np.ndarray,
-        instances: np.ndarray,
-        counts: np.ndarray,
-    ) -> np.ndarray:
-        for number in np.unique(instances):
-            only = np.where(instances == number, 1, 0).astype(np.uint16)
-            far = np.where((instances == number)[:, None, None], poses, _far_below(camera_pose))
-            counts[number] = self.render_outputs(("instance",), lens, camera_pose, far, instances=only)[
-                "instance"
-            ].sum()
-        return counts
+            def draw(number: int) -> None:
+                only.value = float(number)
+                self._draw_batches(gl, self._batches.all, ALONE)
 
-    def _gathered(
-        self,
-        names: tuple[str, ...],
-        lens: Distorted,
-        camera_pose: np.ndarray,
-        poses: np.ndarray,
-        instances: np.ndarray | None,
-        before: Moment | None,
-    ) -> dict[str, np.ndarray]:
-        """`render_outputs` through a lens."""
-        view = self._lens_view(lens)
-        drawn = names if "before" not in names or "depth" in names else (*names, "depth")
-        parts = [
-            self.render_outputs(
-                drawn, one.intrinsics, camera_pose @ one.turn, poses, instances=instances, before=before
-            )
-            for one in view.views
-        ]
-        turn = None if before is None else before.camera_pose[:3, :3].T @ camera_pose[:3, :3]
-        gathered = view.gather({name: np.concatenate([part[name] for part in parts]) for name in drawn}, turn)
-        return {name: gathered[name] for name in names}
-
-    def _lens_view(self, lens: Distorted) -> LensView:
-        if lens not in self._lens_views:
-            if len(self._lens_views) >= _MOST_LENSES:  # of cameras that have been tuned since
-                self._lens_views.clear()
-            self._lens_views[lens] = LensView(lens)
-        return self._lens_views[lens]
+            return counting.fragments(gl, np.unique(instances), draw)
 
     def close(self) -> None:
         """Free the context and all it holds; the renderer cannot be used after. May be called twice."""
@@ -249,76 +175,131 @@ class Renderer:
             raise RuntimeError("a renderer can only be used by the thread that made it")
         return self._gl
 
-    def _output_program(self, names: tuple[str, ...]) -> Any:
-        """Return what draws some outputs, made when they are first asked for."""
-        role = _role(names)
-        if role not in self._programs:
-            vertex, fragment = sources(names)
-            self._programs[role] = self._current().program(vertex_shader=vertex.lstrip(), fragment_shader=fragment)
-        return self._programs[role]
+    # ---- drawing
 
-    def _output_target(self, names: tuple[str, ...], size: tuple[int, int]) -> moderngl.Framebuffer:
-        if (names, size) not in self._output_targets:
-            gl, made = self._current(), [OUTPUTS[name] for name in names]
-            pictures = [gl.renderbuffer(size, one.components, dtype=one.dtype) for one in made]
-            self._output_targets[names, size] = gl.framebuffer(pictures, gl.depth_renderbuffer(size))
-        return self._output_targets[names, size]
+    def _draw(self, names: tuple[str, ...], view: _View, into: np.ndarray | None) -> dict[str, np.ndarray]:
+        """Draw colours, outputs or both; the colours into an array, if it is given."""
+        if isinstance(view.intrinsics, Distorted):
+            return self._draw_through(view.intrinsics, names, view, into)
+        view = view._replace(poses=np.asarray(view.poses, dtype=np.float64))
+        outputs = tuple(name for name in names if name != COLOR)
+        if len(outputs) == len(names):
+            return self._draw_outputs(outputs, view)
+        if outputs and self._samples:  # of several samples there is no one depth
+            return {**self._draw_picture((), view, into), **self._draw_outputs(outputs, view)}
+        return self._draw_picture(outputs, view, into)
 
-    def _send(
-        self,
-        program: Any,
-        intrinsics: Lens,
-        camera_pose: np.ndarray,
-        instances: np.ndarray | None,
-        before: Moment | None,
-    ) -> None:
-        """Send what the outputs of a program need besides the poses."""
-        if "parallel" in program:
-            parallel = isinstance(intrinsics, Orthographic)
-            program["parallel"] = intrinsics.near, (intrinsics.far - intrinsics.near) * parallel
-        if "optical_from_world" in program:
-            program["optical_from_world"].write(_turn(camera_pose).T.astype(np.float32).tobytes())
-        if "identity" in program:
-            self._batches.identify(np.zeros(len(self._batches.visuals)) if instances is None else instances)
-        if "before0" in program:
-            if before is None:
-                raise ValueError("needs the moment before")
-            program["optical_before_from_world"].write(_turn(before.camera_pose).T.astype(np.float32).tobytes())
-            self._batches.move_before(before.camera_pose[:3, 3], np.asarray(before.poses, dtype=np.float64))
+    def _draw_outputs(self, names: tuple[str, ...], view: _View) -> dict[str, Any]:
+        role = Role("bare", names)
+        with self._current() as gl:
+            self._place(names, view)
+            self._aim(role, view)
+            target = self._cleared(names, view, 0.0)
+            gl.enable_only(gl.DEPTH_TEST)
+            self._draw_batches(gl, self._batches.all, role)
+            return target.read(None)
 
-    def _prepare(self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray) -> None:
-        """Send the poses and what depends on the camera alone."""
-        self._batches.move(camera_pose[:3, 3], poses)
-        clip_from_world = _clip_from_world(intrinsics, camera_pose)
-        for program in self._programs.values():
-            program["clip_from_world"].write(clip_from_world)
+    def _draw_picture(self, outputs: tuple[str, ...], view: _View, into: np.ndarray | None) -> dict[str, Any]:
+        """Draw solid things, floor, sky, shadows, what can be seen through; of the ground there are only outputs."""
+        batches, role = self._batches, SURFACE._replace(outputs=outputs)
+        with self._current() as gl:
+            self._place(outputs, view)
+            self._aim(role, view)
+            self._aim(SHADOW, view)
+            target = self._cleared((COLOR, *outputs), view, SHADE if batches.ground else 1.0)
+            gl.enable_only(gl.DEPTH_TEST)
+            self._draw_batches(gl, batches.solids, role)
+            self._draw_batches(gl, batches.floors, role)
+            if outputs:
+                target.use(outputs=False)
+            gl.disable(gl.CULL_FACE)
+            if isinstance(view.intrinsics, Intrinsics):
+                self._programs.one(SKY)["clip_from_world"].write(_clip_from_world(view))
+                self._sky.render()
+            height = batches.floor_height(view.poses)
+            if height is not None:
+                self._programs.one(SHADOW)["floor_height"] = height - view.camera_pose[2, 3]
+                gl.enable_only(gl.BLEND)
+                gl.blend_func = gl.ZERO, gl.DST_ALPHA, gl.ONE, gl.ZERO
+                self._draw_batches(gl, batches.solids, SHADOW)
+            if batches.glass:
+                if outputs:
+                    target.use()
+                gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
+                gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
+                self._draw_batches(gl, batches.glass_from_far(view.camera_pose[:3, 2], view.poses), role)
+            if outputs and batches.ground:
+                target.use(color=False)
+                gl.enable_only(gl.DEPTH_TEST)
+                self._draw_batches(gl, batches.ground, role)
+            return target.read(into)
 
-    def _paint(self, gl: Any, camera_pose: np.ndarray, poses: np.ndarray, with_sky: bool) -> None:
-        """Solid things, floor, sky, shadows, then what can be seen through, into the bound framebuffer."""
+    def _draw_batches(self, gl: moderngl.Context, batches: Sequence[Batch], role: Role) -> None:
+        """Draw the batches; the far sides of closed meshes, which nobody can see, are left out."""
+        for batch in batches:
+            if batch.surface.closed:
+                gl.enable(gl.CULL_FACE)
+            else:
+                gl.disable(gl.CULL_FACE)
+            batch.draw(role)
+
+    def _place(self, names: Sequence[str], view: _View) -> None:
+        """Send where the visuals are, and of each what the outputs say."""
         batches = self._batches
-        gl.enable_only(gl.DEPTH_TEST)
-        _draw(gl, batches.solids, "surface")
-        _draw(gl, batches.floors, "surface")
-        gl.disable(gl.CULL_FACE)
-        if with_sky:
-            self._sky.render()
-        height = batches.floor_height(poses)
-        if height is not None:
-            self._programs["shadow"]["floor_height"] = height - camera_pose[2, 3]
-            gl.enable_only(gl.BLEND)
-            gl.blend_func = gl.ZERO, gl.DST_ALPHA, gl.ONE, gl.ZERO
-            _draw(gl, batches.solids, "shadow")
-        if batches.glass:
-            gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
-            gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
-            _draw(gl, batches.glass_from_far(camera_pose[:3, 2], poses), "surface")
+        batches.move(view.camera_pose[:3, 3], view.poses)
+        if "instance" in names:
+            batches.identify(np.zeros(len(batches.visuals)) if view.instances is None else view.instances)
+        if "before" in names:
+            if view.before is None:
+                raise ValueError("needs the moment before")
+            batches.move_before(view.before.camera_pose[:3, 3], np.asarray(view.before.poses, dtype=np.float64))
 
+    def _aim(self, role: Role, view: _View) -> None:
+        """Let the batches be drawn in a role, by what depends on the camera alone."""
+        programs = self._programs.of(role)
+        self._batches.link(role, programs)
+        given = {"clip_from_world": _clip_from_world(view), "optical_from_world": _bytes(_turn(view.camera_pose))}
+        if view.before is not None:
+            given["optical_before_from_world"] = _bytes(_turn(view.before.camera_pose))
+        lens = view.intrinsics
+        for program in set(programs.values()):
+            for name, matrix in given.items():
+                if name in program:
+                    program[name].write(matrix)
+            if "parallel" in program:
+                program["parallel"] = lens.near, (lens.far - lens.near) * isinstance(lens, Orthographic)
 
-def _far_below(camera_pose: np.ndarray) -> np.ndarray:
-    """A pose at which nothing is seen."""
-    pose = np.eye(4)
-    pose[:3, 3] = camera_pose[:3, 3] - (0.0, 0.0, 1e9)
-    return pose
+    def _cleared(self, names: tuple[str, ...], view: _View, alpha: float) -> Target:
+        """Return what to draw into, empty."""
+        whole = view.intrinsics.width, view.intrinsics.height
+        box = view.box or Box(0, 0, *whole)
+        size = box.width, box.height
+        if (names, size) not in self._targets:
+            samples = self._samples if names == (COLOR,) else 0
+            self._targets[names, size] = Target(self._current(), names, size, samples)
+        target = self._targets[names, size]
+        target.clear(alpha, box, whole)
+        return target
+
+    # ---- lenses
+
+    def _draw_through(
+        self, lens: Distorted, names: tuple[str, ...], view: _View, into: np.ndarray | None
+    ) -> dict[str, np.ndarray]:
+        def draw(pinhole: PinholeView, drawn: tuple[str, ...]) -> dict[str, np.ndarray]:
+            pose = view.camera_pose @ pinhole.turn
+            turned = view._replace(intrinsics=pinhole.intrinsics, camera_pose=pose, box=pinhole.box)
+            return self._draw(drawn, turned, None)
+
+        turn = None if view.before is None else view.before.camera_pose[:3, :3].T @ view.camera_pose[:3, :3]
+        return self._lens_view(lens).seen(names, draw, turn, into)
+
+    def _lens_view(self, lens: Distorted) -> LensView:
+        if lens not in self._lens_views:
+            if len(self._lens_views) >= _MOST_LENSES:  # of cameras that have been tuned since
+                self._lens_views.clear()
+            self._lens_views[lens] = LensView(lens)
+        return self._lens_views[lens]
 
 
 def _turn(camera_pose: np.ndarray) -> np.ndarray:
@@ -328,59 +309,10 @@ def _turn(camera_pose: np.ndarray) -> np.ndarray:
     return turn
 
 
-def _clip_from_world(intrinsics: Lens, camera_pose: np.ndarray) -> bytes:
-    return bytes((intrinsics.projection() @ _turn(camera_pose)).T.astype(np.float32).tobytes())
+def _clip_from_world(view: _View) -> bytes:
+    return _bytes(view.intrinsics.projection() @ _turn(view.camera_pose))
 
 
-def _role(names: Sequence[str]) -> str:
-    return "outputs " + " ".join(names)
-
-
-def _read(target: moderngl.Framebuffer, place: int, name: str, out: np.ndarray | None) -> np.ndarray:
-    """Read one of a framebuffer's pictures, the top row first, into `out` where given."""
-    one, (width, height) = OUTPUTS[name], target.size
-    shape = (height, width) if one.components == 1 else (height, width, one.components)
-    out = _output(out, shape, np.uint16 if one.dtype == "u2" else np.float32)
-    target.read_into(out, components=one.components, attachment=place, dtype=one.dtype)
-    return out
-
-
-def _draw(gl: moderngl.Context, batches: Sequence[Batch], role: str) -> None:
-    """Draw the batches; the far sides of closed meshes, which nobody can see, are left out."""
-    for batch in batches:
-        if batch.surface.closed:
-            gl.enable(gl.CULL_FACE)
-        else:
-            gl.disable(gl.CULL_FACE)
-        batch.draw(role)
-
-
-def _programs(gl: moderngl.Context) -> Programs:
-    def surface(*names: str) -> tuple[str, ...]:
-        start = "\n".join(["#version 330 core", *(f"#define {name}" for name in names)])
-        plain = (shaders.SURFACE_VERTEX, shaders.SURFACE_FRAGMENT)
-        return tuple(source.replace("#version 330 core", start) for source in plain)
-
-    sources = {
-        "plain": surface(),
-        "textured": surface("TEXTURED"),
-        "floor": surface("TEXTURED", "FLAT"),
-        "shadow": (shaders.SHADOW_VERTEX, shaders.SHADOW_FRAGMENT),
-        "sky": (shaders.SKY_VERTEX, shaders.SKY_FRAGMENT),
-    }
-    programs = {
-        name: gl.program(vertex_shader=vertex.lstrip(), fragment_shader=fragment.lstrip())
-        for name, (vertex, fragment) in sources.items()
-    }
-    to_sun = np.array(TO_SUN) / np.linalg.norm(TO_SUN)
-    for name in ("plain", "textured", "floor", "shadow"):
-        programs[name]["to_sun"] = tuple(to_sun)
-    return programs
-
-
-def _output(out: np.ndarray | None, shape: tuple[int, ...], dtype: type) -> np.ndarray:
-    if out is None:
-        return np.empty(shape, dtype=dtype)
-    if out.shape != shape or out.dtype != dtype or not out.flags.c_contiguous:
-        raise ValueError(f"out must be a C-contiguous {np.dtype(dtype).name} array of shape {shape}")
-    return out
+def _bytes(matrix: np.ndarray) -> bytes:
+    """A matrix as GLSL has it, column by column."""
+    return bytes(matrix.T.astype(np.float32).tobytes())

@@ -53,7 +53,7 @@ in vec4 colour;
 in vec2 texel;
 uniform sampler2D image;
 #endif
-out vec4 pixel;
+layout(location = 0) out vec4 pixel;
 void main() {
 #ifdef TEXTURED
     pixel = colour * texture(image, texel);
@@ -62,6 +62,34 @@ void main() {
 #endif
 }
 """
+
+# What has no colour: only its depth, and the outputs that are added to these.
+BARE_VERTEX = (
+    INPUTS
+    + """
+void main() {
+    gl_Position = clip_from_world * vec4(world_point(), 1.0);
+}
+"""
+)
+
+BARE_FRAGMENT = """
+#version 330 core
+void main() {
+}
+"""
+
+# One object alone, whose fragments are counted.
+ALONE_VERTEX = (
+    INPUTS
+    + """
+uniform float only;
+in float identity;
+void main() {
+    gl_Position = identity == only ? clip_from_world * vec4(world_point(), 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+}
+"""
+)
 
 # Every vertex slides along the light onto the floor; what lies below the floor casts nothing beyond itself.
 SHADOW_VERTEX = (

@@ -30,8 +30,8 @@ from drone_sim.scripting.api.windows import Windows
 from drone_sim.scripting.breakpoints import Breakpoints, Scope
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.script_log import LOG
-from drone_sim.sensors.camera import Vision
 from drone_sim.sensors.truth import VEHICLE, Identity, category_of
+from drone_sim.sensors.vision import Vision
 from drone_sim.vehicles.vehicle import Vehicle
 from drone_sim.world import World
 

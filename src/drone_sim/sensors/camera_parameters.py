@@ -8,9 +8,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from drone_sim.config.types import TOPIC, Checked, Finite, Name, Switch, Within
+from drone_sim.config.types import TOPIC, Checked, Finite, Name, ParameterError, Switch, Within
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.sensors.imperfections import Imperfections
 from drone_sim.sensors.sensor import MountParameters
 
 MAX_CAMERAS = 16
@@ -32,8 +33,8 @@ class LensParameters(Checked):
     coefficients: Annotated[tuple[Finite, ...], Field(max_length=8)] = ()
 
 
-class CameraParameters(Checked):
-    """A vision sensor: where it sits, what it sees."""
+class CameraParameters(Imperfections):
+    """A vision sensor: where it sits, what it sees, and how well."""
 
     object: Name
     topic: Annotated[str, Field(pattern=TOPIC, max_length=128)]
@@ -47,7 +48,7 @@ class CameraParameters(Checked):
     lens: LensParameters | None = None
     near: Annotated[Finite, Within(1e-4, 1e4)]
     far: Annotated[Finite, Within(1e-3, 1e5)]
-    baseline: Annotated[Finite, Within(0, 100)] = 0.0  # m to the right of the camera whose frame is its own, too
+    baseline: Annotated[Finite, Within(0, 100)] = 0.0  # m, of the right camera of a pair: how far from the left one
     truth: Switch = False  # whether it publishes what is behind its pictures, too
 
     @model_validator(mode="after")
@@ -56,12 +57,21 @@ class CameraParameters(Checked):
             raise ValueError(f"horizontal_fov: must be from 0.01 to {WIDEST}, without an equidistant lens")
         if self.lens is not None:
             self.intrinsics()
+        if self.kind == "depth":
+            self._refuse_imperfections()
         return self
+
+    def _refuse_imperfections(self) -> None:
+        for name in Imperfections.model_fields:
+            if getattr(self, name).is_on:
+                raise ParameterError("is of cameras of kind color", (name,))
 
     def intrinsics(self) -> Intrinsics:
         """Return how it makes pixels of the world."""
         own = self.width, self.height, self.horizontal_fov, self.near, self.far
-        return Intrinsics(*own) if self.lens is None else _lens(*own, self.lens.model, self.lens.coefficients)
+        if self.lens is None:
+            return Intrinsics(*own, baseline=self.baseline)
+        return _lens(*own, self.lens.model, self.lens.coefficients, baseline=self.baseline)
 
     def topics(self) -> Iterator[tuple[str, str]]:
         """Yield what it publishes, and what each topic is."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from drone_sim.mechanics.frames import to_quaternion
 from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.outputs import COLOR
 from drone_sim.render.renderer import Moment
 from drone_sim.shapes.shape import DrawnShape
 from drone_sim.shapes.visual import Visual
@@ -116,8 +117,13 @@ class PictureTruth:
         if missing:
             self._drawn.update(self._draw(missing))
 
+    @property
+    def drawn(self) -> tuple[str, ...]:
+        """The outputs that have been asked for, the picture aside."""
+        return tuple(name for name in self._drawn if name != COLOR)
+
     def output(self, name: str) -> np.ndarray:
-        """Return one of `render.outputs.OUTPUTS`."""
+        """Return one of `render.outputs.OUTPUTS`, or the picture."""
         self.want([name])
         return self._drawn[name]
 

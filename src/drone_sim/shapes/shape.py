@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -19,9 +19,6 @@ import numpy as np
 from drone_sim.files.mesh_part import WHITE
 from drone_sim.mechanics.frames import IDENTITY, Matrix
 from drone_sim.shapes.solid import Solid, hull_of
-
-if TYPE_CHECKING:
-    import trimesh
 
 
 class Files(Protocol):
@@ -98,16 +95,11 @@ class Triangles(NamedTuple):
     texture: np.ndarray | None = None
 
 
-def corners_of(mesh: trimesh.Trimesh) -> np.ndarray:
-    """Return the corners (m, 3, 3) of a mesh's triangles."""
-    return np.asarray(mesh.vertices, dtype=np.float64)[np.asarray(mesh.faces)]
-
-
-def turned(profile: Sequence[tuple[float, float]], sections: int = SECTIONS) -> np.ndarray:
+def turned(profile: Sequence[tuple[float, float]]) -> np.ndarray:
     """Return the corners (m, 3, 3) of what a line of points (radius, z), upwards, makes as it turns about z."""
-    angles = 2 * np.pi / sections * np.arange(sections)
-    round_ = np.column_stack([np.cos(angles), np.sin(angles), np.ones(sections)])
-    rings = np.array([round_ * (radius, radius, z) for radius, z in profile])
+    angles = 2 * np.pi / SECTIONS * np.arange(SECTIONS)
+    circle = np.column_stack([np.cos(angles), np.sin(angles), np.ones(SECTIONS)])
+    rings = np.array([circle * (radius, radius, z) for radius, z in profile])
     low, high = rings[:-1], rings[1:]
     next_low, next_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
     both = np.stack([np.stack([low, next_low, next_high], axis=2), np.stack([low, next_high, high], axis=2)], axis=2)

@@ -11,13 +11,13 @@ from drone_sim.forces.drag import DragParameters
 from drone_sim.forces.force import Force
 from drone_sim.forces.pushes import Pushes
 from drone_sim.mechanics import frames, urdf
-from drone_sim.mechanics.frames import Matrix
+from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.scripting.api.messages import MessageBus
-from drone_sim.sensors.camera import Camera
+from drone_sim.sensors.camera import Camera, CameraFitting
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.vehicles.body import Body
 from drone_sim.vehicles.commands import LANDED, RESET, Commands, FlightState, request
@@ -59,7 +59,7 @@ class Vehicle:
         self.handles: list[int] = []  # of its objects
         self._cleared = -1  # how often the tree had been, when they were added
         self.cameras = {
-            name: Camera(one, partial(self.optical, one), context.vision) for name, one in parameters.cameras.items()
+            name: Camera(one, self._fitting(name, one), context.vision) for name, one in parameters.cameras.items()
         }
         context.blades.append(self.propulsion.blades)
         context.names[self.body.number] = (parameters.name, self.object_name)
@@ -144,6 +144,18 @@ class Vehicle:
         objects = self.context.objects
         sensor = objects.matrix(objects.handle(camera.object + self.suffix))
         return frames.multiply(sensor, OPTICAL_FROM_SENSOR)
+
+    def _fitting(self, name: str, camera: CameraParameters) -> CameraFitting:
+        pose, velocity = partial(self.optical, camera), partial(self._velocity, camera)
+        return CameraFitting(f"{self.name}/{name}", pose, velocity, self.context.clock)
+
+    def _velocity(self, camera: CameraParameters) -> tuple[Vector, Vector]:
+        """Velocity of a camera and of its turn: now, or over the last step, where a script moves it."""
+        objects, meter = self.context.objects, self.context.velocities
+        handle = objects.handle(camera.object + self.suffix)
+        if objects[handle].carrier is not None:
+            return objects[handle].velocity()
+        return meter.velocity(handle)[0], meter.rotation(handle)
 
     # ---- from outside
 

@@ -134,6 +134,25 @@ class Pictures:
             self._poses = self.changes, self._poses_of(self._inertial_from_root)
         return self._poses[1]
 
+    def visual_velocities(self) -> np.ndarray:
+        """Return the velocities of the visuals' origins and of their turns, (N, 6), m/s and rad/s in the world."""
+        poses = self.visual_poses()
+        velocities = np.zeros((len(poses), 6))
+        links = zip(self.places(), poses[:, :3, 3])
+        for number, ((body, link), origin) in enumerate(links):
+            if body not in self._standing:
+                centre, linear, angular = self._motion(body, link)
+                velocities[number] = *(linear + np.cross(angular, origin - centre)), *angular
+        return velocities
+
+    def _motion(self, body: int, link: int) -> np.ndarray:
+        """Return where a link's centre of mass is, and its velocities, in the world, (3, 3)."""
+        if link < 0:
+            centre, _ = pybullet.getBasePositionAndOrientation(body, self._client)
+            return np.array([centre, *pybullet.getBaseVelocity(body, self._client)])
+        state = pybullet.getLinkState(body, link, 1, 1, self._client)
+        return np.array([state[0], *state[6:8]])
+
     def _chosen(self, bodies: Iterable[int] | None) -> Iterable[int]:
         return self._inertial_from_root if bodies is None else bodies
 

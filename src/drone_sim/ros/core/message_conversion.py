@@ -84,12 +84,12 @@ def image(picture: np.ndarray, encoding: str, header: Header | None = None) -> I
     return Image(header or Header(), height, width, encoding, is_big, picture[0].nbytes, picture.tobytes())
 
 
-def camera_info(intrinsics: Intrinsics, frame: str, baseline: float = 0.0) -> CameraInfo:
-    """Return the camera's model, without a stamp; `baseline` (m) is how far to the right of `frame` it is."""
+def camera_info(intrinsics: Intrinsics, frame: str) -> CameraInfo:
+    """Return the camera's model, without a stamp."""
     size = {"width": intrinsics.width, "height": intrinsics.height}
     message = CameraInfo(header=Header(frame_id=frame), **size)
     message.distortion_model, message.D = intrinsics.distortion
-    message.K, message.P = intrinsics.K, (*intrinsics.P[:3], -intrinsics.P[0] * baseline, *intrinsics.P[4:])
+    message.K, message.P = intrinsics.K, intrinsics.P
     message.R = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     return message
 

@@ -22,7 +22,7 @@ from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.path import Path
 from drone_sim.mechanics.scene_object import SceneObject
-from drone_sim.render.renderer import TO_SUN
+from drone_sim.render.programs import TO_SUN
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.rviz.marker_topics import WORDS, MarkerTopic, namespace, new_marker
 from drone_sim.ros.rviz.rviz_meshes import RvizMeshes

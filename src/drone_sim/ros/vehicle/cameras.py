@@ -47,7 +47,6 @@ class CameraOutput:
         self._image = rospy.Publisher(topic, Image, subscriber_listener=new_subscribers, queue_size=1)
         self._compressed = CompressedPublisher(topic, new_subscribers) if parameters.kind == "color" else None
         self._info_publisher = rospy.Publisher(info_topic, CameraInfo, queue_size=1)
-        self._baseline = parameters.baseline
         self._truth = TruthOutput(topic, self._frame, new_subscribers) if parameters.truth else None
         self.follow(camera)
 
@@ -59,7 +58,7 @@ class CameraOutput:
 
     def _describe(self) -> None:
         self._intrinsics = self._camera.intrinsics
-        self._info = message_conversion.camera_info(self._intrinsics, self._frame, self._baseline)
+        self._info = message_conversion.camera_info(self._intrinsics, self._frame)
 
     def close(self) -> None:
         """Advertise no more."""

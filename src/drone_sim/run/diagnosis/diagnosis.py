@@ -14,7 +14,7 @@ from drone_sim.run.diagnosis.vehicles import VehicleDiagnosis
 from drone_sim.run.pacing import Pacer
 from drone_sim.run.player import Player
 from drone_sim.run.simulation import Simulation
-from drone_sim.sensors.camera import TINY
+from drone_sim.sensors.vision import TINY
 
 _ENOUGH = 0.9  # of the nominal rate, and of the pace that is asked for
 _FEW = 2  # pictures that fall into this look or the next

@@ -1,0 +1,104 @@
+"""How long the sensor is exposed, and how much its signal is amplified; set, or following what is seen.
+
+    light' = light · time / reference · 10^(gain / 20)
+
+Automatically, the product follows what brings the mean luminance (ITU-R BT.709) to 18 %, middle grey, so that it would
+be there after `settling` but for 1/e of the way, in stops: first by the time, up to the one that is set, then by the
+gain, likewise. A picture is exposed as those before it have shown, as in cameras; the first one by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import cv2
+import numpy as np
+from pydantic import Field
+
+from drone_sim.config.types import Finite, ParameterError, Switch, Within
+from drone_sim.mechanics.saved_state import Restore, saved
+from drone_sim.sensors.imperfections.imperfection import Imperfection, Shot
+
+_GREY = 0.18
+_LUMINANCE = (0.2126, 0.7152, 0.0722)
+_DARKEST = 1e-4  # mean luminance that is told from black
+_SHORTEST = 1e-6  # s
+
+
+class ExposureParameters(Imperfection):
+    """Exposure time and gain."""
+
+    time: Annotated[Finite, Within(1e-6, 1, or_zero=True)] = Field(
+        default=0.0, description="s; what moves is blurred by it; 0: an instant, as bright as it is drawn"
+    )
+    gain: Annotated[Finite, Within(0, 60)] = Field(default=0.0, description="dB")
+    automatic: Switch = Field(default=False, description="time and gain are then the most that it takes")
+    reference: Annotated[Finite, Within(1e-6, 1)] = Field(
+        default=0.01, description="s, of the exposure that is as bright as what is drawn, without gain"
+    )
+    settling: Annotated[Finite, Within(0, 60)] = Field(
+        default=0.2, description="s, in which it follows what it sees, when it is automatic"
+    )
+
+    def model_post_init(self, _context: Any) -> None:
+        """Refuse to follow without an exposure time."""
+        if self.automatic and not self.time:
+            raise ParameterError("needs time, the longest that it takes", ("automatic",), "true")
+
+    @property
+    def is_on(self) -> bool:
+        """Whether pictures are other ones by it."""
+        return self.time > 0 or self.gain > 0
+
+    @property
+    def most(self) -> float:
+        """How much brighter than drawn pictures can be."""
+        brightness = self.time / self.reference if self.time else 1.0
+        return brightness * 10 ** (self.gain / 20)
+
+    def settings(self, brightness: float) -> tuple[float, float]:
+        """Return exposure time (s) and gain (a factor) that make pictures so much brighter than drawn."""
+        if not self.time:
+            return 0.0, brightness
+        time = min(max(brightness * self.reference, _SHORTEST), self.time)
+        return time, max(1.0, brightness * self.reference / time)
+
+    def apply(self, light: np.ndarray, shot: Shot) -> np.ndarray:
+        """Brighten or darken it."""
+        light *= np.float32((shot.exposure / self.reference if shot.exposure else 1.0) * shot.gain)
+        return light
+
+
+class ExposureControl:
+    """What a camera's exposure is: how much brighter its pictures are than drawn."""
+
+    def __init__(self) -> None:
+        """Know nothing of what is seen yet."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was seen."""
+        self._brightness, self._wanted, self._at = 0.0, 1.0, 0.0
+
+    @property
+    def has_seen_nothing(self) -> bool:
+        """Whether it is to `meter` before there is a brightness."""
+        return self._brightness == 0.0
+
+    def brightness(self, parameters: ExposureParameters, now: float) -> float:
+        """Return it for a picture at some time (s)."""
+        if not parameters.automatic:
+            return parameters.most
+        left = math.exp((self._at - now) / parameters.settling) if parameters.settling else float(now == self._at)
+        return min(self._wanted * (self._brightness / self._wanted) ** left, parameters.most)
+
+    def meter(self, light: np.ndarray, brightness: float | None, now: float) -> None:
+        """Look at light of a picture at some time, before it is brightened, that was taken with such a brightness."""
+        mean = float(np.dot(cv2.mean(light)[:3], _LUMINANCE))
+        self._wanted, self._at = _GREY / max(mean, _DARKEST), now
+        self._brightness = self._wanted if brightness is None else brightness
+
+    def save_state(self) -> Restore:
+        """Return a function that brings it back."""
+        return saved(self, "_brightness", "_wanted", "_at")

@@ -1,0 +1,23 @@
+"""A rolling shutter exposes the rows of a picture one after another: light is gathered so, as render.shutter says."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from drone_sim.config.types import Finite, Within
+from drone_sim.sensors.imperfections.imperfection import Imperfection
+
+
+class ShutterParameters(Imperfection):
+    """How the rows of a picture are exposed."""
+
+    readout: Annotated[Finite, Within(0, 1)] = Field(
+        default=0.0, description="s, from the first row to the last; 0: all at once"
+    )
+
+    @property
+    def is_on(self) -> bool:
+        """Whether pictures are other ones by it."""
+        return self.readout > 0
