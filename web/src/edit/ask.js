@@ -1,6 +1,5 @@
 // A small window that asks for some values: names, numbers, one of several.
-import { create } from "../dom.js";
-import { at } from "../dom.js";
+import { at, create } from "../dom.js";
 
 // `fields`: { label, value, type: "text", "number" or "choice", choices: [[value, words]], hint }; `act(values)` does
 // what is asked for, and what it throws is told in the window. `verb` is on the button.

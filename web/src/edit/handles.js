@@ -8,8 +8,7 @@ const LARGER = 0.1; // of a size
 const SIZE = 0.75;
 
 export class Handles {
-  // `camera` sees them; `on` has change() and moved(matrix), with what has been done to the world's coordinates, and
-  // resized(factors).
+  // `camera` sees them; `on.changed(change)` hears what a drag has done so far, as `change` says.
   constructor(camera, on) {
     this.scene = new THREE.Scene();
     this.base = new THREE.Group(); // the axes along which it goes

@@ -9,7 +9,6 @@ const KINDS = { own: "Yours", recent: "Opened last", package: "Of the package" }
 export class SceneFiles {
   constructor(edit) {
     this.edit = edit;
-    this.loaded = "";
     edit.on("objects", () => this.show());
   }
 
