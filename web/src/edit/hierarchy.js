@@ -19,7 +19,7 @@ export class Hierarchy {
     tree.append(this.body);
     tree.onscroll = () => this.draw();
     new ResizeObserver(() => this.draw()).observe(tree);
-    find.oninput = () => this.list();
+    find.oninput = () => this.seek();
     find.onkeydown = (event) => this.keyOfFind(event);
     tree.onkeydown = (event) => this.key(event);
     new RowDrag(tree, edit, (handle) => this.range(handle), () => this.rename());
@@ -32,6 +32,12 @@ export class Hierarchy {
   }
 
   // ---- which rows there are
+
+  // Shows what is sought, from the first one.
+  seek() {
+    this.tree.scrollTop = 0;
+    this.list();
+  }
 
   list() {
     for (const one of this.objects.all()) this.begin(one);
