@@ -380,6 +380,12 @@ def test_a_draft_outlives_the_node(tmp_path):
     assert place(second, "Gate") == [5, 0, 1]
     assert second.is_modified
     assert second.described()["draft"] is None
+    second.keep_draft()
+    second._drafts.wait()
+    second.simulation.load_scene("")  # of somebody else's
+    second.follow()
+    assert second.described()["draft"]
+    assert not second.is_modified
     second.simulation.close()
 
 

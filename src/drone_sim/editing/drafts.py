@@ -33,7 +33,12 @@ class Drafts:
         self._lock = threading.Lock()
         self._writing: threading.Thread | None = None
         self._number = 0  # of the last text that was to be written
-        with contextlib.suppress(OSError):
+        self.offered: Draft | None = None
+        self.offer()
+
+    def offer(self) -> None:
+        """Offer the draft that there is: what it is of has gone."""
+        with self._lock, contextlib.suppress(OSError):
             if self._file and self._left:
                 self._file.replace(self._left)
         self.offered = _read(self._left) if self._left else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.files.yaml_text import YamlText
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
+from drone_sim.scripting.errors import ScriptError
 
+_LOG = logging.getLogger(__name__)
 _DRAFT_PERIOD = 1.0  # s of real time
 
 
@@ -39,7 +42,7 @@ class SceneEditor:
         self._started = 0, False  # the revision with which it runs, and whether that is not in the file
         self._run = -1  # whose edits stop takes back, -1 while it is stopped
         self._operations = EditOperations(self.scene)
-        self._read = -1
+        self._read, self._is_opening = -1, False
         self.follow()
 
     @property
@@ -71,6 +74,8 @@ class SceneEditor:
         simulation = self.simulation
         if simulation.scenes_read != self._read:
             self._read = simulation.scenes_read
+            if self.is_modified and not self._is_opening:  # another has loaded a scene over what was not saved
+                self._drafts.offer()
             self.document.read()
             self._begin_anew()
         run = simulation.run if simulation.running else -1
@@ -183,11 +188,18 @@ class SceneEditor:
         return answer
 
     def _open(self, file: str | None) -> dict[str, Any]:
-        self._player.stop()
-        self.document.open(file)
-        if file is None:
-            self._begin_anew()
-        self.follow()
+        try:
+            self._player.stop()
+        except ScriptError as error:  # in a cleanup, which must not hinder it
+            _LOG.error("%s", error)
+        self._is_opening = True
+        try:
+            self.document.open(file)
+            if file is None:
+                self._begin_anew()
+            self.follow()
+        finally:
+            self._is_opening = False
         return self._answer("new scene" if file is None else f"opened {file}", file=self.scene_file)
 
     def _save(self, request: records.Save) -> dict[str, Any]:
