@@ -121,6 +121,8 @@ class GradeLive(unittest.TestCase):
         plan = self.read("duration: 3\ncriteria: [{kind: reach, places: [[1.5, 0, 2]], within: 0.3}]\n")
         with subprocess.Popen(command, stdout=subprocess.DEVNULL) as cheat:
             try:
+                while "/drone/set_pose" not in dict(rospy.get_published_topics()):  # its start takes a while
+                    rospy.rostime.wallsleep(0.05)
                 found, flown = grade(plan, 0, "", "drone_sim", PATIENCE)
             finally:
                 cheat.terminate()

@@ -147,8 +147,9 @@ class Rviz(unittest.TestCase):
             self.command(x=1.0)
             path.wait_for(lambda m: sum(map(len, lines(m))) > 10)
             self.command()
+            heard = len(path.messages)
             self.call(service)
-            path.wait_for(lambda m: sum(map(len, lines(m))) < 5)
+            path.wait_for(lambda m: sum(map(len, lines(m))) < 5, after=heard)
 
     def test_the_arrow_is_what_is_commanded(self):
         command = self.listen("view/command")

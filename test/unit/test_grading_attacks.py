@@ -111,7 +111,7 @@ SEARCHES = {  # each would find something, were it there
 ENDS = {  # what ends the flight, and what is said of it
     "a forged end": (
         "os.write(3, struct.pack('<I', 12) + b'[[\"end\",1,1]]')\n    os._exit(0)",
-        "with status 0, before the flight was over",
+        "has sent what is no message: no JSON",
     ),
     "a forged result": (
         "for number in range(64):\n"

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from drone_sim.files.resources import package_path
 from drone_sim.hosting.child_scripts import surroundings
 from drone_sim.mechanics.state import Pose
 from drone_sim.run import parameters
@@ -237,3 +238,15 @@ def test_an_image_of_a_large_sensor_comes_as_numbers(tmp_path):
         assert numbers == [3 * 1280 * 720, 1280 * 720, 3 * 1280 * 720]
     finally:
         simulation.close()
+
+
+def test_the_right_camera_of_the_stereo_pair_projects_what_is_in_the_left_one_s_frame():
+    simulation = Simulation(parameters.load({"config": str(package_path() / "config" / "stereo.yaml")}))
+    left, right = (simulation.drone.cameras[name] for name in ("left", "right"))
+    point = np.array([0.3, -0.2, 2.0, 1.0])  # m, in the left one's frame
+    poses = [np.reshape((*one.pose(), 0, 0, 0, 1), (4, 4)) for one in (left, right)]
+    own = np.linalg.inv(poses[1]) @ poses[0] @ point
+    u, v, w = np.reshape(right.intrinsics.P, (3, 4)) @ point
+    np.testing.assert_allclose((u / w, v / w), right.intrinsics.project(own[:3]), atol=1e-9)
+    assert left.intrinsics.P[3] == 0
+    simulation.close()

@@ -44,7 +44,9 @@ class Target:
         self._drawn.viewport = -box.left, -box.top, *whole
         if self._outputs:
             self.use(color=False)
+            self._drawn.depth_mask = not self._has_color  # with the colours depths are cleared once
             self._drawn.clear()
+            self._drawn.depth_mask = True
         if self._has_color:
             self.use(outputs=False)
             self._drawn.clear(*sky.HAZE, alpha)

@@ -68,10 +68,10 @@ class Flyer:
                     raise Cancelled from None
                 why = "ended the process that watches its flight"
                 continue
-            if reply.get("result") is not None and not (end and reply["is_gone"]):
+            if reply.get("result") is not None and not reply["is_gone"]:
                 result = _as_asked(job, Result.from_json(reply["result"]))
                 return JobResult(job, result, rows if result.flown else b"")
-            why = end or reply.get("lost") or "gave no result"
+            why = end or reply.get("lost") or "ended its process before the flight was over"
             break
         return lost(job, plan, f"the script {why}")
 

@@ -41,13 +41,17 @@ def main() -> None:
             requests.reply(*_answer(request, door, requests, known))
 
 
-def _answer(request: dict[str, Any], door: int, requests: Requests, known: FileCache[Plan]) -> tuple[bytes, bytes]:
+def _answer(
+    request: dict[str, Any], door: socket.socket, requests: Requests, known: FileCache[Plan]
+) -> tuple[bytes, bytes]:
     """Return result, or why there is none, as JSON; and the table, b'' where none is wanted or left."""
     try:
         plan = known.get(request["plan"])
     except (OSError, PlanError) as error:
         return json.dumps({"lost": format_error(error)}).encode(), b""
-    process = LimitedProcess(request["limits"], functools.partial(_judge, plan, request, door), _MOST, [door])
+    judge = functools.partial(_judge, plan, request, door)
+    process = LimitedProcess(request["limits"], judge, _MOST, [door.fileno()])
+    door.close()
     with process:
         if not process.watch(requests.fileno()):
             sys.exit(0)  # nobody wants it any more
@@ -57,15 +61,15 @@ def _answer(request: dict[str, Any], door: int, requests: Requests, known: FileC
     return json.dumps({"lost": process.end}).encode(), b""
 
 
-def _judge(plan: Plan, request: dict[str, Any], door: int, outputs: Mapping[str, int]) -> None:
+def _judge(plan: Plan, request: dict[str, Any], door: socket.socket, outputs: Mapping[str, int]) -> None:
     """Fly once, in a process of its own, and write what came of it."""
     script, seed, changes = request["script"], request["seed"], request["changes"]
-    end = SimulationEnd(socket.socket(fileno=door), processor=stay_on_one_processor())
+    end = SimulationEnd(door, processor=stay_on_one_processor())
     rows, is_gone = None, False
     try:
         flight = Flight(plan, script, seed, changes, end)
         result = flight.grade()
-        rows, is_gone = flight.rows, bool(end.why_closed)
+        rows, is_gone = flight.rows, end.is_gone
     except BaseException as error:
         result = ungraded(plan, script, seed, changes, _format_error(error))
     if request["table"] and rows is not None:

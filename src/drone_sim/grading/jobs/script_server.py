@@ -42,7 +42,8 @@ def main() -> None:
             for path in request["handed_in"]:
                 _lay(f"{HANDED_IN}{path}", requests.receive())
             run = functools.partial(_run, request, door)
-            process = LimitedProcess(request["limits"], run, {}, [door], is_alone)
+            process = LimitedProcess(request["limits"], run, {}, [door.fileno()], is_alone)
+            door.close()
             with process:
                 has_ended = process.watch(requests.fileno())
             requests.receive()
@@ -52,11 +53,12 @@ def main() -> None:
                 break
 
 
-def _run(request: dict[str, Any], door: int, _outputs: Mapping[str, int]) -> None:
+def _run(request: dict[str, Any], door: socket.socket, _outputs: Mapping[str, int]) -> None:
     """Serve the script's end of the door, in a process of its own."""
-    if door != DOOR:
-        os.dup2(door, DOOR, inheritable=False)
-        os.close(door)
+    given = door.detach()
+    if given != DOOR:
+        os.dup2(given, DOOR, inheritable=False)
+        os.close(given)
     open_to_itself()
     random.seed(request["random"])
     np.random.seed(request["random"] % 2**32)

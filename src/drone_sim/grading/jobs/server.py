@@ -11,6 +11,7 @@ import gc
 import json
 import os
 import signal
+import socket
 from collections.abc import Iterator
 from multiprocessing.connection import Connection
 from multiprocessing.reduction import recv_handle
@@ -36,19 +37,19 @@ class Requests:
         os.dup2(nothing, 0)
         os.close(nothing)
 
-    def __iter__(self) -> Iterator[tuple[dict[str, Any], int]]:
-        """Say that it is ready, and give each request, with one end of the connection between judge and script."""
+    def __iter__(self) -> Iterator[tuple[dict[str, Any], socket.socket]]:
+        """Say that it is ready, and give each request, with one end of the connection between judge and script.
+
+        Who has forked the process that the end is for closes it: the other end is to hear when that process is gone.
+        """
         gc.collect()
         gc.freeze()  # a fork that counts references copies fewer pages
         with contextlib.suppress(*GONE):
             self._connection.send_bytes(READY)
             while self._connection.poll(_IDLE):
                 request = json.loads(self._connection.recv_bytes())
-                door = recv_handle(self._connection)
-                try:
+                with socket.socket(fileno=recv_handle(self._connection)) as door:
                     yield request, door
-                finally:
-                    os.close(door)
 
     def fileno(self) -> int:
         """Return what is readable where there is more to receive, or the input has ended."""

@@ -63,6 +63,7 @@ class SimulationEnd:
         self._items: deque[list[Any]] = deque()  # that have come, and are not carried out
         self._numbers = 0
         self.why_closed = ""  # in one line; '' while it is open
+        self.is_gone = False  # whether the script's process has ended, or hears nothing
         self.objects: ObjectTree | None = None
         self.is_quiet: Callable[[], bool] = lambda: False
 
@@ -232,6 +233,7 @@ class ScriptThere:
         except TimeoutError:
             self._end(said, f"did not return after {self._limit.seconds:g} s (script_time_limit)")
         except Disconnected:
+            self._door.is_gone = True
             self._end(said, "its process has ended")
         except NoMessage as error:
             self._end(said, f"its process has sent what is no message: {error}")
