@@ -12,10 +12,17 @@ from playwright.sync_api import sync_playwright
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test" / "web"))
 from cockpit_page import STARTED, switch_camera, wait_for
 from launched import launched
+from scene_builder import Builder
 
 LARGE, TABLET, PHONE = ({"width": x, "height": y} for x, y in ((1440, 900), (820, 1180), (390, 844)))  # px
 TOUCH = {"has_touch": True, "is_mobile": True}
 PATIENCE = 60_000  # ms, without a GPU
+GATES = (  # models of a scene that is built, where they stand (m), and how they are turned (degrees)
+    ("Quadricopter", -0.8, 0.0, 0),
+    ("Landing pad", 0.2, -1.2, 0),
+    ("Table", 1.6, 1.6, 30),
+    ("Gate", 1.5, -0.4, -15),
+)
 FLIGHT, SETTLED = 2500, 3000  # ms
 
 
@@ -42,6 +49,19 @@ def task(page: Any) -> None:
     page.get_by_role("button", name="Plots").click()
 
 
+def build(page: Any) -> None:
+    """The scene while it is built: another gate has been dropped, and is selected."""
+    page.locator("#toggle").click()
+    builder = Builder(page)
+    builder.menu("Scene file", "New")
+    builder.row("Drone").wait_for(state="detached")
+    for model, x, y, turn in GATES:
+        builder.drop(model, [x, y, 0])
+        builder.write(X=x, Y=y, Gamma=turn)
+    page.get_by_role("searchbox", name="Find a model").fill("")
+    page.locator("#models").evaluate("one => one.scrollTo(620, 0)")
+
+
 def just_fly(page: Any) -> None:
     """The scene alone."""
 
@@ -50,6 +70,7 @@ def just_fly(page: Any) -> None:
 PICTURES: dict[str, tuple[Callable[[Any], None], dict[str, Any], bool]] = {
     "cockpit_start": (start, {"viewport": LARGE}, False),
     "cockpit": (stage, {"viewport": LARGE}, True),
+    "cockpit_build": (build, {"viewport": LARGE}, True),
     "cockpit_task": (task, {"viewport": LARGE, "color_scheme": "dark"}, True),
     "cockpit_tablet": (just_fly, {"viewport": TABLET, **TOUCH}, True),
     "cockpit_phone": (just_fly, {"viewport": PHONE, **TOUCH}, True),

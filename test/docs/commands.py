@@ -52,6 +52,8 @@ NOT_RUN = {  # with the reason
     "rosrun drone_sim joy_teleop": GAMEPAD,
     "rosrun drone_sim joy_teleop _device:=/dev/input/js1 _drone:=drone2 _axes/vx/scale:=2": GAMEPAD,
     "rosrun drone_sim joy_teleop _config:=$PWD/my_pad.yaml": GAMEPAD,
+    """rosservice call /drone_sim/edit_scene "'{\\"edit\\": [{\\"do\\": \\"add_model\\", \\"model\\": \\"gate\\", """
+    """\\"position\\": [3, 0, 0]}]}'\"""": "test/ros/toolbar.test edits so; the numbers depend on what was done",
     "ROS_NAMESPACE=/drone/stereo rosrun stereo_image_proc stereo_image_proc": ANOTHER,
     "rostopic hz /drone/stereo/points2": ANOTHER,
     "python3 try_cone.py": EXTENDING,

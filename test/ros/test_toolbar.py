@@ -14,6 +14,7 @@ import rospy
 import rostest
 import trimesh
 import yaml
+from diagnostic_msgs.srv import AddDiagnostics
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped, WrenchStamped
 from listening import Listener, connected
 from nav_msgs.msg import Odometry
@@ -284,6 +285,38 @@ class Toolbar(unittest.TestCase):
         self.scene.write_text("object: []\n")
         said = self.call("load_scene", expected=False)
         self.assertIn("parameter object: unknown key; known are collections, datum, drone, floor, gravity", said)
+
+    def test_the_scene_is_edited_by_two_at_once(self):
+        self.call("stop")
+        told = Listener("~scene_objects", String)
+
+        def names(_):
+            rows = {}
+            for said in (json.loads(message.data) for message in told.messages):
+                rows = {} if said["since"] is None else rows
+                rows.update((row["handle"], row["name"]) for row in said["objects"])
+                for handle in said["gone"]:
+                    rows.pop(handle)
+            return {*rows.values()} >= {"Gate", "Mark", "Goal"}
+
+        one, other = (rospy.ServiceProxy("~edit_scene", AddDiagnostics) for _ in range(2))
+        gate = {"do": "add_model", "model": "gate", "position": [3, 0, 0]}
+        mark = {"do": "add", "objects": [{"name": "Mark", "kind": "dummy"}]}
+        goal = {"do": "add", "objects": [{"name": "Goal", "kind": "dummy"}]}
+        edits = [(one, [gate]), (other, [mark]), (other, [goal])]
+        threads = [threading.Thread(target=ask, args=(json.dumps({"edit": edit}),)) for ask, edit in edits]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        told.wait_for(names, after=0)
+        refused = one(json.dumps({"edit": [{"do": "remove", "objects": ["Gat"]}]}))
+        self.assertFalse(refused.success)
+        self.assertIn("near names are Gate", refused.message)
+        self.assertIn("no JSON", other("{").message)
+        self.assertEqual(json.loads(one(json.dumps({"save": str(self.scene)})).message)["file"], str(self.scene))
+        self.assertEqual(rospy.get_param("~scene_file"), str(self.scene))
+        told.close()
 
     def test_rviz_sees_the_objects_and_where_they_go(self):
         trimesh.creation.box().export(str(self.scene.parent / "one.stl"))

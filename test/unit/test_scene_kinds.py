@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.object_tree import PARENT, WORLD
@@ -365,7 +366,12 @@ DOCS = (Path(__file__).parents[2] / "docs/scenes.md").read_text(encoding="utf-8"
 def test_the_examples_of_the_docs_load(simulate):
     examples = re.findall(r"^```yaml\n(.*?)^```", DOCS, re.S | re.M)
     entries = ["".join(line for line in one.splitlines(True) if "file:" not in line) for one in examples]
-    objects = "objects:\n" + "".join(one.partition("objects:")[2].partition("\n")[2] for one in entries)
-    simulation = simulate(objects)
-    assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way"} <= set(simulation.context.objects.names)
+    said = [yaml.safe_load(one) for one in entries]
+    objects = [entry for one in said for entry in one.get("objects", [])]
+    vehicles = next(one["vehicles"] for one in said if "vehicles" in one)
+    simulation = simulate(yaml.safe_dump({"objects": objects, "vehicles": vehicles}))
+    names = set(simulation.context.objects.names)
+    assert {"Crate", "Hinge", "Gauge", "Sonar", "Watch", "Way", "Ball", "Door", "Aim"} <= names
+    assert "Quadricopter_floorCamera" not in names
+    assert "floor" not in simulation.vehicles["drone"].cameras
     simulation.step()

@@ -84,6 +84,30 @@ def test_every_shape_is_read_drawn_and_hit(write, simulate, renderer, shape, mas
     assert simulation.world.state(ball).position[2] == pytest.approx(0.65, abs=0.03), "it lies on top of it"
 
 
+def test_what_rebounds_and_what_slides(write, simulate):
+    ball = "shape: sphere, size: [0.1], mass: 1"
+    box = "shape: box, size: [0.2, 0.2, 0.2], mass: 1"
+    simulation = simulate(
+        write(
+            f"objects:\n- {{name: Rebounds, {ball}, position: [3, 0, 1.1], restitution: 0.8}}\n"
+            f"- {{name: Lies, {ball}, position: [4, 0, 1.1]}}\n"
+            f"- {{name: Slides, {box}, position: [0, 3, 0.1], friction: 0.05}}\n"
+            f"- {{name: Stops, {box}, position: [0, 4, 0.1]}}\n"
+        )
+    )
+    tree, world = simulation.context.objects, simulation.world
+    for name in ("Slides", "Stops"):
+        world.set_velocity(tree[tree.handle(name)].number, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    places = []
+    for _ in range(18):
+        simulation.step()
+        places.append({name: tree.matrix(tree.handle(name)) for name in ("Rebounds", "Lies", "Slides", "Stops")})
+    assert max(one["Rebounds"][11] for one in places[10:]) == pytest.approx(0.1 + 0.64, abs=0.03)
+    assert max(one["Lies"][11] for one in places[10:]) == pytest.approx(0.1, abs=0.01)
+    assert places[-1]["Slides"][3] > 0.6
+    assert places[-1]["Stops"][3] < 0.1
+
+
 def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     objects = "\n".join(f"  - {SHAPES[shape] % (2 * n, n % 2)}" for n, shape in enumerate(SHAPES, start=1))
     look = "{name: A, shape: box, size: [1, 2, 3], position: [1, -9, 2], rpy: [0.1, 0.2, 0.3], color: [1, 0, 0, 0.5]}"

@@ -3,8 +3,10 @@
 import os
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from drone_sim.files import yaml_files
+from drone_sim.files import yaml_files, yaml_text
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 
@@ -96,3 +98,48 @@ def test_what_is_no_file_is_not_kept_open(tmp_path):
         with pytest.raises(yaml_files.YamlError):
             yaml_files.read(tmp_path / name)
     assert len(os.listdir("/proc/self/fd")) == before
+
+
+WRITTEN = """\
+# above
+floor:            # wide
+  size: 20.0      # enough
+  # and more
+  edge: true
+defaults: &own {mass: 2, color: [1, 0, 0]}
+objects:
+- name: A   # first
+  position: &here [0, 0, 1]
+  size: [1,
+         2]
+# before B
+- {name: B, size: [0.2], position: *here}   # second
+-   name: "C: d"
+    <<: *own
+
+    position: *here
+  # below C
+# the end
+"""
+ITEM = {"name": "New", "parts": [{"size": 1.5}, {"size": [2, "a: b"]}], "on": True, "off": None}
+VALUES = st.sampled_from([1, 2.5, "x: y", None, [1, 2], {"a": {"b": 1}}, [ITEM], {}])
+
+
+@given(
+    keys=st.dictionaries(st.sampled_from(["floor", "defaults", "new"]), VALUES),
+    floor=st.dictionaries(st.sampled_from(["size", "edge", "tile"]), VALUES),
+    stay=st.lists(st.sampled_from([0, 1, 2]), unique=True).map(sorted),
+    changes=st.dictionaries(st.sampled_from(["name", "position", "size", "mass", "more"]), VALUES),
+    gone=st.sampled_from(["name", "position", "size", "none"]),
+    added=st.integers(0, 2),
+)
+def test_a_text_says_what_it_is_to_say_whatever_that_is(keys, floor, stay, changes, gone, added):
+    said = yaml_files.parse(WRITTEN)
+    items = [said["objects"][index] for index in stay]
+    for one in items[:1]:
+        one.update(changes)
+        one.pop(gone, None)
+    new = {**said, "floor": {**said["floor"], **floor}, **keys, "objects": [*items, *[ITEM] * added]}
+    made = yaml_text.YamlText(WRITTEN).rewritten(new, {"objects": [*stay, *[None] * added]})
+    assert yaml_text.says(made, new), made
+    assert "# above\n" in made

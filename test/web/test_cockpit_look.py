@@ -54,7 +54,7 @@ LOOK = """([contrast, target]) => {
 def test_text_can_be_read_and_buttons_can_be_hit(cockpit, browser, scheme):
     with open_page(cockpit, browser, color_scheme=scheme, viewport={"width": 1440, "height": 900}) as page:
         panel = Panel(page)
-        for name in ("View", "Cameras", "Plots", "Tune", "Log"):
+        for name in ("View", "Cameras", "Plots", "Tune", "Log", "Edit"):
             panel.show(name)
             page.locator(f"#{name.lower()}-panel").wait_for()
             assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []

@@ -78,7 +78,7 @@ def test_a_key_flies_while_a_switch_has_the_focus(cockpit, opened):
     wait_until(opened, lambda: not picture.count())
 
 
-def test_three_doors_and_the_way_back(cockpit, browser):
+def test_the_doors_and_the_way_back(cockpit, browser):
     with open_page(cockpit, browser, started=False) as page:
         doors = page.get_by_role("dialog", name="drone_sim")
         assert doors.is_visible() and not page.locator("#go-on").is_visible()
@@ -95,6 +95,10 @@ def test_three_doors_and_the_way_back(cockpit, browser):
         doors.get_by_role("button", name="Just fly").click()
         wait_until(page, lambda: page.locator("#scene").bounding_box()["width"] == 1280)
         assert not page.locator("#editor").is_visible()
+        page.click("#home")
+        doors.get_by_role("button", name="Build").click()
+        wait_until(page, lambda: page.get_by_role("treeitem").count() > 1)
+        page.click("#fold-side")
         page.reload()
         ready(page)
         assert not doors.is_visible(), "it is answered"

@@ -112,6 +112,7 @@ const panels = new Panels({
   scene: () => scene,
   go: { tutorial: () => first(false), tasks: () => first(true) },
   open,
+  goTo: (file, line) => scripts.goTo(file, line).catch((error) => panels.notice.say(error.message, true)),
 });
 const lesson = new Lesson(
   {

@@ -14,7 +14,7 @@ import { completion } from "./completion.js";
 const QUIET = 500; // ms without a key before the text is checked
 const FLOWN = "flight"; // the source of a failure while it flew
 
-const colors = HighlightStyle.define([
+export const colors = HighlightStyle.define([
   { tag: [tags.keyword, tags.operatorKeyword, tags.modifier], color: "var(--code-keyword)" },
   { tag: [tags.comment, tags.meta], color: "var(--code-comment)" },
   { tag: [tags.string, tags.special(tags.string)], color: "var(--code-string)" },
@@ -23,6 +23,17 @@ const colors = HighlightStyle.define([
   { tag: [tags.className, tags.definition(tags.className)], color: "var(--code-class)" },
   { tag: tags.invalid, color: "var(--bad)" },
 ]);
+
+// Puts another text there, as one change; what is the same stays, and the cursor with it. `annotations` are the change's.
+export function fillWith(view, text, annotations = []) {
+  const before = view.state.doc.toString();
+  const most = Math.min(text.length, before.length);
+  let from = 0;
+  while (from < most && text[from] === before[from]) from++;
+  let end = 0;
+  while (end < most - from && text[text.length - 1 - end] === before[before.length - 1 - end]) end++;
+  view.dispatch({ changes: { from, to: before.length - end, insert: text.slice(from, text.length - end) }, annotations });
+}
 
 export const isLua = (script) => script.endsWith(".lua");
 
@@ -95,14 +106,8 @@ export class Editor {
     const before = this.text;
     this.mark(null);
     if (text === before) return;
-    const most = Math.min(text.length, before.length);
-    let from = 0;
-    while (from < most && text[from] === before[from]) from++;
-    let end = 0;
-    while (end < most - from && text[text.length - 1 - end] === before[before.length - 1 - end]) end++;
     this.filling = true;
-    const insert = text.slice(from, text.length - end);
-    this.view.dispatch({ changes: { from, to: before.length - end, insert } });
+    fillWith(this.view, text);
     this.filling = false;
   }
 

@@ -1,5 +1,6 @@
 // Toolbar, side panels, start page and message line: everything of the page but the scene and the editor.
 import { Board } from "./board.js";
+import { Build } from "./edit/build.js";
 import { Cameras } from "./cameras.js";
 import { at, icon } from "./dom.js";
 import { keep, kept } from "./kept.js";
@@ -16,8 +17,8 @@ const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // where the 
 
 export class Panels {
   // `socket()` and `scene()` are there once the page is; `go` has what the doors of the start page do, `open(script)`
-  // opens one.
-  constructor({ socket, scene, go, open }) {
+  // opens one, `goTo(file, line)` a file's line.
+  constructor({ socket, scene, go, open, goTo }) {
     for (const element of document.querySelectorAll("[data-icon]")) element.prepend(icon(element.dataset.icon));
     this.board = new Board();
     this.notice = new Notice(at("notice"));
@@ -28,8 +29,13 @@ export class Panels {
     this.tune = new Tune(this.board, this.ask, this.notice);
     this.log = new Log(this.board);
     this.view = new View(scene());
+    const openScript = (file) => (file.includes("/") ? goTo(file, 1) : open(`built-in/${file}.py`));
+    const ofScript = { openScript, showScript: (is) => this.showScript(is) };
+    this.build = new Build(scene(), this.ask, this.notice, ofScript);
     this.side = new Side((panel) => {
       this.plots.show(panel === "plots");
+      this.edits = panel === "edit";
+      if (this.isConnected) this.build.turn(this.edits); // else once it is
       if (panel === "view") this.view.list();
     });
     at("why").onclick = () => this.side.open("log");
@@ -37,7 +43,7 @@ export class Panels {
     this.board.on("master", (answers) => this.master(answers));
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
     this.showScript(!TOUCH.matches);
-    const doors = { tutorial: () => this.enter(go.tutorial), tasks: () => this.enter(go.tasks), fly: () => this.showScript(false) };
+    const doors = { tutorial: () => this.enter(go.tutorial), tasks: () => this.enter(go.tasks), fly: () => this.showScript(false), build: () => this.enterBuild() };
     this.start = new Start(doors, (script) => this.enter(() => open(script)));
     this.keys();
   }
@@ -45,6 +51,11 @@ export class Panels {
   enter(go) {
     this.showScript(true);
     go();
+  }
+
+  enterBuild() {
+    this.showScript(false);
+    this.side.open("edit");
   }
 
   showScript(is) {
@@ -83,6 +94,9 @@ export class Panels {
     const whole = await this.ask("panel");
     this.version = Math.max(this.version ?? 0, whole.version);
     this.board.take(whole);
+    this.isConnected = true;
+    this.build.turn(this.edits);
+    this.build.edit.connected();
     this.start.load();
     this.log.begin(whole.lines);
   }
@@ -94,6 +108,7 @@ export class Panels {
       this.board.take(message);
     }
     if (message.log) this.log.add(message.log);
+    this.build.told(message);
     if (message.pictures) this.cameras.show(message.pictures);
   }
 
@@ -101,6 +116,7 @@ export class Panels {
     this.version = undefined; // another node counts anew
     this.board.take({ panel: { status: "no simulation", flight: "" }, version: Infinity });
     this.board.begin();
+    this.build.edit.lost();
   }
 
   master(answers) {

@@ -29,7 +29,7 @@ export class PageSocket {
     const waiting = this.waiting.get(message.id);
     if (!waiting) return this.onTell(message);
     this.waiting.delete(message.id);
-    if (message.error) waiting.reject(Object.assign(new Error(message.error), { kind: message.kind }));
+    if (message.error) waiting.reject(Object.assign(new Error(message.error), { kind: message.kind, line: message.line }));
     else waiting.resolve(message);
   }
 

@@ -13,8 +13,9 @@ def sysCall_init():
     self.heli = sim.getObjectHandle("Drone")
     self.target = sim.getObjectHandle("DronePosition")
     sim.setObjectParent(self.target, -1, True)
-    self.trackBase = sim.getObjectHandle("Track_base")
-    sim.setObjectParent(self.trackBase, -1, True)
+    self.trackBase = sim.getObjectHandle("Track_base@silentError")  # which V-REP's own quadricopter has not
+    if self.trackBase != -1:
+        sim.setObjectParent(self.trackBase, -1, True)
     self.propellerScripts = [sim.getScriptHandle(f"Quadricopter_propeller_respondable{i}") for i in (1, 2, 3, 4)]
     self.thrust_gravity = THRUST_GRAVITY[sim.getScriptSimulationParameter(sim.handle_self, "propeller_law")]
     self.alphaE = self.betaE = 0  # height of the tips of the base's y and x axes over its origin
@@ -65,7 +66,9 @@ def rotational_control():
 
 
 def sysCall_sensing():
-    """Move the track frame, which the tracking camera hangs on."""
+    """Move the track frame, if there is one, which the tracking camera hangs on."""
+    if self.trackBase == -1:
+        return
     orientation = sim.getObjectOrientation(self.d, -1)
     sim.setObjectPosition(self.trackBase, -1, sim.getObjectPosition(self.d, -1))
     sim.setObjectOrientation(self.trackBase, -1, [0, 0, orientation[2]])

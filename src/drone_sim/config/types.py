@@ -22,6 +22,7 @@ from pydantic import (
     PlainSerializer,
     PlainValidator,
     Tag,
+    WrapValidator,
 )
 
 from drone_sim.files import yaml_files
@@ -208,7 +209,6 @@ def _printable(text: str) -> str:
 
 
 Label = Annotated[str, Field(max_length=MAX_NAME), AfterValidator(_printable)]
-FileName = Annotated[str, Field(max_length=MAX_FILE_NAME), AfterValidator(_printable)]
 
 
 class FoundFile(str):
@@ -221,6 +221,16 @@ class FoundFile(str):
         """Return the name by which a file in `folder` can name it: as it was given, where that leads to it."""
         absolute = self.given.startswith(("package://", "~", "/"))
         return self.given if absolute or Path(self.folder or ".").resolve() == folder.resolve() else str(self)
+
+
+def _as_found(value: Any, check: Callable[[Any], str]) -> str:
+    checked = check(value)
+    return value if isinstance(value, FoundFile) else checked  # which knows how it was given
+
+
+FileName = Annotated[
+    str, Field(max_length=MAX_FILE_NAME), AfterValidator(_printable), WrapValidator(_as_found), PlainSerializer(str)
+]
 
 
 def named_in(folder: Path, name: str) -> FoundFile:

@@ -71,6 +71,11 @@ def parse(text: str) -> Any:
         raise YamlError(f"{' '.join(str(error).split()):.200}") from None
 
 
+def compose(text: str) -> Any:
+    """Return the nodes of a text that `parse` reads, with where they begin and end; None for an empty one."""
+    return yaml.compose(text, Loader=_Loader)
+
+
 class Depth(NamedTuple):
     """How far the way to a value leads in a file, and the line (from 1) where it ends."""
 
@@ -84,7 +89,7 @@ class YamlLines:
     def __init__(self, text: str):
         """Take a text that `parse` reads; of any other nothing is found."""
         try:
-            self._root = yaml.compose(text, Loader=_Loader)
+            self._root = compose(text)
         except (yaml.YAMLError, RecursionError):
             self._root = None
 

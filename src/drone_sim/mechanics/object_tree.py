@@ -36,6 +36,12 @@ class Handles(NamedTuple):
     by_name: Mapping[str, int] = {}
     next: int = 0
 
+    def with_those_of(self, before: Handles) -> Handles:
+        """Return these, with those of objects that are not there any more: they may come again."""
+        taken = {*self.by_name.values()}
+        gone = {name: handle for name, handle in before.by_name.items() if handle not in taken}
+        return Handles({**gone, **self.by_name}, max(self.next, before.next))
+
 
 NO_HANDLES = Handles()
 
@@ -85,12 +91,19 @@ class ObjectTree:
         handle = self._kept.get(added.name, self._next)
         if handle == self._next or handle in self._objects:
             handle, self._next = self._next, self._next + 1
+        is_late = handle < next(reversed(self._objects), handle)
         self._objects[handle] = added
+        if is_late:  # it has come again: its place among its siblings is what it was
+            self._objects = dict(sorted(self._objects.items()))
         self._handles.update((one, handle) for one in added.names)
         self._copied.update(plain(one) for one in added.names if plain(one) != one)
         if added.is_loose:
             self._loose.append(added)
         return handle
+
+    def reserve(self, handles: Mapping[str, int]) -> None:
+        """Let objects that come under these names have these handles again, where nothing else has them."""
+        self._kept = {**self._kept, **handles}
 
     def remove(self, handles: Collection[int]) -> None:
         """Take objects out of the tree; others that hang on them stay where they are, in the world."""

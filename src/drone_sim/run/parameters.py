@@ -5,6 +5,7 @@ No value is defined here: config/drone.yaml holds every default, this module say
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -31,6 +32,7 @@ from drone_sim.config.types import (
 )
 from drone_sim.files import yaml_files
 from drone_sim.files.resources import package_path, resolve
+from drone_sim.files.yaml_files import YamlLines
 from drone_sim.forces.weather import WeatherParameters
 from drone_sim.importing.cache import imported_scene
 from drone_sim.message_text import MAX_NAME, shown
@@ -145,7 +147,21 @@ class Parameters(PaceParameters, EquipmentParameters):
 
         '' is the scene that was given without a file.
         """
-        found = _in_scene(self._given, file)
+        return self._at_the_same_step(_in_scene(self._given, file), file)
+
+    def with_content(self, content: Mapping[str, Any], folder: Path, lines: YamlLines | None = None) -> Parameters:
+        """Return the parameters in a scene of this content, such as a file in `folder` could have.
+
+        Raises ParameterError, with where it stands in the `lines` of its text.
+        """
+        said = scene_parameters.from_content(copy.deepcopy(dict(content)), folder)
+        return self._at_the_same_step(_checked(self._given, self.scene_file, said, lines=lines), "")
+
+    def in_file(self, file: str) -> Parameters:
+        """Return the same parameters, of a scene that has another file from now on."""
+        return self.model_copy(update={"scene_file": file})
+
+    def _at_the_same_step(self, found: Parameters, file: str) -> Parameters:
         if found.time_step != self.time_step:
             said = f"a simulation that runs with {self.time_step:g} s goes on with that"
             raise ParameterError(f"{file or 'the scene'}: time_step = {found.time_step:g}: {said}", ("time_step",))
@@ -276,10 +292,13 @@ def _imported(file: str) -> str:
         raise ParameterError(str(error), ("scene_file",), shown(file)) from None
 
 
-def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str = "") -> Parameters:
+def _checked(
+    given: dict[str, Any], file: Any, scene: dict[str, Any], named: str = "", lines: YamlLines | None = None
+) -> Parameters:
     """Return the parameters with what the scene file says; `file` is its name, '' where there is none.
 
-    What is wrong may stand in the file `named`, which is the scene file or one laid over config/drone.yaml.
+    What is wrong may stand in the file `named`, which is the scene file or one laid over config/drone.yaml, or in the
+    `lines` of a scene's text.
     """
     nobody = scene.get("vehicles") == {}
     laid = {key: value for key, value in scene.items() if key != "vehicles"} if nobody else scene
@@ -289,7 +308,7 @@ def _checked(given: dict[str, Any], file: Any, scene: dict[str, Any], named: str
         found = problems(error, Parameters)
         own = [one for one in found if _is_given(one, given, scene)]  # what is only a vehicle's own is told at the top
         told = own or list(dict.fromkeys(one._replace(location=one.location[2:]) for one in found))
-        raise ParameterError.of(told, _in_file(told, named, bool(scene))) from None
+        raise ParameterError.of(told, _in_file(told, named, bool(scene), lines)) from None
     parameters._given = given
     parameters._in_scene_file = {key: scene[key] for key in scene_parameters.BESIDE if key in scene}
     if nobody and not parameters.vehicles:
@@ -310,11 +329,11 @@ def _is_given(problem: ParameterProblem, *sources: Mapping[str, Any]) -> bool:
     return False
 
 
-def _in_file(found: Sequence[ParameterProblem], file: str, is_scene: bool) -> str:
-    """Return what is wrong with the lines of a file that it stands in; '' where there is none."""
-    if not file:
+def _in_file(found: Sequence[ParameterProblem], file: str, is_scene: bool, lines: YamlLines | None) -> str:
+    """Return what is wrong with the lines of a file, or of a text, that it stands in; '' where there is none."""
+    if not file and lines is None:
         return ""
-    lines = yaml_files.lines(resolve(file))
+    lines = lines or yaml_files.lines(resolve(file))
     placed = []
     for problem in found:
         inner = scene_parameters.problem_in_file(problem) if is_scene else problem

@@ -88,6 +88,7 @@ class Simulation:
             backend=backend,
             load_script=load_script,
         )
+        self.scenes_read = 0  # how often a scene file, or none, has taken the last one's place
         self._handles = NO_HANDLES  # of the objects as the scene began
         self._is_arranged = False  # whether that is what was made of it, not what the scene file says
         self.run = 0  # number of the run: another one after every start and every stop
@@ -208,6 +209,19 @@ class Simulation:
     def _read(self, scene_file: str) -> None:
         self._rebuild(self.parameters.in_scene(scene_file), NO_HANDLES)
         self._is_arranged = False
+        self.scenes_read += 1
+
+    def arrange(self, parameters: Parameters, rebuild: bool = True) -> None:
+        """While it is stopped: begin as these parameters say from now on, with the handles that objects have, or had.
+
+        Without `rebuild`, what stands there stays until then. Raises ParameterError and UrdfError, where all is as it
+        was.
+        """
+        if rebuild:
+            self._handles = self.context.objects.handles().with_those_of(self._handles)
+            self._rebuild(parameters, self._handles)
+        self.parameters = parameters
+        self._is_arranged = True
 
     def load_scripts(self) -> None:
         """Load the scripts and run their init, of a simulation that was built without. Raises ScriptError."""
@@ -253,6 +267,10 @@ class Simulation:
     def _clean_up(self) -> None:
         was_running, self.running = self.running, False
         self._setup.end_scripts(clean_up=was_running)
+
+    def read_at_start(self) -> None:
+        """Have the next start read the scene file, whatever was made of the scene while it was stopped."""
+        self._is_arranged = self.scene.is_changed = False
 
     # ---- stepping
 

@@ -62,6 +62,8 @@ def build(
 
 
 def _make_seem(world: World, one: EntryParameters, body: int, link: int) -> None:
+    if isinstance(one, ObjectParameters) and (one.friction, one.restitution) != (1.0, 0.0):
+        world.set_material(body, link, one.friction, one.restitution)
     if isinstance(one, ObjectParameters) and not one.respondable:
         world.collision_filter.let_everything_pass(body, link)
     if isinstance(one, ObjectParameters) and not one.visible:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from drone_sim.config.types import Angles, Checked, Label, ParameterError, Point, Switch
@@ -11,6 +12,8 @@ from drone_sim.mechanics.frames import Matrix, from_rpy, to_quaternion
 from drone_sim.mechanics.joint import FORCE, POSITION, SPHERICAL, VELOCITY, Joint
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.mechanics.state import Pose
+
+_STANDS = 1e-7  # m, by which what has not been moved may seem to be elsewhere
 
 
 class Place(NamedTuple):
@@ -73,15 +76,25 @@ def place_of(one: SceneObject) -> dict[str, Any]:
 
 
 def place_at(matrix: Matrix, parent: str) -> dict[str, Any]:
-    """Return the keys of an entry that say where it is in the frame of its parent."""
-    turn = [angle + 0.0 for angle in frames.to_rpy(matrix)]  # without a -0.0
-    return {"position": list(frames.position(matrix)), "rpy": turn, "parent": parent}
+    """Return the keys of an entry that say where it is in the frame of its parent, to 1e-9 m and rad."""
+    position, turn = (
+        [round(one, 9) + 0.0 for one in three] for three in (frames.position(matrix), frames.to_rpy(matrix))
+    )
+    return {"position": position, "rpy": turn, "parent": parent}  # without a -0.0
+
+
+def stands_at(entry: EntryParameters, place: Mapping[str, Any]) -> bool:
+    """Tell whether an entry says already, to 1e-7 m and 1e-7 of a turn's matrix, what `place_of` says."""
+    if entry.parent != place["parent"]:
+        return False
+    now = from_rpy(place["position"], place["rpy"])
+    return all(abs(one - other) < _STANDS for one, other in zip(entry.local, now))
 
 
 def placed(entry: EntryParameters, parent: str, matrix: Matrix) -> EntryParameters:
     """Return an entry in another place, in the frame of its parent."""
-    place = {"parent": parent, "position": frames.position(matrix), "rpy": tuple(frames.to_rpy(matrix))}
-    return entry.model_copy(update=place)
+    place = place_at(matrix, parent)
+    return entry.model_copy(update={"parent": parent, **{key: tuple(place[key]) for key in ("position", "rpy")}})
 
 
 def _joint(joint: Joint) -> dict[str, Any]:

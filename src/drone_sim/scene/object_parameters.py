@@ -47,13 +47,16 @@ class InertiaParameters(Checked):
 class ObjectParameters(EntryParameters):
     """A shape in the scene: what all have in common; each brings its own keys.
 
-    A mass of 0 stands still, and what is `static`, until a script lets it move.
+    A mass of 0 stands still, and what is `static`, until a script lets it move. Of two that touch, friction and
+    restitution are multiplied; the floor has 1 and 1.
     """
 
     mass: Mass = 0.0
     inertia: InertiaParameters | None = None
     static: Switch = False
     respondable: Switch = True
+    friction: Annotated[Finite, Within(0, 100)] = 1.0
+    restitution: Annotated[Finite, Within(0, 1)] = 0.0
     visible: Switch = True
     color: Color
     texture: OptionalFile = ""

@@ -40,9 +40,9 @@ class SceneOperations:
 
         `imported` returns the scene file that one of V-REP's is made into; it raises ValueError and OSError.
         """
+        self.folder = folder
         self._scene = scene
-        self._imported = imported
-        self._folder = folder
+        self.imported = imported
         self._scripts = scripts
 
     # ---- which there are
@@ -145,9 +145,9 @@ class SceneOperations:
         names = {one.name for one in entries}
         matrices = map(self._scene.tree.matrix, handles)
         copies = [one if one.parent in names else placed(one, "", at) for one, at in zip(entries, matrices)]
-        return self._add_named_anew(copies, [one for name, one in self._scene.scripts.items() if name in names])
+        return self.add_named_anew(copies, [one for name, one in self._scene.scripts.items() if name in names])
 
-    def _add_named_anew(
+    def add_named_anew(
         self, entries: Sequence[EntryParameters], scripts: Sequence[AttachedScriptParameters] = ()
     ) -> list[int]:
         """Add entries, and scripts on them, under their names, or, where one is taken, all of them as copies."""
@@ -157,8 +157,9 @@ class SceneOperations:
             names.append(next(name for name in free if name not in tree and name not in names))
             new.setdefault(one.name, names[-1])
         made = [
-            one.model_copy(update={"name": name, "alias": one.shown, "parent": new.get(one.parent, one.parent)})
+            one.model_copy(update={"name": name, "alias": alias, "parent": new.get(one.parent, one.parent)})
             for one, name in zip(entries, names)
+            for alias in ["" if one.shown == name else one.shown]
         ]
         on = [one.model_copy(update={"object": new[one.object]}) for one in scripts if new.get(one.object)]
         return self.add(made, on)
@@ -187,7 +188,7 @@ class SceneOperations:
         """Make a shape of each part of a compound; return their handles. Raises ValueError."""
         entry = self.entry(handle)
         parts = models.parted(entry, self._scene.tree.matrix(handle))
-        made = self._add_named_anew([entry_from({**one, "name": entry.name}) for one in parts])
+        made = self.add_named_anew([entry_from({**one, "name": entry.name}) for one in parts])
         self._move_script(entry.name, self._scene.tree[made[0]].name)
         self._inherit([handle], made[0])
         return made
@@ -206,15 +207,15 @@ class SceneOperations:
 
         Raises ValueError.
         """
-        model = models.read(models.inside(self._folder, name, ".ttm"), self._imported)
+        model = models.read(models.inside(self.folder, name, ".ttm"), self.imported)
         scripts = [script_from(one) for one in model.scripts]
         entries = [entry_from(one) for one in model.objects]
         name_shapes(entries)
-        return self._add_named_anew(entries, scripts)[0]
+        return self.add_named_anew(entries, scripts)[0]
 
     def save_model(self, handle: int, name: str) -> None:
         """Write an object and all that hangs on it into a file. Raises ValueError."""
-        path = models.inside(self._folder, name)
+        path = models.inside(self.folder, name)
         entries = [self.entry(one) for one in self.model(handle)]
         scripts = [self._scene.scripts[one.name] for one in entries if one.name in self._scene.scripts]
         models.write(path, [placed(entries[0], "", self._scene.tree.matrix(handle)), *entries[1:]], scripts)
@@ -248,12 +249,61 @@ class SceneOperations:
 
     def set_alias(self, handle: int, alias: str) -> None:
         """Give an object another alias, which its siblings may have, too. Raises ValueError."""
+        self.describe(handle, alias=alias)
+
+    def describe(self, handle: int, **values: Any) -> None:
+        """Give an object another `alias` or `category`, or let it be the base of a `model`. Raises ValueError."""
         index = self._index(handle)
         entry = self._scene.entries[index]
-        checked = changed(entry, {"alias": alias}).alias
+        checked = changed(entry, values)
         with self._changing(bodies=False):
-            self._scene.entries[index] = entry.model_copy(update={"alias": checked})
-        self._scene.objects[index].alias = checked or entry.name
+            self._scene.entries[index] = entry.model_copy(update={key: getattr(checked, key) for key in values})
+        described = self._scene.objects[index]
+        described.alias, described.is_model = checked.shown, checked.model
+
+    # ---- scripts on them
+
+    def attach_script(self, script: AttachedScriptParameters) -> None:
+        """Attach a script to an object, of a vehicle, too, in the place of the one that it has. Raises ValueError."""
+        scene = self._scene
+        scene.tree.handle(script.object)
+        if script.object not in scene.scripts and len(scene.scripts) >= MAX_SCRIPTS:
+            raise ParameterError(f"a scene has at most {MAX_SCRIPTS} scripts")
+        self.detach_script(script.object)
+        scene.scripts[script.object] = script
+        scene.is_changed = True
+        try:
+            self._scripts.attach([script.object])
+        except ParameterError:
+            del scene.scripts[script.object]
+            raise
+
+    def detach_script(self, name: str) -> None:
+        """Let an object have no script."""
+        if name in self._scene.scripts:
+            self._scripts.end([name])
+            del self._scene.scripts[name]
+            self._scene.is_changed = True
+
+    # ---- where they are
+
+    def put(self, handle: int, local: frames.Matrix) -> None:
+        """Put an object somewhere in the frame of its parent, one that a joint holds, too. Raises ValueError."""
+        scene, index = self._scene, self._index(handle)
+        moved = scene.tree[handle]
+        if not getattr(moved, "is_held", False) and moved.kind not in ("joint", "force_sensor"):
+            scene.tree.set_matrix(handle, PARENT, local)
+            scene.is_changed = True
+            return
+
+        def put() -> None:
+            if moved.body is None:
+                moved.local = local
+
+        with self._changing(change_tree=put):
+            scene.entries[index] = placed(self.entry(handle), scene.entries[index].parent, local)
+            scene.changed[index] += 1
+            self._hold_anew(moved)
 
     def set_parent(self, handle: int, parent: int, keep_in_place: bool) -> None:
         """Hang an object on another (-1: on nothing), as ObjectTree.set_parent does; a joint may hold it from now on.
@@ -301,7 +351,7 @@ class SceneOperations:
             moments = [one * values["mass"] / entry.mass for one in entry.inertia.moments]  # how it lies stays
             values["inertia"] = {"moments": moments}
             checked = changed(entry, values)
-        self._exchange({handle: entry.model_copy(update={key: getattr(checked, key) for key in values})})
+        self.exchange({handle: entry.model_copy(update={key: getattr(checked, key) for key in values})})
 
     def paint(self, handle: int, rgba: Sequence[float | None]) -> None:
         """Give a shape another color, all its parts; None among the numbers stays. Raises ValueError."""
@@ -351,7 +401,7 @@ class SceneOperations:
             for handle in entries:
                 m = tree[handle].matrix() if tree[handle].parent is None else tree.matrix(handle, PARENT)
                 places[handle] = (*m[:3], x * m[3], *m[4:7], y * m[7], *m[8:11], z * m[11])
-        self._exchange(entries)
+        self.exchange(entries)
         for handle in sorted(places, key=lambda one: levels(tree[one])):
             if not getattr(tree[handle], "is_held", False):
                 tree.set_matrix(handle, PARENT, places[handle])
@@ -365,8 +415,8 @@ class SceneOperations:
         index = self._index_of(self._scene.tree[handle])
         return (1.0, 1.0, 1.0) if index is None else self._scene.factors.get(index, (1.0, 1.0, 1.0))
 
-    def _exchange(self, entries: Mapping[int, EntryParameters]) -> None:
-        """Let other entries take the place of objects', whose names and places they have."""
+    def exchange(self, entries: Mapping[int, EntryParameters]) -> None:
+        """Let other entries take the place of objects', whose names and places they have. Raises ParameterError."""
         scene = self._scene
         indices = {handle: self._index(handle) for handle in entries}
         new = entries.values()

@@ -20,7 +20,7 @@ from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.bodies import CarriedBody, ShapeInWorld, ShapeObject, bodies_above
 from drone_sim.scene.building import Built
 from drone_sim.scene.chains import Chain
-from drone_sim.scene.entry import EntryParameters, Place, place_of
+from drone_sim.scene.entry import EntryParameters, Place, place_of, stands_at
 from drone_sim.scene.kinds.force_sensor import ForceSensor, ForceSensorParameters
 from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.kinds.kind import KindParameters
@@ -310,22 +310,34 @@ class Scene:
         """Return the keys of an entry that say where it is, what it hangs on, how a joint stands, what is static."""
         one, entry = self.objects[index], self.entries[index]
         values = place_of(one)
+        if stands_at(entry, values):  # its numbers are its author's
+            values.update(position=list(entry.position), rpy=list(entry.rpy))
         if isinstance(one, ShapeObject) and one.mass and not one.is_held:
             is_other = isinstance(entry, ObjectParameters) and one.is_static != entry.static
             values.update({"static": one.is_static} if is_other else {})
         return values
 
+    def entry_now(self, index: int) -> EntryParameters:
+        """Return an entry as it is now: itself, where it says that already."""
+        entry, now = self.entries[index], self.now(index).items()
+        values = {key: tuple(value) if isinstance(value, list) else value for key, value in now}
+        values = {key: value for key, value in values.items() if getattr(entry, key) != value}
+        return entry.model_copy(update=values) if values else entry
+
     def write_down(self, indices: Iterable[int]) -> None:
         """Let entries say where they are now."""
         for index in indices:
-            now = self.now(index).items()
-            values = {key: tuple(value) if isinstance(value, list) else value for key, value in now}
-            self.entries[index] = self.entries[index].model_copy(update=values)
+            self.entries[index] = self.entry_now(index)
 
     def write_down_joints(self) -> None:
         """Let entries say where they are now, where joints may be about to hold others than they do."""
         if any(isinstance(one, (JointParameters, ForceSensorParameters)) for one in self.entries.values()):
             self.write_down(self.entries)
+
+    def put_in_order(self) -> None:
+        """Let entries stand in the order of their objects' handles, as they came first."""
+        handles = {index: self.tree.handle(one.name) for index, one in self.entries.items()}
+        self.entries = dict(sorted(self.entries.items(), key=lambda pair: handles[pair[0]]))
 
     def parameters_now(self) -> SceneParameters:
         """Return what a file would say of the scene as it is now."""

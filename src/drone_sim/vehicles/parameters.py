@@ -34,7 +34,7 @@ from drone_sim.sensors import AnySensor
 from drone_sim.sensors.camera_parameters import MAX_CAMERAS, CameraParameters
 from drone_sim.sensors.sensor import Failure
 from drone_sim.sensors.validation import check_sensors
-from drone_sim.vehicles.quadricopter_objects import OWN_NAMES, ObjectPlace
+from drone_sim.vehicles.quadricopter_objects import OWN_NAMES, REMOVABLE, ObjectPlace
 from drone_sim.vehicles.radio_link import LinkParameters
 from drone_sim.vehicles.types import TYPES
 
@@ -99,10 +99,12 @@ class FaultParameters(Checked):
                 raise ParameterError(said, ("faults", "sensors", name))
 
 
-def _own(places: Mapping[str, ObjectPlace]) -> Mapping[str, ObjectPlace]:
-    for name in places:
+def _own(places: Mapping[str, ObjectPlace | None]) -> Mapping[str, ObjectPlace | None]:
+    for name, place in places.items():
         if name not in OWN_NAMES:
             raise ValueError(f"'{name}' is no object of a vehicle; {near_names(name, OWN_NAMES)}")
+        if place is None and name not in REMOVABLE:
+            raise ValueError(f"'{name}': a vehicle can be without {', '.join(REMOVABLE)} alone")
     return places
 
 
@@ -126,7 +128,7 @@ class PlaceParameters(Checked):
     yaw: Angle
     tilt: Annotated[tuple[Angle, Angle], Field(description="2 numbers, [roll, pitch] in rad")] = (0.0, 0.0)
     suffix: Annotated[int, Within(NO_SUFFIX, 1_000_000)] | None = None
-    objects: Annotated[dict[Label, ObjectPlace], AfterValidator(_own)] = Field(default_factory=dict)
+    objects: Annotated[dict[Label, ObjectPlace | None], AfterValidator(_own)] = Field(default_factory=dict)
 
 
 class DroneParameters(PlaceParameters):
@@ -194,10 +196,17 @@ class VehicleParameters(EquipmentParameters, PlaceParameters):
 
 
 def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an entry of `vehicles` with what it leaves out, from the keys at the top. Raises ParameterError."""
+    """Return an entry of `vehicles` with what it leaves out, from the keys at the top; without cameras that are null.
+
+    Raises ParameterError.
+    """
     if "name" in entry:
         raise ParameterError("unknown key; the entry's own key is its name", ("vehicles", name, "name"))
     drone = everything.get("drone")
     base = {key: everything[key] for key in EquipmentParameters.model_fields if key in everything}
     place = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}
-    return {**merged({**base, **place}, entry), "name": name}
+    whole = merged({**base, **place}, entry)
+    for key in ("cameras", "sensors"):
+        if isinstance(whole.get(key), Mapping):
+            whole[key] = {one: value for one, value in whole[key].items() if value is not None}
+    return {**whole, "name": name}

@@ -89,15 +89,23 @@ OWN_NAMES = (
 )  # of every vehicle
 
 
+REMOVABLE = (FLOOR_CAMERA, FRONT_CAMERA, TRACK_BASE)  # without which a vehicle flies
+
+
 class QuadricopterObjects:
     """Puts the objects of one vehicle into the tree, all under names with its suffix."""
 
     def __init__(
-        self, objects: ObjectTree, suffix: str, handles: list[int], places: Mapping[str, ObjectPlace] | None = None
+        self,
+        objects: ObjectTree,
+        suffix: str,
+        handles: list[int],
+        places: Mapping[str, ObjectPlace | None] | None = None,
     ):
         """Take the tree, '' or '#0' and so on, and the list to which every object's handle is added.
 
-        `places` says of some objects, by their names here, how else they are called and where they are.
+        `places` says of some objects, by their names here, how else they are called and where they are, or None of
+        those that are not there.
         """
         self._objects = objects
         self._suffix = suffix
@@ -148,6 +156,8 @@ class QuadricopterObjects:
         kind: str = "",
     ) -> None:
         place = self._places.get(name, NOWHERE_ELSE)
+        if place is None:
+            return
         own = None if parent is None else f"{parent}{self._suffix}"
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
         if place.parent is not None:

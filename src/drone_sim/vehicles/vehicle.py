@@ -33,7 +33,6 @@ class Vehicle:
     """A vehicle of any type in a world. What it shares with others is in its context, and nothing else is."""
 
     object: SceneObject  # that its child script is attached to, the root of all of its own
-    track: SceneObject  # Track_base: at the drone, level, turned by its yaw
     target: SceneObject  # DronePosition, the green sphere
     pushes: Pushes  # of the run
 
@@ -82,8 +81,7 @@ class Vehicle:
         self._cleared = tree.cleared
         objects = QuadricopterObjects(tree, self.suffix, self.handles, own.objects)
         objects.add(self.body, rigid.links, self.propulsion.rotors.links, own.cameras, own.sensors)
-        names = (one + self.suffix for one in (DRONE, TRACK_BASE, TARGET))
-        self.object, self.track, self.target = (tree[tree.handle(name)] for name in names)
+        self.object, self.target = (tree[tree.handle(one + self.suffix)] for one in (DRONE, TARGET))
         for handle in self.handles:
             if tree[handle].body is not None:
                 self.context.velocities.follow(handle)
@@ -93,6 +91,12 @@ class Vehicle:
             camera.reset()
         self.instruments.reset()
         self._begin_faults()
+
+    @property
+    def track(self) -> SceneObject:
+        """Track_base: at the drone, level, turned by its yaw; the scene's own, or the drone, where it brings none."""
+        tree, name = self.context.objects, TRACK_BASE + self.suffix
+        return tree[tree.handle(name)] if name in tree else self.object
 
     def _begin_forces(self) -> None:
         time_step = self.context.clock.time_step

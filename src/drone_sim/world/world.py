@@ -110,6 +110,7 @@ class World:
         body = bodies.create_floor(self._client, self._files, size, ground)
         self.pictures.cover(body, texture, visual=0)
         self._know(body)
+        self.set_material(body, -1, friction=1.0, restitution=1.0)  # of two that touch, what falls on it has the say
         seen = [(Plane(size, bodies.TILE), texture), (Plane(2 * bodies.GROUND_REACH, bodies.TILE), "")]
         self.pictures.set_floor(body, seen if ground else seen[:1])
         return body
@@ -177,6 +178,12 @@ class World:
         self._dynamics.forget(body)
         self.pictures.remove(body)
         self._files.drop_old()
+
+    def set_material(self, body: int, link: int, friction: float, restitution: float) -> None:
+        """Let a link (-1: the root) rub and rebound otherwise; of two that touch, each is multiplied."""
+        pybullet.changeDynamics(
+            body, link, lateralFriction=friction, restitution=restitution, physicsClientId=self._client
+        )
 
     def set_color(self, body: int, rgba: Sequence[float], link: int | None = None) -> None:
         """Paint a link of a body, or all of it (0..1 each)."""

@@ -85,6 +85,7 @@ export class Hand {
   }
 
   click(event) {
+    if (event.shiftKey) return;
     const name = this.pick(event)?.name ?? "";
     const isVehicle = this.scene.bodies?.has(name);
     const isFirst = event.timeStamp - this.clicked > DOUBLE;

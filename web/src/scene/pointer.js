@@ -37,7 +37,7 @@ export class Pointer {
     const pans = event.button !== 0 || event.shiftKey;
     const taken = pans ? null : this.acts.take(event);
     this.does = taken ? "drag" : pans ? "pan" : "orbit";
-    this.isClick = !pans && taken !== "part"; // until it has moved
+    this.isClick = event.button === 0 && taken !== "part"; // until it has moved
   }
 
   move(event) {

@@ -28,6 +28,7 @@ export class Scene {
     this.pushes = 0.5; // N
     this.views = [BEHIND, FREE];
     this.selected = "";
+    this.editing = null; // who edits the scene: Edit, while its panel is open
     this.world = new THREE.Scene();
     this.world.matrixWorldAutoUpdate = false;
     this.camera = new THREE.PerspectiveCamera(FOV, 1, 0.05, 4000);
@@ -144,15 +145,18 @@ export class Scene {
 
   // Looks at something by its name, or at the vehicle, from near.
   frame(name = this.selected || this.vehicle) {
-    const meshes = this.meshesOf(name);
-    if (name === this.vehicle && this.view.name === BEHIND) this.view.reset();
-    else if (meshes.length) {
-      const box = new THREE.Box3();
-      for (const mesh of meshes) box.expandByObject(mesh);
-      const ball = box.getBoundingSphere(new THREE.Sphere());
-      this.view.lookAt(ball.center, ball.radius);
-    }
+    if (this.editing?.last !== undefined) this.lookAt(this.editing.seen.meshesOf(this.editing.selected));
+    else if (name === this.vehicle && this.view.name === BEHIND) this.view.reset();
+    else this.lookAt(this.meshesOf(name));
     this.change();
+  }
+
+  lookAt(meshes) {
+    if (!meshes.length) return;
+    const box = new THREE.Box3();
+    for (const mesh of meshes) box.expandByObject(mesh);
+    const ball = box.getBoundingSphere(new THREE.Sphere());
+    this.view.lookAt(ball.center, ball.radius);
   }
 
   show(layers) {
@@ -206,6 +210,7 @@ export class Scene {
     if (this.tree.isMoved) this.batch.place();
     this.tree.isMoved = false;
     const isMoving = this.tree.advance(performance.now());
+    this.editing?.dragged?.show();
     this.world.updateMatrixWorld();
     const isLate = this.view.update(this.followed, seconds);
     this.camera.updateMatrixWorld();
@@ -218,6 +223,7 @@ export class Scene {
     renderer.render(this.world, this.camera);
     this.outline.render(renderer, this.camera);
     this.gizmo.render(renderer, this.camera, this.unit);
+    this.editing?.handles.render(renderer, this.camera);
     if (isLate || isMoving) this.change();
   }
 
@@ -267,6 +273,7 @@ export class Scene {
   }
 
   mark() {
+    if (this.editing) return this.outline.show(this.editing.seen.lit());
     const lit = [];
     if (this.hand.hovered && this.hand.hovered !== this.selected) lit.push([this.meshesOf(this.hand.hovered), HOVERED, 1.5]);
     if (this.selected) lit.push([this.meshesOf(this.selected), ACCENT, 2.5]);
@@ -274,6 +281,7 @@ export class Scene {
   }
 
   putGizmo() {
+    if (this.editing) return void (this.gizmo.put(null), this.editing.putHandles());
     const name = this.active;
     const handle = name && this.shown.handles ? this.handleOf(name) : null;
     if (!handle) return this.gizmo.put(null);

@@ -57,13 +57,17 @@ export class Tree {
   }
 
   hang(index, name, parent) {
-    const frame = this.frames[index] ?? new THREE.Group();
+    const frame = this.frameAt(index);
     frame.name = name;
-    this.frames[index] = frame;
     this.byName.set(name, frame);
-    (parent < 0 ? this.root : this.frames[parent]).add(frame);
+    (parent < 0 ? this.root : this.frameAt(parent)).add(frame);
     if (this.shows) this.mark(frame);
     this.isNew = true;
+  }
+
+  // A frame may be told before the one that it hangs on.
+  frameAt(index) {
+    return (this.frames[index] ??= new THREE.Group());
   }
 
   move(frame, numbers, at) {

@@ -11,6 +11,7 @@ const NEAREST = 0.65, FARTHEST = 2.5; // m, of what that comes to
 const LOW = 0.3; // rad, from which one looks down
 const CLOSE = 0.12, AWAY = 800; // m, how far one can zoom
 const STEEPEST = 1.55; // rad
+const WIDE_VIEW = 5, STEEP = 0.5; // m, rad: from where one builds
 const EASE = 0.12; // s, in which the eyes come back to a drone that was dragged
 const up = new THREE.Vector3(0, 0, 1);
 const CAMERA = new THREE.Quaternion().setFromAxisAngle(new THREE.Vector3(1, 0, 0), Math.PI); // optical frames look along z
@@ -126,6 +127,12 @@ export class View {
     this.ofHand();
     const before = this.distance;
     this.zoom *= THREE.MathUtils.clamp(before * factor, CLOSE, AWAY) / before;
+  }
+
+  // Goes back and up, to see what is about it.
+  stepBack() {
+    this.zoom = Math.max(this.zoom, WIDE_VIEW);
+    this.pitch = Math.max(this.pitch, STEEP);
   }
 
   ofHand() {

@@ -14,6 +14,7 @@ import rospy
 from drone_sim.ros.cockpit.editor.backend import EditorBackend
 from drone_sim.ros.cockpit.editor.inspection import ScriptInspector
 from drone_sim.ros.cockpit.editor.lessons import Lessons
+from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
 from drone_sim.ros.cockpit.editor.scene_files import SceneList
 from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.editor.task_flights import TimelinePlayer
@@ -54,7 +55,8 @@ class Cockpit:
         editor = EditorBackend(store, self._lessons, self._simulator, TimelinePlayer(self._simulator.node))
         self._server = server
         self._inspector = ScriptInspector(self._simulator.node, store, lambda message: self._socket.tell(message))
-        answers = {**editor.answers, **self._inspector.answers}
+        self._editing = SceneEditing(self._simulator.node, scripts, lambda message: self._socket.tell(message))
+        answers = {**editor.answers, **self._inspector.answers, **self._editing.answers}
         takes = {"drag": self._drag, "push": self._push}
         self._socket = PageSocket(held, answers, takes, scene=self._state.since)
         self._panel = Panel(self._simulator, self._commands, SceneList(scripts), self._socket.tell)
@@ -103,6 +105,7 @@ class Cockpit:
         if self._view is not None:
             self._view.meet(self._topics.vehicles)
             self._view.collect()
+            self._editing.listen(True)
             self._panel.follow(self._commands.vehicle)
             self._panel.plots.rest()
             self._cameras.show()
@@ -118,11 +121,13 @@ class Cockpit:
         self._cameras.rest(not namespace)
         self._windows.listen(bool(namespace))
         if not namespace:
+            self._editing.listen(False)
             self._panel.follow("")
             self._panel.plots.rest()
 
     def _find(self, path: str) -> Content:
-        return self._meshes.find(path) or self._lessons.picture(path) or self._manual.find(path)
+        content = self._meshes.find(path) or self._lessons.picture(path) or self._manual.find(path)
+        return content or self._editing.picture(path)
 
     def _drag(self, browser: int, message: Mapping[str, Any]) -> None:
         if self._view is not None:

@@ -24,13 +24,30 @@ _MOST_SCRIPTS = 16
 _MOST_NAMES = 2000
 
 
+class _Newcomers(rospy.SubscribeListener):
+    """Whether somebody has begun to listen; who lets go and listens again has, too."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._any = False
+
+    def peer_subscribe(self, *_: Any) -> None:
+        """Hear from a thread of rospy's."""
+        self._any = True
+
+    def take(self) -> bool:
+        """Tell, and forget."""
+        was, self._any = self._any, False
+        return was
+
+
 class LatchedText:
     """A latched topic of text, made anew only while somebody listens, and for everybody who begins to."""
 
-    def __init__(self, topic: str):
-        """Advertise it."""
-        self._publisher = rospy.Publisher(topic, String, queue_size=1, latch=True)
-        self._listeners = 0
+    def __init__(self, topic: str, queue_size: int = 1):
+        """Advertise it; so many messages wait for who listens, before the oldest is lost."""
+        self._came = _Newcomers()
+        self._publisher = rospy.Publisher(topic, String, self._came, queue_size=queue_size, latch=True)
         self._said = ""
 
     @property
@@ -41,8 +58,7 @@ class LatchedText:
     @property
     def has_new_listeners(self) -> bool:
         """Whether somebody has begun to listen since this was last asked."""
-        before, self._listeners = self._listeners, self._publisher.get_num_connections()
-        return self._listeners > before
+        return self._came.take()
 
     def say(self, value: Any) -> None:
         """Publish a value as JSON, unless that is what was said last."""

@@ -28,6 +28,7 @@ from drone_sim.ros.core.validation import parameters_of, use_sim_time
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.inspection import InspectionTopics
 from drone_sim.ros.node.object_poses import ObjectPoses
+from drone_sim.ros.node.scene_editing import SceneEditing
 from drone_sim.ros.node.services import Services
 from drone_sim.ros.node.signals import SignalTopic
 from drone_sim.ros.node.start_checks import check_launch_arguments, check_others
@@ -86,6 +87,7 @@ class Node:
         self._topics = FleetTopics(self.simulation, self._inbox, self._time.stamp)
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
+        self._editing = SceneEditing(self.player, self._inbox, self._services)
         self._windows = WindowTopics(self.simulation, self._inbox)
         self._signals = SignalTopic(self.simulation)
         self._object_poses = ObjectPoses(self.simulation, self._inbox)
@@ -249,6 +251,7 @@ class Node:
         self._windows.update(self._time.stamp)
         self._signals.update()
         self._inspection.update()
+        self._editing.update()
         if self._parameters.gui:
             for track in [vehicle.track.matrix() for vehicle in self._first()]:
                 self.simulation.world.pictures.look_from_behind(position(track), to_euler(track)[2])

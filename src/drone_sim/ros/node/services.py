@@ -5,13 +5,11 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import rospy
 from std_srvs.srv import SetBool, Trigger
 
-from drone_sim.files.resources import locate, package_path
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.startup import MASTER_GONE, from_shell
 from drone_sim.run.parameters import ParameterError, Parameters
@@ -21,11 +19,10 @@ from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.load import script_path
 
 _VEHICLES = "~vehicles"
-_HOME = Path("~/.ros/drone_sim/scene.yaml")
 
 
 class Services:
-    """~start, ~stop, ~restart, ~step, ~pause; ~save_scene, ~load_scene; ~set_vehicles; ~snapshot, ~restore.
+    """~start, ~stop, ~restart, ~step, ~pause; ~load_scene; ~set_vehicles; ~snapshot, ~restore.
 
     Each answers when it is done, with one line. The scene's file is the private parameter `scene_file`, the script
     that of `script`, the vehicles are those of the private parameter `vehicles`.
@@ -42,7 +39,7 @@ class Services:
         self._vehicles = VehiclesParameter()
         self._vehicles.tell(player.simulation.parameters)
         self._snapshot: Snapshot | None = None
-        jobs = ("start", "stop", "restart", "step", "save_scene", "load_scene", "set_vehicles", "snapshot", "restore")
+        jobs = ("start", "stop", "restart", "step", "load_scene", "set_vehicles", "snapshot", "restore")
         for name in jobs:
             rospy.Service(f"~{name}", Trigger, partial(self._answer, getattr(self, name)))
         rospy.Service("~pause", SetBool, lambda request: self._answer(lambda: player.pause(request.data)))
@@ -50,6 +47,11 @@ class Services:
     def close(self) -> None:
         """Leave the parameters as they were given."""
         self._vehicles.close()
+
+    def tell_vehicles(self) -> None:
+        """Say in the parameter who flies, and let the topics follow: the scene may have other vehicles."""
+        self._vehicles.tell(self._player.simulation.parameters)
+        self._follow()
 
     def _answer(self, job: Callable[[], str], _request: Any = None) -> tuple[bool, str]:
         try:
@@ -79,19 +81,9 @@ class Services:
         """Run one step while paused."""
         return self._player.one_step()
 
-    def save_scene(self) -> str:
-        """Write the scene as it stands now. A scene of the package itself is not overwritten."""
-        simulation = self._player.simulation
-        name = _scene_parameter()
-        path = locate(name) if name else _HOME.expanduser()
-        if package_path() in path.resolve().parents:
-            path = _HOME.expanduser()
-        simulation.save_scene(path)
-        return f"saved {path}"
-
     def load_scene(self) -> str:
         """Start anew in the scene of `scene_file`."""
-        file = _scene_parameter()
+        file = scene_parameter()
         self._take_script()
         return f"{self._begun(self._player.start(file))} in {file or 'the scene of the parameters'}"
 
@@ -128,7 +120,8 @@ class Services:
         return f"restored t = {self._player.simulation.time:.2f} s"
 
 
-def _scene_parameter() -> str:
+def scene_parameter() -> str:
+    """Return the file that the private parameter `scene_file` names, '' for none."""
     return from_shell(str(rospy.get_param("~scene_file", "")))
 
 

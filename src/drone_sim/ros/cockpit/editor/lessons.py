@@ -34,7 +34,7 @@ _ALTERNATIVE = re.compile(r"<!-- browser:\n?(.*?)\n?-->(.*?)<!-- end -->", re.DO
 _CONSOLE = re.compile(r"^( *)```console\n(.*?)^ *```\n", re.MULTILINE | re.DOTALL)
 _COMMAND = re.compile(r"^ *[12]\$ ")
 _FLEW = re.compile(r"^flew ([\d.]+ s) in .*?; ended at")
-_PICTURE = re.compile(r"/(docs/pictures/tutorial_\w+\.png|tasks/\w+/\w+\.png)")
+_PICTURE = re.compile(r"/(docs/pictures/(?:tutorial_\w+|cockpit_build)\.png|tasks/\w+/\w+\.png)")
 
 
 @dataclass(frozen=True)

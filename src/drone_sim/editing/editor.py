@@ -1,0 +1,244 @@
+"""The scene's editor: requests as records, carried out on the living scene; undo, redo, revisions."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from drone_sim.config.errors import checked
+from drone_sim.config.types import Checked
+from drone_sim.editing import records
+from drone_sim.editing.changes import SceneChange, carry_out, change_between
+from drone_sim.editing.document import SceneDocument
+from drone_sim.editing.drafts import Drafts
+from drone_sim.editing.edit_operations import EditOperations
+from drone_sim.editing.history import History, Step
+from drone_sim.editing.scene_access import SceneAccess
+from drone_sim.files.yaml_text import YamlText
+from drone_sim.run.pacing import Throttle
+from drone_sim.run.player import Player
+from drone_sim.scripting.errors import ScriptError
+
+_LOG = logging.getLogger(__name__)
+_DRAFT_PERIOD = 1.0  # s of real time
+
+
+class SceneEditor:
+    """One for a simulation, whose thread calls all of this: what windows and scripts ask for, they ask of it."""
+
+    def __init__(self, player: Player, drafts: Path | None = None):
+        """Edit the scene of the simulation that `player` plays; what is not saved is kept in the folder `drafts`."""
+        self._player = player
+        self.simulation = player.simulation
+        self.scene = SceneAccess(self.simulation)
+        self.document = SceneDocument(self.scene)
+        self.history = History()
+        self._drafts, self._drafted = Drafts(drafts), (0, False)
+        self._seldom = Throttle(_DRAFT_PERIOD)
+        self.revision = 0  # another number after every edit
+        self._saved = 0  # the revision that is in the file
+        self._started = 0, False  # the revision with which it runs, and whether that is not in the file
+        self._run = -1  # whose edits stop takes back, -1 while it is stopped
+        self._operations = EditOperations(self.scene)
+        self._read, self._is_opening = -1, False
+        self.follow()
+
+    @property
+    def is_modified(self) -> bool:
+        """Whether the file does not say what the scene is."""
+        return self.revision != self._saved
+
+    @property
+    def scene_file(self) -> str:
+        """The file of the scene, '' where it has none."""
+        return str(self.document.file or "")
+
+    def described(self) -> dict[str, Any]:
+        """Return what a window shows of the scene as a whole."""
+        offered = self._drafts.offered
+        return {
+            "revision": self.revision,
+            "file": self.scene_file,
+            "modified": self.is_modified,
+            "read_only": self.document.is_read_only,
+            "state": self._player.state,
+            "undo": self.history.undo_name,
+            "redo": self.history.redo_name,
+            "draft": {"file": offered.file, "saved": offered.saved} if offered else None,
+        }
+
+    def follow(self) -> None:
+        """Know what start, stop, and who has read another scene have done meanwhile."""
+        simulation = self.simulation
+        if simulation.scenes_read != self._read:
+            self._read = simulation.scenes_read
+            if self.is_modified and not self._is_opening:  # another has loaded a scene over what was not saved
+                self._drafts.offer()
+            self.document.read()
+            self._begin_anew()
+        run = simulation.run if simulation.running else -1
+        if run == -1 and not self.is_modified and self.document.is_changed_on_disk:
+            simulation.read_at_start()
+        if run != self._run:
+            if self._run != -1:
+                self._stop()
+            if run != -1:
+                self.history.start()
+                self._started = self.revision, self.is_modified
+            self._run = run
+
+    def _begin_anew(self) -> None:
+        self.history.clear()
+        self.revision += 1
+        self._saved = self.revision
+
+    def _stop(self) -> None:
+        """What was edited since the start has been undone."""
+        before, was_modified = self._started
+        self.history.stop()
+        if self.revision != before:
+            self.revision += 1
+            self._saved = self._saved if was_modified else self.revision
+
+    def answer(self, said: Any) -> dict[str, Any]:
+        """Do what a message asks for; return the answer. Raises ValueError and OSError, where nothing has changed."""
+        self.follow()
+        kind = records.request_of(said)
+        request: Any = checked(kind, said)
+        does: Mapping[type[Checked], Callable[[Any], dict[str, Any]]] = {
+            records.Edit: self._edit,
+            records.Undo: lambda _: self._go(self.history.undone, self.history.redone, "undone"),
+            records.Redo: lambda _: self._go(self.history.redone, self.history.undone, "redone"),
+            records.Text: lambda _: self._text(),
+            records.Write: self._write,
+            records.New: lambda _: self._open(None),
+            records.Open: lambda one: self._open(one.open),
+            records.Save: self._save,
+            records.SaveModel: self._save_model,
+            records.Draft: lambda one: self._draft(one.draft),
+        }
+        return does[kind](request)
+
+    # ---- edits
+
+    def _edit(self, request: records.Edit) -> dict[str, Any]:
+        name = request.name or _name(request.edit)
+        return self._change(
+            name, lambda: [one for op in request.edit for one in self._operations.do(op)], request.merge
+        )
+
+    def _change(self, name: str, change: Callable[[], list[int]], merge: str = "") -> dict[str, Any]:
+        """Carry something out as a whole, or, where it fails, not at all."""
+        before = self.scene.content()
+        try:
+            handles = change()
+        except (ValueError, OSError):
+            self._carry_out(change_between(self.scene.content(), before))
+            raise
+        done = change_between(before, self.scene.content())
+        if not done.is_empty:
+            self.history.add(Step(name, merge, done))
+            self.revision += 1
+        return self._answer(name, handles=[one for one in handles if self.scene.tree.get(one) is not None])
+
+    def _carry_out(self, change: SceneChange) -> None:
+        if not change.is_empty:
+            carry_out(self.simulation, change, self.scene.arrange)
+
+    def _answer(self, said: str, **more: Any) -> dict[str, Any]:
+        return {"revision": self.revision, "said": said, "until_stop": self.simulation.running, **more}
+
+    def _go(self, step: Callable[[], Step], back: Callable[[], Step], word: str) -> dict[str, Any]:
+        """Undo or redo; `back` lets the history be as it was."""
+        there = step()
+        change = there.change.reversed if word == "undone" else there.change
+        before = self.scene.content()
+        try:
+            self._carry_out(change)
+        except ValueError as error:
+            self._carry_out(change_between(self.scene.content(), before))
+            back()
+            raise ValueError(f"'{there.name}' cannot be {word}: {error}") from None
+        self.revision += 1
+        handles = [one for one in change.entries if self.scene.tree.get(one) is not None]
+        return self._answer(f"{word}: {there.name}", handles=handles)
+
+    # ---- texts and files
+
+    def _text(self) -> dict[str, Any]:
+        return self._answer("text", text=self.document.text(), file=self.scene_file)
+
+    def _write(self, request: records.Write) -> dict[str, Any]:
+        if request.revision not in (None, self.revision):
+            raise ValueError(f"the scene has changed meanwhile (revision {self.revision}): look at its text again")
+        return self._take_text(request.write)
+
+    def _take_text(self, written: str) -> dict[str, Any]:
+        text = YamlText(written)
+        wanted = self.document.content_of(text)
+
+        def change() -> list[int]:
+            self._carry_out(change_between(self.scene.content(), wanted))
+            return []
+
+        answer = self._change("Edit text", change)
+        self.document.take_text(text)
+        return answer
+
+    def _open(self, file: str | None) -> dict[str, Any]:
+        try:
+            self._player.stop()
+        except ScriptError as error:  # in a cleanup, which must not hinder it
+            _LOG.error("%s", error)
+        self._is_opening = True
+        try:
+            self.document.open(file)
+            if file is None:
+                self._begin_anew()
+            self.follow()
+        finally:
+            self._is_opening = False
+        return self._answer("new scene" if file is None else f"opened {file}", file=self.scene_file)
+
+    def _save(self, request: records.Save) -> dict[str, Any]:
+        path = self.document.save(None if request.save is True else str(request.save))
+        if self.simulation.running:
+            return self._answer(f"saved {path} as it stands in flight", file=str(path))
+        self._saved = self.revision
+        return self._answer(f"saved {path}", file=str(path))
+
+    def _save_model(self, request: records.SaveModel) -> dict[str, Any]:
+        path = self.document.save_model(self.scene.handle(request.save_model), request.file)
+        return self._answer(f"saved {path}", file=str(path))
+
+    # ---- drafts
+
+    def keep_draft(self) -> None:
+        """Keep what is not saved, now and then; what stop undoes is not kept."""
+        now = self.revision, self.is_modified
+        if now == self._drafted or self.simulation.running or not self._seldom.passes():
+            return
+        self._drafted = now
+        if self.is_modified:
+            self._drafts.keep(self.scene_file, self.document.text())
+        else:
+            self._drafts.clear()
+
+    def _draft(self, word: str) -> dict[str, Any]:
+        draft = self._drafts.take()
+        if word == "drop":
+            return self._answer("the draft is dropped")
+        self._open(draft.file if draft.file and Path(draft.file).is_file() else None)
+        self._take_text(draft.text)
+        return self._answer("the draft is taken", file=self.scene_file)
+
+
+def _name(operations: list[Any]) -> str:
+    first = operations[0]
+    word = str(first.do).replace("_", " ").capitalize()
+    objects = getattr(first, "objects", None)
+    if len(operations) > 1 or (isinstance(objects, list) and len(objects) > 1):
+        return f"{word} {max(len(operations), len(objects or []))} objects"
+    return word

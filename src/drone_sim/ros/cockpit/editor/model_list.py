@@ -1,0 +1,100 @@
+"""The models that the page offers, each with the operation that adds it, and its picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from drone_sim.editing.library import KINDS
+from drone_sim.editing.vehicle_edits import TYPES
+from drone_sim.files.resources import package_path
+from drone_sim.ros.cockpit.server.access_control import Content
+
+PICTURES = "config/models/pictures"
+_WEB = "/models/"
+_FOLDER = "models"  # of the user's, in that of the scripts
+_MOST = 200
+_Operation = dict[str, Any]
+
+
+def _added(name: str, **said: Any) -> _Operation:
+    return {"do": "add", "objects": [{"name": name, **said}]}
+
+
+def _shape(name: str, shape: str, **said: Any) -> _Operation:
+    return _added(name, shape=shape, **said)
+
+
+SHAPES: dict[str, _Operation] = {
+    "Cuboid": _shape("Cuboid", "box", size=[0.5, 0.5, 0.5]),
+    "Sphere": _shape("Sphere", "sphere", size=[0.25]),
+    "Cylinder": _shape("Cylinder", "cylinder", size=[0.25, 0.5]),
+    "Capsule": _shape("Capsule", "capsule", size=[0.15, 0.4]),
+    "Cone": {"do": "add_model", "model": "cone"},
+    "Plane": _shape("Plane", "box", size=[1, 1, 0.002], respondable=False),
+    "Wall": _shape("Wall", "box", size=[3, 0.1, 2], color=[0.86, 0.82, 0.74]),
+}
+ARENA = ("gate", "landing_pad", "pole", "ramp", "table", "window_frame")
+_SIGN = {"do": "add_sign", "text": "START"}
+SENSORS: dict[str, _Operation] = {
+    "Dummy": _added("Dummy", kind="dummy", size=0.05),
+    "Target sphere": _shape("Target", "sphere", size=[0.05], color=[0.2, 0.8, 0.2], respondable=False),
+    "Camera": _added("Camera", kind="vision_sensor", width=640, height=480, rpy=[1.5708, 0, -1.5708]),
+    "Vision sensor": _added("VisionSensor", kind="vision_sensor", rpy=[1.5708, 0, -1.5708]),
+    "Proximity sensor": _added("ProximitySensor", kind="proximity_sensor", type="cone", angle=0.5, range=2),
+    "Joint": _added("Joint", kind="joint", type="revolute"),
+}
+_HEIGHT = 0.5  # m above what a vehicle is dropped on
+_BARE: dict[str, Any] = {  # V-REP's quadricopter: its own two cameras, no frame that goes with it, the stock script
+    "script": "target",
+    "cameras": {name: None for name in ("front", "depth", "track", "floor")},
+    "objects": {"Track_base": None},
+}
+
+
+class ModelList:
+    """Those of the package, and the files in the user's folder."""
+
+    def __init__(self, folder: Path):
+        """Take the folder of the user's scripts and scenes; models are in `models` there."""
+        self.folder = folder / _FOLDER
+
+    def groups(self) -> list[dict[str, Any]]:
+        """Return all, in groups."""
+        vehicles: dict[str, _Operation] = {
+            name.capitalize(): {"do": "add_vehicle", "type": name, "height": _HEIGHT} for name in TYPES
+        }
+        vehicles["Quadricopter of V-REP"] = {**vehicles["Quadricopter"], "values": _BARE}
+        arena: dict[str, _Operation] = {name: {"do": "add_model", "model": name} for name in ARENA}
+        arena["text_sign"] = _SIGN
+        return [
+            {"name": "Shapes", "models": [_said(*one) for one in SHAPES.items()]},
+            {"name": "Arena", "models": [_said(name.replace("_", " ").capitalize(), op) for name, op in arena.items()]},
+            {"name": "Vehicles", "models": [_said(*one) for one in vehicles.items()]},
+            {"name": "Sensors", "models": [_said(*one) for one in SENSORS.items()]},
+            {"name": "Yours", "models": [_said(one.name, self.operation(one), "") for one in self._own()]},
+        ]
+
+    def operation(self, file: Path) -> _Operation:
+        """Return what adds a file of the user's."""
+        return {"do": "add_model", "model": str(file)}
+
+    def _own(self) -> list[Path]:
+        found = sorted(one for one in self.folder.glob("*") if one.suffix.lower() in KINDS and one.is_file())
+        return found[:_MOST]
+
+    def picture(self, path: str) -> Content:
+        """Return the picture of a model of the package; None for any other path."""
+        if not path.startswith(_WEB):
+            return None
+        file = package_path() / PICTURES / path.removeprefix(_WEB)
+        if file.suffix != ".png" or file.parent != package_path() / PICTURES or not file.is_file():
+            return None
+        return "image/png", file.read_bytes()
+
+
+def _said(title: str, operation: _Operation, picture: str | None = None) -> dict[str, Any]:
+    key = title.lower().replace(" ", "_")
+    if picture is None:
+        picture = f"{_WEB}{key}.png" if (package_path() / PICTURES / f"{key}.png").is_file() else ""
+    return {"model": key, "title": title, "picture": picture, "op": operation}

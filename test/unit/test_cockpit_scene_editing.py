@@ -1,0 +1,113 @@
+"""The scene's editor between the node and the browsers, without either of them."""
+
+import base64
+import json
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from std_msgs.msg import String
+from test_cockpit_inspection import Topic
+
+from drone_sim.ros.cockpit.editor import scene_editing
+from drone_sim.ros.cockpit.editor.scene_editing import SceneEditing
+
+ROW = {"handle": 3, "name": "Gate"}
+
+
+class Answer:
+    def __init__(self, success, message):
+        self.success, self.message = success, message
+
+
+@pytest.fixture(name="asked")
+def _asked(monkeypatch):
+    """What the node is asked; it agrees to all but texts with a mistake."""
+    asked = []
+
+    def ask(text):
+        asked.append(json.loads(text))
+        if asked[-1].get("write") == "wrong":
+            return Answer(False, "line 3: objects/0/shape = 'bax': must be one of 'box'")
+        return Answer(True, json.dumps({"revision": len(asked), "file": asked[-1].get("save", "")}))
+
+    monkeypatch.setattr(Topic, "there", {})
+    monkeypatch.setattr(scene_editing.rospy, "Subscriber", Topic)
+    monkeypatch.setattr(scene_editing.rospy, "ServiceProxy", lambda name, kind: ask)
+    return asked
+
+
+@pytest.fixture(name="told")
+def _told():
+    return []
+
+
+@pytest.fixture(name="editing")
+def _editing(asked, told, tmp_path):
+    made = SceneEditing("/sim", tmp_path, told.append)
+    made.listen(True)
+    return made
+
+
+def say(version, since, objects=(), gone=()):
+    said = {"version": version, "since": since, "revision": version, "objects": [*objects], "gone": [*gone]}
+    Topic.there["/sim/scene_objects"].callback(String(json.dumps(said)))
+
+
+def tree(editing):
+    return editing.answers["tree"]({})["tree"]
+
+
+def test_a_browser_that_comes_late_gets_the_whole_tree(editing, told):
+    say(1, None, [ROW, {"handle": 4, "name": "Post"}])
+    say(2, 1, [{**ROW, "name": "Door"}], gone=[4])
+    assert tree(editing)["objects"] == [{**ROW, "name": "Door"}]
+    assert tree(editing)["version"] == 2
+    assert [one["tree"]["version"] for one in told] == [1, 2]
+
+
+def test_after_a_lost_message_the_whole_is_heard_anew(editing, told):
+    say(1, None, [ROW])
+    before = Topic.there["/sim/scene_objects"]
+    say(3, 2, [], gone=[3])
+    editing.listen(True)
+    assert Topic.there["/sim/scene_objects"] is not before
+    say(4, None, [ROW])
+    assert tree(editing)["version"] == 4
+    assert [one["tree"]["version"] for one in told] == [1, 4]
+
+
+def test_edits_go_to_the_node_and_mistakes_come_back_with_their_line(editing, asked):
+    operation = {"do": "remove", "objects": [3]}
+    assert editing.answers["edit"]({"edit": [operation], "name": "Remove", "id": 5})["revision"] == 1
+    assert asked == [{"edit": [operation], "name": "Remove"}]
+    answer = editing.answers["write_scene_text"]({"text": "wrong", "revision": 1})
+    assert answer["line"] == 3
+    with pytest.raises(ValueError, match="file: must be the name"):
+        editing.answers["open_scene"]({"file": 3})
+
+
+def test_a_scene_is_not_saved_over_another_one_unasked(editing, asked, tmp_path):
+    (tmp_path / "mine.yaml").write_text("objects: []\n")
+    with pytest.raises(ValueError, match=r"mine is there already"):
+        editing.answers["save_scene"]({"file": "mine"})
+    editing.answers["save_scene"]({"file": "mine", "over": True})
+    assert asked == [{"save": str(tmp_path / "mine.yaml")}]
+    assert editing.answers["scene_files"]({})["recent"] == [str(tmp_path / "mine.yaml")]
+
+
+def test_models_have_pictures_and_own_ones_are_uploaded(editing, tmp_path):
+    groups = {one["name"]: one["models"] for one in editing.answers["models"]({})["groups"]}
+    for one in [model for name in ("Shapes", "Arena", "Vehicles", "Sensors") for model in groups[name]]:
+        kind, content = editing.picture(one["picture"])
+        assert (kind, content[:4]) == ("image/png", b"\x89PNG"), one
+        assert len(content) < 8000
+    content = base64.b64encode(b"solid").decode()
+    said = editing.answers["upload_model"]({"name": "chair.stl", "content": content})["model"]
+    assert said == {"do": "add_model", "model": str(tmp_path / "models/chair.stl")}
+    assert [one["op"] for one in editing.answers["models"]({})["groups"][-1]["models"]] == [said]
+    for name in ("../chair.stl", "chair.exe", "chair.stl"):
+        with pytest.raises(ValueError, match=r"name: must be|already"):
+            editing.answers["upload_model"]({"name": name, "content": content})
+    assert editing.picture("/models/../gate.yaml") is None

@@ -1,0 +1,142 @@
+"""The scene is built with the mouse: the clicks of the V-REP tutorial's first scene, saved, begun anew, and flown."""
+
+import math
+import os
+
+import pytest
+import yaml
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from cockpit_page import STARTED, Panel, open_page, ready, wait_for, wait_until
+from launched import launched
+from scene_builder import Builder
+
+# The stock script, with one view less: it shows what TrackCam sees, as the tutorial asks.
+SCRIPT = """
+import target
+from target import sysCall_actuation, sysCall_sensing
+
+
+def sysCall_init():
+    target.sysCall_init()
+    view = sim.floatingViewAdd(0.9, 0.9, 0.2, 0.2, 0)
+    sim.adjustView(view, sim.getObjectHandle("TrackCam"), 64)
+"""
+FAR = 1e-4  # m, rad
+
+
+def near(one, position):
+    return math.dist(one["position"], position) < FAR
+
+
+def build(builder, script):
+    """Click what the tutorial's sections "Our first drone scene" and "Game-like tracking camera" ask for."""
+    builder.menu("Scene file", "New")
+    wait_until(builder.page, lambda: builder.page.get_by_role("treeitem").count() == 1)
+    builder.select("Floor")
+    builder.set("size", 10)
+    builder.rename(builder.drop("Quadricopter of V-REP", [0.5, 0.5, 0]), "Drone")
+    builder.write(X=0, Y=0, Z=0.8)
+    builder.unfold("Drone")
+    move_target(builder)
+    builder.set("script", script)
+    for camera in ("Quadricopter_floorCamera", "Quadricopter_frontCamera"):
+        builder.select(camera)
+        builder.page.keyboard.press("Delete")
+        builder.row(camera).wait_for(state="detached")
+    builder.rename(builder.drop("Camera", [1, 0.6, 0]), "TrackCam")
+    builder.hang("TrackCam", "Quadricopter_base")
+    builder.write("Parent", X=-0.8, Y=0, Z=0.3, Alpha=180, Beta=75, Gamma=-90)
+    builder.wait("TrackCam", lambda one: near(one, (-0.8, 0, 0.3)))
+    builder.rename(builder.drop("Dummy", [1, -0.6, 0]), "Track_base")
+    builder.hang("Track_base", "Quadricopter_base")
+    builder.write("Parent", X=0, Y=0, Z=0)
+    builder.hang("TrackCam", "Track_base")
+
+
+def move_target(builder):
+    """Start, and move the green sphere: the drone follows; stop puts both back."""
+    panel = Panel(builder.page)
+    panel.press("Start", "started")
+    builder.select("DronePosition")
+    builder.write(X=0.5)
+    builder.wait("Drone", lambda one: one["pose"][0] > 0.2)
+    panel.press("Stop", "stopped")
+    builder.select("Drone")
+    builder.wait("Drone", lambda one: near(one, (0, 0, 0.8)))
+
+
+def check(builder):
+    """See that objects, names, parents and poses are as the tutorial asks."""
+    assert builder.object("Floor")["values"]["size"] == 10
+    assert math.dist(builder.object("Quadricopter_base")["pose"][:3], (0, 0, 0.8)) < 0.1
+    assert builder.object("DronePosition") and builder.object("Drone")
+    assert near(builder.wait("Track_base", lambda one: one["above"] == "Quadricopter_base"), (0, 0, 0))
+    assert near(builder.wait("TrackCam", lambda one: one["above"] == "Track_base"), (-0.8, 0, 0.3))
+
+
+def flies(page):
+    """See that it flies where it was put, and that the page shows what TrackCam sees."""
+    wait_for(page, "document.querySelector('#status').dataset.is === 'flying'")
+    window = page.locator(".picture", has_text="TrackCam")
+    wait_until(page, lambda: window.locator("img").evaluate("one => one.naturalWidth") > 0)
+
+
+def load(cockpit, scene):
+    import rospy
+
+    rospy.set_param("/drone_sim/scene_file", scene)
+    cockpit.call("load_scene")
+
+
+def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cockpit, browser, monkeypatch):
+    monkeypatch.setenv("ROS_MASTER_URI", os.environ["ROS_MASTER_URI"])  # that of this process, afterwards
+    cockpit.scripts.mkdir(exist_ok=True)
+    script, scene = cockpit.scripts / "stock.py", cockpit.scripts / "Drone.yaml"
+    script.write_text(SCRIPT)
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        page.click("#toggle")
+        builder = Builder(page)
+        build(builder, str(script))
+        check(builder)
+        builder.save_as(scene.name)
+    load(cockpit, "")  # as it was launched
+    said = yaml.safe_load(scene.read_text())
+    assert [one["name"] for one in said["objects"]] == ["TrackCam", "Track_base"]
+    with launched(f"scene:={scene}") as again, browser.new_page() as page:
+        page.add_init_script(STARTED)
+        page.goto(again.address, wait_until="commit")
+        ready(page)
+        flies(page)
+        Panel(page).press("Stop", "stopped")  # which puts back what the script has unparented
+        check(Builder(page))
+
+
+def test_a_drag_is_one_step_of_undo_and_the_text_is_the_same_scene(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder = Builder(page)
+        builder.menu("Scene file", "New")
+        builder.row("Drone").wait_for(state="detached")
+        builder.drop("Cuboid", [1, 0, 0])
+        before = builder.wait("Cuboid", lambda one: one["position"][:2] == [1, 0])["position"]
+        builder.pull(60)
+        moved = builder.wait("Cuboid", lambda one: one["position"][1] < -0.05)["position"]
+        assert moved[0] == before[0] and moved[2] == before[2]
+        assert abs(moved[1] * 10 - round(moved[1] * 10)) < FAR, "in steps of 0.1 m"
+        wait_until(page, lambda: "Move Cuboid" in page.get_attribute("[data-edit=undo]", "title"))
+        page.keyboard.press("Control+z")
+        builder.wait("Cuboid", lambda one: one["position"] == before)
+        page.click("[data-edit=text]")
+        text = page.get_by_label("Text of the scene; Escape and then Tab leaves it")
+        wait_until(page, lambda: "name: Cuboid" in text.inner_text())
+        text.fill("floor: {size: 4}\nobjects:\n  - {name: Ball, shape: sphere, size: [0.2], position: [1, 1, 0.2]}\n")
+        builder.row("Ball").wait_for()
+        assert builder.object("Cuboid") is None
+        text.fill("floor: {size: 4}\nobjects:\n  - {name: Ball, shape: ball}\n")
+        wait_until(page, lambda: "line 3" in page.inner_text("#scene-text-said"))
+        assert builder.object("Ball")["position"] == [1, 1, 0.2], "what is wrong changes nothing"
+        page.reload()
+        ready(page)
+        builder.row("Ball").wait_for()
+    load(cockpit, "")

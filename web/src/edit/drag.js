@@ -1,0 +1,77 @@
+// One drag of what is selected: seen at once, told to the node as it goes, and one step of undo in the end.
+import * as THREE from "three";
+
+const SAID = 120; // ms between two words to the node
+const NOTHING = new THREE.Matrix4().elements.join();
+let drags = 0;
+const page = Math.random().toString(36).slice(2); // this page's name
+
+export class Drag {
+  // Of the objects `roots`, and of all that hangs on them.
+  constructor(edit, roots) {
+    Object.assign(this, { edit, roots });
+    this.change = { matrix: new THREE.Matrix4(), factors: null };
+    this.merge = `${page}-${++drags}`;
+    this.from = new Map(roots.map((one) => [one, edit.objects.get(one).matrix.clone()]));
+    const all = roots.flatMap((one) => edit.objects.withBelow(one));
+    const names = new Set(all.map((one) => edit.objects.get(one)).filter(({ of }) => of === "scene").map(({ name }) => name));
+    const { scene, glyphs } = edit;
+    const shown = [...scene.tree.markers.values()].filter(({ userData: { said } }) => said.layer === "scene" && names.has(said.ns));
+    this.shown = [...shown, ...all.map((one) => glyphs.get(one)).filter(Boolean)].map((one) => [one, one.matrixWorld.clone()]);
+  }
+
+  // `change`: a matrix of the world, and factors along the own axes, null for none.
+  go(change) {
+    this.change = change;
+    this.edit.scene.change();
+    if (this.isResize(change)) return;
+    this.saying ??= setTimeout(() => this.tell(this.change).then(() => (this.saying = undefined)), SAID);
+  }
+
+  isResize({ factors }) {
+    return Boolean(factors) && factors.toArray().some((one) => one !== 1);
+  }
+
+  // Shows it where it will be, before each picture: the node's word comes later.
+  show({ matrix, factors } = this.change) {
+    const whole = matrix.clone();
+    const own = this.from.get(this.roots.at(-1));
+    if (factors && own) whole.multiply(own.clone().scale(factors).multiply(own.clone().invert()));
+    for (const [object, from] of this.shown) {
+      const local = from.clone().premultiply(whole).premultiply(object.parent.matrixWorld.clone().invert());
+      if (!object.matrixAutoUpdate) object.matrix.copy(local);
+      local.decompose(object.position, object.quaternion, object.scale);
+      object.matrixWorldNeedsUpdate = true;
+    }
+    this.edit.scene.tree.isMoved = true;
+  }
+
+  tell({ matrix }) {
+    if (this.isOver) return Promise.resolve();
+    this.isTold = true;
+    const places = new Map([...this.from].map(([handle, from]) => [handle, from.clone().premultiply(matrix)]));
+    return this.edit.place(places, this.edit.named("Move", this.roots), this.merge);
+  }
+
+  async end(change) {
+    clearTimeout(this.saying);
+    for (const [object] of this.shown) object.scale.setScalar(1);
+    const { edit, roots } = this;
+    const isMoved = this.isTold || change.matrix.elements.join() !== NOTHING;
+    const resize = { do: "scale", objects: roots, factors: change.factors?.toArray().map((one) => Number(one.toFixed(6))) };
+    const done = this.isResize(change) ? await edit.do([resize], edit.named("Resize", roots)) : isMoved && (await this.tell(change));
+    this.isOver = true;
+    if (done === undefined) this.back();
+  }
+
+  cancel() {
+    clearTimeout(this.saying);
+    this.back();
+    if (this.isTold) this.edit.undo("undo");
+  }
+
+  back() {
+    this.show({ matrix: new THREE.Matrix4(), factors: null });
+    this.edit.scene.change();
+  }
+}

@@ -1,0 +1,291 @@
+// Editing of the scene: what is selected, what is done to it, and who is told of that. The node has the scene; here is
+// what it tells of it.
+import * as THREE from "three";
+import { FREE } from "../scene/view.js";
+import { Assumed } from "./assumed.js";
+import { Drag } from "./drag.js";
+import { EditHand } from "./edit_hand.js";
+import { Glyphs } from "./glyphs.js";
+import { Handles } from "./handles.js";
+import { Measure } from "./measure.js";
+import { Objects, WORLD } from "./objects.js";
+import { poseOf } from "./poses.js";
+import { Seen } from "./seen.js";
+
+const TARGET = "target"; // the alias of the green sphere: what of a vehicle is moved by itself
+const NOTHING = { file: "", modified: false, read_only: false, state: "", undo: "", redo: "", draft: null, revision: 0 };
+
+export class Edit {
+  // `ask` asks the node, `notice` is the message line, `openScript(file)` opens one in the editor.
+  constructor(scene, ask, notice, openScript) {
+    Object.assign(this, { scene, ask, notice, openScriptFile: openScript });
+    this.objects = new Objects();
+    this.assumed = new Assumed(this.objects);
+    this.is = NOTHING; // of the scene as a whole
+    this.selected = []; // handles, the last one last
+    this.expected = new Set(); // selected, but not told yet
+    this.hearing = new Map();
+    this.isOn = false;
+    this.frame = "world"; // the axes of the handles
+    this.glyphs = new Glyphs(scene.world);
+    this.handles = new Handles(scene.camera, { changed: (change) => this.drag(change) });
+    this.seen = new Seen(this);
+    this.measure = new Measure(scene);
+    this.hand = new EditHand(scene, this, this.handles);
+  }
+
+  on(what, act) {
+    this.hearing.set(what, [...(this.hearing.get(what) ?? []), act]);
+  }
+
+  emit(what) {
+    for (const act of this.hearing.get(what) ?? []) act();
+  }
+
+  // ---- begin and end
+
+  turn(on) {
+    if (on === this.isOn) return;
+    this.isOn = on;
+    const { scene } = this;
+    scene.select("");
+    scene.hand.enter(null);
+    scene.editing = on ? this : null;
+    scene.hand.pointer.acts = on ? { ...scene.hand.acts(), ...this.hand.acts } : scene.hand.acts();
+    if (on) {
+      this.viewBefore = scene.view.name;
+      if (scene.view.name !== FREE) {
+        scene.look(FREE);
+        scene.view.stepBack();
+      }
+      this.connected();
+    } else {
+      this.endMeasure();
+      if (this.viewBefore !== FREE && scene.view.name === FREE) scene.look(this.viewBefore);
+    }
+    this.show();
+    this.emit("mode");
+  }
+
+  connected() {
+    if (!this.isOn || this.asking) return;
+    this.asking = true; // once, however much is missed meanwhile
+    // What has been told meanwhile may be newer.
+    const take = ({ tree }) => tree.version >= (this.objects.version ?? tree.version) && this.take(tree);
+    return this.ask("tree").then(take, (error) => this.wrong(error.message)).finally(() => (this.asking = false));
+  }
+
+  lost() {
+    this.objects.clear();
+    this.assumed.clear();
+    this.is = NOTHING;
+    this.selected = [];
+    for (const what of ["tree", "objects", "selection"]) this.emit(what);
+    this.show();
+  }
+
+  // ---- what the node tells
+
+  take(told) {
+    if (!this.isOn) return void (this.objects.version = null);
+    const changed = this.objects.take(told);
+    if (changed === "missed") return void this.connected();
+    const { objects, gone, version, since, ...is } = told;
+    this.is = is;
+    this.assumed.told(is.revision);
+    for (const one of [...this.expected]) if (this.objects.get(one)) this.expected.delete(one);
+    const still = this.selected.filter((one) => this.objects.get(one) || this.expected.has(one));
+    if (changed === "tree") this.emit("tree");
+    this.emit("objects");
+    if (still.length !== this.selected.length || changed === "tree") this.choose(still);
+    this.show();
+  }
+
+  // Paints anew what is seen of the objects, and of what is selected.
+  show() {
+    this.glyphs.show(this.isOn ? this.seen.bodiless() : null);
+    this.scene.rearrange();
+  }
+
+  // ---- what is selected
+
+  get last() {
+    return this.selected.at(-1);
+  }
+
+  has(handle) {
+    return this.selected.includes(handle);
+  }
+
+  select(handles, more = false) {
+    const known = handles.filter((one) => this.objects.get(one) || this.expected.has(one));
+    this.choose(more ? [...this.selected.filter((one) => !known.includes(one)), ...known] : known);
+  }
+
+  toggle(handle) {
+    this.choose(this.has(handle) ? this.selected.filter((one) => one !== handle) : [...this.selected, handle]);
+  }
+
+  choose(handles) {
+    this.selected = handles;
+    this.emit("selection");
+    this.show();
+  }
+
+  hover(handle) {
+    if (handle === this.hovered) return;
+    this.hovered = handle;
+    this.scene.rearrange();
+  }
+
+  // What a click on an object selects: its outermost model first, what it is a part of next, then the part itself.
+  shownAs(handle) {
+    const models = this.objects.above(handle).filter((one) => this.objects.get(one).model || this.objects.get(one).root);
+    const way = [...models.reverse(), handle];
+    const at = way.findLastIndex((one) => this.has(one));
+    return way[Math.min(at + 1, way.length - 1)];
+  }
+
+  // ---- the handles: the scene asks while one edits
+
+  putHandles() {
+    const one = this.objects.get(this.last);
+    const isShown = this.isOn && one && this.mayMove(one.handle) && !this.hand.measuring && this.scene.shown.handles;
+    const frame = this.handles.mode === "scale" ? "own" : this.frame;
+    this.handles.put(isShown ? this.frameOf(one.handle, frame) : null, isShown && new THREE.Vector3().setFromMatrixPosition(one.matrix));
+  }
+
+  // ---- frames and places
+
+  mayMove(handle) {
+    const one = this.objects.get(handle);
+    return Boolean(one) && (one.of === "scene" || Boolean(one.root) || (one.of === "vehicle" && one.alias === TARGET));
+  }
+
+  mayRename({ of }) {
+    return of !== "floor";
+  }
+
+  frameOf(handle, which) {
+    const one = this.objects.get(handle);
+    if (which === "own" && one) return one.matrix;
+    return (which === "parent" && this.objects.get(one?.parent)?.matrix) || new THREE.Matrix4();
+  }
+
+  // ---- what is done
+
+  // Does some operations as one edit, after all before it; returns the answer, undefined where it was refused.
+  do(operations, name, merge) {
+    this.doing = (this.doing ?? Promise.resolve()).then(() => this.doNow(operations, name, merge));
+    return this.doing;
+  }
+
+  async doNow(operations, name, merge) {
+    try {
+      const { is } = this;
+      const answer = await this.assumed.during(this.ask("edit", { edit: operations, name, ...(merge ? { merge } : {}) }));
+      const first = answer.until_stop && !this.hasTold;
+      if (first) this.notice.say("It flies: what you edit now is undone when it is stopped.");
+      this.hasTold = Boolean(answer.until_stop) && is.state !== "stopped";
+      return answer;
+    } catch (error) {
+      this.wrong(error.message);
+      this.connected(); // what was assumed is not so
+    }
+  }
+
+  // Does what makes objects, and selects the first of them, or all.
+  async make(operations, name, isAll = false) {
+    const answer = await this.do(operations, name);
+    const made = answer?.handles ?? [];
+    const chosen = isAll ? made : made.slice(0, 1);
+    for (const one of chosen) if (!this.objects.get(one)) this.expected.add(one);
+    if (chosen.length) this.select(chosen);
+    return answer;
+  }
+
+  wrong(line) {
+    this.notice.say(line, true);
+  }
+
+  async undo(which) {
+    try {
+      const { said, handles = [] } = await this.ask(which);
+      this.notice.say(said);
+      const there = handles.filter((one) => this.objects.get(one));
+      if (there.length) this.select(there);
+    } catch (error) {
+      this.wrong(error.message);
+    }
+  }
+
+  // Puts objects at places: matrices of the world, by handle.
+  place(places, name = this.named("Move", [...places.keys()]), merge) {
+    for (const [handle, matrix] of places) this.assumed.put(handle, matrix);
+    this.glyphs.show(this.seen.bodiless());
+    const operations = [...places].map(([object, matrix]) => {
+      const pose = poseOf(matrix);
+      return { do: "move", object, position: pose.slice(0, 3), quaternion: pose.slice(3), relative_to: "world" };
+    });
+    return this.do(operations, name, merge);
+  }
+
+  named(verb, handles = this.selected) {
+    return `${verb} ${handles.length === 1 ? this.objects.get(handles[0])?.name ?? "" : `${handles.length} objects`}`;
+  }
+
+  rename({ handle, name: before }, name) {
+    return this.do([{ do: "rename", object: handle, name }], `Rename ${before}`);
+  }
+
+  hang(parent, isRelative) {
+    const objects = this.objects.roots(this.selected);
+    const under = parent === WORLD ? "the world" : this.objects.get(parent).name;
+    return this.do([{ do: "reparent", objects, parent, keep: isRelative ? "relative" : "pose" }], `${this.named("Hang", objects)} on ${under}`);
+  }
+
+  set(handles, values) {
+    for (const one of handles) this.assumed.set(one, values);
+    return this.do(handles.map((object) => ({ do: "set", object, values })), this.named("Change", handles));
+  }
+
+  openScript({ script }) {
+    return this.openScriptFile(script);
+  }
+
+  // ---- drags
+
+  beginDrag() {
+    const roots = this.objects.roots(this.selected).filter((one) => this.mayMove(one));
+    this.dragged = new Drag(this, roots);
+  }
+
+  drag(change) {
+    this.dragged?.go(change);
+  }
+
+  endDrag(change) {
+    this.dragged?.end(change);
+    this.dragged = null;
+  }
+
+  cancelDrag() {
+    this.dragged?.cancel();
+    this.dragged = null;
+  }
+
+  // ---- measure
+
+  beginMeasure() {
+    this.hand.measuring = this.measure;
+    this.emit("mode");
+    this.scene.rearrange();
+  }
+
+  endMeasure() {
+    this.hand.measuring = null;
+    this.measure.clear();
+    this.emit("mode");
+    this.scene.rearrange();
+  }
+}

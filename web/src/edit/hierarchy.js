@@ -1,0 +1,204 @@
+// The tree of objects beside the scene. Only the rows that are in view are made: 2000 objects stay fluent.
+import { create, icon } from "../dom.js";
+import { iconOf } from "./kinds.js";
+import { RowDrag } from "./row_drag.js";
+import { WORLD } from "./objects.js";
+
+const ROW = 32; // px, as high as a finger needs
+const MORE = 8; // rows above and below those that are seen
+const INDENT = 14; // px
+
+export class Hierarchy {
+  // `tree` is the element that scrolls, `find` the search field above it.
+  constructor(tree, find, edit) {
+    Object.assign(this, { tree, find, edit });
+    this.folded = new Set(); // handles
+    this.known = new Set(); // handles of models that have been folded, or not, by the user
+    this.rows = []; // { handle, depth } of what is unfolded, from top to bottom
+    this.body = create("div", { className: "rows", role: "presentation" });
+    tree.append(this.body);
+    tree.onscroll = () => this.draw();
+    new ResizeObserver(() => this.draw()).observe(tree);
+    find.oninput = () => this.seek();
+    find.onkeydown = (event) => this.keyOfFind(event);
+    tree.onkeydown = (event) => this.key(event);
+    new RowDrag(tree, edit, (handle) => this.range(handle), () => this.rename());
+    edit.on("tree", () => this.list());
+    edit.on("selection", () => this.reveal());
+  }
+
+  get objects() {
+    return this.edit.objects;
+  }
+
+  // ---- which rows there are
+
+  // Shows what is sought, from the first one.
+  seek() {
+    this.tree.scrollTop = 0;
+    this.list();
+  }
+
+  list() {
+    for (const one of this.objects.all()) this.begin(one);
+    const shown = this.found();
+    this.rows = [];
+    const walk = (handle, depth) => {
+      if (shown && !shown.has(handle)) return;
+      this.rows.push({ handle, depth });
+      if (shown || !this.folded.has(handle)) for (const child of this.objects.children(handle)) walk(child, depth + 1);
+    };
+    for (const handle of this.objects.children(WORLD)) walk(handle, 0);
+    this.body.style.height = `${this.rows.length * ROW}px`;
+    this.draw();
+  }
+
+  // A model begins folded, and so do a vehicle's propellers: what they are made of is seldom looked at.
+  begin({ handle, model, of, type }) {
+    if (!(model || (of === "vehicle" && type !== "dummy")) || this.known.has(handle)) return;
+    this.known.add(handle);
+    this.folded.add(handle);
+  }
+
+  // The objects that are sought, with all above them; null where nothing is sought.
+  found() {
+    const sought = this.find.value.trim().toLowerCase();
+    if (!sought) return null;
+    const shown = new Set();
+    for (const one of this.objects.all()) {
+      if (!`${one.alias} ${one.name} ${one.type}`.toLowerCase().includes(sought)) continue;
+      for (let above = one; above && !shown.has(above.handle); above = this.objects.get(above.parent)) shown.add(above.handle);
+    }
+    return shown;
+  }
+
+  fold(handle, folded) {
+    folded ? this.folded.add(handle) : this.folded.delete(handle);
+    this.known.add(handle);
+    this.list();
+  }
+
+  // Unfolds what is above the object that was selected last, and scrolls to it.
+  reveal() {
+    const last = this.edit.last;
+    const hidden = this.objects.above(last).filter((one) => this.folded.has(one));
+    for (const one of hidden) this.folded.delete(one);
+    if (hidden.length) this.list();
+    const at = this.rows.findIndex(({ handle }) => handle === last);
+    if (at >= 0) {
+      const { scrollTop, clientHeight } = this.tree;
+      if (at * ROW < scrollTop) this.tree.scrollTop = at * ROW;
+      else if ((at + 1) * ROW > scrollTop + clientHeight) this.tree.scrollTop = (at + 1) * ROW - clientHeight;
+    }
+    this.draw();
+  }
+
+  // ---- what is seen of them
+
+  draw() {
+    if (this.renaming) return;
+    const first = Math.max(0, Math.floor(this.tree.scrollTop / ROW) - MORE);
+    const count = Math.ceil(this.tree.clientHeight / ROW) + 2 * MORE;
+    const made = this.rows.slice(first, first + count).map((row, number) => this.row(row, first + number));
+    this.body.replaceChildren(...made);
+    this.tree.setAttribute("aria-activedescendant", this.edit.last === undefined ? "" : `object-${this.edit.last}`);
+  }
+
+  row({ handle, depth }, number) {
+    const one = this.objects.get(handle);
+    const row = create("div", { className: "row", role: "treeitem", id: `object-${handle}`, title: `${one.name}: ${one.type}` });
+    row.dataset.handle = handle;
+    row.style.cssText = `top:${number * ROW}px;padding-left:${4 + depth * INDENT}px`;
+    row.setAttribute("aria-level", depth + 1);
+    row.setAttribute("aria-selected", this.edit.has(handle));
+    row.append(this.folder(row, handle), icon(iconOf(one)), create("span", { className: "name", textContent: one.name }));
+    if (one.script) row.append(this.script(one));
+    return row;
+  }
+
+  folder(row, handle) {
+    const has = this.objects.children(handle).length > 0;
+    const folded = this.folded.has(handle);
+    if (has) row.setAttribute("aria-expanded", !folded);
+    const said = { className: "folder", type: "button", tabIndex: -1, "aria-label": folded ? "Unfold" : "Fold", textContent: folded ? "▸" : "▾" };
+    return has ? create("button", { ...said, onclick: () => this.fold(handle, !folded) }) : create("span", { className: "folder" });
+  }
+
+  script(one) {
+    const said = { className: "script", type: "button", tabIndex: -1, title: `Open the script of ${one.name}`, "aria-label": `Open the script of ${one.name}` };
+    return create("button", { ...said, onclick: () => this.edit.openScript(one) }, icon("script"));
+  }
+
+  // ---- keys
+
+  key(event) {
+    if (event.target.matches("input") || event.ctrlKey || event.metaKey || event.altKey) return;
+    const { last } = this.edit;
+    const acts = {
+      ArrowDown: () => this.step(1, event.shiftKey),
+      ArrowUp: () => this.step(-1, event.shiftKey),
+      ArrowRight: () => this.fold(last, false),
+      ArrowLeft: () => (this.folded.has(last) || !this.objects.children(last).length ? this.edit.select([this.objects.get(last)?.parent]) : this.fold(last, true)),
+      Home: () => this.edit.select([this.rows[0]?.handle]),
+      End: () => this.edit.select([this.rows.at(-1)?.handle]),
+      F2: () => this.rename(),
+      Enter: () => this.rename(), // it would stop the flight
+    };
+    if (!(event.key in acts)) return;
+    acts[event.key]();
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  keyOfFind(event) {
+    if (event.key === "ArrowDown" || event.key === "Enter") {
+      const sought = this.find.value.trim().toLowerCase();
+      const row = this.rows.find(({ handle }) => this.objects.get(handle).name.toLowerCase().includes(sought));
+      if (row) this.edit.select([row.handle]);
+      this.tree.focus();
+    } else if (event.key === "Escape" && this.find.value) this.find.value = "";
+    else return;
+    this.list();
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  step(way, more) {
+    const at = this.rows.findIndex(({ handle }) => handle === this.edit.last);
+    const row = this.rows[Math.min(Math.max(0, at + way), this.rows.length - 1)];
+    if (row) this.edit.select([row.handle], more);
+  }
+
+  // Selects all rows from the one that was selected last to this one.
+  range(handle) {
+    const place = (sought) => this.rows.findIndex((row) => row.handle === sought);
+    const [from, to] = [place(this.edit.last), place(handle)];
+    const between = this.rows.slice(Math.min(from, to), Math.max(from, to) + 1).map((row) => row.handle);
+    this.edit.select([...(from < 0 ? [] : between.filter((one) => one !== handle)), handle], true);
+  }
+
+  // ---- a new name
+
+  rename(handle = this.edit.last) {
+    const one = this.objects.get(handle);
+    const name = this.body.querySelector(`#object-${handle} .name`);
+    if (!one || !name || this.renaming || !this.edit.mayRename(one)) return;
+    const field = create("input", { value: one.name, "aria-label": `New name of ${one.name}`, spellcheck: false, maxLength: 100 });
+    const end = (wanted) => {
+      if (!this.renaming) return;
+      this.renaming = false;
+      this.draw();
+      this.tree.focus();
+      if (wanted && wanted !== one.name) this.edit.rename(one, wanted);
+    };
+    field.onblur = () => end(field.value.trim());
+    field.onkeydown = (event) => {
+      if (event.key === "Enter") end(field.value.trim());
+      if (event.key === "Escape") end("");
+      event.stopPropagation();
+    };
+    this.renaming = true;
+    name.replaceWith(field);
+    field.select();
+  }
+}

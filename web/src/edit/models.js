@@ -1,0 +1,167 @@
+// The shelf of models, with pictures: dragged into the scene one lands on what is under the mouse. So do files.
+import { create } from "../dom.js";
+import { askFor } from "./ask.js";
+import { isFree } from "./edit_hand.js";
+import { follow } from "./follow.js";
+import { onGrid } from "./handles.js";
+import { Landing } from "./landing.js";
+
+const FAR = 5; // px, from which on a press is a drag
+const LARGEST = 5 << 20; // bytes of a file: as text it is a third longer, and a message has an end
+const FILES = /\.(?:ttm|obj|stl|dae|urdf|ya?ml)$/i;
+
+export class Models {
+  constructor(shelf, find, edit) {
+    Object.assign(this, { shelf, find, edit });
+    this.groups = [];
+    this.landing = new Landing(edit.scene);
+    find.oninput = () => this.show();
+    find.addEventListener("keydown", (event) => event.key === "Escape" && this.clear(event));
+    shelf.addEventListener("pointerdown", (event) => this.down(event));
+    shelf.addEventListener("keydown", (event) => this.key(event));
+    window.addEventListener("keydown", (event) => event.key === "Escape" && this.end(), true);
+    this.listen(edit.scene.canvas.element);
+    edit.on("mode", () => edit.isOn && !this.groups.length && this.ask());
+  }
+
+  ask() {
+    return this.edit.ask("models").then(({ groups }) => {
+      this.groups = groups;
+      this.show();
+    }, (error) => this.edit.wrong(error.message));
+  }
+
+  clear(event) {
+    if (!this.find.value) return;
+    event.stopPropagation();
+    this.find.value = "";
+    this.show();
+  }
+
+  show() {
+    const sought = this.find.value.trim().toLowerCase();
+    this.ops = new Map();
+    const made = this.groups.flatMap(({ name, models }) => {
+      const found = models.filter(({ title }) => `${title} ${name}`.toLowerCase().includes(sought));
+      return found.length ? [create("h3", { textContent: name }), create("div", { className: "cards", role: "group", "aria-label": name }, ...found.map((one) => this.card(one)))] : [];
+    });
+    this.shelf.replaceChildren(...(made.length ? made : [create("p", { textContent: "There is no such model." })]));
+  }
+
+  card({ model, title, picture, op }) {
+    this.ops.set(model, { op, title });
+    const seen = picture ? create("img", { src: picture, alt: "", draggable: false }) : create("span", { className: "blank" });
+    const card = create("button", { type: "button", className: "card", title: `${title}: drag it into the scene, or press Enter` }, seen, create("span", { textContent: title }));
+    card.dataset.model = model;
+    return card;
+  }
+
+  // ---- by the mouse, or a finger
+
+  down(event) {
+    const card = event.target.closest(".card");
+    if (!card || event.button) return;
+    this.began = { ...this.ops.get(card.dataset.model), x: event.clientX, y: event.clientY, card };
+    follow(event, (moved) => this.began && this.move(moved), (_, isCancelled) => (isCancelled ? this.end() : this.began && this.up()));
+  }
+
+  move(event) {
+    const { x, y, card, title } = this.began;
+    if (!this.label) {
+      if (Math.hypot(event.clientX - x, event.clientY - y) < FAR) return;
+      this.label = create("div", { className: "drag-label with-picture" }, card.firstElementChild.cloneNode(), title);
+      document.body.append(this.label);
+    }
+    this.label.style.translate = `${event.clientX + 12}px ${event.clientY + 8}px`;
+    this.place = this.aim(event);
+    this.label.classList.toggle("wrong", !this.place);
+  }
+
+  up() {
+    const { op, title } = this.began;
+    const { label, place } = this;
+    this.end();
+    if (label && place) this.put(op, title, place);
+  }
+
+  end() {
+    this.label?.remove();
+    this.landing.show(null);
+    this.began = this.label = this.place = undefined;
+  }
+
+  // Where in the world it would land; undefined beside the scene, and in the sky.
+  aim(event) {
+    const { edit } = this;
+    const isScene = document.elementFromPoint(event.clientX, event.clientY) === edit.scene.canvas.dom;
+    const met = isScene && edit.hand.meet(event);
+    const place = met ? this.snapped(met.point.toArray(), isFree(event)) : undefined;
+    this.landing.show(place);
+    return place;
+  }
+
+  snapped([x, y, z], free) {
+    return this.edit.handles.isSnapped !== free ? [onGrid(x), onGrid(y), Number(z.toFixed(4))] : [x, y, z].map((one) => Number(one.toFixed(4)));
+  }
+
+  // By the keyboard it lands where one looks.
+  key(event) {
+    const card = event.target.closest?.(".card");
+    if (event.key !== "Enter" || !card) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const { op, title } = this.ops.get(card.dataset.model);
+    const { x, y } = this.edit.scene.view.aim;
+    this.put(op, title, this.snapped([x, y, 0], false));
+  }
+
+  put(op, title, position) {
+    const add = (more) => this.edit.make([{ ...op, ...more, position, yaw: op.yaw ?? 0 }], `Add ${title}`);
+    if (op.text === undefined) return add();
+    askFor(title, [{ label: "Text", value: op.text }], "Put it there", ([text]) => add({ text }));
+  }
+
+  // ---- files
+
+  listen(place) {
+    const isOfFiles = (event) => this.edit.isOn && event.dataTransfer?.types.includes("Files");
+    const over = (on) => (event) => {
+      if (!isOfFiles(event)) return;
+      event.preventDefault();
+      place.classList.toggle("drop", on);
+      if (on) this.aim(event);
+      else this.landing.show(null);
+    };
+    place.addEventListener("dragover", over(true));
+    place.addEventListener("dragleave", over(false));
+    place.addEventListener("drop", (event) => {
+      if (!isOfFiles(event)) return;
+      const spot = this.aim(event) ?? [0, 0, 0];
+      over(false)(event);
+      this.upload([...event.dataTransfer.files], spot);
+    });
+  }
+
+  async upload(files, place) {
+    for (const file of files) {
+      try {
+        if (!FILES.test(file.name)) throw new Error(`${file.name}: a model's name ends in .ttm, .obj, .stl, .dae, .urdf or .yaml`);
+        if (file.size > LARGEST) throw new Error(`${file.name}: has ${file.size} bytes; at most ${LARGEST} can be dropped`);
+        const { model } = await this.edit.ask("upload_model", { name: file.name, content: await base64(file) });
+        await this.put(model, file.name, place);
+      } catch (error) {
+        this.edit.wrong(error.message);
+      }
+    }
+    await this.ask();
+  }
+}
+
+function base64(file) {
+  return new Promise((done, fail) => {
+    const reader = new FileReader();
+    reader.onload = () => done(reader.result.split(",")[1] ?? "");
+    reader.onerror = () => fail(new Error(`${file.name}: cannot be read`));
+    reader.readAsDataURL(file);
+  });
+}

@@ -1,0 +1,46 @@
+// A field for a number: taken when it is entered, put back where it is none; arrow keys step it.
+import { create } from "../dom.js";
+
+export const shown = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toFixed(digits))) : "");
+
+// `take(value)` gets a new number, `wrong(line)` what is said of a bad one. The element's `fill(value)` shows one,
+// unless somebody writes there.
+export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, high, isWhole = false, ...more }) {
+  const field = create("input", { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false, "aria-label": label, ...more });
+  let holds;
+  field.fill = (value) => {
+    const isWritten = document.activeElement === field && field.value !== shown(holds, digits);
+    holds = value;
+    if (!isWritten) field.value = shown(value, digits);
+  };
+  const enter = () => {
+    const text = field.value.trim().replace(",", ".");
+    if (text === shown(holds, digits)) return;
+    const value = text === "" ? NaN : Number(text);
+    const isIn = Number.isFinite(value) && !(value < low) && !(value > high) && !(isWhole && value % 1);
+    if (isIn) return void take(value);
+    wrong(`${label} = ${field.value.slice(0, 40)}: must be a ${isWhole ? "whole " : ""}number${range(low, high)}`);
+    field.value = shown(holds, digits);
+  };
+  field.onchange = enter;
+  field.onfocus = () => field.select();
+  field.onkeydown = (event) => {
+    const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (way && Number.isFinite(holds)) {
+      event.preventDefault();
+      field.value = shown(Number(field.value) + way * step, digits);
+      enter();
+    }
+    if (event.key === "Enter") enter();
+    if (event.key !== "Escape") return;
+    field.value = shown(holds, digits);
+    field.blur();
+    event.stopPropagation();
+  };
+  return field;
+}
+
+function range(low, high) {
+  const ends = [low === undefined || low === null ? "" : ` from ${low}`, high === undefined || high === null ? "" : ` to ${high}`];
+  return ends.join("");
+}

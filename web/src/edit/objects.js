@@ -1,0 +1,88 @@
+// The objects of the scene, as the node tells them; one is { handle, name, alias, kind, type, parent, pose, values, ... }
+// with its `matrix` in the world.
+import { matrixOf } from "./poses.js";
+
+export const WORLD = -1;
+const STRUCTURE = ["name", "alias", "type", "parent", "model", "script", "root"]; // what the tree shows
+
+export class Objects {
+  constructor() {
+    this.clear();
+  }
+
+  clear() {
+    this.rows = new Map(); // by handle
+    this.below = new Map(); // handles, by that of their parent
+    this.names = new Map(); // handles, by name
+    this.version = null;
+  }
+
+  // Takes the topic's message; returns "missed" where something was missed before it, "tree" where names, parents or the
+  // like have changed, "" where nothing but poses and values have.
+  take({ version, since, objects, gone }) {
+    if (since !== null && since !== this.version) return "missed";
+    let isNew = gone.length > 0;
+    if (since === null) {
+      isNew = true;
+      this.rows.clear();
+    }
+    this.version = version;
+    for (const handle of gone) this.rows.delete(handle);
+    for (const row of objects) {
+      const before = this.rows.get(row.handle);
+      isNew ||= !before || STRUCTURE.some((key) => before[key] !== row[key]);
+      this.rows.set(row.handle, { ...row, matrix: matrixOf(row.pose) });
+    }
+    if (isNew) this.sort();
+    return isNew ? "tree" : "";
+  }
+
+  sort() {
+    this.below.clear();
+    this.names.clear();
+    for (const { handle, name, parent } of [...this.rows.values()].sort((one, other) => one.handle - other.handle)) {
+      const above = this.rows.has(parent) ? parent : WORLD;
+      if (!this.below.has(above)) this.below.set(above, []);
+      this.below.get(above).push(handle);
+      this.names.set(name, handle);
+    }
+  }
+
+  all() {
+    return this.rows.values();
+  }
+
+  get(handle) {
+    return this.rows.get(handle);
+  }
+
+  named(name) {
+    return this.rows.get(this.names.get(name));
+  }
+
+  children(handle) {
+    return this.below.get(handle) ?? [];
+  }
+
+  // The handles of all that an object hangs on, the nearest first.
+  above(handle) {
+    const found = [];
+    for (let one = this.get(this.get(handle)?.parent); one; one = this.get(one.parent)) found.push(one.handle);
+    return found;
+  }
+
+  // An object and all that hangs on it.
+  withBelow(handle) {
+    return [handle, ...this.children(handle).flatMap((one) => this.withBelow(one))];
+  }
+
+  // Those of some handles that hang on no other of them.
+  roots(handles) {
+    const all = new Set(handles);
+    return handles.filter((one) => this.rows.has(one) && !this.above(one).some((above) => all.has(above)));
+  }
+
+  mayHangOn(handle, parent) {
+    return handle !== parent && (parent === WORLD || (this.rows.has(parent) && !this.withBelow(handle).includes(parent)));
+  }
+}

@@ -1,0 +1,31 @@
+// Poses: of the node they come as x, y, z (m) and a quaternion x, y, z, w; people read V-REP's angles, in degrees.
+import * as THREE from "three";
+
+const DEGREE = Math.PI / 180;
+const ORDER = "XYZ"; // V-REP's alpha, beta, gamma: about its own x, then y, then z
+const ONE = new THREE.Vector3(1, 1, 1);
+
+export function matrixOf([x, y, z, qx, qy, qz, qw]) {
+  return new THREE.Matrix4().compose(new THREE.Vector3(x, y, z), new THREE.Quaternion(qx, qy, qz, qw).normalize(), ONE);
+}
+
+export function poseOf(matrix) {
+  const [position, turn] = [new THREE.Vector3(), new THREE.Quaternion()];
+  matrix.decompose(position, turn, new THREE.Vector3());
+  return [...position.toArray(), ...turn.toArray()];
+}
+
+// Position in m, and V-REP's angles in degrees, of a matrix.
+export function numbersOf(matrix) {
+  const [x, y, z, ...turn] = poseOf(matrix);
+  const angles = new THREE.Euler().setFromQuaternion(new THREE.Quaternion(...turn), ORDER);
+  return [x, y, z, ...[angles.x, angles.y, angles.z].map((one) => one / DEGREE)];
+}
+
+export function matrixOfNumbers([x, y, z, ...angles]) {
+  const turn = new THREE.Quaternion().setFromEuler(new THREE.Euler(...angles.map((one) => one * DEGREE), ORDER));
+  return new THREE.Matrix4().compose(new THREE.Vector3(x, y, z), turn, ONE);
+}
+
+// Where something is, seen from a frame; both are matrices of the world.
+export const seenFrom = (frame, matrix) => frame.clone().invert().multiply(matrix);

@@ -1,0 +1,225 @@
+// What an object is like, by the keys that a scene file has for its type: a field for each, by the kind of its value.
+import { create } from "../dom.js";
+import { numberField } from "./number_field.js";
+import { volumeOf } from "./volumes.js";
+
+// What is changed most comes first; all else as the node tells it.
+const FIRST = ["size", "color", "texture", "mass", "static", "respondable", "visible", "friction", "restitution", "script", "width", "height", "fov", "near", "far", "rate", "noise"];
+const FINE = { size: 0.1, mass: 0.1 }; // steps of the arrow keys
+const STEP = 0.1;
+const WHITE = [1, 1, 1, 1];
+
+const words = (key) => key.replaceAll("_", " ");
+const hex = (color) => `#${color.slice(0, 3).map((one) => Math.round(255 * one).toString(16).padStart(2, "0")).join("")}`;
+const numbers = (text) => [1, 3, 5].map((from) => Number((parseInt(text.slice(from, from + 2), 16) / 255).toFixed(3)));
+const isPlain = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
+const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+
+export class Properties {
+  // `openText()` shows the scene as text, where what has no field can be written.
+  constructor(element, edit, openText) {
+    Object.assign(this, { element, edit, openText });
+    this.types = null; // the keys of each type, once they have been asked for
+    this.built = ""; // for what there are fields
+    this.fills = []; // show the values of now
+    edit.on("mode", () => this.ask());
+    edit.on("selection", () => this.show());
+    edit.on("objects", () => this.show());
+  }
+
+  ask() {
+    if (!this.edit.isOn || this.types) return;
+    this.edit.ask("properties").then(({ types }) => {
+      this.types = types;
+      this.show();
+    }, (error) => this.edit.wrong(error.message));
+  }
+
+  get ones() {
+    return this.edit.selected.map((one) => this.edit.objects.get(one)).filter(Boolean);
+  }
+
+  // The keys that all of what is selected have.
+  keys() {
+    const lists = this.ones.map(({ type }) => this.types?.[type] ?? []);
+    const [first = [], ...others] = lists.reverse();
+    const common = first.filter(({ key, kind }) => others.every((list) => list.some((one) => one.key === key && one.kind === kind)));
+    const rank = ({ key }) => (FIRST.includes(key) ? FIRST.indexOf(key) : FIRST.length);
+    return common.sort((one, other) => rank(one) - rank(other));
+  }
+
+  show() {
+    const { ones } = this;
+    const one = ones.at(-1);
+    const inside = one && Object.keys(one.values.script_parameters ?? {});
+    const wanted = JSON.stringify([ones.map(({ handle, type, script }) => [handle, type, Boolean(script)]), inside, Boolean(this.types)]);
+    if (wanted !== this.built) this.build(one);
+    this.built = wanted;
+    if (one) for (const fill of this.fills) fill(one);
+  }
+
+  build(one) {
+    this.fills = [];
+    const isPart = this.ones.some(({ of, root }) => of === "vehicle" && !root);
+    const keys = one && !isPart ? this.keys() : [];
+    const rows = keys.map((said) => this.row(said));
+    if (one && this.ones.length === 1) rows.unshift(...this.names(one));
+    if (one && keys.some(({ key }) => key === "mass")) rows.splice(rows.findIndex(({ dataset }) => dataset.key === "mass") + 1, 0, this.density());
+    if (one?.script && this.ones.length === 1) rows.push(this.parameters(one));
+    if (isPart) rows.push(create("p", { textContent: "A part of a vehicle: what it is like stands at the vehicle, in the text." }));
+    this.element.replaceChildren(...rows.filter(Boolean));
+    this.element.parentElement.scrollTop = 0;
+  }
+
+  line(key, hint, ...parts) {
+    const row = create("div", { className: "field", title: hint }, create("span", { textContent: words(key) }), ...parts);
+    row.dataset.key = key;
+    return row;
+  }
+
+  set(key, value) {
+    return this.edit.set(this.edit.selected, { [key]: value });
+  }
+
+  // Shows the value of now by `fill`.
+  follow(key, otherwise, fill) {
+    this.fills.push((one) => fill(one.values[key] ?? otherwise));
+  }
+
+  names(one) {
+    if (!this.edit.mayRename(one)) return [];
+    const field = (label, now, take, hint) => {
+      const input = create("input", { type: "text", "aria-label": label, value: now(one), maxLength: 100, spellcheck: false });
+      input.onchange = () => (input.value.trim() ? take(input.value.trim()) : (input.value = now(one)));
+      this.fills.push((other) => document.activeElement === input || (input.value = now(other)));
+      return this.line(label, hint, input);
+    };
+    const here = () => this.edit.objects.get(one.handle) ?? one;
+    const name = field("name", ({ name }) => name, (wanted) => this.edit.rename(here(), wanted), "By which V-REP 3.x's scripts find it; no other object has it");
+    if (one.of !== "scene") return [name];
+    return [name, field("alias", ({ alias }) => alias, (wanted) => this.set("alias", wanted), "Its name in 4.x paths, which siblings may share")];
+  }
+
+  row(said) {
+    const { key, kind, what = "" } = said;
+    const made = (KINDS[kind] ?? other)(this, said);
+    const row = this.line(key, what, ...[made].flat());
+    row.classList.add(kind);
+    return row;
+  }
+
+  // Of what has a volume that is known: kg/m³, which sets the mass.
+  density() {
+    if (!this.ones.every((each) => volumeOf(this.whole(each)))) return null;
+    const take = (value) => {
+      const operations = this.ones.map((each) => ({ do: "set", object: each.handle, values: { mass: value * volumeOf(this.whole(each)) } }));
+      return this.edit.do(operations, this.edit.named("Change"));
+    };
+    const field = numberField("density", { take, wrong: (line) => this.edit.wrong(line), low: 0, step: 100, digits: 2 });
+    this.fills.push((each) => field.fill((each.values.mass ?? 0) / volumeOf(this.whole(each))));
+    return this.line("density", "kg/m³: another one sets the mass", field);
+  }
+
+  whole(one) {
+    const size = (this.types[one.type] ?? []).find(({ key }) => key === "size")?.default;
+    return { type: one.type, size: one.values.size ?? size };
+  }
+
+  // Of the script on an object: those that have a value, and a line for another one.
+  parameters({ values: { script_parameters: known = {} } }) {
+    const set = (name, value) => this.set("script_parameters", { ...this.given, [name]: value });
+    const rows = Object.keys(known).map((name) => this.line(name, `${name}: a parameter of its script`, this.parameter(name, known[name], set)));
+    const more = create("input", { type: "text", placeholder: "name = value", "aria-label": "Another script parameter", spellcheck: false });
+    more.onchange = () => {
+      const [, name, text] = /^\s*([A-Za-z_]\w*)\s*=\s*(.+?)\s*$/.exec(more.value) ?? [];
+      if (!name) return this.edit.wrong(`${more.value.slice(0, 40)}: must be a name, = and a value, such as speed = 2`);
+      more.value = "";
+      return set(name, Number.isFinite(Number(text)) ? Number(text) : text);
+    };
+    return create("div", { className: "parameters" }, create("h3", { textContent: "Script parameters" }), ...rows, this.line("another one", "", more));
+  }
+
+  get given() {
+    return this.ones.at(-1)?.values.script_parameters ?? {};
+  }
+
+  parameter(name, value, set) {
+    if (typeof value === "number") {
+      const field = numberField(name, { take: (entered) => set(name, entered), wrong: (line) => this.edit.wrong(line), digits: 6 });
+      this.fills.push(() => field.fill(this.given[name]));
+      return field;
+    }
+    const field = create("input", { type: "text", "aria-label": name, onchange: () => set(name, field.value) });
+    this.fills.push(() => document.activeElement === field || (field.value = this.given[name] ?? ""));
+    return field;
+  }
+}
+
+// ---- the kinds of values
+
+function number(panel, { key, default: otherwise, least, most, what }) {
+  const isWhole = /whole/.test(what ?? "");
+  const field = numberField(words(key), { take: (value) => panel.set(key, value), wrong: (line) => panel.edit.wrong(line), low: least, high: most, step: isWhole ? 1 : FINE[key] ?? STEP, isWhole });
+  panel.follow(key, otherwise, (value) => field.fill(value));
+  return field;
+}
+
+function several(panel, { key, default: otherwise, count, least, most }) {
+  const length = count ?? otherwise?.length ?? 3;
+  const now = () => panel.ones.at(-1).values[key] ?? otherwise ?? Array(length).fill(0);
+  const fields = [...Array(length).keys()].map((place) =>
+    numberField(`${words(key)} ${place + 1}`, {
+      take: (value) => panel.set(key, now().map((one, at) => (at === place ? value : one))),
+      wrong: (line) => panel.edit.wrong(line), low: least, high: most, step: FINE[key] ?? STEP,
+    }),
+  );
+  panel.follow(key, otherwise, (value) => fields.forEach((field, place) => field.fill(value?.[place])));
+  return create("span", { className: "several" }, ...fields);
+}
+
+function onOff(panel, { key, default: otherwise }) {
+  const box = create("input", { type: "checkbox", "aria-label": words(key) });
+  box.onchange = () => panel.set(key, box.checked);
+  panel.follow(key, otherwise, (value) => (box.checked = Boolean(value)));
+  return box;
+}
+
+function text(panel, { key, default: otherwise }) {
+  const field = create("input", { type: "text", "aria-label": words(key), spellcheck: false });
+  field.onchange = () => panel.set(key, field.value.trim() || null);
+  panel.follow(key, otherwise, (value) => document.activeElement === field || (field.value = value ?? ""));
+  return field;
+}
+
+function choice(panel, { key, default: otherwise, choices }) {
+  const select = create("select", { "aria-label": words(key) }, ...(otherwise === null ? [new Option("", "")] : []), ...choices.map((one) => new Option(one, one)));
+  select.onchange = () => panel.set(key, select.value || null);
+  panel.follow(key, otherwise, (value) => (select.value = value ?? ""));
+  return select;
+}
+
+function color(panel, { key, default: otherwise }) {
+  const now = () => panel.ones.at(-1)?.values[key] ?? otherwise ?? WHITE;
+  const alpha = () => now()[3] ?? 1;
+  const paint = create("input", { type: "color", "aria-label": words(key) });
+  const clear = create("input", { type: "range", min: 0, max: 1, step: 0.05, "aria-label": "opacity", title: "Opacity" });
+  paint.onchange = () => panel.set(key, [...numbers(paint.value), alpha()]);
+  clear.onchange = () => panel.set(key, [...now().slice(0, 3), clear.valueAsNumber]);
+  panel.follow(key, otherwise, () => {
+    paint.value = hex(now());
+    if (document.activeElement !== clear) clear.value = alpha();
+  });
+  return [create("span", { className: "paint" }, paint, clear)];
+}
+
+// What is longer than a field is written in the text.
+function other(panel, { key, default: otherwise }) {
+  const button = create("button", { type: "button", title: "Written in the scene's text", onclick: () => panel.openText() });
+  panel.follow(key, otherwise, (value) => {
+    const count = Array.isArray(value) ? value.length : isPlain(value) ? Object.keys(value).length : 0;
+    button.textContent = same(value, otherwise) || !count ? "in the text" : `${count}, in the text`;
+  });
+  return button;
+}
+
+const KINDS = { number, numbers: several, switch: onOff, text, file: text, choice, color };

@@ -1,0 +1,82 @@
+// A press on a row of the tree selects it; dragged to another row, what is selected hangs there from then on.
+import { create } from "../dom.js";
+import { follow } from "./follow.js";
+import { WORLD } from "./objects.js";
+
+const DOUBLE = 400; // ms between two presses that are a double click
+const FAR = 5; // px, from which on a press is a drag
+const EDGE = 24; // px, at which the tree scrolls
+const PACE = 8; // px
+
+export class RowDrag {
+  // `range(handle)` selects all rows up to that one; `twice()` hears of a double click.
+  constructor(tree, edit, range, twice) {
+    Object.assign(this, { tree, edit, range, twice });
+    tree.addEventListener("pointerdown", (event) => this.down(event));
+    window.addEventListener("keydown", (event) => event.key === "Escape" && this.end(), true);
+  }
+
+  handleAt(element) {
+    const row = element?.closest?.("[data-handle]");
+    return row && this.tree.contains(row) ? Number(row.dataset.handle) : undefined;
+  }
+
+  down(event) {
+    if (event.button || event.target.closest("button, input")) return;
+    const handle = this.handleAt(event.target);
+    if (handle === undefined) return this.edit.select([]);
+    const before = this.pressed;
+    this.pressed = { handle, time: event.timeStamp };
+    const isSecond = before?.handle === handle && event.timeStamp - before.time < DOUBLE;
+    this.began = { handle, x: event.clientX, y: event.clientY, isSecond };
+    follow(event, (moved) => this.began && this.move(moved), (ended, isCancelled) => (isCancelled ? this.end() : this.began && this.up(ended)));
+    if (event.shiftKey) this.range(handle);
+    else if (event.ctrlKey || event.metaKey) this.edit.toggle(handle);
+    else if (!this.edit.has(handle)) this.edit.select([handle]);
+    else return;
+    this.began.isDone = true; // there is nothing left to do when it is let go
+  }
+
+  move(event) {
+    const { x, y } = this.began;
+    if (!this.label) {
+      if (Math.hypot(event.clientX - x, event.clientY - y) < FAR || !this.edit.selected.every((one) => this.edit.mayMove(one))) return;
+      const names = this.edit.selected.map((one) => this.edit.objects.get(one).name);
+      this.label = create("div", { className: "drag-label", textContent: names.length > 1 ? `${names.length} objects` : names[0] });
+      document.body.append(this.label);
+    }
+    this.label.style.translate = `${event.clientX + 12}px ${event.clientY + 8}px`;
+    this.aim(event);
+  }
+
+  // Marks the row under the mouse: there it would hang.
+  aim({ clientX, clientY }) {
+    const box = this.tree.getBoundingClientRect();
+    if (clientY < box.top + EDGE) this.tree.scrollTop -= PACE;
+    if (clientY > box.bottom - EDGE) this.tree.scrollTop += PACE;
+    const over = document.elementFromPoint(clientX, clientY);
+    const handle = this.tree.contains(over) ? this.handleAt(over) ?? WORLD : undefined;
+    const isFine = handle !== undefined && this.edit.selected.every((one) => this.edit.objects.mayHangOn(one, handle));
+    this.to = isFine ? handle : undefined;
+    for (const row of this.tree.querySelectorAll(".aimed")) row.classList.remove("aimed");
+    if (isFine && handle !== WORLD) over.closest("[data-handle]").classList.add("aimed");
+    this.tree.classList.toggle("aimed", isFine && handle === WORLD);
+    this.label.classList.toggle("wrong", !isFine);
+  }
+
+  up(event) {
+    const { handle, isDone, isSecond } = this.began;
+    const { label, to } = this;
+    this.end();
+    if (label && to !== undefined) this.edit.hang(to, event.shiftKey);
+    else if (!label && !isDone) this.edit.select([handle]);
+    if (!label && isSecond) this.twice();
+  }
+
+  end() {
+    this.label?.remove();
+    this.label = this.began = this.to = undefined;
+    this.tree.classList.remove("aimed");
+    for (const row of this.tree.querySelectorAll(".aimed")) row.classList.remove("aimed");
+  }
+}

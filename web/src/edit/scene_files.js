@@ -1,0 +1,106 @@
+// New, open, recent, save, save as; a model alone; and the draft that an earlier session has left.
+import { at, create } from "../dom.js";
+import { askFor } from "./ask.js";
+
+const nameOf = (path) => path.split("/").pop();
+const stem = (path) => nameOf(path).replace(/\.\w+$/, "");
+const KINDS = { own: "Yours", recent: "Opened last", package: "Of the package" };
+
+export class SceneFiles {
+  constructor(edit) {
+    this.edit = edit;
+    edit.on("objects", () => this.show());
+  }
+
+  // The name of the file, and whether it lacks something.
+  show() {
+    const { file, modified, draft } = this.edit.is;
+    at("scene-file").textContent = file ? nameOf(file) : "new scene";
+    at("scene-file").title = file;
+    at("scene-modified").hidden = !modified;
+    const question = at("draft");
+    question.hidden = !draft;
+    if (!draft || question.dataset.of === String(draft.saved)) return;
+    question.dataset.of = draft.saved;
+    const when = new Date(1000 * draft.saved).toLocaleString();
+    const choice = (which, textContent) => create("button", { type: "button", textContent, onclick: () => this.act("draft", { draft: which }) });
+    question.replaceChildren(`${draft.file ? nameOf(draft.file) : "A new scene"} was not saved (${when}). `, choice("take", "Go on with it"), choice("drop", "Forget it"));
+  }
+
+  async act(ask, more) {
+    try {
+      const { said } = await this.edit.ask(ask, more);
+      if (said) this.edit.notice.say(said);
+      return true;
+    } catch (error) {
+      this.edit.wrong(error.message);
+      return false;
+    }
+  }
+
+  // What is not saved would be lost: that is asked first.
+  ifSaved(act) {
+    const { modified, file } = this.edit.is;
+    if (!modified) return act();
+    askFor(`${file ? nameOf(file) : "The new scene"} has changes that are not saved`, [], "Throw them away", act);
+  }
+
+  begin() {
+    return this.ifSaved(() => this.act("new_scene"));
+  }
+
+  save() {
+    return this.edit.is.file && !this.edit.is.read_only ? this.act("save_scene") : this.saveAs();
+  }
+
+  saveAs() {
+    const { file } = this.edit.is;
+    const kept = { label: "Name", value: file ? nameOf(file).replace(/\.tt[tm]$/, ".yaml") : "my_scene.yaml" };
+    this.askForFile("Save the scene as", kept, "save_scene", {});
+  }
+
+  saveModel() {
+    const one = this.edit.objects.get(this.edit.last);
+    if (!one) return this.edit.wrong("Nothing is selected: a model is an object with all that hangs on it.");
+    this.askForFile(`Save ${one.name} as a model`, { label: "Name", value: `${one.name}.yaml` }, "save_model", { object: one.handle });
+  }
+
+  // A name that is taken is asked about once more.
+  askForFile(title, field, ask, more) {
+    let taken = "";
+    askFor(title, [field], "Save", async ([name]) => {
+      const file = /\.ya?ml$/.test(name) ? name : `${name}.yaml`;
+      try {
+        const { said } = await this.edit.ask(ask, { ...more, file, ...(taken === file ? { over: true } : {}) });
+        this.edit.notice.say(said ?? `saved ${file}`);
+      } catch (error) {
+        const isTaken = error.message.includes("is there already");
+        taken = isTaken ? file : "";
+        throw isTaken ? new Error(`${error.message}. Save again to write over it.`) : error;
+      }
+    });
+  }
+
+  async open() {
+    try {
+      const found = await this.edit.ask("scene_files");
+      const dialog = at("ask");
+      const groups = Object.entries(KINDS).flatMap(([kind, words]) => (found[kind].length ? [create("h3", { textContent: words }), ...found[kind].map((path) => this.choice(path, dialog))] : []));
+      const cancel = create("button", { type: "button", textContent: "Cancel", onclick: () => dialog.close() });
+      const list = create("div", { className: "choices" }, ...(groups.length ? groups : ["There is no scene yet."]));
+      dialog.replaceChildren(create("h2", { textContent: "Open a scene" }), list, create("div", { className: "buttons" }, cancel));
+      dialog.setAttribute("aria-label", "Open a scene");
+      dialog.showModal();
+    } catch (error) {
+      this.edit.wrong(error.message);
+    }
+  }
+
+  choice(path, dialog) {
+    const open = () => {
+      dialog.close();
+      this.ifSaved(() => this.act("open_scene", { file: path }));
+    };
+    return create("button", { type: "button", className: "plain", textContent: stem(path), title: path, onclick: open });
+  }
+}
