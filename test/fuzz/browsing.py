@@ -83,7 +83,7 @@ class Cockpit:
         self._outside = folder / "outside.py"
         asked = Asked(ScriptStore(own))
         panel = Panel(asked.node, CommandPublisher(), SceneList(own), self.socket.tell)  # type: ignore[arg-type]
-        panel.offer(FoundTopics("/drone", ("drone", "wing"), (), {"/drone/range": "sensor_msgs/Range"}), "", "pilot")
+        panel.offer(FoundTopics("/drone", ("drone", "wing"), (), {"/drone/range": "sensor_msgs/Range"}), "")
         panel.follow("drone")
         cameras = CameraSwitches(panel.board, self.socket)
         cameras.offer((ImageTopic("/drone/front"),), ("drone", "wing"))

@@ -1,5 +1,7 @@
 """The camera model: K, P and the OpenGL matrix all send a point to the same pixel."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawing import pixel
@@ -68,6 +70,6 @@ def test_the_right_camera_of_a_pair_says_how_far_apart_they_are():
     pytest.importorskip("rospy", reason="needs ROS")
     from drone_sim.ros.core.message_conversion import camera_info
 
-    left, right = camera_info(CAMERA, "left_optical"), camera_info(CAMERA, "left_optical", 0.12)
+    left, right = (camera_info(replace(CAMERA, baseline=way), "left_optical") for way in (0.0, 0.12))
     assert left.P[3] == 0 and right.P[3] == pytest.approx(-CAMERA.fx * 0.12)
     assert (*left.P[:3], *left.P[4:]) == (*right.P[:3], *right.P[4:])

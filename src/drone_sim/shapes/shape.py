@@ -95,10 +95,10 @@ class Triangles(NamedTuple):
     texture: np.ndarray | None = None
 
 
-def turned(profile: Sequence[tuple[float, float]]) -> np.ndarray:
+def turned(profile: Sequence[tuple[float, float]], sections: int = SECTIONS) -> np.ndarray:
     """Return the corners (m, 3, 3) of what a line of points (radius, z), upwards, makes as it turns about z."""
-    angles = 2 * np.pi / SECTIONS * np.arange(SECTIONS)
-    circle = np.column_stack([np.cos(angles), np.sin(angles), np.ones(SECTIONS)])
+    angles = 2 * np.pi / sections * np.arange(sections)
+    circle = np.column_stack([np.cos(angles), np.sin(angles), np.ones(sections)])
     rings = np.array([circle * (radius, radius, z) for radius, z in profile])
     low, high = rings[:-1], rings[1:]
     next_low, next_high = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
@@ -108,9 +108,9 @@ def turned(profile: Sequence[tuple[float, float]]) -> np.ndarray:
     return corners[~meet]
 
 
-def half_circle(radius: float, length: float = 0.0) -> list[tuple[float, float]]:
+def half_circle(radius: float, length: float = 0.0, sections: int = SECTIONS) -> list[tuple[float, float]]:
     """Return points (radius, z) of half a circle, upwards, whose upper half is shifted away by a length."""
-    angles = np.linspace(0, np.pi / 2, SECTIONS // 4 + 1)[:-1]
+    angles = np.linspace(0, np.pi / 2, sections // 4 + 1)[:-1]
     upper = [*zip(radius * np.cos(angles), radius * np.sin(angles) + length / 2), (0.0, radius + length / 2)]
     return [*((wide, -z) for wide, z in reversed(upper)), *upper]
 
