@@ -15,6 +15,7 @@ from drone_sim.ros.cockpit.editor.script_store import ScriptStore
 from drone_sim.ros.cockpit.server.page_socket import Answer
 
 _LOOKS = 4.0  # s for which a browser looks that has said so: it says so every second
+_HEARD_WITHIN = 1.0  # s
 _STAYS = 90.0  # s after which its breakpoints go: one in the background speaks once a minute
 _LONGEST = 1 << 20  # characters of a message
 _MOST_PAGES = 50
@@ -60,9 +61,17 @@ class ScriptInspector:
             if page not in self._pages and len(self._pages) >= _MOST_PAGES:
                 raise ValueError(f"inspect: at most {_MOST_PAGES} pages at once")
             self._pages[page] = asked
-            if self._publisher is not None:  # at once: who sets one may go on in the next moment
-                self._publish(_union(list(self._pages.values())))
+            before = self._publisher
+            self._publish(_union(list(self._pages.values())))  # at once: who sets one may go on in the next moment
+            if self._publisher is not before:
+                self._wait_until_heard(self._publisher)
             return self._names
+
+    def _wait_until_heard(self, publisher: rospy.Publisher) -> None:
+        """Let who asks go on when the simulation hears what is published, or after a while."""
+        until = time.monotonic() + _HEARD_WITHIN
+        while not publisher.get_num_connections() and time.monotonic() < until:
+            time.sleep(0.01)
 
     def _files(self, given: Any) -> _Lines:
         """Return the breakpoints of a page by files. Raises ValueError."""
