@@ -48,7 +48,8 @@ class Dataset:
 
         mask: (height, width) uint16, numbers of objects. objects: as sensors.truth.described has them.
         """
-        number, height, width = len(self._images), *mask.shape
+        number = len(self._images)
+        height, width = mask.shape
         name = f"{number:06}"
         _write_png(self._folder / "color" / f"{name}.png", picture)
         _write_png(self._folder / "instances" / f"{name}.png", mask)

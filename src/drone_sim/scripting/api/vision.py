@@ -154,9 +154,12 @@ class VisionSensors(Functions):
         The bottom row comes first. A depth of 1 is where it is not: the others are its mask.
         """
         only = self._names(entity)
-        if not returnImage:
-            return self._depths(bare(handle), only=only).ravel().tolist()
-        return (self._colors(handle, only=only)[::-1] / np.float32(255)).ravel().tolist()
+        if returnImage:
+            seen: Any = self._colors(handle, only=only)[::-1] / np.float32(255)
+        else:
+            seen = self._depths(bare(handle), only=only)
+        values: list[float] = seen.ravel().tolist()
+        return values
 
     def _names(self, entity: int) -> set[str] | None:
         """Return the names of the objects that an entity is, None for all."""
