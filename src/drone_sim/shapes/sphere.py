@@ -13,7 +13,7 @@ from drone_sim.config.types import Length
 from drone_sim.shapes.shape import Files, Geometry, Primitive, ReportedShape, SceneShape, Triangles, half_circle, turned
 from drone_sim.shapes.solid import Solid, round_solid
 
-_SECTIONS = 36  # finer than other shapes: nothing but its outline tells that it is round
+_SECTIONS = 32  # finer than other shapes: its outline alone tells that it is round; at its poles so many faces meet
 _CORNERS = turned(half_circle(1.0, sections=_SECTIONS), _SECTIONS)
 _CORNERS *= np.cbrt(4 / 3 * np.pi / (np.linalg.det(_CORNERS).sum() / 6))  # the volume of the unit sphere
 
