@@ -261,8 +261,9 @@ hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
 run_tests() {
   make_venv "${ALL[@]}"
   say "left out: the tests in a browser (./dev.sh test-web), the commands of README and docs (./dev.sh docs-commands)"
-  # Every core tests; tests with a master, each with its own, wait a third of their time: one more of them than cores.
-  PYTEST_ADDOPTS="-n auto" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$(($(nproc) + 1))"
+  # Tests wait a third of their time, for a master of their own or for a limit: one more of them at once than cores.
+  local at_once=$(($(nproc) + 1))
+  PYTEST_ADDOPTS="-n $at_once" CTEST_OUTPUT_ON_FAILURE=1 make --no-print-directory -C build test ARGS="-j$at_once"
 }
 
 # A python of that version which can make an environment. pyenv's are found where it has put them: its shims on the
