@@ -118,7 +118,7 @@ ENDS = {  # what ends the flight, and what is said of it
         "        with contextlib.suppress(OSError):\n"
         '            os.write(number, b\'{"result": {"passed": true, "points": 5}}\')\n'
         "    os._exit(0)",
-        "with status 0, before the flight was over",
+        "before the flight was over",
     ),
     "a function that is none": (
         'say = b\'[["call","os.system",-1,[],"id"]]\'\n    os.write(3, struct.pack(\'<I\', len(say)) + say)\n'
@@ -130,7 +130,7 @@ ENDS = {  # what ends the flight, and what is said of it
         "    time.sleep(9)",
         "no arguments by name",
     ),
-    "the door closed": ("os.close(3)", "with status 0, before the flight was over"),
+    "the door closed": ("os.close(3)", "before the flight was over"),
     "a stop": ("os.kill(os.getpid(), signal.SIGSTOP)", "did not return after 3 s (script_time_limit)"),
     "a step without end": ("while True:\n        pass", "stopped after 3 s without returning"),
     "a fork bomb": ("while True:\n        os.fork()", ""),  # too many, or no return, whichever comes first

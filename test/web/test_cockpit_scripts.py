@@ -116,7 +116,7 @@ def test_a_question_mark_shows_all_keys_and_leads_to_the_manual(desk):
     assert "forward, back" in desk.inner_text("#sheet") and "find, replace" in desk.inner_text("#sheet")
     with desk.expect_popup() as opened:
         desk.click("#sheet a")
-    assert "/manual/" in opened.value.url and "manual" in opened.value.inner_text("body")
+    wait_until(desk, lambda: "/manual/" in opened.value.url and opened.value.inner_text("body"))
     opened.value.close()
     desk.get_by_role("button", name="Close").click()
     assert not desk.is_visible("#sheet")
