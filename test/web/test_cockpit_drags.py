@@ -24,20 +24,27 @@ class Mouse:
     """The mouse on a page, whose eyes stand still while something is dragged."""
 
     def __init__(self, page):
-        self.page = page
+        self.page, self.at = page, (0, 0)
 
     def over(self, point):
         """Go to a point of the world; there is another picture when the page has seen it."""
-        self.page.mouse.move(*self.page.evaluate(PROJECT, list(map(float, point))))
+        self.at = self.page.evaluate(PROJECT, list(map(float, point)))
+        self.page.mouse.move(*self.at)
         self.page.evaluate("new Promise(done => scene.canvas.then(done))")
 
     def take(self, part, place=ARROW):
         """Press the button on a part of the handle; return where that is in the world."""
-        wait_until(self.page, lambda: self.page.evaluate("scene.gizmo.isShown"))
+        wait_until(self.page, self._has_handle)
         tip = np.array(self.page.evaluate(TIP, [part, place]))
         self.over(tip)
         self.page.mouse.down()
         return tip
+
+    def _has_handle(self):
+        """Whether the handle is shown; what comes under a mouse that rests is not seen: it moves a little."""
+        self.page.mouse.move(self.at[0] + 1, self.at[1])
+        self.page.mouse.move(*self.at)
+        return self.page.evaluate("scene.gizmo.isShown")
 
     def drag(self, point):
         self.page.mouse.move(*self.page.evaluate(PROJECT, list(map(float, point))), steps=5)
