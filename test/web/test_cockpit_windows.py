@@ -76,6 +76,7 @@ def test_the_pace_is_changed_and_follows(cockpit, opened):
 def test_boxes_and_a_mask_lie_over_the_picture_of_a_camera_with_truth(cockpit, opened):
     rospy.set_param("/drone_sim/scene_file", str(Path(__file__).parents[2] / "docs/tutorial/8_scene.yaml"))
     cockpit.call("load_scene")
+    opened.wait_for_timeout(2500)  # the cockpit asks the master every second which cameras there are
     try:
         switch_camera(opened)
         for kind in ("Boxes", "Mask"):
