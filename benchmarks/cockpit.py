@@ -6,7 +6,6 @@ import importlib.util
 import os
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import threading
@@ -64,12 +63,9 @@ def measure(seconds: float = 30.0) -> list[Row]:
 @contextlib.contextmanager
 def _launched() -> Iterator[tuple[str, float]]:
     """Launch with a master of its own; yield the address, and after how many s it answered."""
-    with socket.socket() as probe:
-        probe.bind(("localhost", 0))
-        port = probe.getsockname()[1]
-    os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+    port = node.choose_port()
     began = time.monotonic()
-    with node.launched("-p", str(port), "rviz:=false", "web:=true") as lines:
+    with node.launched("-p", port, "rviz:=false", "web:=true") as lines:
         while not (found := re.search(r"the cockpit is at (http\S+)", "".join(lines))):
             if time.monotonic() > began + PATIENCE:
                 raise RuntimeError("the cockpit does not start:\n" + "".join(lines))

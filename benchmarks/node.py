@@ -25,18 +25,24 @@ Row = dict[str, Any]
 CORE = "0"  # the node's; listeners have the others
 
 
-@contextlib.contextmanager
-def master() -> Iterator[None]:
-    """Run a ROS master on a free port."""
+def choose_port() -> str:
+    """Return a port that is free for a ROS master, and name it in ROS_MASTER_URI."""
     with socket.socket() as probe:
         probe.bind(("localhost", 0))
         port = str(probe.getsockname()[1])
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+    return port
+
+
+@contextlib.contextmanager
+def master() -> Iterator[str]:
+    """Run a ROS master on a free port, which is yielded."""
+    port = choose_port()
     process = subprocess.Popen(["rosmaster", "--core", "-p", port], stdout=subprocess.DEVNULL)
     try:
         while subprocess.run(["rosparam", "list"], capture_output=True, check=False).returncode:
             time.sleep(0.1)
-        yield
+        yield port
     finally:
         process.terminate()
         process.wait(30)
@@ -73,7 +79,7 @@ def _running(*command: str) -> Iterator[list[str]]:
 
     reader = threading.Thread(target=read, daemon=True)
     reader.start()
-    if not ready.wait(30):
+    if not ready.wait(60):
         process.kill()
         raise RuntimeError("the node does not fly:\n" + "".join(lines))
     try:

@@ -1,12 +1,13 @@
 """Write docs/api.md, the functions of the script API, from the code: PYTHONPATH=src python docs/make_api.py.
 
 A function's declaration says which generations of V-REP have it; api_names.txt says what else they have, as their
-manuals and headers list it.
+manuals and headers list it. The examples are those of the tests, which call each of them.
 """
 
 from __future__ import annotations
 
 import inspect
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,9 +15,15 @@ from typing import Any
 
 from drone_sim.scripting.api import ignored, unknown
 from drone_sim.scripting.api.calls import Declaration, contents, flat_name
-from drone_sim.scripting.api.listing import apis, declared, first_paragraph, is_ignored
+from drone_sim.scripting.api.listing import apis, arguments_of, declared, first_paragraph, is_ignored
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "test" / "unit"))
+from api_examples import ANY, REMOTE_API, SIM, Example  # noqa: E402
+from api_examples_ros import ROS  # noqa: E402
+from api_examples_vision import VISION  # noqa: E402
+
+EXAMPLES = {"sim": SIM, "simROS": ROS, "simVision": VISION, "simRemoteApi": REMOTE_API}
 PAGE = HERE / "api.md"
 _INTRODUCTION = """\
 # The script API
@@ -34,9 +41,16 @@ similar names. (`if simROS2 then` asks for a plugin; it is nil, and no error.)
 - In Lua, you get a field of the type uint8[], such as a picture, as a string: `string.byte(data, 1)` is its first byte.
   You may send it as a string or a table.
 - A constant is `sim.` and its name, or `sim_` and its name. It has CoppeliaSim's value (simConst.h).
+- The first column shows how to call a function. You can leave out a value with `=`; `*` stands for any number of
+  values. *Other names* are those of 3.x (`simGetObjectPosition`) and of some versions of 4.x. A function without a name
+  of 3.x is new in 4.x.
 - "drone_sim's own" functions do not exist in CoppeliaSim.
+- An example is a line of Lua, and what it returns behind `->`; `…` is any value. In Python, write `[1, 2, 3]` for
+  `{1,2,3}`. The tests run each example in both languages. In it, `BASE`, `DRONE`, `TARGET`, `CAMERA`, ... are handles
+  of objects, and `REFUSED(f, ...)` is the error that `f(...)` raises.
 """
-_HEAD = "| 3.x | 4.0 to 4.2 | 4.3 and later | what it does |\n|---|---|---|---|\n"
+_LONG = re.compile(r"\d+\.\d{6,}")
+_HEAD = "| function | other names | what it does |\n|---|---|---|\n"
 _IGNORED_HEAD = "| 3.x | 4.0 to 4.2 | 4.3 and later | returns |\n|---|---|---|---|\n"
 
 
@@ -51,8 +65,7 @@ def _implemented() -> Iterator[str]:
         sections: dict[str, list[str]] = {}
         for declaration, function in declared(api):
             if not is_ignored(function):
-                what = first_paragraph(inspect.getdoc(function) or "").replace("|", "\\|")
-                sections.setdefault(_section(function), []).append(_row(declaration, what))
+                sections.setdefault(_section(function), []).append(_described(declaration, function))
         for title, rows in sections.items():
             yield f"## {module}: {title}\n\n{_HEAD}{''.join(sorted(rows, key=str.lower))}"
 
@@ -64,11 +77,61 @@ def _section(function: Any) -> str:
     return title[:1].lower() + title[1:]
 
 
+def _described(declaration: Declaration, function: Any) -> str:
+    """Return the row of a function: how it is called under its newest name, its other names, what it does."""
+    module, known = declaration.module, declaration.names
+    newest = max(known, key=lambda name: max(known[name], default=""))
+    what = first_paragraph(inspect.getdoc(function) or "")
+    example = next((found[0] for name in known if (found := EXAMPLES[module].get(name))), None)
+    if example is not None:
+        what += f"<br>{_shown(example, f'{module}.{newest}')}"
+    return _in_table(
+        f"`{module}.{newest}({arguments_of(function)})`{_mark(known[newest])}", _others(declaration, newest), what
+    )
+
+
+def _others(declaration: Declaration, newest: str) -> str:
+    """Return the names but the newest one: those of 3.x, and those that other versions of 4.x have."""
+    module, known = declaration.module, dict(sorted(declaration.names.items()))
+    flat = [f"`{flat_name(module, name)}`" for name, generations in known.items() if "3" in generations]
+    later = [
+        f"`{module}.{name}`{_mark(generations)}"
+        for name, generations in known.items()
+        if name != newest and not {"4", "5"}.isdisjoint(generations)
+    ]
+    return ", ".join([*flat, *later])
+
+
+def _mark(generations: str) -> str:
+    """Return which versions of 4.x have a name, where not all do."""
+    if not generations:
+        return " (drone_sim's own)"
+    return {"": " (3.x)", "4": " (to 4.2)", "5": " (from 4.3)"}.get(generations.replace("3", ""), "")
+
+
+def _shown(example: Example, name: str) -> str:
+    """Return an example, and what it returns, as Lua writes it."""
+    call = _LONG.sub(lambda number: f"{float(number[0]):.4g}", example.call.replace("NAME", name))
+    return f"`{call} -> {', '.join(map(_in_lua, example.returns))}`" if example.returns else f"`{call}`"
+
+
+def _in_lua(value: Any) -> str:
+    value = getattr(value, "expected", value)  # of pytest's approx
+    if value is ANY:
+        return "…"
+    if isinstance(value, list | tuple):
+        return f"{{{', '.join(map(_in_lua, value))}}}"
+    if isinstance(value, str):
+        return f"'{value}'" if value.isprintable() else repr(value)
+    return str(value).lower() if isinstance(value, bool) else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _in_table(*cells: str) -> str:
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |\n"
+
+
 def _row(declaration: Declaration, what: str) -> str:
     module, known = declaration.module, dict(sorted(declaration.names.items()))
-    if not any(known.values()):
-        own = f"`{module}.{next(iter(declaration.names))}`"
-        return f"| | | {own} (drone_sim's own) | {what} |\n"
     flat = [flat_name(module, name) for name, generations in known.items() if "3" in generations]
     fourth = [f"{module}.{name}" for name, generations in known.items() if "4" in generations]
     new = [f"{module}.{name}" for name, generations in known.items() if "5" in generations and "4" not in generations]

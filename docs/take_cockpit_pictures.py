@@ -27,7 +27,7 @@ FLIGHT, SETTLED = 2500, 3000  # ms
 
 
 def start(page: Any) -> None:
-    """The three doors of a first visit."""
+    """The start page of a first visit."""
     page.get_by_role("dialog").first.wait_for()
 
 

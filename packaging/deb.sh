@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
-# ./dev.sh deb: builds ros-drone-sim_<version>_<architecture>.deb for the Debian that it runs on, in build/deb/.
+# ./dev.sh deb: builds ros-drone-sim_<version>_<architecture>.deb for the Debian that it runs on, in build/deb/, with what
+# makes that folder a source for apt: Packages and Release.
 #
 # The package lies where Debian's own ROS packages lie, so that roslaunch finds it without a setup.bash. What
 # Debian lacks (PyBullet, lupa, pydantic 2, ...) lies in a python environment of its own under /usr/lib/drone_sim.
 set -eo pipefail
 umask 022
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+root=$PWD
 out=$(mktemp -d) # not below this folder, where roslaunch would find a second drone.launch
 trap 'rm -rf "$out"' EXIT
 stage=$out/root
@@ -24,7 +26,7 @@ DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), 
  python3-std-srvs, python3-tf2-ros, python3-tqdm, python3-visualization-msgs, python3-yaml, ros-environment,
  python3-tf2-msgs, python3-zmq, rosbash, libdynamic-reconfigure-config-init-mutex-dev"
 
-mkdir -p "$stage" build/deb
+mkdir -p "$stage" "$out/deb" build
 cmake -S . -B "$out/build" -DCMAKE_INSTALL_PREFIX=/usr -DCATKIN_BUILD_BINARY_PACKAGE=ON -DCATKIN_ENABLE_TESTING=OFF \
   -DCATKIN_DEVEL_PREFIX="$out/devel" >"$out/cmake.log" 2>&1
 DESTDIR=$stage make -C "$out/build" install >"$out/install.log" 2>&1
@@ -36,7 +38,8 @@ grep -hEv '^(opencv|av|matplotlib)\b' requirements.txt requirements-all.txt >"$o
 .venv/bin/python -m pip --python "$stage$own/bin/python" install -q --disable-pip-version-check \
   --find-links "$wheels" --no-compile -r "$out/requirements.txt"
 site=$stage$own/lib/python$python/site-packages
-rm -rf "$site"/pybullet_{data,envs,examples,utils,robots} "$site"/eglRenderer* "$stage$own/include" # not used here
+packaging/slim_pybullet.sh "$site"
+rm -rf "$site"/eglRenderer* "$stage$own/include" # not used here
 find "$site" -name '*.so' -exec strip --strip-unneeded {} +
 find "$stage$own/bin" -type f -delete
 find "$stage" -name __pycache__ -prune -exec rm -rf {} +
@@ -72,6 +75,11 @@ set -e
 find /usr/lib/drone_sim /usr/lib/python3/dist-packages/drone_sim -name __pycache__ -prune -exec rm -rf {} +
 PRERM
 chmod 755 "$stage/DEBIAN/postinst" "$stage/DEBIAN/prerm"
-package=ros-drone-sim_${version}_$architecture.deb
-dpkg-deb --root-owner-group --build "$stage" "$out/$package" >&2
-mv "$out/$package" build/deb # whole, or not at all
+cd "$out/deb"
+dpkg-deb --root-owner-group --build "$stage" "ros-drone-sim_${version}_$architecture.deb" >&2
+apt-ftparchive packages . >Packages
+gzip -kn9 Packages
+apt-ftparchive -o APT::FTPArchive::Release::Label=drone_sim release . >"$out/Release"
+mv "$out/Release" .
+rm -rf "$root/build/deb"
+mv "$out/deb" "$root/build" # whole, or not at all

@@ -30,9 +30,13 @@ threads = pool.ThreadPool
 pool.ThreadPool = lambda _: threads($jobs)
 LIMIT
 set -m # in a group of its own, which ends as a whole
-# Without debug information, and with numpy's arrays as the wheels have them, for which gcc 14 has to be lenient.
-PYTHONPATH=$scratch TMPDIR=$scratch CFLAGS="-g0 -w -Wno-incompatible-pointer-types" "$python" -m pip wheel -v \
-  --disable-pip-version-check --no-deps --no-build-isolation --no-binary :all: -w "$scratch" "$version" >"$log" 2>&1 &
+# As python's own flags, which newer setuptools drop; without debug information, and with numpy's arrays as the wheels have
+# them, for which gcc 14 has to be lenient. For arm64, gcc would round a product and a sum only once: a flight would not be
+# that of amd64.
+flags="-O2 -DNDEBUG -fno-strict-overflow -g0 -w -ffp-contract=off"
+PYTHONPATH=$scratch TMPDIR=$scratch CFLAGS="$flags -Wno-incompatible-pointer-types" CXXFLAGS=$flags \
+  "$python" -m pip wheel -v --disable-pip-version-check --no-deps --no-build-isolation --no-binary :all: \
+  -w "$scratch" "$version" >"$log" 2>&1 &
 compiling=$!
 set +m
 while kill -0 "$compiling" 2>/dev/null; do

@@ -1,11 +1,11 @@
 """Fly through the gates in order: to a place before each, then to one behind it."""
 
+import itertools
 import math
 
 import tutorial
 from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # called as they are
 
-GATES = ("Red", "Orange", "Yellow", "Green", "Blue", "Violet")
 BEFORE, BEHIND = -1.0, 0.6  # m from the gate's middle, along the way through it
 NEAR = 0.25  # m: so near, a place is reached
 APPROACH, FASTEST = 0.8, 0.9  # 1/s, m/s
@@ -16,15 +16,22 @@ def sysCall_init():
     """Begin as the tutorial's script does; look up where to fly."""
     tutorial.sysCall_init()
     self.Pangle = 0.6  # twice the tutorial's: it swings less (its stage 4)
-    self.places = [place for gate in GATES for place in around(gate)]
+    self.places = [place for gate in gates() for place in around(gate)]
+
+
+def gates():
+    """Yield the handle of each gate, in order."""
+    for number in itertools.count():
+        gate = sim.getObject(f"/Gate[{number}]", {"noError": True})
+        if gate == -1:
+            return
+        yield gate
 
 
 def around(gate):
     """Return the places before and behind a gate: x, y, z (m), heading (rad)."""
-    left, right = (sim.getObjectPosition(sim.getObjectHandle(gate + side), -1) for side in ("Left", "Right"))
-    top, bottom = (sim.getObjectPosition(sim.getObjectHandle(gate + side), -1) for side in ("Top", "Bottom"))
-    x, y, z = (left[0] + right[0]) / 2, (left[1] + right[1]) / 2, (top[2] + bottom[2]) / 2
-    heading = math.atan2(right[0] - left[0], left[1] - right[1])  # the way through, left of which `left` is
+    x, y, z = sim.getObjectPosition(gate, -1)
+    heading = sim.getObjectOrientation(gate, -1)[2]
     ahead, aside = math.cos(heading), math.sin(heading)
     return [[x + way * ahead, y + way * aside, z, heading] for way in (BEFORE, BEHIND)]
 

@@ -7,8 +7,7 @@ from tutorial import on_twist, sysCall_actuation, sysCall_cleanup  # called as t
 def sysCall_init():
     """Begin as the tutorial's script does; find the first gate."""
     tutorial.sysCall_init()
-    left, right = (sim.getObjectPosition(sim.getObjectHandle(name), -1) for name in ("RedLeft", "RedRight"))
-    self.gate = [(one + other) / 2 for one, other in zip(left, right)]  # m, world: its middle
+    self.gate = sim.getObjectPosition(sim.getObject("/Gate[0]"), -1)  # m, world: its middle
 
 
 def sysCall_sensing():

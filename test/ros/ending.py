@@ -4,7 +4,7 @@ import shlex
 import signal
 import subprocess
 
-HANGS = 30.0  # s; nothing takes nearly as long to end unless it hangs
+HANGS = 90.0  # s; nothing takes nearly as long to end unless it hangs
 
 
 def end(*processes, number=signal.SIGTERM):

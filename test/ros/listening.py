@@ -23,7 +23,7 @@ class Listener:
         """Stop listening."""
         self._subscriber.unregister()
 
-    def wait_for(self, condition=lambda message: True, after=None, timeout=20.0):
+    def wait_for(self, condition=lambda message: True, after=None, timeout=90.0):
         """Return the first message that fulfils `condition`, of those that come after `after` messages."""
         start = len(self.messages) if after is None else after
         with self._came:
@@ -34,7 +34,7 @@ class Listener:
 
 def connected(publisher, listeners=1):
     """Wait until so many listen, and return the publisher."""
-    patience, end = threading.Event(), time.monotonic() + 60.0
+    patience, end = threading.Event(), time.monotonic() + 120.0
     while publisher.get_num_connections() < listeners:
         assert not rospy.is_shutdown() and time.monotonic() < end, f"nobody hears {publisher.resolved_name}"
         patience.wait(0.02)

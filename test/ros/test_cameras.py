@@ -17,7 +17,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
+from drone_sim.ros.core.mask_colors import painted as painted_over
 from drone_sim.ros.node.node import Node
+from drone_sim.ros.vehicle import camera_truth
 from drone_sim.run import parameters
 
 CAMERAS = {
@@ -33,7 +35,7 @@ class Cameras(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.parameters = parameters.load({"cameras": {"floor": {"every": 3}}})
+        cls.parameters = parameters.load({"cameras": {"floor": {"every": 3, "truth": True}}})
         cls.node = Node(cls.parameters)
         cls.node.player.start()
         vision = cls.node.simulation.vision
@@ -90,8 +92,9 @@ class Cameras(unittest.TestCase):
         for name, (topic, info_topic, frame, encoding) in CAMERAS.items():
             with self.subTest(name):
                 image, info = self.listen(topic, Image), self.listen(info_topic, CameraInfo)
-                self.step_until(lambda image=image, info=info: image.messages and info.messages)
-                self.step_until(lambda image=image: len(image.messages) > 3)
+                self.step_until(lambda several=(image, info, odometry): all(one.messages for one in several))
+                before = len(image.messages) + 1  # what is heard of the one is heard of the others, too, from here on
+                self.step_until(lambda image=image, before=before: len(image.messages) >= before + 3)
                 expected = self.parameters.cameras[name]
                 picture, model = image.messages[-1], info.messages[-1]
                 self.assertEqual((picture.encoding, picture.header.frame_id), (encoding, frame))
@@ -104,13 +107,30 @@ class Cameras(unittest.TestCase):
                     np.testing.assert_allclose(matrix[2], (expected.width - 1) / 2, atol=1e-9)
                     np.testing.assert_allclose(matrix[row + 2], (expected.height - 1) / 2, atol=1e-9)
                 # Pictures come in threads of their own: what belongs to one may come a moment later, but it comes.
-                stamps = {m.header.stamp for m in image.messages[1:4]}
+                stamps = {m.header.stamp for m in image.messages[before : before + 3]}
                 self.step_until(lambda info=info, stamps=stamps: stamps <= stamps_of(info) & stamps_of(odometry))
 
     def test_every_third_step(self):
         image = self.listen("/drone/floor/image", Image)
         self.step_until(lambda: image.messages)
         self.assertEqual(sum(len(self.rendered_in_a_step()) for _ in range(9)), 3)
+
+    def test_the_mask_lies_over_the_picture_of_its_stamp_while_somebody_listens(self):
+        topics = ("", "/truth/categories", "/truth/overlay")
+        with mock.patch.object(camera_truth, "painted", wraps=camera_truth.painted) as painted:
+            listeners = [self.listen(f"/drone/floor/image{one}", Image) for one in topics[:2]]
+            self.step_until(lambda: all(len(one.messages) > 2 for one in listeners))
+            painted.assert_not_called()
+            listeners.append(self.listen(f"/drone/floor/image{topics[2]}", Image))
+            self.step_until(lambda: set.intersection(*map(stamps_of, listeners)))
+        stamp = min(set.intersection(*map(stamps_of, listeners)))
+        picture, mask, overlay = (next(one for one in each.messages if one.header.stamp == stamp) for each in listeners)
+        self.assertEqual((overlay.encoding, overlay.header.frame_id), ("rgb8", picture.header.frame_id))
+        size = picture.height, picture.width
+        colors, over = (np.frombuffer(one.data, np.uint8).reshape(*size, 3) for one in (picture, overlay))
+        numbers = np.frombuffer(mask.data, np.uint16).reshape(size)
+        self.assertTrue(numbers.any())
+        np.testing.assert_array_equal(over, painted_over(colors, numbers))
 
     def test_depth_of_the_floor(self):
         depth = self.listen("/drone/depth/image", Image)
@@ -127,8 +147,8 @@ class Cameras(unittest.TestCase):
     def test_jpeg_and_png(self):
         compressed, raw = self.listen("/drone/front/compressed", CompressedImage), self.listen("/drone/front", Image)
         self.step_until(lambda: compressed.messages and raw.messages)
-        client = Client("/drone/front/compressed", timeout=10)
-        self.assertEqual(client.get_configuration(timeout=10)["jpeg_quality"], 80)
+        client = Client("/drone/front/compressed", timeout=60)
+        self.assertEqual(client.get_configuration(timeout=60)["jpeg_quality"], 80)
         self.assert_like_raw(compressed, raw, "rgb8; jpeg compressed bgr8", tolerance=25)
         client.update_configuration({"format": "png", "png_level": 1})
         self.assert_like_raw(compressed, raw, "rgb8; png compressed bgr8", tolerance=0)
@@ -144,7 +164,7 @@ class Cameras(unittest.TestCase):
 
         def slow(*arguments):
             stopped.set()
-            assert go_on.wait(20)
+            assert go_on.wait(60)
             return encode(*arguments)
 
         with mock.patch.object(cv2, "imencode", slow):

@@ -92,8 +92,8 @@ class Conditions(unittest.TestCase):
 
     def test_tuning(self):
         """What `dynparam set`, `get` and `dump` do, by the library that they use."""
-        client, told = Client("/drone", timeout=20), Listener("/drone/parameter_updates", Config)
-        self.assertEqual(client.get_configuration(timeout=20)["Kzref"], 5.0)
+        client, told = Client("/drone", timeout=60), Listener("/drone/parameter_updates", Config)
+        self.assertEqual(client.get_configuration(timeout=60)["Kzref"], 5.0)
         self.assertEqual(client.update_configuration({"Kzref": 0.0})["Kzref"], 0.0)
         higher = PoseStamped()
         higher.pose.position.z, higher.pose.orientation.w = 1.5, 1.0

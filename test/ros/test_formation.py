@@ -43,13 +43,13 @@ class Formation(unittest.TestCase):
             commands.publish(Twist())
             for name, wing in WINGS.items():
                 odometry[name].wait_for(
-                    lambda o, wing=wing: off(o, odometry["drone1"].messages[-1], wing) < 0.05, timeout=40
+                    lambda o, wing=wing: off(o, odometry["drone1"].messages[-1], wing) < 0.05, timeout=90
                 )
         finally:
             # Not SIGTERM: rospy's own handler closes topics, and waits for ever where it interrupts `publish` (see
             # ros/core/shutdown.py). How a user's script ends is not what this test is about.
             node.kill()
-            node.wait(30)
+            node.wait(90)
 
 
 if __name__ == "__main__":

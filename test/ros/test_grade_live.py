@@ -11,6 +11,7 @@ import numpy as np
 import rosnode
 import rospy
 import rostest
+from nav_msgs.msg import Odometry
 
 from drone_sim.files.resources import package_path
 from drone_sim.grading import flight
@@ -54,8 +55,10 @@ def sysCall_sensing():
     sim.setFloatSignal("x", sim.getObjectPosition(self.ball, -1)[0])
 """
 ROOM = "objects: [{name: Ball, shape: sphere, size: [0.1], position: [3, 3, 1]}]\n"
+SHORT = "duration: 4\ncriteria: [{kind: stays, of: z, at_least: 0.3}"
 STEP = 0.05  # s
-PATIENCE = 20  # s
+PATIENCE = 90  # s
+HERE = Path(__file__).parent
 
 
 class GradeLive(unittest.TestCase):
@@ -85,8 +88,13 @@ class GradeLive(unittest.TestCase):
         plan = self.read(PLAN)
         offline = Path(self.folder.name) / "offline.csv"
         wanted = flight.grade(plan, "", 3, None, offline)
+        listener = rospy.Subscriber("/drone/odom", Odometry)
+        while not (connections := list(listener.impl.connections)):
+            rospy.rostime.wallsleep(0.05)
+        self.addCleanup(listener.unregister)
         found, flown = grade(plan, 3, "", "drone_sim", PATIENCE)
         self.assertEqual((found.error, round(found.flown, 6)), (None, 4.5))
+        self.assertEqual(listener.impl.connections, connections, "a seed that begins elsewhere hides the first steps")
         self.assertEqual([one.passed for one in found.outcomes], [one.passed for one in wanted.outcomes])
         self.assertEqual({one.passed for one in found.outcomes}, {True, False})
         for one, other in zip(found.outcomes, wanted.outcomes):
@@ -150,6 +158,31 @@ class GradeLive(unittest.TestCase):
     def test_5_a_node_that_never_comes_is_not_waited_for_for_ever(self):
         with self.assertRaisesRegex(Mismatch, r"no node student \(waited for 2 s\)"):
             grade(self.read(PLAN), 0, "student", "drone_sim", 2)
+
+    def test_6_what_others_do_to_the_world_is_named_and_flying_is_none_of_it(self):
+        edit = r"change the scene at \d\.\d\d s \(/drone_sim/edit_scene, by /edit\)"
+        for does, allowed, said in (
+            ("fly", "", ""),
+            ("push", "", r"push Drone at \d\.\d\d s \(sim.addForceAndTorque, by a client of the remote API\)"),
+            ("push", "push", ""),
+            ("edit", "move, push", edit),
+            ("tune", "", r"change drone at \d\.\d\d s \(/drone/set_parameters, by /tune\)"),
+            ("fly", "", r"change drone at 0\.\d\d s \(Kzref, tuned before\)"),
+        ):
+            with (
+                self.subTest(f"{does} {said}"),
+                subprocess.Popen([sys.executable, HERE / "interfering.py", does]) as other,
+            ):
+                try:
+                    flown = ", {kind: signal, signal: flown, equals: 1}" if does == "fly" else ""
+                    plan = self.read(f"{SHORT}{flown}]\nallowed: [{allowed}]\n")
+                    found, _ = grade(plan, 0, does, "drone_sim", PATIENCE)
+                finally:
+                    other.terminate()
+                self.assertEqual((found.error, found.passed), (None, not said), found)
+                self.assertTrue(all(one.passed for one in found.outcomes), found)
+                self.assertEqual(len(found.tried), bool(said), found)
+                self.assertRegex(found.tried[0] if said else "", f"^tried to {said}$" if said else "^$")
 
 
 if __name__ == "__main__":

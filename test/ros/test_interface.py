@@ -68,7 +68,7 @@ class Interface(unittest.TestCase):
         cls.script.write_text((package_path() / "src/drone_sim/child_scripts/tutorial.py").read_text() + DRAWS)
         cls.thread = threading.Thread(target=cls.run_node)
         cls.thread.start()
-        cls.ready.wait(20)
+        cls.ready.wait(60)
         master = rospy.get_master()
         published, subscribed, _ = master.getSystemState()[2]
         own = rospy.get_name()

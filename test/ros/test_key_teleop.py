@@ -22,7 +22,7 @@ from listening import Listener, connected
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-PATIENCE = 30.0  # s; nothing here takes nearly as long unless it hangs
+PATIENCE = 90.0  # s; nothing here takes nearly as long unless it hangs
 UP, LEFT = b"\x1b[A", b"\x1bOD"
 
 
@@ -123,14 +123,13 @@ class KeyTeleop(unittest.TestCase):
     def test_keys_while_it_starts_do_not_end_it(self):
         typed, before = 0, len(self.sent.messages)
         while "stop the drone and leave" not in self.terminal.shown:
-            self.terminal.type(UP, b"\x1b", b"[A", delay=0.03)
+            self.terminal.type(UP, b"\x1b[", b"A", delay=0.03)
             self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
             typed += 2
         self.assertGreater(typed, 6)
         self.terminal.wait_for("state    flying", "command  vx")
-        time.sleep(0.5)  # the input has been flushed by now
         self.assertIsNone(self.terminal.process.poll(), self.terminal.shown)
-        self.assertLess(max(m.linear.x for m in [Twist(), *self.sent.messages[before:]]), 0.35)  # but for the last ones
+        self.assertLess(len(self.sent.messages) - before, typed, "what was typed before it read keys is forgotten")
         self.terminal.type(b"\x1b")
         self.assert_it_says_stop()
 

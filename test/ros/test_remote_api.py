@@ -34,7 +34,7 @@ class RemoteApi(unittest.TestCase):
         cls.ready = threading.Event()
         cls.thread = threading.Thread(target=cls.run_node)
         cls.thread.start()
-        assert cls.ready.wait(20)
+        assert cls.ready.wait(60)
         cls.state = Listener(rospy.resolve_name("~state"), String)
         cls.services = {name: rospy.ServiceProxy(f"~{name}", Trigger) for name in ("start", "stop")}
 

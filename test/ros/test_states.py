@@ -137,7 +137,7 @@ class States(unittest.TestCase):
 
     def check_flight(self, name):
         """Check that a pilot took off, flew a square, handed over, and landed."""
-        self.assertEqual(self.pilots[name].wait(30), 0)
+        self.assertEqual(self.pilots[name].wait(90), 0)
         self.states[name].wait_for(lambda m: len(self.states[name].messages) == 5, after=0)
         said = [message.data for message in self.states[name].messages]
         self.assertEqual(said, ["landed", "taking off", "flying", "landing", "landed"])
@@ -189,7 +189,9 @@ class States(unittest.TestCase):
         before = [len(one.messages) for one in heard]
         topics = (f"/{RECORDED}/{topic}" for topic in ("takeoff", "cmd_vel", "land"))
         pace = str(FLIGHTS[RECORDED].factor)
-        subprocess.run(["rosbag", "play", "--quiet", "-r", pace, str(bag), "--topics", *topics], check=True, timeout=60)
+        subprocess.run(
+            ["rosbag", "play", "--quiet", "-r", pace, str(bag), "--topics", *topics], check=True, timeout=120
+        )
         self.states[RECORDED].wait_for(lambda m: m.data == "landed", after=-1)
         again, changes_again = path([one.messages[count:] for one, count in zip(heard, before)])
         self.assertEqual(len(changes_again), len(changes))

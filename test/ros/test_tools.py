@@ -21,7 +21,7 @@ from sensor_msgs.msg import Image, Joy
 from std_msgs.msg import Empty
 from std_srvs.srv import SetBool, SetBoolResponse
 
-PATIENCE = 20.0  # s; nothing here takes nearly as long unless it hangs
+PATIENCE = 90.0  # s; nothing here takes nearly as long unless it hangs
 LB, Y = 4, 3
 BUTTON, AXIS = 1, 2
 

@@ -16,7 +16,7 @@ from cv_bridge import CvBridge
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
-HANGS = 60.0  # s; nothing here takes nearly as long unless it hangs
+HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
 RED = np.full((48, 64, 3), (0, 0, 255), np.uint8)
 
 

@@ -19,7 +19,7 @@ NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
 NO_FUNCTION = "the script has no function 'nothing' to call back"
 ANY = object()  # whatever comes
 STEP_STAYS = "`time_step` of the scene file says it"
-NO_SCENE_FILE = "a model lies beside the scene file, and there is no scene file"
+NO_SCENE_FILE = "a model must be in the folder of the scene file, and there is no scene file"
 
 
 class Example(NamedTuple):

@@ -39,7 +39,7 @@ def flown(plan, script, seed=0, serve=None):
     def serve_script(end):
         random.seed(random_of(seed))
         np.random.seed(random_of(seed) % 2**32)
-        script_process.serve(end, script)
+        script_process.serve(script_process.ScriptEnd(), end, script)
 
     with process_of(serve or serve_script) as end:
         door = SimulationEnd(end)

@@ -7,9 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from api_examples import ANY, REMOTE_API, SIM
-from api_examples_ros import ROS
-from api_examples_vision import VISION
+from api_examples import ANY
 
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
@@ -27,7 +25,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 sys.path.insert(0, str(DOCS))
 import make_api  # noqa: E402
 
-EXAMPLES = {"sim": SIM, "simROS": ROS, "simVision": VISION, "simRemoteApi": REMOTE_API}
+EXAMPLES = make_api.EXAMPLES
 COLORS = np.array([[[3, 4, 5]], [[0, 1, 2]]], np.uint8)  # the top row first
 DISTANCES = np.array([[2.0, 4.0]], np.float32)
 PICTURES = {

@@ -33,7 +33,7 @@ class Sensors(Checked):
             {"sensors": {"a": {"kind": "nose"}}},
             "sensors/a/kind = 'nose': must be one of 'ultrasonic', 'laser', 'scale'",
         ),
-        ({"sensors": {"a": 3}}, "sensors/a = 3: must hold `key: value` lines, of which one is `kind`"),
+        ({"sensors": {"a": 3}}, "sensors/a = 3: must have `key: value` lines, one of them `kind`"),
         ({"sensors": {"a": {"kind": "laser"}}}, "sensors/a/reach: missing"),
         (
             {"sensors": {"scale": {"kind": "scale", "weight": 3}}},

@@ -52,7 +52,7 @@ def test_ports_for_root_are_told(monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(socket.socket, "listen", refuse)
-    with pytest.raises(address.AddressError, match=r"^port = 80: is for root alone"):
+    with pytest.raises(address.AddressError, match=r"^port = 80: only root may use it"):
         address._is_free(socket.AF_INET, "127.0.0.1", 80)
 
 

@@ -1,5 +1,6 @@
 """Where a script of the cockpit flies, what happens to it there, and how it is graded, without a browser."""
 
+import threading
 import time
 from pathlib import Path
 
@@ -142,9 +143,12 @@ class Topics:
 
     def __init__(self):
         self.hears, self.sent = {}, []
+        self.latched = {}
 
     def subscriber(self, name, _kind, callback, **_):
         self.hears[name] = callback
+        if name in self.latched:
+            callback(self.latched[name])  # as rospy does, before its constructor returns
         return Topic(lambda: self.hears.pop(name, None))
 
     def publisher(self, name, *_, **__):
@@ -180,3 +184,13 @@ def test_what_happens_in_a_task_is_sent_by_the_count_of_steps(topics):
     player.prepare(plans.read(tasks.find("gates")))
     player.begin()
     assert not topics.hears, "nothing happens in this one"
+
+
+def test_a_state_from_before_the_flight_ends_nothing(topics):
+    topics.latched["/drone_sim/state"] = String("stopped")
+    player = TimelinePlayer("/drone_sim")
+    player.prepare(plans.read(tasks.find("steps")))
+    beginning = threading.Thread(target=player.begin, daemon=True)  # which could wait for itself for ever
+    beginning.start()
+    beginning.join(10)
+    assert not beginning.is_alive() and set(topics.hears) == {"/drone/odom", "/drone_sim/state"}

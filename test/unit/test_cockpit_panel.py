@@ -82,8 +82,8 @@ def test_parameters_are_offered_in_groups_with_unit_and_ends(tuning, board):
         ("Kzref", True, "Kzref = True: must be a number"),
         ("Kzref", None, "Kzref = None: must be a number"),
         ("cameras/front/every", 1.5, "cameras/front/every = 1.5: must be a whole number"),
-        ("faults/sensors/front", "lame", "faults/sensors/front = 'lame': is none of those that there are; "),
-        ("Kzreff", 2, "name = 'Kzreff': is none of those that there are; near names are Kzref"),
+        ("faults/sensors/front", "lame", "faults/sensors/front = 'lame': does not exist; "),
+        ("Kzreff", 2, "name = 'Kzreff': does not exist; near names are Kzref"),
         ("weather/wind/x", 1, "weather/wind/x = 1.0: refused (the log says why); "),
     ],
 )
@@ -177,7 +177,7 @@ def test_buttons_call_services_and_tell_what_they_say(panel):
     ],
 )
 def test_what_there_is_not_is_refused_in_one_line(panel, ask, message):
-    with pytest.raises(ValueError, match=rf"^{ask} = [^\n]*: is none of those that there are; "):
+    with pytest.raises(ValueError, match=rf"^{ask} = [^\n]*: does not exist; "):
         panel.answers[ask](message)
     assert not panel._simulator.asked
 

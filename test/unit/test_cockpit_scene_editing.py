@@ -82,6 +82,8 @@ def test_edits_go_to_the_node_and_mistakes_come_back_with_their_line(editing, as
     operation = {"do": "remove", "objects": [3]}
     assert editing.answers["edit"]({"edit": [operation], "name": "Remove", "id": 5})["revision"] == 1
     assert asked == [{"edit": [operation], "name": "Remove"}]
+    editing.answers["objects_text"]({"objects": [3]})
+    assert asked[-1] == {"text_of": [3]}
     answer = editing.answers["write_scene_text"]({"text": "wrong", "revision": 1})
     assert answer["line"] == 3
     with pytest.raises(ValueError, match="file: must be the name"):

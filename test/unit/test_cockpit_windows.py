@@ -207,6 +207,21 @@ def test_cameras_are_listened_to_while_they_are_shown_to_somebody(cameras, sent)
     assert not Subscriber.there and sent.told[-2:] == ["closed /drone/front", {"pictures": []}]
 
 
+def test_a_camera_that_is_shown_stays_on_while_another_scene_with_it_is_loaded(cameras, sent):
+    cameras.rest(False)
+    cameras.turn("/drone/front", True)
+    front, depth = ImageTopic("/drone/front", "/drone/front/compressed"), ImageTopic("/drone/depth/image")
+    cameras.offer(())  # the master is asked just while the one has gone, and the other has not come
+    assert not Subscriber.there
+    cameras.offer((front, depth))
+    assert cameras.shown == ["/drone/front"]
+    assert list(Subscriber.there) == ["/drone/front/compressed"]
+    cameras.turn("/drone/front", False)
+    cameras.offer(())
+    cameras.offer((front, depth))
+    assert not cameras.shown, "who is switched off stays off"
+
+
 def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
     cameras.rest(False)
     cameras.offer((ImageTopic("/drone/front", has_truth=True), ImageTopic("/drone/depth/image")))
@@ -215,7 +230,7 @@ def test_boxes_and_mask_are_those_of_the_pictures_stamp(cameras, sent):
         {"topic": "/drone/depth/image", "overlay": "mask", "on": True},
         {"topic": "/drone/front", "on": True},
     ):
-        with pytest.raises(ValueError, match="is none of those that there are"):
+        with pytest.raises(ValueError, match="does not exist"):
             cameras.overlay_asked(wrong)
     for kind in ("boxes", "mask"):
         cameras.overlay_asked({"topic": "/drone/front", "overlay": kind, "on": True})
@@ -294,7 +309,7 @@ def test_cameras_go_by_the_names_that_people_use(topic, vehicles, name):
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        ({"topic": "/drone/frond", "on": True}, "topic = '/drone/frond': is none of those that there are; near names"),
+        ({"topic": "/drone/frond", "on": True}, "topic = '/drone/frond': does not exist; near names"),
         ({"topic": "/drone/front", "on": 1}, "on = 1: must be true or false"),
         ({"on": True}, "topic = None: "),
     ],

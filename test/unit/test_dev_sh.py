@@ -1,5 +1,6 @@
 """dev.sh on a machine whose python, pip, CMake and apt are stubs: what is interrupted, shared, moved or read-only."""
 
+import hashlib
 import os
 import re
 import shutil
@@ -23,9 +24,16 @@ if [ -n "$STOP_AT" ] && [[ "$*" = *"$STOP_AT"* ]]; then
 fi
 case "$*" in
   --version) echo Python 3.11.2 ;;
+  -c*) echo cp311 ;;
+  *--dry-run*) [ -z "$NO_WHEEL" ] ;; # whether the index has one
+  *"pip wheel"*) touch "$TMPDIR/pybullet-1-cp311-cp311-linux_$(uname -m).whl" ;;
   "-m venv"*) mkdir -p "${@: -1}/bin"; cp "$0" "${@: -1}/bin/python" ;;
+  *--collect-only*) seq -f "test_page.py::test_%g" "$FAILED" ;;
+  *--last-failed*) exit "$AGAIN" ;;
+  "-m pytest"*) exit "$STATUS" ;;
 esac
 """
+PACKAGING = ("packaging/pybullet.sh", "packaging/slim_pybullet.sh", "packaging/wheel.sh")
 CMAKE = """#!/bin/bash
 mkdir devel
 touch devel/setup.bash
@@ -42,7 +50,7 @@ class Machine:
         (self.checkout / "test/ros/flight.test").touch()
         (self.checkout / "packaging").mkdir()
         shutil.copytree(ROOT / "cmake", self.checkout / "cmake")
-        for name in ("dev.sh", "CMakeLists.txt", "setup.py", "package.xml", "packaging/pybullet.sh"):
+        for name in ("dev.sh", "CMakeLists.txt", "setup.py", "package.xml", *PACKAGING):
             shutil.copy(ROOT / name, self.checkout / name)
         for name in ("requirements.txt", "requirements-all.txt", "requirements-dev.txt"):
             (self.checkout / name).write_text("pybullet==1\n", encoding="utf-8")
@@ -203,6 +211,33 @@ def test_an_interrupted_dpkg_is_named_with_its_mend(machine, interrupted):
     assert interrupted or "cannot install: bubblewrap" in said
 
 
+@pytest.mark.parametrize("checksum", ["of the wheel", "of another", "none"])
+def test_a_wheel_of_pybullet_is_taken_only_with_its_checksum(machine, checksum):
+    wheel = machine.checkout / f"wheels/pybullet-1-cp311-cp311-linux_{os.uname().machine}.whl"
+    wheel.parent.mkdir()
+    wheel.write_text("ours", encoding="utf-8")
+    if checksum != "none":
+        summed = hashlib.sha256(b"ours" if checksum == "of the wheel" else b"theirs").hexdigest()
+        (wheel.parent / "SHA256SUMS").write_text(f"{summed}  {wheel.name}\n", encoding="utf-8")
+    code, said = machine.run("setup", env={"NO_WHEEL": "1"})
+    assert code == 0, said
+    there = machine.folder / ".cache/drone_sim/wheels" / wheel.name
+    if checksum == "of the wheel":
+        assert f"taking PyBullet from {wheel}, whose checksum" in said
+        assert machine.asked("pip wheel") == 0 and there.read_text(encoding="utf-8") == "ours"
+    else:
+        assert f"not taking {wheel}: its checksum is not in {wheel.parent}/SHA256SUMS" in said
+        assert machine.asked("pip wheel") == 1 and there.read_text(encoding="utf-8") == ""
+
+
+def test_a_wheel_lies_where_one_says_and_one_of_another_python_is_left_alone(machine):
+    name = f"pybullet-1-cp312-cp312-linux_{os.uname().machine}.whl"
+    (machine.folder / "lab").mkdir()
+    (machine.folder / "lab" / name).write_text("ours", encoding="utf-8")
+    code, said = machine.run("setup", env={"NO_WHEEL": "1", "DRONE_SIM_WHEELS": f"{machine.folder}/lab"})
+    assert code == 0 and name not in said and machine.asked("pip wheel") == 1
+
+
 def compile_pybullet(machine, pip):
     """Start packaging/pybullet.sh with a pip that is a bash script."""
     machine.stub("python", f"#!/bin/bash\ncase $1 in --version) echo Python 3.13.0 ;; *) {pip} ;; esac\n")
@@ -237,6 +272,45 @@ def test_an_interrupted_compilation_leaves_nothing(machine, how):
     assert [path.name for path in (machine.folder / "wheels").iterdir()] == ["pybullet.log"]
     with pytest.raises(ProcessLookupError):
         os.kill(int((machine.folder / "pid").read_text(encoding="utf-8")), 0)
+
+
+@pytest.mark.parametrize(
+    "status, failed, again, runs, code",
+    [(0, 0, 0, 1, 0), (1, 2, 0, 2, 0), (1, 2, 1, 2, 1), (1, 5, 0, 1, 1), (2, 2, 0, 1, 2)],
+    ids=["all well", "well the second time", "twice", "too many", "cannot be collected"],
+)
+def test_a_few_tests_in_the_browser_that_fail_are_run_once_more(machine, status, failed, again, runs, code):
+    (machine.checkout / "requirements-web.txt").write_text("playwright==1\n", encoding="utf-8")
+    results = {"STATUS": str(status), "FAILED": str(failed), "AGAIN": str(again)}
+    ended, said = machine.run("test-web", "-k", "page", env=results)
+    assert (ended, machine.asked("-m pytest test/web -k page") - machine.asked("--collect-only")) == (code, runs)
+    once_more = f"{failed} failed: once more test_page.py::test_1 test_page.py::test_2\n"
+    assert (once_more in said) == (runs == 2)
+
+
+MAKE = """#!/bin/bash
+echo "make $PYTEST_ADDOPTS $*" >>"$STUBS/made"
+[[ "$* " == *" test "* ]] || exit 0
+[[ $* == *--rerun-failed* ]] && exit "$AGAIN"
+mkdir -p build/Testing/Temporary
+for ((i = 1; i <= FAILED; i++)); do echo "$i:suite_$i"; done >build/Testing/Temporary/LastTestsFailed.log
+exit "$STATUS"
+"""
+
+
+@pytest.mark.parametrize(
+    "status, failed, again, runs, code",
+    [(0, 0, 0, 1, 0), (2, 2, 0, 2, 0), (2, 2, 2, 2, 2), (2, 3, 0, 1, 1), (2, 0, 0, 1, 1)],
+    ids=["all well", "well the second time", "twice", "too many", "not a suite"],
+)
+def test_a_few_suites_that_fail_are_run_once_more(machine, status, failed, again, runs, code):
+    machine.stub("bin/make", MAKE)
+    results = {"STATUS": str(status), "FAILED": str(failed), "AGAIN": str(again)}
+    ended, said = machine.run("test", env=results)
+    made = [one for one in (machine.folder / "made").read_text(encoding="utf-8").splitlines() if " test " in one]
+    assert (ended, len(made)) == (code, runs), said
+    assert ("2 of the suites failed: once more suite_1 suite_2\n" in said) == (runs == 2)
+    assert runs == 1 or "--last-failed" in made[1]
 
 
 def test_what_a_change_must_pass_leaves_no_suite_out(machine):

@@ -271,7 +271,7 @@ def test_lying_on_its_back_is_told(looked):
 
 def test_cameras_tell_their_rate_and_what_draws(looked):
     camera = looked.drone.cameras["front"]
-    assert looked.look("cameras").message == "nobody looks"
+    assert looked.look("cameras").message == "no camera is in use"
     camera.viewers.add(lambda: True)
     try:
         looked.fly(1)

@@ -1,27 +1,20 @@
 """The scene's editor: edits as records, undo and redo, the scene's text, files, drafts."""
 
 import os
-import random
-from importlib.util import find_spec
-from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from living import KINDS, SCENE, picture, sizes
+from living import picture
+from scene_edits import assert_same, edit, editor_of, place, state, text_of
 
 from drone_sim.editing import records
-from drone_sim.editing.changes import change_between
-from drone_sim.editing.editor import SceneEditor
 from drone_sim.files import yaml_files
 from drone_sim.mechanics.state import Pose
-from drone_sim.run import parameters
-from drone_sim.run.player import Player
-from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.errors import ScriptError
 
-EDITS = int(os.environ.get("DRONE_SIM_EDITS", "20"))  # in a row: 500 by hand
 GATE = {"name": "Gate", "shape": "box", "size": [0.1, 2, 2]}
+TWO_IN_A_CIRCLE = [{"name": one, "kind": "dummy", "parent": other} for one, other in ("AB", "BA")]
 COURSE = """\
 # A course, by hand.
 floor: {size: 20.0}   # wide enough
@@ -37,11 +30,6 @@ objects:
     parent: Left     # goes with it
     position: [0, 0, 1]
 """
-
-
-def editor_of(given=None, drafts=None):
-    simulation = Simulation(parameters.load(given), started=False)
-    return SceneEditor(Player(simulation, simulation.step, lambda state: None, False), drafts)
 
 
 @pytest.fixture(name="editor")
@@ -63,40 +51,10 @@ def _course(tmp_path):
 @pytest.fixture(name="shared", scope="module")
 def _shared(tmp_path_factory):
     made = editor_of()
-    made.scene.folder = tmp_path_factory.mktemp("shared")
+    made.scene.document.folder = tmp_path_factory.mktemp("shared")
     edit(made, {"do": "add", "objects": [GATE]})
     yield made
     made.simulation.close()
-
-
-def edit(editor, *operations, **more):
-    return editor.answer({"edit": list(operations), **more})
-
-
-def text_of(editor):
-    return editor.answer({"text": True})["text"]
-
-
-def state(simulation):
-    """Return what `picture` does, what is seen in any order."""
-    objects, looks, poses, seen = picture(simulation)
-    return (
-        objects,
-        np.round(poses, 6) + 0.0,
-        sorted((str(look), (np.round(pose, 5) + 0.0).tolist()) for look, pose in zip(looks, seen)),
-    )
-
-
-def assert_same(one, other):
-    assert one[0] == other[0]
-    np.testing.assert_allclose(one[1], other[1], atol=2e-6)
-    assert one[2] == other[2]
-
-
-def place(editor, name):
-    tree = editor.simulation.context.objects
-    matrix = tree.matrix(tree.handle(name))
-    return [round(matrix[index], 9) for index in (3, 7, 11)]
 
 
 def changed_lines(before, after):
@@ -133,6 +91,24 @@ def test_a_drag_is_one_step_of_undo(editor):
     assert place(editor, "Gate") == [3, 0, 1]
     editor.answer({"redo": True})
     assert place(editor, "Gate") == [3, 4, 1]
+
+
+def test_a_drag_that_is_taken_back_leaves_what_another_did_meanwhile(editor):
+    edit(editor, {"do": "add", "objects": [GATE, {**GATE, "name": "Other"}], "position": [3, 0, 0]})
+    edit(editor, {"do": "move", "object": "Gate", "position": [3, 4, 1]}, merge="mine 1")
+    edit(editor, {"do": "move", "object": "Drone", "position": [1, 0, 1]}, merge="mine 2")
+    edit(editor, {"do": "move", "object": "Other", "position": [5, 5, 1]})
+    edit(editor, {"do": "set", "object": "Floor", "values": {"size": 9}})
+    editor.answer({"undo": True, "merge": "mine 1"})
+    editor.answer({"undo": True, "merge": "mine 2"})
+    assert (place(editor, "Gate"), place(editor, "Other")) == ([3, 0, 1], [5, 5, 1])
+    assert place(editor, "Drone") == [0, 0, 0.8]
+    assert yaml_files.parse(text_of(editor))["floor"] == {"size": 9}
+    edit(editor, {"do": "move", "object": "Gate", "position": [3, 7, 1]}, merge="mine 3")
+    editor.answer({"undo": True, "merge": "mine 3"})
+    assert editor.history.redo_name == "Move"
+    with pytest.raises(ValueError, match="nothing to undo"):
+        editor.answer({"undo": True, "merge": "nobody's"})
 
 
 def test_a_parent_takes_its_children_along_and_keeps_them_where_they_are(editor):
@@ -203,9 +179,93 @@ def test_vehicles_and_floor(editor):
     while editor.history.undo_name:
         editor.answer({"undo": True})
     assert picture(editor.simulation) == before
+
+
+def vehicle_state(editor, name="drone"):
+    return editor.simulation.vehicles[name].body.state
+
+
+def test_vehicles_floor_and_weather_are_edited_in_flight_until_stop(editor):
+    simulation = editor.simulation
+    before, text = state(simulation), text_of(editor)
+    edit(editor, {"do": "add", "objects": [{"name": "Mark", "kind": "dummy", "parent": "Drone"}]})
+    edit(editor, {"do": "move", "object": "Mark", "position": [0, 0, 0.3], "relative_to": "parent"})
+    simulation.start()
+    for _ in range(5):
+        simulation.step()
+    handle, drone = simulation.context.objects.handle("Drone"), simulation.drone
+    edit(editor, {"do": "set", "object": "Floor", "values": {"size": 12}})
+    assert simulation.drone is drone
+    assert next(one for one in simulation.world.pictures.visuals() if one.floor).shape.size == 12
+    edit(editor, {"do": "move", "object": "Drone", "position": [1, 2, 2], "rpy": [0, 0, 1]})
+    assert simulation.drone is drone, "it is only moved, and flies on"
+    simulation.step()
+    assert place(editor, "Drone") == pytest.approx([1, 2, 2], abs=0.1)
+    edit(editor, {"do": "set", "object": "Drone", "values": {"cameras": {"front": {"width": 320}}}})
+    assert simulation.drone is not drone
+    assert place(editor, "Drone") == pytest.approx([1, 2, 2], abs=0.1)
+    assert simulation.context.objects.handle("Drone") == handle
+    assert editor.scene.tree.matrix(editor.scene.tree.handle("Mark"), handle)[11] == pytest.approx(0.3)
+    (new,) = edit(editor, {"do": "add_vehicle", "name": "second", "position": [-2, 0, 1]})["handles"]
+    edit(editor, {"do": "rename", "object": new, "name": "guest"})
+    simulation.step()
+    assert list(simulation.vehicles) == ["drone", "guest"]
+    editor.answer({"write": text_of(editor) + "weather: {wind: [2, 0, 0]}\n"})
+    assert simulation.context.weather.now.wind == (2, 0, 0)
+    simulation.step()
+    for _ in range(7):
+        editor.answer({"undo": True})
+    assert list(simulation.vehicles) == ["drone"]
+    assert simulation.context.weather.now.wind == (0, 0, 0)
+    editor.answer({"redo": True})
+    simulation.stop()
+    editor.follow()
+    editor.answer({"undo": True})
+    editor.answer({"undo": True})
+    assert_same(state(simulation), before)
+    assert text_of(editor) == text
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "datum: {latitude: 1}",
+        "magnetic_field: [0, 0, 1.0e-5]",
+        "gravity: -3",
+        "physics: {gyroscopic: false}",
+        "sub_step: 0.01",
+        "collections: [{name: all, items: [{what: all}]}]",
+    ],
+)
+def test_what_no_flight_can_go_on_with_is_refused(editor, said):
     editor.simulation.start()
-    with pytest.raises(ValueError, match="stop it first"):
-        edit(editor, {"do": "set", "object": "Floor", "values": {"size": 12}})
+    key = said.partition(":")[0]
+    with pytest.raises(ValueError, match=f"{key}: is changed while the simulation is stopped: stop it first"):
+        editor.answer({"write": f"{text_of(editor)}{said}\n"})
+    editor.simulation.stop()
+    editor.follow()
+    editor.answer({"write": f"{text_of(editor)}{said}\n"})
+
+
+def test_a_vehicle_that_cannot_begin_leaves_all_as_it_was(editor, tmp_path):
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text("def sysCall_init():\n    raise ValueError('not today')\n", encoding="utf-8")
+    editor.simulation.start()
+    before = text_of(editor)
+    for operation in (
+        {"do": "add_vehicle", "name": "second", "position": [2, 0, 1], "values": {"script": str(wrong)}},
+        {"do": "set", "object": "Drone", "values": {"script": str(wrong)}},
+    ):
+        with pytest.raises(ScriptError, match="not today"):
+            edit(editor, operation)
+        assert list(editor.simulation.vehicles) == ["drone"]
+        assert text_of(editor) == before
+        editor.simulation.step()
+    edit(editor, {"do": "remove", "objects": ["Drone"]})
+    editor.simulation.step()
+    assert not editor.simulation.vehicles
+    editor.simulation.stop()
+    assert list(editor.simulation.vehicles) == ["drone"]
 
 
 def test_a_model_is_grouped_copied_into_a_row_and_removed_whole(editor):
@@ -223,7 +283,7 @@ def test_a_model_is_grouped_copied_into_a_row_and_removed_whole(editor):
 
 
 def test_a_script_is_attached_and_taken_away(course):
-    folder = course.document.file.parent
+    folder = course.scene.document.file.parent
     edit(course, {"do": "attach_script", "object": "Lamp"})
     assert "sysCall_actuation" in (folder / "lamp.lua").read_text(encoding="utf-8")
     edit(course, {"do": "set", "object": "Lamp", "values": {"script_parameters": {"speed": 2}}})
@@ -244,7 +304,25 @@ def test_a_script_is_attached_and_taken_away(course):
         ({"edit": [{"do": "move", "object": "Drone", "quaternion": [0, 0, 0, 0]}]}, "must be about 1"),
         ({"edit": [{"do": "set", "object": "Drone", "values": {"cameras": {"front": {"width": 0}}}}]}, "width"),
         ({"edit": [{"do": "add_model", "model": "gat"}]}, "no model named 'gat'"),
-        ({"edit": [{"do": "remove", "objects": ["Quadricopter_base"]}]}, "does not fly without it"),
+        ({"edit": [{"do": "remove", "objects": ["Quadricopter_base"]}]}, "cannot fly without it"),
+        ({"edit": [{"do": "add", "objects": [{"name": "A", "kind": "dummy", "parent": "A"}]}]}, "its own ancestor"),
+        ({"edit": [{"do": "add", "objects": TWO_IN_A_CIRCLE}]}, "'A' would be its own ancestor"),
+        (
+            {
+                "edit": [
+                    {"do": "set", "object": "Drone", "values": {"objects": {"Track_base": {"parent": "Track_base"}}}}
+                ]
+            },
+            "no object is named 'Track_base', the parent of 'Track_base'",
+        ),
+        (
+            {"edit": [{"do": "add", "objects": [GATE]}, {"do": "set", "object": "Gate", "values": {"color": 5}}]},
+            "color = 5: must be 3 or 4 numbers",
+        ),
+        (
+            {"edit": [{"do": "add", "objects": [GATE]}, {"do": "set", "object": "Gate", "values": {"color": "red"}}]},
+            "color = 'red'",
+        ),
         ({"redo": True}, "nothing to redo"),
         ({"save": "/tmp/scene.txt"}, ".yaml file"),
         ({"write": "objects: ["}, "line"),
@@ -336,9 +414,9 @@ def test_in_flight_it_is_saved_as_it_stands_and_stays_the_scene_that_it_was(cour
     course.simulation.start()
     course.simulation.drone.body.move(Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)))
     course.answer({"save": True})
-    file = course.document.file
+    file = course.scene.document.file
     was, now = changed_lines(COURSE, file.read_text(encoding="utf-8"))
-    assert (was, now) == (["drone: {position: [0, 0, 1.50]}"], ["drone: {position: [1, 2, 3], yaw: 0}"])
+    assert (was, now) == (["drone: {position: [0, 0, 1.50]}"], ["drone: {position: [1, 2, 3]}"])
     course.simulation.stop()
     course.follow()
     assert text_of(course) == COURSE
@@ -347,7 +425,7 @@ def test_in_flight_it_is_saved_as_it_stands_and_stays_the_scene_that_it_was(cour
 def test_a_start_reads_what_somebody_has_written_since_it_was_saved(course):
     edit(course, {"do": "move", "object": "Left", "position": [4, 1, 1]})
     course.answer({"save": True})
-    file = course.document.file
+    file = course.scene.document.file
     file.write_text(COURSE.replace("[3, 1, 1]", "[5, 1, 1]"), encoding="utf-8")
     os.utime(file, ns=(1, 1))
     course.follow()
@@ -358,14 +436,39 @@ def test_a_start_reads_what_somebody_has_written_since_it_was_saved(course):
 def test_a_scene_of_the_package_is_copied(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     editor = editor_of({"scene_file": "package://drone_sim/config/scenes/gates.yaml"})
-    shipped = editor.document.file
+    shipped = editor.scene.document.file
     before = shipped.read_text(encoding="utf-8")
-    edit(editor, {"do": "remove", "objects": ["RedTop"]})
+    edit(editor, {"do": "remove", "objects": ["Red"]})
     assert editor.answer({"save": True})["file"] == str(tmp_path / ".ros/drone_sim/gates.yaml")
     assert shipped.read_text(encoding="utf-8") == before
     editor.answer({"new": True})
     assert not editor.simulation.vehicles
     editor.simulation.close()
+
+
+@pytest.mark.parametrize("name", ["1e3", "true", "~", "2026-01-01", "1:30", "010", ".inf", "a: b", "- a", "<<"])
+def test_whatever_its_name_it_can_be_saved_and_loaded(course, tmp_path, name):
+    edit(course, {"do": "add", "objects": [{"name": name, "kind": "dummy", "model": True}]})
+    course.answer({"save": str(tmp_path / "named.yaml")})
+    course.answer({"save_model": name, "file": str(tmp_path / "model.yaml")})
+    edit(course, {"do": "remove", "objects": [name]})
+    edit(course, {"do": "add_model", "model": str(tmp_path / "model.yaml"), "position": [0, 0, 0]})
+    course.answer({"open": str(tmp_path / "named.yaml")})
+    assert name in course.simulation.context.objects
+
+
+@pytest.mark.parametrize("values", [{"script_parameters": 5}, {"mass": "x"}])
+def test_an_edit_that_fails_in_its_midst_leaves_nothing(course, values):
+    edit(course, {"do": "attach_script", "object": "Lamp"})
+    before, revision = text_of(course), course.revision
+    with pytest.raises(ValueError) as raised:
+        edit(
+            course,
+            {"do": "move", "object": "Lamp", "position": [1, 1, 1]},
+            {"do": "set", "object": "Lamp", "values": values},
+        )
+    assert "\n" not in str(raised.value)
+    assert (text_of(course), course.revision) == (before, revision)
 
 
 def test_a_draft_outlives_the_node(tmp_path):
@@ -389,6 +492,15 @@ def test_a_draft_outlives_the_node(tmp_path):
     second.simulation.close()
 
 
+def test_a_scene_that_is_loaded_in_flight_is_not_modified(editor):
+    edit(editor, {"do": "add", "objects": [GATE], "position": [5, 0, 0]})
+    editor.simulation.start()
+    editor.follow()
+    editor.simulation.load_scene("")
+    editor.follow()
+    assert not editor.is_modified
+
+
 def test_models_of_the_package_are_written_for_any_machine(editor):
     pads = {"do": "add_model", "model": "landing_pad", "position": [1, 0, 0]}
     edit(editor, pads, {"do": "add_model", "model": "pole", "position": [2, 0, 0]})
@@ -403,135 +515,3 @@ def test_models_of_the_package_are_written_for_any_machine(editor):
         "      - {shape: cylinder, size: [0.15, 0.04], position: [0, 0, 0.02], color: [0.25, 0.25, 0.27, 1]}",
         "      - {shape: cylinder, size: [0.03, 2], position: [0, 0, 1.04], color: [0.95, 0.8, 0.1, 1]}",
     ]
-
-
-# ---- many
-
-
-class RandomEdits:
-    """Edits that a person could make, one after another."""
-
-    def __init__(self, editor, seed):
-        self.editor, self.dice = editor, random.Random(seed)
-
-    def step(self):
-        """Make an edit, or undo or redo some; what cannot be is refused."""
-        word = self.dice.choice(["edit"] * 7 + ["undo"] * 2 + ["redo"])
-        try:
-            self.editor.answer({"edit": [self.operation()]} if word == "edit" else {word: True})
-        except ValueError:
-            assert word != "undo" or not self.editor.history.undo_name, "what was done can be undone"
-
-    def operation(self):
-        choose, tree = self.dice.choice, self.editor.simulation.context.objects
-        own = [one.name for one in self.editor.simulation.scene.entries.values()]
-        one, other = choose(own or ["Drone"]), choose([*own, "Drone", "Quadricopter_base"])
-        place = [round(self.dice.uniform(-4, 4), 1) for _ in range(2)] + [round(self.dice.uniform(0.5, 3), 2)]
-        kind = choose([*KINDS.values()])
-        operations = [
-            {"do": "add", "objects": [{"name": choose(["A", "B"]), **kind}], "position": place},
-            {
-                "do": "move",
-                "object": choose([one, "Drone"]),
-                "position": place,
-                "rpy": [0, 0, round(self.dice.uniform(-3, 3), 2)],
-            },
-            {"do": "move", "object": one, "position": place, "relative_to": "parent"},
-            {"do": "rename", "object": one, "name": choose(["C", "D", "E"])},
-            {"do": "reparent", "objects": [one], "parent": choose([other, -1]), "keep": choose(["pose", "relative"])},
-            {
-                "do": "set",
-                "object": one,
-                "values": choose([{"mass": 2}, {"color": [1, 0, 0]}, {"alias": "x"}, {"size": [0.3]}]),
-            },
-            {"do": "set", "object": "Floor", "values": {"size": self.dice.randint(8, 12)}},
-            {"do": "copy", "objects": [one], "counts": [2, 1, 1], "steps": [0, 0.5, 0]},
-            {"do": "scale", "objects": [one], "factors": [1.5, 1.5, 1.5]},
-            {"do": "remove", "objects": [one]}
-            if len(own) > 12 or self.dice.random() < 0.3
-            else {"do": "detach_script", "object": one},
-            {"do": "group", "objects": [one], "name": "Model"},
-        ]
-        return choose([entry for entry in operations if tree is not None])
-
-
-def assert_agree(editor, folder):
-    """Let tree, bodies, rviz's markers and the saved file say the same."""
-    simulation = editor.simulation
-    scene = simulation.scene
-    simulation.context.carried.follow()
-    assert {one.name for one in scene.entries.values()} == {one.name for one in scene.objects.values()}
-    for index, one in scene.objects.items():
-        entry = scene.entry_now(index)
-        assert (one.parent.name if one.parent else "") == entry.parent
-        number = getattr(one, "number", None)
-        if number is not None and one.link == -1:
-            assert np.allclose(simulation.world.state(number).matrix, one.matrix(), atol=1e-6), one.name
-    file = folder / "saved.yaml"
-    editor.answer({"save": str(file)})
-    again = editor_of({"scene_file": str(file)})
-    difference = change_between(by_name(editor), by_name(again))
-    assert not difference.entries, difference.entries
-    assert not difference.scripts
-    assert markers(simulation) == markers(again.simulation)
-    assert sizes(simulation) == sizes(again.simulation)  # nothing is left of what has gone
-    assert set(simulation.vehicles) == set(again.simulation.vehicles)
-    seen = [seen_by_camera(one.simulation) for one in (editor, again)]
-    assert seen[0] is None or np.abs(seen[0].astype(int) - seen[1]).mean() < 0.5
-    again.simulation.close()
-
-
-def by_name(editor):
-    content = editor.scene.content()
-    rounded = {one.name: rounded_entry(one) for one in content.entries.values()}
-    return content._replace(entries=rounded, settings={})
-
-
-def rounded_entry(entry):
-    values = entry.model_dump(mode="json")
-    for key in ("position", "rpy"):
-        values[key] = [round(one, 5) + 0.0 for one in values[key]]
-    return values
-
-
-def markers(simulation):
-    """Return what rviz is told of the scene's objects: names, looks and places."""
-    visuals, poses = simulation.scene.visuals()
-    told = sorted(
-        (name, type(one.shape).__name__, np.round(one.rgba, 3).tolist(), np.round(pose, 4).tolist())
-        for name, one, pose in zip(simulation.scene.visual_names(), visuals, poses + 0.0)
-    )
-    if find_spec("visualization_msgs") is None:
-        return told
-    from drone_sim.ros.rviz.scene_markers import bodiless_markers
-
-    frames = sorted(
-        (one.ns, one.type, round(one.scale.x, 4)) for one in bodiless_markers(simulation.scene.objects.values())
-    )
-    return told, frames
-
-
-def seen_by_camera(simulation):
-    for vehicle in simulation.vehicles.values():
-        for camera in vehicle.cameras.values():
-            return camera.look()
-    return None
-
-
-@settings(max_examples=1)
-@given(st.integers(0, 2**32))
-def test_random_edits_agree_everywhere_and_leave_nothing(tmp_path_factory, seed):
-    folder = Path(tmp_path_factory.mktemp("edits"))
-    editor = editor_of({"scene": SCENE, "drone": {"position": [0.0, 0.0, 2.0]}})
-    began, before = sizes(editor.simulation), state(editor.simulation)
-    edits = RandomEdits(editor, seed)
-    for number in range(EDITS):
-        edits.step()
-        if number % 10 == 9:
-            assert_agree(editor, folder)
-    if EDITS <= 100:
-        while editor.history.undo_name:
-            editor.answer({"undo": True})
-        assert_same(state(editor.simulation), before)
-        assert sizes(editor.simulation) == began
-    editor.simulation.close()

@@ -129,6 +129,17 @@ def test_places_are_reached_between_the_rows_and_in_order():
     assert not judged(ahead, "reach", places=gates, within=0.12, until=4.0).passed
 
 
+def test_a_path_stands_for_every_object_that_it_finds():
+    at = times(step=0.5)
+    poses = {name: np.tile([x, 0, 1, 0, 0, 0, 1], (len(at), 1)) for name, x in (("Red", 2.0), ("Blue", 6.0))}
+    more = {"other_poses": poses, "found": {"/Gate": ["Red", "Blue"]}}
+    ahead = flown(at, x=at, vx=1.0, z=1.0, more=more)
+    assert judged(ahead, "reach", places=["/Gate", [9, 0, 1]], within=0.1).said == "reached all 3, the last at 9.00 s"
+    back = judged(ahead, "reach", places=[[9, 0, 1], "/Gate"], within=0.1, partial=True, points=3)
+    assert (back.value, back.points) == (1.0, 1.0)
+    assert judged(ahead, "formation", to="/Gate", offset=[1, 0, 0], axes="yz", at_most=0.01).passed, "the first of them"
+
+
 def test_a_vehicle_that_is_put_elsewhere_has_not_been_in_between():
     at = times(2.0, 0.05)
     jumping = flown(at, x=np.where(at < 1, 0.0, 4.0))

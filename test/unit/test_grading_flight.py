@@ -310,7 +310,7 @@ def test_what_the_plan_itself_does_breaks_no_rule(written):
 
 
 WRONG = {
-    "": "must hold `key: value` lines, of which one is `criteria`, not None",
+    "": "must have `key: value` lines, one of them `criteria`, not None",
     "duration: 5": "criteria: missing",
     "duration: 5\ncriteria: []": "line 2: criteria = []: list should have at least 1 item",
     "duration: 5\ncriteria:\n- {kind: rise_tme}": "line 3: criteria/0/kind = 'rise_tme': must be one of 'rise_time', ",
@@ -319,7 +319,7 @@ WRONG = {
     "duration: 5\ncriteria:\n- {kind: no_contact}\n- {kind: no_contact}": "criteria/1/name = 'no_contact': comes twice",
     "duration: 5\ncriteria:\n- {kind: no_contact, until: 9}": "line 3: criteria/0/until = 9: the flight lasts 5 s",
     "duration: 5\ncriteria:\n- {kind: landed, at: [1, 2, 3]}": "criteria/0/at = [1, 2, 3]: must be 2 numbers",
-    "duration: 5\ncriteria:\n- {kind: rise_time, of: vx, from: 1, to: 1, at_most: 1}": "criteria/0/to = 1: is where it",
+    "duration: 5\ncriteria:\n- {kind: rise_time, of: vx, from: 1, to: 1, at_most: 1}": "criteria/0/to = 1: is the same",
 }
 BESIDE = {
     "duratoin: 5": "line 1: duratoin: unknown key; known are duration",

@@ -36,6 +36,10 @@ HOSTILE = {
     "aborts": ("import os; os.abort()", "crashed: its process was ended by SIGABRT"),
     "crashes": ("import ctypes; ctypes.string_at(0)", "crashed: its process was ended by SIGSEGV"),
     "closes": ("import os; os.closerange(0, 1000)", "with status 0, before the flight was over"),
+    "hangs up": (
+        "import os, time; os.close(3); time.sleep(0.5); os._exit(7)",
+        "with status 7, before the flight was over",
+    ),
     "leaves": ("import os; os._exit(0)", "with status 0, before the flight was over"),
     "exits": ("import sys; sys.exit(0)", "SystemExit"),
     "grows": ("x = [bytearray(2**26) for _ in range(100)]", "MemoryError"),

@@ -147,7 +147,7 @@ SCENES = {
     "a folder": (f"objects: [{{{BALL}, texture: .}}]", "no such file: "),
     "a pipe": (f"objects: [{{{BALL}, texture: fifo}}]", "no such file: "),
     "a long name": (f"objects: [{{{BALL}, texture: {'x' * 300}}}]", "no such file"),
-    "many boxes": ("objects: [" + f"{{{BALL}}}," * 1001 + "]", "at most 1000 items"),
+    "many boxes": ("objects: [" + f"{{{BALL}}}," * 2001 + "]", "at most 2000 items"),
     "a big mesh often": ("objects: [" + f"{{{MESH}: disc.stl}}," * 600 + "]", "more than 500000 triangles"),
     "a wide mesh": (f"objects: [{{{MESH}: good.obj, size: [1e6, 1, 1]}}]", "reaches 1e+06 m from its origin"),
     "a disc": (f"objects: [{{{MESH}: disc.stl, mass: 1}}]", "built"),

@@ -8,7 +8,7 @@ from drawing import AHEAD, CAMERA, at, box
 
 from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.render.light import decoded, encoded
-from drone_sim.render.shutter import Shutter
+from drone_sim.render.shutter import Shutter, moved
 from drone_sim.run import parameters
 from drone_sim.run.parameters import ParameterError
 from drone_sim.run.simulation import Simulation
@@ -132,11 +132,11 @@ def test_automatic_exposure_follows_the_light_in_its_time():
     assert control.brightness(own, 120.0) == pytest.approx(2 * 10**0.6), "it has its limits"
 
 
-def flown(front, steps=6):
-    """Return the pictures of a flight, and what it is restored to."""
+def flown(front, steps=6, first=0):
+    """Return the pictures of a flight that somebody looks at from a step on, and what it is restored to."""
     simulation = Simulation(parameters.load({"cameras": {"front": {"width": 80, "height": 60, **front}}}))
     camera = simulation.drone.cameras["front"]
-    camera.viewers.add(lambda: True)
+    camera.viewers.add(lambda: len(pictures) >= first)
     simulation.drone.commands.receive(Twist(Vector3(1.0, 0.0, 0.0), Vector3(0.0, 0.0, 2.0)))
     pictures = []
     for step in range(steps):
@@ -158,6 +158,43 @@ def test_the_same_flight_has_the_same_pictures_to_the_last_bit():
     np.testing.assert_array_equal(again, first[3])
     other, _ = flown({**ALL, "noise": {**ALL["noise"], "seed": 4}})
     assert all((one != two).mean() > 0.3 for one, two in zip(first, other))
+
+
+def test_automatic_exposure_is_the_same_whoever_looks():
+    always, _ = flown(ALL)
+    late, _ = flown(ALL, first=4)
+    assert late[:4] == [None] * 4
+    np.testing.assert_array_equal(late[4:], always[4:])
+    steady = {**ALL, "exposure": {**ALL["exposure"], "automatic": False}}
+    assert (decoded(flown(steady)[0][5]).mean() / decoded(always[5]).mean()) > 1.5, "it is bright, and follows that"
+
+
+def test_blades_blur_at_the_speed_at_which_they_are_seen_to_turn():
+    simulation = Simulation(parameters.load({}))
+    drone, shutter = simulation.drone, Shutter(0.03, 0.0)
+    track = drone.cameras["track"]
+    for _ in range(10):
+        simulation.step()
+
+    def light(exposed):
+        pose = np.reshape((*track.pose(), 0, 0, 0, 1), (4, 4))
+        return simulation.vision.light(track.intrinsics, pose, STILL, exposed)
+
+    def blurred():
+        return (np.abs(light(shutter) - light(Shutter(0.0, 0.0))) > 0.02).any(axis=-1).sum()
+
+    assert blurred() > 20
+    pictures, time_step = simulation.world.pictures, simulation.parameters.time_step
+    before, velocities = pictures.visual_poses(), pictures.visual_velocities()
+    simulation.step()
+    light(shutter)  # only who looks turns them
+    turned, expected = pictures.visual_poses()[:, :3, :3], moved(before, velocities, time_step)[:, :3, :3]
+    assert np.abs(turned - before[:, :3, :3]).max() > 0.1
+    np.testing.assert_allclose(turned, expected, atol=0.01)
+    for number in range(1, 5):
+        drone.propulsion.blades.turn(f"Quadricopter_propeller_joint{number}", 0.3)
+    assert blurred() == 0
+    simulation.close()
 
 
 def test_it_is_tuned_in_flight_and_fails():

@@ -1,5 +1,7 @@
 """Lenses: what they do against OpenCV's models, and what OpenCV's calibration makes of pictures taken through them."""
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pybullet
@@ -157,6 +159,7 @@ def edge(picture):
 
 @LENSES
 def test_masks_and_depths_through_a_lens_are_what_rays_meet(renderer, lens):
+    lens = dataclasses.replace(lens, width=320, height=240)
     visuals, poses, client = random_scene(np.random.RandomState(4))
     eye = looking((0, 0, 1), (4, 0.2, 1.1))
     bodies, points, _ = cast(client, lens, eye)
@@ -169,5 +172,5 @@ def test_masks_and_depths_through_a_lens_are_what_rays_meet(renderer, lens):
     there = sure & (bodies > 0) & (drawn["instance"] == bodies)
     away = points - eye[:3, 3]
     depth = np.linalg.norm(away, axis=-1) if lens.is_fisheye else away @ eye[:3, 2]
-    assert there.sum() > 10_000
+    assert there.sum() > 4_000
     assert np.percentile(np.abs(drawn["depth"] - depth)[there], 99) < 0.01

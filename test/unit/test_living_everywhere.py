@@ -14,6 +14,7 @@ import yaml
 from living import KINDS, SCENE, picture, sizes
 from remote_client import official_client
 
+from drone_sim.editing.editor import SceneEditor
 from drone_sim.remote.server import RemoteApiServer
 from drone_sim.run import parameters
 from drone_sim.run.player import Player
@@ -119,7 +120,7 @@ def hold_flat(do, simulation):
     do(TIMES)
     assert sizes(simulation) == before
     after, after_descriptors = resources()
-    assert after_descriptors == descriptors
+    assert after_descriptors <= descriptors  # tests before may have left some, which are closed by and by
     print(f"{TIMES} times: {(after - memory) / 1e6:.2f} MB more, of {memory / 1e6:.0f}")
     assert TIMES < OFTEN or after - memory < ROOM
 
@@ -203,3 +204,22 @@ def test_a_client_changes_everything(simulation, tmp_path, running):
             same(picture(simulation), made)
     finally:
         served.close()
+
+
+@pytest.mark.parametrize("running", [True, False], ids=["running", "stopped"])
+def test_a_window_a_client_and_a_program_write_the_same_bytes(simulation, tmp_path, running):
+    program, client = tmp_path / "program.yaml", tmp_path / "client.yaml"
+    served = Served(simulation)
+    try:
+        if running:
+            served.player.start()
+            served.player.step()
+            served.player.pause(True)
+        simulation.operations.paint(simulation.context.objects.handle("Ball"), (0.1, 0.2, 0.3, 1.0))
+        simulation.save_scene(program)
+        served.do(lambda sim: sim.saveScene(client.name))
+        SceneEditor(served.player).answer({"save": str(tmp_path / "window.yaml")})
+    finally:
+        served.close()
+    assert client.read_bytes() == program.read_bytes() == (tmp_path / "window.yaml").read_bytes()
+    assert "[0.1, 0.2, 0.3, 1]" in program.read_text(encoding="utf-8")

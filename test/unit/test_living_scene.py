@@ -11,7 +11,7 @@ from living import KINDS, SCENE, picture, simulate, sizes
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
-TIMES = 100
+TIMES = 20
 
 
 def do_all(operations, tree, kind):

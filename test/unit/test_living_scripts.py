@@ -187,7 +187,7 @@ def test_a_model_of_v_reps_comes_with_its_scripts(build, tmp_path):
         assert [tree[one].kind for one in operations.model(top)] == ["shape", "shape"]
         simulation.step()
         assert told(simulation)[0] == f"{name}:init"
-    with pytest.raises(ValueError, match=r"drone\.ttm: is a quadricopter, which comes by the parameter `vehicles`"):
+    with pytest.raises(ValueError, match=r"drone\.ttm: is a quadricopter: add it with the parameter `vehicles`"):
         operations.load_model("drone.ttm")
     with pytest.raises(ValueError, match=r"torn\.ttm: is cut"):
         operations.load_model("torn.ttm")

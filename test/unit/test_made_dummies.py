@@ -41,7 +41,7 @@ def test_a_script_makes_dummies_and_takes_them_away(tmp_path, caplog):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        ("[sim.createDummy(0.01) for _ in range(2000)]", "a scene has at most 1000 objects"),
+        ("[sim.createDummy(0.01) for _ in range(3000)]", "a scene has at most 2000 objects"),
         ("sim.removeObject(sim.getObject('/Floor'))", "'Floor' is the floor"),
         ("sim.removeObjects(3)", "a table of handles is expected"),
         ("sim.createDummy('large')", "a number is expected"),

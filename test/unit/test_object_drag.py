@@ -89,7 +89,7 @@ def test_what_a_joint_holds_takes_along_what_it_is_held_to(simulation, drag):
     cart, rod = place(simulation, "Cart"), place(simulation, "Rod")
     assert math.dist(cart, rod) == pytest.approx(math.hypot(0.2, 0.3), abs=0.2) and cart[2] > 0.9
     drag.let_go("Rod")
-    with pytest.raises(ValueError, match="'Sign' is held in its place: it hangs on no shape of the scene"):
+    with pytest.raises(ValueError, match="'Sign' is held in its place: no shape of the scene is above it"):
         drag.put("Sign", at(5, 5, 1))
 
 

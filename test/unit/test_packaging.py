@@ -73,6 +73,15 @@ def test_rosdep_and_pip_take_the_same_versions():
         assert {one["pip"]["packages"][0] for one in systems.values()} == {versions[name]}
 
 
+def test_the_version_is_the_same_everywhere():
+    """package.xml has it; the changelog's newest section and the citation say the same, with one date."""
+    changelog = (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8")
+    newest = re.search(r"^(\d+\.\d+\.\d+) \((\d{4}-\d\d-\d\d)\)\n-+$", changelog, re.MULTILINE).groups()
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert newest == (citation["version"], str(citation["date-released"]))
+    assert newest[0] == Xml.parse(ROOT / "package.xml").findtext("version")
+
+
 @pytest.mark.ros
 def test_the_node_imports_neither_what_takes_long_nor_what_setup_leaves_out():
     program = (

@@ -168,3 +168,12 @@ def test_outputs_are_the_same_alone_and_together(renderer):
     assert set(np.unique(together["instance"])) >= {0, 7, 60000}, "what one can see through is there, too"
     with pytest.raises(ValueError, match="needs the moment before"):
         renderer.render_outputs(("before",), CAMERA, AHEAD, poses)
+
+
+@pytest.mark.parametrize("largest", [255, 256])
+def test_masks_have_the_same_type_whatever_numbers_are_in_them(renderer, largest):
+    renderer.set_visuals([box("a", (0.5, 0.5, 0.5)), box("b", (0.5, 0.5, 0.5))])
+    poses, numbers = np.array([at(3, 0.5, 1), at(3, -0.5, 1)]), np.array([3, largest])
+    mask = renderer.render_outputs(("instance",), CAMERA, AHEAD, poses, instances=numbers)["instance"]
+    assert mask.dtype == np.uint16
+    assert set(np.unique(mask)) == {0, 3, largest}

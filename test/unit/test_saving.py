@@ -54,13 +54,15 @@ def test_files_keep_the_names_that_they_were_given(simulation, scene):
     assert yaml.safe_load(scene.read_text(encoding="utf-8"))["objects"][0]["name"] == "Å"
 
 
-def test_a_file_that_somebody_wrote_stays_beside_it(simulation, scene):
-    before = scene.read_bytes()
-    for _ in range(2):
-        simulation.save_scene(scene)
-    assert (scene.parent / "scene.yaml.bak").read_bytes() == before
-    saved = yaml.safe_load(scene.read_text(encoding="utf-8"))
-    assert saved.keys() == {"floor", "drone", "objects"} and "rpy" not in saved["objects"][0], "no defaults"
+def test_what_its_author_wrote_stays_and_another_file_stays_beside_it(simulation, scene):
+    simulation.save_scene(scene)
+    assert scene.read_text(encoding="utf-8") == SCENE.replace("ABSOLUTE", str(scene.parent / "pictures" / "tile.png"))
+    other = scene.with_name("other.yaml")
+    other.write_text("objects: []  # mine\n", encoding="utf-8")
+    simulation.save_scene(other)
+    assert (scene.parent / "other.yaml.bak").read_text(encoding="utf-8") == "objects: []  # mine\n"
+    assert other.read_bytes() == scene.read_bytes()
+    assert not scene.with_name("scene.yaml.bak").exists()
 
 
 def test_what_was_taken_off_and_put_upright_is_so_when_it_is_loaded(tmp_path):
@@ -126,13 +128,12 @@ def test_a_full_disk_leaves_the_last_scene(simulation, scene, monkeypatch):
     assert sorted(os.listdir(scene.parent)) == ["ball.stl", "pictures", "scene.yaml"]
 
 
-def test_every_shipped_scene_can_be_saved(tmp_path):
-    for name in ("empty", "gates", "room"):
-        simulation = Simulation(
-            parameters.load({"scene_file": str(package_path() / "config" / "scenes" / f"{name}.yaml")})
-        )
-        simulation.save_scene(tmp_path / f"{name}.yaml")
-        simulation.close()
-        assert parameters.load({"scene_file": str(tmp_path / f"{name}.yaml")}).scene.floor.size == pytest.approx(
-            simulation.parameters.scene.floor.size
-        )
+@pytest.mark.parametrize(
+    "path", sorted((package_path() / "config" / "scenes").glob("*.yaml")), ids=lambda one: one.stem
+)
+@pytest.mark.parametrize("started", [False, True])
+def test_a_shipped_scene_is_saved_as_it_was_written(path, started, tmp_path):
+    simulation = Simulation(parameters.load({"scene_file": str(path)}), started=started)
+    simulation.save_scene(tmp_path / path.name)
+    simulation.close()
+    assert (tmp_path / path.name).read_bytes() == path.read_bytes()

@@ -118,7 +118,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
     saved = tmp_path / "elsewhere" / "saved.yaml"
     simulation.save_scene(saved)
     loaded = simulate(str(saved))
-    assert loaded.drone.body.state.position == simulation.drone.body.state.position
+    assert loaded.drone.body.state.position == pytest.approx(simulation.drone.body.state.position, abs=1e-9)
     for ours, theirs in zip(simulation.parameters.scene.objects, loaded.parameters.scene.objects):
         assert ours.model_dump(exclude={"position", "rpy"}) == theirs.model_dump(exclude={"position", "rpy"})
     assert loaded.parameters.scene.floor == simulation.parameters.scene.floor
@@ -143,7 +143,7 @@ def test_save_then_load_is_the_same_scene(write, simulate, tmp_path):
         ("objects: {}", "scene.yaml: line 1: parameter objects = {}: input should be a valid list"),
         (
             "objects: [5]",
-            "scene.yaml: line 1: parameter objects/0 = 5: must hold `key: value` lines, of which one is `shape`",
+            "scene.yaml: line 1: parameter objects/0 = 5: must have `key: value` lines, one of them `shape`",
         ),
         ("drone:", "parameter drone = None"),
         ("drone: {position: [0, 0, .nan]}", "drone/position/2 = nan: input should be a finite number"),

@@ -177,7 +177,7 @@ def test_it_waits_for_a_signal(fly):
 )
 def test_what_goes_wrong_in_it_gets_one_line(fly, text, words):
     with pytest.raises(ScriptError, match=words):
-        fly(text, 3, script_time_limit=0.2)
+        fly(text, 3, script_time_limit=0.2 if "stopped" in words else 60.0)
 
 
 @pytest.mark.parametrize("rest", ["while True: sim.step()", "while True:\n      try: sim.step()\n      except: pass"])

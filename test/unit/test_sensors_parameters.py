@@ -26,7 +26,7 @@ def refused(overrides):
 @pytest.mark.parametrize(
     "sensors, words",
     [
-        ({"imu": 3}, "sensors/imu = 3: must hold `key: value` lines, of which one is `kind`"),
+        ({"imu": 3}, "sensors/imu = 3: must have `key: value` lines, one of them `kind`"),
         ({"imu": {"rate": 200}}, "sensors/imu/kind: missing; must be one of 'imu', 'range', 'magnetic_field'"),
         ({"imu": {"kind": "lidar"}}, "sensors/imu/kind = 'lidar': must be one of 'imu', 'range'"),
         ({"imu": {**IMU, "rat": 1}}, "sensors/imu/rat: unknown key; known are rate"),
@@ -67,7 +67,7 @@ def refused(overrides):
         ({"a": {**IMU, "frame": "Track_base"}}, "sensors/a/frame = 'Track_base': is that of the vehicle"),
         ({"a": {**IMU, "frame": "track_optical"}}, "sensors/a/frame = 'track_optical': is that of cameras/track"),
         ({f"s{number}": {} for number in range(70)}, "parameter sensors"),
-        ({"a": {**IMU, "frame": "base_link", "mount": DOWN}}, "sensor a: the URDF says where base_link is"),
+        ({"a": {**IMU, "frame": "base_link", "mount": DOWN}}, "sensor a: the URDF has the place of base_link"),
         ({"a": {**IMU, "mount": {**DOWN, "parent": "Nobody"}}}, "sensor a: no object is named Nobody"),
         ({"Drone": IMU}, "sensor Drone: an object named 'Drone' is there already"),
     ],

@@ -270,7 +270,7 @@ REFUSED = {
     "no rotation": (file(scene_object("DMY", 0, "A", turned=(0, 0, 0, 0))), "object A: _fq: its quaternion has"),
     "no such vertex": (
         file(shape(0, "S", mesh().replace(packed([0, 1, 2]), packed([0, 1, 9])))),
-        "object S: a face names a vertex that there is not",
+        "object S: a face names a vertex that does not exist",
     ),
     "no such mesh": (file(shape(0, "S", mesh(inline=False))), "object S: Vev: the file has no mesh 0"),
     "many parameters": (

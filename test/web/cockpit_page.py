@@ -3,7 +3,7 @@
 import contextlib
 import time
 
-WAIT = 30_000  # ms; a browser without a GPU is slow
+WAIT = 90_000  # ms; a browser without a GPU is slow
 
 
 class Drone:
@@ -33,11 +33,17 @@ class Drone:
         self.flown.setdefault(message.header.stamp, {})["command"] = (linear.x, linear.y, linear.z, turn)
 
 
-def wait_until(page, condition, seconds=30):
+def _seen(page):
+    """Return what the page says, for whoever reads that a test has failed."""
+    texts = {name: page.locator(f"#{name}").all_inner_texts() for name in ("notice", "said", "status", "flown")}
+    return {**texts, "script": page.locator("#script").all_inner_texts() and page.input_value("#script")}
+
+
+def wait_until(page, condition, seconds=90):
     """Wait, and let the browser go on."""
     until = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < until, "it did not come to pass"
+        assert time.monotonic() < until, f"it did not come to pass; {_seen(page)}"
         page.wait_for_timeout(50)
 
 

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 _ADDRESS = re.compile(r"the cockpit is at (\S+)")
-_PATIENCE = 60  # s
+_PATIENCE = 120  # s
 
 
 class Launched:
@@ -31,6 +31,13 @@ class Launched:
         service = f"/drone_sim/{service}"
         rospy.wait_for_service(service, _PATIENCE)  # the cockpit may be there before the simulation
         return rospy.ServiceProxy(service, SetBool if request else Trigger)(*request).message
+
+    def load(self, scene):
+        """Begin anew in a scene's file; '' is the scene as it was launched without one."""
+        import rospy
+
+        rospy.set_param("/drone_sim/scene_file", scene)
+        self.call("load_scene")
 
     def start_afresh(self):
         """Fly the pilot from the start, as after the launch."""
@@ -52,6 +59,7 @@ def launched(*arguments):
             "ROS_MASTER_URI": f"http://localhost:{port}",
             "ROS_HOSTNAME": "localhost",
             "HOME": folder,
+            "ROS_HOME": f"{folder}/.ros",
         }
         environment.pop("PYTHONUNBUFFERED", None)  # the address has to be in the log at once without it, too
         command = ["roslaunch", "-p", str(port), "drone_sim", "drone.launch", "rviz:=false", "web:=true"]

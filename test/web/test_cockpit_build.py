@@ -1,4 +1,4 @@
-"""The scene is built with the mouse: the clicks of the V-REP tutorial's first scene, saved, begun anew, and flown."""
+"""The scene is built with the mouse: the V-REP tutorial's first scene, and an arena; saved, begun anew, and flown."""
 
 import math
 import os
@@ -12,6 +12,9 @@ from cockpit_page import STARTED, Panel, open_page, ready, wait_for, wait_until
 from launched import launched
 from scene_builder import Builder
 
+from drone_sim.grading import flight, tasks
+from drone_sim.grading import plan as plans
+
 # The stock script, with one view less: it shows what TrackCam sees, as the tutorial asks.
 SCRIPT = """
 import target
@@ -24,6 +27,12 @@ def sysCall_init():
     sim.adjustView(view, sim.getObjectHandle("TrackCam"), 64)
 """
 FAR = 1e-4  # m, rad
+ACTS = """
+window.acts = 0;
+for (const kind of ["pointerdown", "input"]) addEventListener(kind, () => window.acts++, true);
+"""
+MOST_ACTS = 40
+COURSE = ({"X": 3, "Y": 0}, {"X": 6, "Y": 1, "Gamma": 30}, {"X": 8, "Y": 4, "Gamma": 90})  # m, degrees
 
 
 def near(one, position):
@@ -83,13 +92,6 @@ def flies(page):
     wait_until(page, lambda: window.locator("img").evaluate("one => one.naturalWidth") > 0)
 
 
-def load(cockpit, scene):
-    import rospy
-
-    rospy.set_param("/drone_sim/scene_file", scene)
-    cockpit.call("load_scene")
-
-
 def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cockpit, browser, monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", os.environ["ROS_MASTER_URI"])  # that of this process, afterwards
     cockpit.scripts.mkdir(exist_ok=True)
@@ -101,7 +103,7 @@ def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cock
         build(builder, str(script))
         check(builder)
         builder.save_as(scene.name)
-    load(cockpit, "")  # as it was launched
+    cockpit.load("")  # as it was launched
     said = yaml.safe_load(scene.read_text())
     assert [one["name"] for one in said["objects"]] == ["TrackCam", "Track_base"]
     with launched(f"scene:={scene}") as again, browser.new_page() as page:
@@ -111,6 +113,38 @@ def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cock
         flies(page)
         Panel(page).press("Stop", "stopped")  # which puts back what the script has unparented
         check(Builder(page))
+
+
+def build_arena(builder):
+    """Build three gates, a pad and a wall."""
+    builder.menu("Scene file", "New")
+    wait_until(builder.page, lambda: builder.page.get_by_role("treeitem").count() == 1)
+    for place in COURSE:
+        gate = builder.drop("Gate", [1, 1, 0])
+        builder.write(**place)
+        builder.wait(gate, lambda one, wanted=(place["X"], place["Y"], 1.1): near(one, wanted))
+    builder.drop("Landing pad", [-1, -1, 0])
+    builder.drop("Quadricopter", [0, 0, 0])
+    builder.drop("Wall", [-1.5, 1, 0])  # last: from where the page looks it hides what is behind it
+
+
+def test_an_arena_is_built_with_the_mouse_and_flown_by_the_gates_tasks_solution(cockpit, browser, tmp_path):
+    cockpit.scripts.mkdir(exist_ok=True)
+    scene = cockpit.scripts / "arena.yaml"
+    with open_page(cockpit, browser, init=ACTS, viewport={"width": 1440, "height": 900}) as page:
+        builder = Builder(page)
+        before = page.evaluate("acts")
+        build_arena(builder)
+        builder.save_as(scene.name)
+        assert page.evaluate("acts") - before <= MOST_ACTS
+    cockpit.load("")
+    task = tasks.find("gates")
+    said = {**yaml.safe_load(task.read_text()), "scene": str(scene), "script": str(task.parent / "solution.py")}
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(yaml.safe_dump(said))
+    result = flight.grade(plans.read(plan))
+    assert result.passed, result
+    assert [one.value for one in result.outcomes if one.kind == "reach"] == [3], "each of the three gates"
 
 
 def test_a_drag_is_one_step_of_undo_and_the_text_is_the_same_scene(cockpit, browser):
@@ -139,4 +173,4 @@ def test_a_drag_is_one_step_of_undo_and_the_text_is_the_same_scene(cockpit, brow
         page.reload()
         ready(page)
         builder.row("Ball").wait_for()
-    load(cockpit, "")
+    cockpit.load("")

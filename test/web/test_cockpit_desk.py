@@ -1,5 +1,6 @@
 """What helps to write a script: completion, errors while one types, a console, variables, breakpoints, files."""
 
+import contextlib
 import re
 
 import pytest
@@ -229,7 +230,8 @@ def test_a_breakpoint_pauses_with_the_variables_of_its_line(cockpit, desk):
     line_number(desk, 10).click()
     while "line 11" not in desk.inner_text("#variables-of"):  # the simulation hears of it a little later
         cockpit.call("step")
-        desk.wait_for_timeout(300)
+        with contextlib.suppress(AssertionError):
+            wait_until(desk, lambda: "line 11" in desk.inner_text("#variables-of"), seconds=5)
     count = int(shown(desk, "count"))
     assert shown(desk, "twice") == str(2 * count), "as they were at that line"
     cockpit.call("step")

@@ -102,7 +102,7 @@ def test_each_stage_flies_when_one_goes_from_one_to_the_next(cockpit, student):
     door(student, "Tutorial")
     for stage in STAGES:
         wait_until(student, lambda stage=stage: student.input_value("#script") == f"tutorial/{stage}.py")
-        assert "Run" in student.inner_text("#lesson-text")
+        wait_until(student, lambda: "Run" in student.inner_text("#lesson-text"))
         run(student)
         wait_until(student, lambda stage=stage: student.inner_text("#flown") == f"tutorial/{stage}.py")
         wait_until(student, lambda: cockpit.drone.state == "flying" and Panel(student).status == "flying")

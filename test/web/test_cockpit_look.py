@@ -61,7 +61,7 @@ def test_text_can_be_read_and_buttons_can_be_hit(cockpit, browser, scheme):
         panel.press("Stop", "stopped")
         panel.press("Step", "failed")
         assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []
-        for opens, closes in (("#home", "#doors-close"), ("#help-open", "#help-close")):
+        for opens, closes in (("#home", "#start-close"), ("#help-open", "#help-close")):
             page.click(opens)
             assert page.evaluate(LOOK, [CONTRAST, TARGET]) == []
             page.click(closes)

@@ -11,7 +11,7 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 import rospy
 import trimesh
-from cockpit_page import open_page, wait_until
+from cockpit_page import Panel, open_page, wait_until
 from geometry_msgs.msg import WrenchStamped
 from PIL import Image
 from visualization_msgs.msg import Marker, MarkerArray
@@ -288,21 +288,30 @@ def test_one_browsers_view_is_its_own_and_is_kept(cockpit, browser, opened):
     assert opened.evaluate("[scene.view.name, scene.shown.frames]") == ["free", True]
 
 
+def stand_still(cockpit, page):
+    """Pause, and wait until nothing is painted any more, not even the words that say so; return how often it was."""
+
+    def is_still():
+        before = page.evaluate("scene.canvas.frames")
+        page.wait_for_timeout(1000)
+        return page.evaluate("scene.canvas.frames") - before <= 1
+
+    cockpit.call("pause", True)
+    wait_until(page, lambda: Panel(page).status == "paused")
+    wait_until(page, is_still)
+    return page.evaluate("scene.canvas.frames")
+
+
 def test_nothing_is_painted_while_nothing_changes(cockpit, opened):
     hover(cockpit, opened)
-    cockpit.call("pause", True)
-    opened.wait_for_timeout(1500)  # words say that it is paused
-    before = opened.evaluate("scene.canvas.frames")
-    opened.wait_for_timeout(1000)
-    assert opened.evaluate("scene.canvas.frames") - before <= 1
+    before = stand_still(cockpit, opened)
     cockpit.call("pause", False)
     wait_until(opened, lambda: opened.evaluate("scene.canvas.frames") > before + 10)
 
 
 def test_shadows_can_be_switched_on_without_a_gpu(cockpit, opened):
     hover(cockpit, opened)
-    cockpit.call("pause", True)
-    opened.wait_for_timeout(1500)
+    stand_still(cockpit, opened)
     canvas, pictures = opened.locator("#scene canvas"), []
     for shadows in ("false", "true", "false"):
         opened.evaluate(f"scene.show({{ shadows: {shadows}, labels: false }})")
@@ -315,8 +324,7 @@ def test_shadows_can_be_switched_on_without_a_gpu(cockpit, opened):
 
 def test_frames_glide_from_step_to_step_where_there_is_a_gpu(cockpit, opened):
     hover(cockpit, opened)
-    cockpit.call("pause", True)
-    opened.wait_for_timeout(1500)
+    stand_still(cockpit, opened)
     glide = """() => {
         const base = scene.tree.byName.get("base_link"), index = scene.tree.frames.indexOf(base);
         const told = { whole: false, gone: [], frames: [], moved: [index], placed: [], markers: [] };

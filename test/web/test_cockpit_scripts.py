@@ -74,7 +74,7 @@ def test_a_stages_text_is_beside_it_and_the_next_follows(desk):
     assert desk.locator("#lesson-text a", has_text="Solution").count() == 2
     desk.click("#after")
     wait_until(desk, lambda: desk.input_value("#script").endswith("/2_elevation.py") and "zref" in text(desk))
-    assert "These are two laws" in desk.inner_text("#lesson-text")
+    wait_until(desk, lambda: "You need two control laws" in desk.inner_text("#lesson-text"))
     desk.locator("#lesson-body").focus()
     desk.keyboard.down("ArrowDown")
     assert "-" not in desk.inner_text("#command"), "who reads does not fly"

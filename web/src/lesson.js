@@ -73,8 +73,8 @@ export class Lesson {
 
   // What can be done with lines of Python in the text.
   actions(code) {
-    const put = { label: "Put into the script", title: "A function in the place of its namesake; other lines at the cursor", act: () => this.put(code) };
-    const run = { label: "Run", title: "Put it into the script, and fly that", act: () => this.put(code) && this.run() };
+    const put = { label: "Put into the script", title: "Replaces the function of the same name; other lines go to the cursor", act: () => this.put(code) };
+    const run = { label: "Run", title: "Put it into the script, and fly", act: () => this.put(code) && this.run() };
     return hasFunctions(code) ? [put, run] : [put];
   }
 
@@ -94,7 +94,7 @@ export class Lesson {
     const { grade, graded } = this.parts;
     const task = this.name;
     grade.disabled = true;
-    graded.textContent = "flying without a picture ...";
+    graded.textContent = "flying without pictures ...";
     try {
       await this.save();
       const { script } = this.opened;

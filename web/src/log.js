@@ -8,13 +8,17 @@ export class Log {
   constructor(board) {
     this.lines = new Console(at("log-lines"));
     board.on("diagnosis", (all) => this.show(all));
-    board.on("hears_commands", (hears) => {
-      for (const id of ["deaf", "sheet-deaf"]) {
-        at(id).hidden = hears;
-        at(id).textContent = at(id).title = hears ? "" : DEAF;
-      }
-      document.body.classList.toggle("deaf", !hears);
-    });
+    for (const part of ["hears_commands", "status"]) board.on(part, () => this.showDeaf(board));
+  }
+
+  // A script that is stopped listens to nothing, whichever it is.
+  showDeaf(board) {
+    const isDeaf = board.get("hears_commands", true) === false && board.get("status", "") !== "stopped";
+    for (const id of ["deaf", "sheet-deaf"]) {
+      at(id).hidden = !isDeaf;
+      at(id).textContent = at(id).title = isDeaf ? DEAF : "";
+    }
+    document.body.classList.toggle("deaf", isDeaf);
   }
 
   begin(lines) {

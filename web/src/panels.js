@@ -16,7 +16,7 @@ import { View } from "./view.js";
 const TOUCH = matchMedia("(pointer: coarse), (max-width: 900px)"); // where the script covers the scene
 
 export class Panels {
-  // `socket()` and `scene()` are there once the page is; `go` has what the doors of the start page do, `open(script)`
+  // `socket()` and `scene()` are there once the page is; `go` has what the buttons of the start page do, `open(script)`
   // opens one, `goTo(file, line)` a file's line.
   constructor({ socket, scene, go, open, goTo }) {
     for (const element of document.querySelectorAll("[data-icon]")) element.prepend(icon(element.dataset.icon));
@@ -43,8 +43,8 @@ export class Panels {
     this.board.on("master", (answers) => this.master(answers));
     at("toggle").onclick = () => this.showScript(document.body.classList.contains("wide"));
     this.showScript(!TOUCH.matches);
-    const doors = { tutorial: () => this.enter(go.tutorial), tasks: () => this.enter(go.tasks), fly: () => this.showScript(false), build: () => this.enterBuild() };
-    this.start = new Start(doors, (script) => this.enter(() => open(script)));
+    const choices = { tutorial: () => this.enter(go.tutorial), tasks: () => this.enter(go.tasks), fly: () => this.showScript(false), build: () => this.enterBuild() };
+    this.start = new Start(choices, (script) => this.enter(() => open(script)));
     this.keys();
   }
 
@@ -121,7 +121,7 @@ export class Panels {
 
   master(answers) {
     if (answers !== (this.hasMaster ?? true)) {
-      this.notice.say(answers ? "the ROS master is there again" : "no ROS master answers: waiting for one", !answers);
+      this.notice.say(answers ? "the ROS master is back" : "no ROS master answers: waiting", !answers);
     }
     this.hasMaster = answers;
   }

@@ -17,7 +17,7 @@ export class Recorder {
   }
 
   begin() {
-    if (!window.MediaRecorder?.isTypeSupported(KIND)) return this.notice.say("this browser records no videos", true);
+    if (!window.MediaRecorder?.isTypeSupported(KIND)) return this.notice.say("this browser cannot record videos", true);
     const parts = [];
     this.recorder = new MediaRecorder(this.stream(), { mimeType: KIND });
     this.recorder.ondataavailable = ({ data }) => parts.push(data);
@@ -27,10 +27,10 @@ export class Recorder {
       this.button.setAttribute("aria-pressed", "false");
       this.ended();
       save(new Blob(parts, { type: KIND }), `drone_sim-${this.name}-${stamp()}.webm`);
-      this.notice.say("the video is saved where your browser puts downloads");
+      this.notice.say("the video is in your browser's downloads");
     };
     this.recorder.start(1000); // ms: so much is lost at most
     this.button.setAttribute("aria-pressed", "true");
-    this.notice.say("recording: press again to end and save it");
+    this.notice.say("recording: press again to stop and save the video");
   }
 }

@@ -44,11 +44,14 @@ export class Scripts {
 
   // After the connection is there, again: what was not saved comes first.
   async connected() {
-    const { flown } = await this.list();
+    const { flown, groups, folder } = await this.list();
     await this.save().catch(() => {});
     const left = this.drafts.scripts.filter((script) => script !== this.is.script);
     for (const script of left) await this.open(script).catch((error) => this.page.show({ said: error.message, bad: true }));
-    if (!this.is.script) await this.open(flown);
+    if (this.is.script) return;
+    if (groups.some(({ scripts }) => scripts.includes(flown))) return this.open(flown);
+    await this.open("built-in/pilot.py");
+    this.page.show({ said: `${flown} flies, from another folder than ${folder}: Upload (⋯) makes a copy that you can edit` });
   }
 
   open(script) {

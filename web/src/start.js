@@ -1,15 +1,15 @@
-// The first thing that a visitor sees: three doors, and the way back to what was open last.
+// The start page: where a visitor begins, and the way back to what was open last.
 import { at } from "./dom.js";
 import { keep, kept } from "./kept.js";
 
 export class Start {
-  // `go` has what each door does: tutorial, tasks, fly; `open(script)` goes on where one was.
+  // `go` has what each button does: tutorial, tasks, fly, build; `open(script)` opens the last script again.
   constructor(go, open) {
-    const dialog = at("doors");
-    for (const door of dialog.querySelectorAll("[data-door]")) {
-      door.onclick = () => {
+    const dialog = at("start-page");
+    for (const button of dialog.querySelectorAll("[data-start]")) {
+      button.onclick = () => {
         dialog.close();
-        go[door.dataset.door]();
+        go[button.dataset.start]();
       };
     }
     at("go-on").onclick = () => {
@@ -18,7 +18,7 @@ export class Start {
     };
     dialog.onclick = (event) => event.target === dialog && dialog.close(); // beside it
     dialog.onclose = () => keep("started", true);
-    at("doors-close").onclick = () => dialog.close();
+    at("start-close").onclick = () => dialog.close();
     at("home").onclick = () => this.show();
     if (!kept("started", false)) this.show();
   }
@@ -27,11 +27,11 @@ export class Start {
     const last = kept("script", "");
     at("go-on").hidden = !last;
     at("go-on-name").textContent = last.split("/").pop();
-    at("doors").showModal();
+    at("start-page").showModal();
   }
 
   // The page is served before the pictures are.
   load() {
-    for (const picture of at("doors").querySelectorAll("img[data-src]")) picture.src ||= picture.dataset.src;
+    for (const picture of at("start-page").querySelectorAll("img[data-src]")) picture.src ||= picture.dataset.src;
   }
 }

@@ -24,7 +24,7 @@ export class Teleop {
   // Keys count in the page and in the scene, but not where somebody writes, reads or moves a bar; slider and tree have their arrows.
   listenTo(window) {
     const writes = (target) => target.closest?.("input:not([type=checkbox], [type=radio]), textarea, select, article, [contenteditable], [role=separator]");
-    const takes = ({ code, target }) => writes(target) || (code.startsWith("Arrow") && target.closest?.("[role=slider], [role=tree]"));
+    const takes = ({ code, target }) => window.document.querySelector("#start-page[open]") || writes(target) || (code.startsWith("Arrow") && target.closest?.("[role=slider], [role=tree]"));
     window.addEventListener("keydown", (event) => {
       if (event.key === "Shift") this.fast = true;
       if (!(event.code in KEYS) || takes(event) || event.ctrlKey || event.metaKey || event.altKey) return;

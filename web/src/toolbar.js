@@ -91,7 +91,7 @@ export class Toolbar {
     at("status").textContent = OTHER[says] ?? capital(says);
     at("status").dataset.is = this.status;
     at("why").hidden = !wrong.length || this.is("no simulation");
-    at("why").textContent = wrong.length === 1 ? "1 complaint" : `${wrong.length} complaints`;
+    at("why").textContent = wrong.length === 1 ? "1 warning" : `${wrong.length} warnings`;
     at("why").title = `${wrong.join("\n")}\n(opens the log)`;
     at("state").classList.toggle("wrong", !at("why").hidden);
     at("sim-start").disabled = this.is("flying") || this.is("no simulation");

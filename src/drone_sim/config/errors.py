@@ -189,7 +189,9 @@ def _wrong_choice(choice: _Choice, location: Location, value: Mapping[str, Any])
     key = choice.or_key if choice.or_key in value else choice.key
     if key in value:
         return ParameterProblem((*location, key), _must_be_one_of(choice, key), shown(value[key]))
-    return ParameterProblem((*location, key), f"missing; {_must_be_one_of(choice)}", or_above=True)
+    meant = difflib.get_close_matches(key, map(str, value), 1)
+    instead = f" (there is {shown(meant[0])})" if meant else ""
+    return ParameterProblem((*location, key), f"missing{instead}; {_must_be_one_of(choice)}", or_above=True)
 
 
 def _reason(error: Any, place: _ErrorPlace) -> str:
@@ -200,8 +202,8 @@ def _reason(error: Any, place: _ErrorPlace) -> str:
     choice = _choice(place.annotation)
     plain = {
         "model_type": f"must hold `key: value` lines with {', '.join(fields)}",
-        "model_attributes_type": f"must hold `key: value` lines, of which one is `{choice.key}`",
-        "union_tag_not_found": f"must hold `key: value` lines, of which one is `{choice.key}`",
+        "model_attributes_type": f"must have `key: value` lines, one of them `{choice.key}`",
+        "union_tag_not_found": f"must have `key: value` lines, one of them `{choice.key}`",
         "bool_type": "must be true or false",
         "string_pattern_mismatch": PATTERNS.get(error.get("ctx", {}).get("pattern"), message),
     }

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 
 import yaml
 
-from drone_sim.config.types import Checked, Location, Parts, Within
+from drone_sim.config.types import Checked, Location, Parts, Unit, Within
 from drone_sim.files.resources import package_path
 
 _UNIONS = (Union, UnionType)
@@ -26,7 +26,7 @@ class ParameterField(NamedTuple):
     high: float = 0.0
     choices: tuple[str, ...] = ()  # of a str
     none: float | None = None  # stands for a value, or for a list, that may also be none
-    said: str = ""  # what the model says of it
+    said: str = ""  # its unit, and what the model says of it
 
     @property
     def name(self) -> str:
@@ -65,7 +65,9 @@ def _of(annotation: Any, marks: Sequence[Any], here: ParameterField) -> Iterator
 
 def _number(kind: type, marks: Sequence[Any], here: ParameterField) -> ParameterField:
     within = next((one for one in marks if isinstance(one, Within)), None)
-    said = next((one.description for one in marks if getattr(one, "description", None)), "")
+    unit = next((one.word for one in marks if isinstance(one, Unit)), "")
+    description = next((one.description for one in marks if getattr(one, "description", None)), "")
+    said = ", ".join(filter(None, (unit, description)))
     if within is None:
         return here._replace(kind=kind, said=said)
     low = 0.0 if within.or_zero or here.none is not None else within.low

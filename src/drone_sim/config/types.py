@@ -149,6 +149,13 @@ class Parts:
     names: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Unit:
+    """Beside a number in Annotated: its unit, for windows that show it."""
+
+    word: str
+
+
 def _increasing(pair: tuple[float, float] | None) -> tuple[float, float] | None:
     if pair is not None and not pair[0] < pair[1]:
         raise ValueError("must be [lowest, highest] with lowest < highest")
@@ -217,10 +224,11 @@ class FoundFile(str):
     given: str
     folder: str
 
-    def seen_from(self, folder: Path) -> str:
-        """Return the name by which a file in `folder` can name it: as it was given, where that leads to it."""
+    def seen_from(self, folder: Path | None) -> str:
+        """Return the name by which a file in `folder`, None for any, can name it: as given, where that leads to it."""
         absolute = self.given.startswith(("package://", "~", "/"))
-        return self.given if absolute or Path(self.folder or ".").resolve() == folder.resolve() else str(self)
+        is_beside = folder is not None and Path(self.folder or ".").resolve() == folder.resolve()
+        return self.given if absolute or is_beside else str(self)
 
 
 def _as_found(value: Any, check: Callable[[Any], str]) -> str:

@@ -3,33 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from drone_sim.mechanics.object_tree import WORLD, levels
+from drone_sim.run.scene_document import SceneContent
+from drone_sim.run.scene_settings import Settings
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters
 
 _Value = TypeVar("_Value")
 _Pair = tuple[_Value | None, _Value | None]  # before, and after; None where it is not there
-Settings = Mapping[str, Any]  # what a scene file says beside objects and scripts; never changed, but replaced
 _DESCRIPTION = ("alias", "category", "model")
 _PLACE = ("parent", "position", "rpy")
-
-
-class SceneContent(NamedTuple):
-    """A scene at a moment: entries by the handles of their objects, scripts by the names of theirs."""
-
-    entries: dict[int, EntryParameters]
-    scripts: dict[str, AttachedScriptParameters]
-    settings: Settings
-
-
-def content_of(simulation: Simulation, settings: Settings) -> SceneContent:
-    """Return what the scene is now."""
-    scene = simulation.scene
-    entries = {scene.tree.handle(one.name): scene.entry_now(index) for index, one in scene.entries.items()}
-    return SceneContent(entries, dict(scene.scripts), settings)
 
 
 class SceneChange(NamedTuple):
@@ -114,8 +100,7 @@ class _Changing:
             self._simulation.context.objects.reserve({one.name: handle for handle, one in self._new.items()})
             self._simulation.operations.add([*self._new.values()])
             self._simulation.scene.put_in_order()
-        for handle, (one, two) in self._other.items():
-            self._be(handle, one, two)
+        self._be()
         self._place()
         for name, (_, script) in self._change.scripts.items():
             if script is not None and self._simulation.scene.scripts.get(name) != script:
@@ -140,18 +125,22 @@ class _Changing:
             for handle in free:
                 operations.rename(handle, names.pop(handle))
 
-    def _be(self, handle: int, one: EntryParameters, two: EntryParameters) -> None:
-        operations = self._simulation.operations
-        if type(one) is not type(two):
-            self._replace(handle, two)
-            return
-        other = [key for key in type(two).model_fields if getattr(one, key) != getattr(two, key)]
-        if any(key not in ("name", *_DESCRIPTION, *_PLACE) for key in other):
-            now = operations.entry(handle)
-            operations.exchange({handle: two.model_copy(update={"name": now.name, "parent": now.parent})})
-        described = {key: getattr(two, key) for key in _DESCRIPTION if key in other}
-        if described:
-            operations.describe(handle, **described)
+    def _be(self) -> None:
+        """Let entries say what they are to say, all of them at once: the world is made anew once."""
+        operations, entries = self._simulation.operations, {}
+        for handle, (one, two) in self._other.items():
+            if type(one) is not type(two):
+                self._replace(handle, two)
+        for handle, (one, two) in self._other.items():
+            if type(one) is type(two) and _others(one, two) - {"name", *_DESCRIPTION, *_PLACE}:
+                now = operations.entry(handle)
+                entries[handle] = two.model_copy(update={"name": now.name, "parent": now.parent})
+        if entries:
+            operations.exchange(entries)
+        for handle, (one, two) in self._other.items():
+            described = {key: getattr(two, key) for key in _DESCRIPTION if key in _others(one, two)}
+            if described and type(one) is type(two):
+                operations.describe(handle, **described)
 
     def _replace(self, handle: int, entry: EntryParameters) -> None:
         """Let an object of another type have its place in the tree."""
@@ -179,3 +168,8 @@ class _Changing:
         ]
         for handle, two in sorted(moved, key=lambda one: levels(tree[one[0]])):
             operations.put(handle, two.local)
+
+
+def _others(one: EntryParameters, two: EntryParameters) -> set[str]:
+    """Return the keys of which two entries of one type say something else."""
+    return {key for key in type(two).model_fields if getattr(one, key, None) != getattr(two, key)}

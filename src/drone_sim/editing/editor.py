@@ -11,14 +11,15 @@ from drone_sim.config.errors import checked
 from drone_sim.config.types import Checked
 from drone_sim.editing import records
 from drone_sim.editing.changes import SceneChange, carry_out, change_between
-from drone_sim.editing.document import SceneDocument
 from drone_sim.editing.drafts import Drafts
 from drone_sim.editing.edit_operations import EditOperations
 from drone_sim.editing.history import History, Step
 from drone_sim.editing.scene_access import SceneAccess
+from drone_sim.editing.scene_files import SceneFiles
 from drone_sim.files.yaml_text import YamlText
 from drone_sim.run.pacing import Throttle
 from drone_sim.run.player import Player
+from drone_sim.run.scene_settings import as_between
 from drone_sim.scripting.errors import ScriptError
 
 _LOG = logging.getLogger(__name__)
@@ -33,7 +34,7 @@ class SceneEditor:
         self._player = player
         self.simulation = player.simulation
         self.scene = SceneAccess(self.simulation)
-        self.document = SceneDocument(self.scene)
+        self.files = SceneFiles(self.scene)
         self.history = History()
         self._drafts, self._drafted = Drafts(drafts), (0, False)
         self._seldom = Throttle(_DRAFT_PERIOD)
@@ -53,7 +54,7 @@ class SceneEditor:
     @property
     def scene_file(self) -> str:
         """The file of the scene, '' where it has none."""
-        return str(self.document.file or "")
+        return str(self.scene.document.file or "")
 
     def described(self) -> dict[str, Any]:
         """Return what a window shows of the scene as a whole."""
@@ -62,7 +63,7 @@ class SceneEditor:
             "revision": self.revision,
             "file": self.scene_file,
             "modified": self.is_modified,
-            "read_only": self.document.is_read_only,
+            "read_only": self.files.is_read_only,
             "state": self._player.state,
             "undo": self.history.undo_name,
             "redo": self.history.redo_name,
@@ -76,10 +77,9 @@ class SceneEditor:
             self._read = simulation.scenes_read
             if self.is_modified and not self._is_opening:  # another has loaded a scene over what was not saved
                 self._drafts.offer()
-            self.document.read()
             self._begin_anew()
         run = simulation.run if simulation.running else -1
-        if run == -1 and not self.is_modified and self.document.is_changed_on_disk:
+        if run == -1 and not self.is_modified and self.scene.document.is_changed_on_disk:
             simulation.read_at_start()
         if run != self._run:
             if self._run != -1:
@@ -92,7 +92,7 @@ class SceneEditor:
     def _begin_anew(self) -> None:
         self.history.clear()
         self.revision += 1
-        self._saved = self.revision
+        self._saved, self._run = self.revision, -1  # a stop takes back nothing of what another scene was
 
     def _stop(self) -> None:
         """What was edited since the start has been undone."""
@@ -109,9 +109,10 @@ class SceneEditor:
         request: Any = checked(kind, said)
         does: Mapping[type[Checked], Callable[[Any], dict[str, Any]]] = {
             records.Edit: self._edit,
-            records.Undo: lambda _: self._go(self.history.undone, self.history.redone, "undone"),
+            records.Undo: self._undo,
             records.Redo: lambda _: self._go(self.history.redone, self.history.undone, "redone"),
             records.Text: lambda _: self._text(),
+            records.TextOf: lambda one: self._answer("text of objects", text=self._operations.text_of(one)),
             records.Write: self._write,
             records.New: lambda _: self._open(None),
             records.Open: lambda one: self._open(one.open),
@@ -125,16 +126,14 @@ class SceneEditor:
 
     def _edit(self, request: records.Edit) -> dict[str, Any]:
         name = request.name or _name(request.edit)
-        return self._change(
-            name, lambda: [one for op in request.edit for one in self._operations.do(op)], request.merge
-        )
+        return self._change(name, lambda: self._operations.do(request.edit), request.merge)
 
     def _change(self, name: str, change: Callable[[], list[int]], merge: str = "") -> dict[str, Any]:
         """Carry something out as a whole, or, where it fails, not at all."""
         before = self.scene.content()
         try:
             handles = change()
-        except (ValueError, OSError):
+        except Exception:  # of whatever kind: nothing of it stays
             self._carry_out(change_between(self.scene.content(), before))
             raise
         done = change_between(before, self.scene.content())
@@ -150,6 +149,19 @@ class SceneEditor:
     def _answer(self, said: str, **more: Any) -> dict[str, Any]:
         return {"revision": self.revision, "said": said, "until_stop": self.simulation.running, **more}
 
+    def _undo(self, request: records.Undo) -> dict[str, Any]:
+        """Take the last step back, or, of an edit in its midst, that one; what others did stays."""
+        if not request.merge or self.history.is_last(request.merge):
+            return self._go(self.history.undone, self.history.redone, "undone")
+        step = self.history.of(request.merge)
+        change, now = step.change.reversed, self.scene.settings
+        settings = now, as_between(now, *change.settings)
+        return self._change(f"Take back: {step.name}", lambda: self._take_back(change._replace(settings=settings)))
+
+    def _take_back(self, change: SceneChange) -> list[int]:
+        self._carry_out(change)
+        return [*change.entries]
+
     def _go(self, step: Callable[[], Step], back: Callable[[], Step], word: str) -> dict[str, Any]:
         """Undo or redo; `back` lets the history be as it was."""
         there = step()
@@ -157,7 +169,7 @@ class SceneEditor:
         before = self.scene.content()
         try:
             self._carry_out(change)
-        except ValueError as error:
+        except (ValueError, OSError, ScriptError) as error:
             self._carry_out(change_between(self.scene.content(), before))
             back()
             raise ValueError(f"'{there.name}' cannot be {word}: {error}") from None
@@ -168,7 +180,7 @@ class SceneEditor:
     # ---- texts and files
 
     def _text(self) -> dict[str, Any]:
-        return self._answer("text", text=self.document.text(), file=self.scene_file)
+        return self._answer("text", text=self.files.text(), file=self.scene_file)
 
     def _write(self, request: records.Write) -> dict[str, Any]:
         if request.revision not in (None, self.revision):
@@ -177,14 +189,14 @@ class SceneEditor:
 
     def _take_text(self, written: str) -> dict[str, Any]:
         text = YamlText(written)
-        wanted = self.document.content_of(text)
+        wanted = self.files.content_of(text)
 
         def change() -> list[int]:
             self._carry_out(change_between(self.scene.content(), wanted))
             return []
 
         answer = self._change("Edit text", change)
-        self.document.take_text(text)
+        self.scene.document.take_text(text, self.simulation.object_handles)
         return answer
 
     def _open(self, file: str | None) -> dict[str, Any]:
@@ -194,7 +206,7 @@ class SceneEditor:
             _LOG.error("%s", error)
         self._is_opening = True
         try:
-            self.document.open(file)
+            self.files.open(file)
             if file is None:
                 self._begin_anew()
             self.follow()
@@ -203,14 +215,14 @@ class SceneEditor:
         return self._answer("new scene" if file is None else f"opened {file}", file=self.scene_file)
 
     def _save(self, request: records.Save) -> dict[str, Any]:
-        path = self.document.save(None if request.save is True else str(request.save))
+        path = self.files.save(None if request.save is True else str(request.save))
         if self.simulation.running:
             return self._answer(f"saved {path} as it stands in flight", file=str(path))
         self._saved = self.revision
         return self._answer(f"saved {path}", file=str(path))
 
     def _save_model(self, request: records.SaveModel) -> dict[str, Any]:
-        path = self.document.save_model(self.scene.handle(request.save_model), request.file)
+        path = self.files.save_model(self.scene.handle(request.save_model), request.file)
         return self._answer(f"saved {path}", file=str(path))
 
     # ---- drafts
@@ -222,7 +234,7 @@ class SceneEditor:
             return
         self._drafted = now
         if self.is_modified:
-            self._drafts.keep(self.scene_file, self.document.text())
+            self._drafts.keep(self.scene_file, self.files.text())
         else:
             self._drafts.clear()
 

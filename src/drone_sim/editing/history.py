@@ -36,6 +36,17 @@ class History:
         """The name of what would be done again, '' for nothing."""
         return self._undone[-1].name if self._undone else ""
 
+    def is_last(self, merge: str) -> bool:
+        """Tell whether the last step is that of some edits that belong together."""
+        return bool(self._done) and self._done[-1].merge == merge
+
+    def of(self, merge: str) -> Step:
+        """Return the step of some edits that belong together. Raises ValueError where there is none."""
+        for step in reversed(self._done):
+            if step.merge == merge:
+                return step
+        raise ValueError("there is nothing to undo")
+
     def add(self, step: Step) -> None:
         """Take an edit that was done; what was undone before is gone."""
         self._undone.clear()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
 from drone_sim.editing import records, scripts
 from drone_sim.editing.library import model_said
@@ -92,6 +93,17 @@ class ObjectEdits:
             made += [new[one] for one in handles]
         return made
 
+    def described(self, handles: Sequence[int]) -> tuple[list[EntryParameters], list[AttachedScriptParameters]]:
+        """Return objects and what hangs on them as a scene file would say them, the first ones in the world."""
+        tree, operations, scripts = self._scene.tree, self._scene.operations, self._scene.simulation.scene.scripts
+        tops = self._scene.tops(handles)
+        entries = []
+        for one in dict.fromkeys(part for top in tops for part in operations.model(top)):
+            if self._scene.vehicle_of(one) is None:
+                entry = operations.entry(one)
+                entries.append(placed(entry, "", tree.matrix(one)) if one in tops else entry)
+        return entries, [scripts[one.name] for one in entries if one.name in scripts]
+
     def _shift(self, copied: int, original: int, by: Sequence[float]) -> None:
         """Hang a copy where the original hangs, so far from it (m, world)."""
         tree, operations = self._scene.tree, self._scene.operations
@@ -129,8 +141,16 @@ class ObjectEdits:
 
     # ---- what they are like
 
-    def set(self, handle: int, values: dict[str, Any]) -> None:
-        """Let an entry say something else."""
+    def set(self, said: Mapping[int, Mapping[str, Any]]) -> None:
+        """Let entries, by handle, say something else, all of them at once: the world is made anew once."""
+        operations = self._scene.operations
+        rest = {handle: self._look_otherwise(handle, values) for handle, values in said.items()}
+        entries = {handle: operations.entry_with(handle, values) for handle, values in rest.items() if values}
+        if entries:
+            operations.exchange(entries)
+
+    def _look_otherwise(self, handle: int, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Set what the world needs no other body for; return the values that are left."""
         for key, word in _OTHERWISE.items():
             if key in values:
                 raise ParameterError(f"{key}: `{word}` changes it")
@@ -145,10 +165,8 @@ class ObjectEdits:
         if described:
             operations.describe(handle, **described)
         if "color" in values and isinstance(entry, ObjectParameters):
-            color = tuple(values.pop("color"))
-            operations.paint(handle, (*color, 1.0) if len(color) == 3 else color)
-        if values:
-            operations.change(handle, **values)
+            operations.paint(handle, changed(entry, {"color": values.pop("color")}).color)
+        return values
 
     def _find_files(self, values: dict[str, Any]) -> None:
         scene_parameters.find_files_beside(self._scene.folder, {"scene": {"objects": [values]}})

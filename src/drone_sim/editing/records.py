@@ -11,7 +11,7 @@ from drone_sim.config.types import Angles, Checked, Finite, Label, ParameterErro
 from drone_sim.mechanics.object_tree import WORLD
 from drone_sim.message_text import shown
 
-MAX_OPERATIONS = 1000
+MAX_OPERATIONS = 2000
 MAX_COPIES = 1000
 
 
@@ -131,6 +131,13 @@ class Copy(Checked):
     steps: Point = (0.0, 0.0, 0.0)
 
 
+class Paste(Checked):
+    """Objects and vehicles of a text, as `text_of` gives it, under free names; beside what stands where they would."""
+
+    do: Literal["paste"]
+    text: str
+
+
 class Group(Checked):
     """One model of several, below a dummy, or one rigid shape."""
 
@@ -176,6 +183,7 @@ OPERATIONS = (
     Set,
     Scale,
     Copy,
+    Paste,
     Group,
     Ungroup,
     AttachScript,
@@ -197,9 +205,10 @@ class Edit(Checked):
 
 
 class Undo(Checked):
-    """The last edit was not done."""
+    """The last edit was not done, or that of this `merge`, whatever others have done since."""
 
     undo: Literal[True]
+    merge: Label = ""
 
 
 class Redo(Checked):
@@ -212,6 +221,12 @@ class Text(Checked):
     """The scene as its file would say it."""
 
     text: Literal[True]
+
+
+class TextOf(Checked):
+    """Objects with what hangs on them, and vehicles, as a scene file would say them."""
+
+    text_of: _Objects
 
 
 class Write(Checked):
@@ -252,9 +267,8 @@ class Draft(Checked):
     draft: Literal["take", "drop"]
 
 
-REQUESTS: dict[str, type[Checked]] = {
-    next(iter(one.model_fields)): one for one in (Edit, Undo, Redo, Text, Write, New, Open, Save, SaveModel, Draft)
-}
+_REQUESTS = (Edit, Undo, Redo, Text, TextOf, Write, New, Open, Save, SaveModel, Draft)
+REQUESTS: dict[str, type[Checked]] = {next(iter(one.model_fields)): one for one in _REQUESTS}
 
 
 def request_of(said: Any) -> type[Checked]:

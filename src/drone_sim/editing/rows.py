@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from drone_sim.config.types import Checked
 from drone_sim.editing.scene_access import SceneAccess
-from drone_sim.editing.settings import PLACE, vehicles_in
 from drone_sim.editing.vehicle_edits import FLOOR
+from drone_sim.editing.vehicle_parts import Part, part_named
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.run.scene_settings import PLACE, vehicles_in
 from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.entry import EntryParameters, place_of
+from drone_sim.vehicles.vehicle import Vehicle
 
 Row = dict[str, Any]
 _ASIDE = ("name", "alias", "model", "parent", "position", "rpy", "shape", "kind")  # which stand in the row itself
@@ -42,11 +45,7 @@ class SceneRows:
             vehicle = whose.get(handle)
             parent = -1 if one.parent is None else handles[id(one.parent)]
             script = scripts.get(one.name)
-            own: Any = entry
-            if vehicle is not None:
-                own = said.get(vehicle.name) if one is vehicle.object else None
-            elif one.name == FLOOR:
-                own = scene.settings.get("floor", {})
+            own = self._beside(one, vehicle, said) if entry is None else entry
             made_of = (
                 one.name, one.alias, one.is_model, parent, one.matrix(), own, script,
                 vehicle.name if vehicle else "", getattr(one, "value", 0.0),
@@ -66,14 +65,24 @@ class SceneRows:
             del self._known[handle], self.rows[handle]
         return changed, gone
 
+    def _beside(self, one: SceneObject, vehicle: Vehicle | None, said: Mapping[str, Any]) -> Any:
+        """Return what an object is like that is no entry of the scene; `said` is that of the vehicles."""
+        if vehicle is None:
+            return _simple(self._scene.simulation.parameters.scene.floor)
+        if one is not vehicle.object:
+            return part_named(vehicle.parameters, one.name)
+        return {**_simple(vehicle.parameters), **said.get(vehicle.name, {})}
+
 
 def _row(handle: int, one: SceneObject, parent: int, own: Any, script: AttachedScriptParameters | None) -> Row:
     place = place_of(one)
-    values: Mapping[str, Any] = own or {}
+    values: Mapping[str, Any] = own if isinstance(own, Mapping) else {}
     if isinstance(own, EntryParameters):
         said = own.model_dump(mode="json", exclude_defaults=True)
         values = {key: value for key, value in said.items() if key not in _ASIDE}
         place = {key: list(getattr(own, key)) for key in ("position", "rpy")}
+    if isinstance(own, Part):
+        values = own.values
     if script is not None and script.parameters:
         values = {**values, "script_parameters": dict(script.parameters)}
     matrix = one.matrix()
@@ -82,7 +91,7 @@ def _row(handle: int, one: SceneObject, parent: int, own: Any, script: AttachedS
         "name": one.name,
         "alias": one.alias,
         "kind": one.kind,
-        "type": getattr(own, "shape", "") or getattr(own, "kind", "") or ("floor" if one.name == FLOOR else one.kind),
+        "type": _type_of(own) or ("floor" if one.name == FLOOR else one.kind),
         "parent": parent,
         "model": one.is_model,
         "script": script.script if script else "",
@@ -91,3 +100,13 @@ def _row(handle: int, one: SceneObject, parent: int, own: Any, script: AttachedS
         "rpy": place["rpy"],
         "values": values,
     }
+
+
+def _simple(parameters: Checked) -> dict[str, Any]:
+    """Return what is a number, a text or a switch, as somebody would write it."""
+    values = {key: getattr(parameters, key) for key in type(parameters).model_fields}
+    return {key: getattr(one, "given", one) for key, one in values.items() if isinstance(one, (bool, int, float, str))}
+
+
+def _type_of(own: Any) -> str:
+    return own.word if isinstance(own, Part) else getattr(own, "shape", "") or getattr(own, "kind", "")

@@ -6,28 +6,41 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from drone_sim.editing.changes import SceneContent, Settings, content_of
-from drone_sim.editing.settings import PLACE, vehicles_in, with_vehicles
-from drone_sim.mechanics import frames
-from drone_sim.mechanics.frames import Matrix
-from drone_sim.mechanics.object_tree import WORLD, ObjectTree
+from drone_sim.mechanics.object_tree import ObjectTree
 from drone_sim.run.parameters import Parameters
+from drone_sim.run.rearrangement import put
+from drone_sim.run.scene_document import SceneContent, SceneDocument
+from drone_sim.run.scene_settings import PLACE, Settings
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.operations import SceneOperations
+from drone_sim.scene.scene_parameters import WORLD
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
-_WHILE_STOPPED = "vehicles, floor and weather are changed while the simulation is stopped: stop it first"
+_FIXED = ("datum", "magnetic_field", "collections", *WORLD)
 
 
 class SceneAccess:
-    """A simulation, and the settings of its scene, which the simulation does not know as they were written."""
+    """A simulation, as whoever edits its scene sees it."""
 
     def __init__(self, simulation: Simulation):
-        """Take the simulation; its scene has no file."""
+        """Take the simulation."""
         self.simulation = simulation
-        self.settings: Settings = {}
-        self.folder = Path()  # relative to which settings name files
+
+    @property
+    def document(self) -> SceneDocument:
+        """Its text, file and settings."""
+        return self.simulation.document
+
+    @property
+    def settings(self) -> Settings:
+        """What is said beside objects and scripts."""
+        return self.document.settings
+
+    @property
+    def folder(self) -> Path:
+        """Relative to which files are named."""
+        return self.document.folder
 
     @property
     def operations(self) -> SceneOperations:
@@ -41,7 +54,7 @@ class SceneAccess:
 
     def content(self) -> SceneContent:
         """Return what the scene is now."""
-        return content_of(self.simulation, self.settings)
+        return self.simulation.content()
 
     def handle(self, named: Any) -> int:
         """Return the handle of an object that is given by it, or by name. Raises ValueError."""
@@ -66,21 +79,6 @@ class SceneAccess:
 
     # ---- settings
 
-    def settings_in_flight(self) -> Settings:
-        """Return the settings with vehicles where they are, and the weather that there is."""
-        simulation = self.simulation
-        said = vehicles_in(self.settings, simulation.parameters)
-        for name, vehicle in simulation.vehicles.items():
-            roll, pitch, yaw = (round(one, 9) + 0.0 for one in frames.to_rpy(vehicle.body.matrix))
-            place = {"position": [round(one, 9) + 0.0 for one in frames.position(vehicle.body.matrix)], "yaw": yaw}
-            tilt = {"tilt": [roll, pitch]} if any(vehicle.parameters.tilt) else {}
-            said[name] = {**said.get(name, {}), **place, **tilt}
-        settings = dict(with_vehicles(self.settings, said, simulation.parameters))
-        weather = simulation.context.weather.now
-        if weather != simulation.parameters.weather:
-            settings["weather"] = weather.model_dump(mode="json")
-        return settings
-
     def checked(self, settings: Settings) -> Parameters:
         """Return the parameters of the same objects with other settings. Raises ParameterError."""
         simulation = self.simulation
@@ -95,16 +93,24 @@ class SceneAccess:
             return
         simulation = self.simulation
         if simulation.running:
-            raise ValueError(_WHILE_STOPPED)
+            self._check_flight(settings)
         parameters = self.checked(settings)
-        if self._only_moves(settings, parameters):
+        if simulation.running:
+            simulation.rearrange(parameters)
+        elif self._only_moves(settings, parameters):
             for one in parameters.fleet:
-                self.put_vehicle(simulation.vehicles[one.name], _matrix(one))
+                put(simulation.vehicles[one.name], one.matrix)
             simulation.arrange(parameters, rebuild=False)
             simulation.scene.is_changed = True
         else:
             simulation.arrange(parameters)
-        self.settings = settings
+        self.document.settings = settings
+
+    def _check_flight(self, settings: Settings) -> None:
+        """Refuse what no flight can go on with."""
+        for key in _FIXED:
+            if settings.get(key) != self.settings.get(key):
+                raise ValueError(f"{key}: is changed while the simulation is stopped: stop it first")
 
     def _only_moves(self, settings: Settings, parameters: Parameters) -> bool:
         """Tell whether nothing is otherwise but where vehicles are."""
@@ -115,11 +121,6 @@ class SceneAccess:
             one.is_alone == two.is_alone and _placed_as(one, two) == two for one, two in zip(fleet, parameters.fleet)
         )
 
-    def put_vehicle(self, vehicle: Vehicle, matrix: Matrix) -> None:
-        """Put a vehicle somewhere in the world, at rest, unless it is there."""
-        if any(abs(one - two) > 1e-9 for one, two in zip(vehicle.body.matrix, matrix)):
-            self.tree.set_matrix(self.tree.handle_of(vehicle.object), WORLD, matrix)
-
 
 def _others(settings: Settings) -> Mapping[str, Any]:
     return {key: value for key, value in settings.items() if key not in ("drone", "vehicles")}
@@ -127,7 +128,3 @@ def _others(settings: Settings) -> Mapping[str, Any]:
 
 def _placed_as(one: VehicleParameters, two: VehicleParameters) -> VehicleParameters:
     return one.model_copy(update={key: getattr(two, key) for key in PLACE})
-
-
-def _matrix(one: VehicleParameters) -> Matrix:
-    return frames.from_rpy(one.position, (*one.tilt, one.yaw))

@@ -10,7 +10,6 @@ from typing import Any
 from drone_sim.config.types import named_in
 from drone_sim.editing.scene_access import SceneAccess
 from drone_sim.files import writing
-from drone_sim.scene.attached_scripts import AttachedScriptParameters
 from drone_sim.scene.scene_parameters import script_from
 from drone_sim.scripting.load import script_path
 
@@ -69,14 +68,14 @@ def _new(folder: Path, name: str, language: str) -> str:
     raise ValueError(f"{folder}: has a thousand scripts of the name {stem}")
 
 
-def set_parameters(scene: SceneAccess, handle: int, parameters: Mapping[str, Any] | None) -> None:
+def set_parameters(scene: SceneAccess, handle: int, parameters: Any) -> None:
     """Let the script of an object have other parameters. Raises ValueError."""
     name = scene.tree[handle].name
     script = scene.simulation.scene.scripts.get(name)
     if script is None:
         raise ValueError(f"'{name}' has no script of the scene")
-    said = {**script.model_dump(), "script": script.script, "parameters": dict(parameters or {})}
-    scene.operations.attach_script(AttachedScriptParameters.model_validate(said))
+    said = {**script.model_dump(), "script": script.script, "parameters": parameters}
+    scene.operations.attach_script(script_from(said))
 
 
 def detach(scene: SceneAccess, handle: int) -> None:

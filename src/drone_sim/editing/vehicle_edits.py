@@ -10,11 +10,13 @@ from typing import Any
 from drone_sim.config.types import ParameterError, merged
 from drone_sim.editing import records
 from drone_sim.editing.scene_access import SceneAccess
-from drone_sim.editing.settings import keep_names, vehicles_in, with_floor, with_vehicles
+from drone_sim.editing.vehicle_parts import Part, part_named, parts_of, with_part
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.object_names import plain
 from drone_sim.mechanics.object_tree import PARENT, WORLD
+from drone_sim.run.rearrangement import put
+from drone_sim.run.scene_settings import keep_names, say_place, vehicles_in, with_floor, with_vehicles
 from drone_sim.vehicles.quadricopter_objects import REMOVABLE
 from drone_sim.vehicles.vehicle import Vehicle
 
@@ -57,11 +59,8 @@ class VehicleEdits:
 
     def copy(self, handle: int, places: Sequence[Vector]) -> list[int]:
         """Add vehicles like one, each so far (m, world) from it; what hangs on it is not copied."""
-        if not self._scene.is_root(handle):
-            raise ValueError(f"'{self._scene.tree[handle].name}' is a part of a vehicle: copy that")
-        name, said = self._vehicle(handle).name, self._said()
-        like = {key: value for key, value in said[name].items() if key not in ("suffix", "objects")}
-        made = []
+        name, like = self.described(handle)
+        said, made = self._said(), []
         for place in places:
             new = _free(name, said)
             moved = [one + by for one, by in zip(like["position"], place)]
@@ -69,6 +68,14 @@ class VehicleEdits:
             made.append(new)
         self._say(said)
         return [self.root(self._scene.simulation.vehicles[one]) for one in made]
+
+    def described(self, handle: int) -> tuple[str, dict[str, Any]]:
+        """Return the name of a vehicle, and what another one like it says."""
+        vehicle = self._vehicle(handle)
+        if not self._scene.is_root(handle):
+            raise ValueError(f"'{self._scene.tree[handle].name}' is a part of a vehicle: copy that")
+        own = self._said()[vehicle.name]
+        return vehicle.name, {key: value for key, value in own.items() if key not in ("suffix", "objects")}
 
     def root(self, vehicle: Vehicle) -> int:
         """Return the handle of a vehicle's root."""
@@ -90,19 +97,22 @@ class VehicleEdits:
         self._say(said)
 
     def _remove_part(self, said: dict[str, Any], vehicle: Vehicle, name: str) -> None:
-        for kind in ("cameras", "sensors"):
-            for key, one in getattr(vehicle.parameters, kind).items():
-                if (one.object or key) == name:
-                    said[kind] = {**said.get(kind, {}), key: None}
-                    return
+        part = part_named(vehicle.parameters, name)
+        if part is not None:
+            said[part.among] = {**said.get(part.among, {}), part.key: None}
+            return
         if name not in REMOVABLE:
-            raise ValueError(f"'{name}' is a part of '{vehicle.name}', which does not fly without it")
+            raise ValueError(f"'{name}' is a part of '{vehicle.name}', which cannot fly without it")
         said["objects"] = {**said.get("objects", {}), name: None}
 
     def rename(self, handle: int, name: str) -> list[int]:
         """Give a vehicle another name, which is that of its topics; or one of its parts."""
         scene, said = self._scene, self._said()
         vehicle = self._vehicle(handle)
+        part = self._part(handle)
+        if part is not None:
+            self._set_camera_or_sensor(vehicle, part, {"object": name})
+            return [scene.tree.handle(f"{name}{vehicle.suffix}")]
         if not scene.is_root(handle):
             self._set_part(handle, name=name, alias=name)
             return [handle]
@@ -112,36 +122,35 @@ class VehicleEdits:
         return [self.root(scene.simulation.vehicles[name])]
 
     def move(self, handle: int, relative_to: int, matrix: Matrix) -> None:
-        """Put a vehicle somewhere, or, where it flies, a part of it."""
+        """Put a vehicle somewhere, or a part of it."""
         scene = self._scene
         tree, vehicle = scene.tree, self._vehicle(handle)
-        is_whole = scene.is_root(handle)
-        if scene.simulation.running:
-            tree.set_matrix(handle, relative_to, matrix)
-            return
-        if not is_whole:
-            before = tree.matrix(handle)
-            tree.set_matrix(handle, relative_to, matrix)
-            local = tree.matrix(handle, PARENT)
-            tree.set_matrix(handle, WORLD, before)
-            self._set_part(handle, position=_rounded(frames.position(local)), rpy=_rounded(frames.to_rpy(local)))
+        if not scene.is_root(handle):
+            self._move_part(handle, relative_to, matrix)
             return
         if relative_to not in (WORLD, PARENT):
             matrix = frames.multiply(tree[relative_to].below(), matrix)
         said = self._said()
-        roll, pitch, yaw = _rounded(frames.to_rpy(matrix))
-        own = said[vehicle.name]
-        own["position"] = _rounded(frames.position(matrix))
-        for key, value in (("yaw", yaw), ("tilt", [roll, pitch] if roll or pitch else None)):
-            if value or key in own:
-                own[key] = value or ([0.0, 0.0] if key == "tilt" else 0.0)
+        say_place(said[vehicle.name], matrix)
         self._say(said)
+        if scene.simulation.running:  # where it may be elsewhere than is said
+            put(scene.simulation.vehicles[vehicle.name], matrix)
+
+    def _move_part(self, handle: int, relative_to: int, matrix: Matrix) -> None:
+        tree = self._scene.tree
+        before = tree.matrix(handle)
+        tree.set_matrix(handle, relative_to, matrix)
+        if self._scene.simulation.running:
+            return
+        local = tree.matrix(handle, PARENT)
+        tree.set_matrix(handle, WORLD, before)
+        self._set_part(handle, position=_rounded(frames.position(local)), rpy=_rounded(frames.to_rpy(local)))
 
     def reparent(self, handle: int, parent: int, keep: str) -> None:
         """Hang a part of a vehicle on another object."""
         tree = self._scene.tree
         if self._scene.is_root(handle):
-            raise ValueError("a vehicle hangs on nothing")
+            raise ValueError("a vehicle cannot have a parent")
         tree.check_parent(handle, parent)
         above = None if parent == WORLD else tree[parent]
         local = tree.matrix(handle, PARENT)
@@ -157,9 +166,10 @@ class VehicleEdits:
     def _set_part(self, handle: int, **values: Any) -> None:
         vehicle, said = self._vehicle(handle), self._said()
         own, name = said[vehicle.name], plain(self._scene.tree[handle].name)
-        camera = next((key for key, one in vehicle.parameters.cameras.items() if one.object == name), None)
-        if camera is not None:
-            raise ValueError(f"'{name}' is the camera '{camera}' of '{vehicle.name}': change its `cameras`")
+        part = self._part(handle)
+        if part is not None:
+            where = f"{part.among}/{part.key}/mount"
+            raise ValueError(f"'{name}' is a part of '{vehicle.name}': where it sits is written in the text, {where}")
         own["objects"] = merged(own.get("objects") or {}, {name: values})
         self._say(said)
 
@@ -170,11 +180,36 @@ class VehicleEdits:
             scene.arrange(with_floor(scene.settings, values))
             return
         vehicle, said = self._vehicle(handle), self._said()
+        part = self._part(handle)
+        if part is not None:
+            self._set_camera_or_sensor(vehicle, part, values)
+            return
         if not scene.is_root(handle):
             raise ValueError(f"'{scene.tree[handle].name}' is a part of '{vehicle.name}': set the vehicle's own keys")
         own = merged(said[vehicle.name], dict(values))
         said[vehicle.name] = {key: value for key, value in own.items() if value is not None or key not in values}
         self._say(said)
+
+    def _part(self, handle: int) -> Part | None:
+        return part_named(self._vehicle(handle).parameters, self._scene.tree[handle].name)
+
+    def _set_camera_or_sensor(self, vehicle: Vehicle, part: Part, values: Mapping[str, Any]) -> None:
+        said = self._said()
+        own = said[vehicle.name]
+        self._say({**said, vehicle.name: with_part(own, part, self._usual(vehicle, part, said), values)})
+
+    def _usual(self, vehicle: Vehicle, part: Part, said: dict[str, dict[str, Any]]) -> Part | None:
+        """Return what a part is where nothing is said of it; None where it is not there then."""
+        own = said[vehicle.name]
+        others = {key: one for key, one in (own.get(part.among) or {}).items() if key != part.key}
+        without = {**said, vehicle.name: {**own, part.among: others}}
+        scene = self._scene
+        try:
+            fleet = scene.checked(with_vehicles(scene.settings, without, scene.simulation.parameters)).fleet
+        except ParameterError:  # something else needs it
+            return None
+        (usual,) = (one for one in fleet if one.name == vehicle.name)
+        return next((one for one in parts_of(usual).values() if one[:2] == part[:2]), None)
 
     def _vehicle(self, handle: int) -> Vehicle:
         found = self._scene.vehicle_of(handle)
@@ -185,7 +220,8 @@ class VehicleEdits:
 
 def _free(wanted: str, said: Mapping[str, Any]) -> str:
     """Return a name that no vehicle has: drone, drone2, drone3, ..."""
-    names = itertools.chain([wanted], (f"{wanted}{number}" for number in itertools.count(2)))
+    bare = wanted.rstrip("0123456789") or wanted
+    names = itertools.chain([wanted], (f"{bare}{number}" for number in itertools.count(2)))
     return next(one for one in names if one not in said)
 
 

@@ -146,7 +146,7 @@ def _part(mesh: trimesh.Trimesh) -> MeshPart:
     if vertices.shape[1:] != (3,) or faces.shape[1:] != (3,):
         raise ValueError("a vertex must have 3 numbers, and a face 3 corners or 4")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise ValueError("a face names a vertex that there is not")
+        raise ValueError("a face names a vertex that does not exist")
     if not np.isfinite(vertices).all():
         raise ValueError("a vertex is not finite")
     uv, rgba, texture = _material(mesh)

@@ -91,7 +91,7 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
     finally:
         os.close(descriptor)
     if len(content) > limit:
-        raise ValueError(f"larger than {limit / MEBIBYTE:g} MiB, the most that is read of such a file")
+        raise ValueError(f"larger than {limit / MEBIBYTE:g} MiB, the limit for such a file")
     return content
 
 

@@ -92,9 +92,14 @@ def read(path: str, kinds: Sequence[str] = JOINTS) -> Xml.Element:
 
     Raises OSError, and ValueError in one line without the file's name.
     """
+    return parsed(read_bytes(path, MAX_SIZE), Path(path).parent, kinds)
+
+
+def parsed(content: bytes, folder: Path, kinds: Sequence[str]) -> Xml.Element:
+    """Do so with what a file in a folder holds. Raises the same."""
     parser = Xml.XMLParser(target=_Builder())
     try:
-        parser.feed(read_bytes(path, MAX_SIZE))
+        parser.feed(content)
         robot = parser.close()
     except Xml.ParseError as error:
         raise ValueError(str(error)) from None
@@ -109,7 +114,7 @@ def read(path: str, kinds: Sequence[str] = JOINTS) -> Xml.Element:
     clean = Xml.Element("robot", name="robot")
     colors = {material.get("name"): material.find("color") for material in robot.findall("material")}
     for link in links:
-        _within(_called(link), _add_link, link, clean, Path(path).parent, colors)
+        _within(_called(link), _add_link, link, clean, folder, colors)
     for joint in joints:
         _within(_called(joint), _add_joint, joint, clean)
     return clean

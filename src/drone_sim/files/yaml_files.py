@@ -71,6 +71,11 @@ def parse(text: str) -> Any:
         raise YamlError(f"{' '.join(str(error).split()):.200}") from None
 
 
+def dump(value: Any, **style: Any) -> str:
+    """Return a YAML text that `parse` reads as this, keys in their order; `style` is as for yaml.dump."""
+    return str(yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, **style))
+
+
 def compose(text: str) -> Any:
     """Return the nodes of a text that `parse` reads, with where they begin and end; None for an empty one."""
     return yaml.compose(text, Loader=_Loader)
@@ -174,8 +179,13 @@ def _refuse_tag(_loader: _Loader, node: Any) -> Any:
     raise _refused(node, f"the tag {shown(node.tag)} is not allowed")
 
 
+class _Dumper(yaml.SafeDumper):
+    """PyYAML's safe dumper, which puts quotes around a text that either version of YAML takes for something else."""
+
+
 for _tag, _pattern in (("int", _INT), ("float", _FLOAT)):
-    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _pattern, list("-+0123456789."))
+    for _kind in (_Loader, _Dumper):
+        _kind.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _pattern, list("-+0123456789."))
     _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _number)
 for _tag in ("binary", "timestamp", "omap", "pairs", "set"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", _refuse_tag)

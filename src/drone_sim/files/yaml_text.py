@@ -297,11 +297,11 @@ def _flow(value: Any) -> str:
     for kind, write in kinds:
         if isinstance(value, kind):
             return write(value)
-    dumped_value = yaml.safe_dump([value], default_flow_style=True, allow_unicode=True, width=10**6)
-    return str(dumped_value).strip()[1:-1]
+    dumped_value = yaml_files.dump([value], default_flow_style=True, width=10**6)
+    return dumped_value.strip()[1:-1]
 
 
 def _number(value: float) -> str:
     if math.isfinite(value) and value.is_integer() and abs(value) < _LONG:
         return str(int(value))
-    return str(yaml.safe_dump(value)).split("\n")[0]
+    return yaml_files.dump(value).split("\n")[0]

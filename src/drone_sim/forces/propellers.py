@@ -126,16 +126,23 @@ class Propellers(Force):
         return [share * min(max(one, slowest), fastest) for share, one in zip(self.effectiveness, self._given())]
 
     @property
+    def velocities(self) -> Sequence[float]:
+        """Velocity of the particles of each propeller in m/s, as in the last step."""
+        return self._emitted
+
+    @property
     def thrusts(self) -> list[float]:
         """Thrust of each propeller in N, as in the last step."""
         return [self._newtons * velocity for velocity in self._emitted]
 
     def save_state(self) -> Callable[[], None]:
-        """Return a function that brings back the fraction of a particle, the blades' way, and what is broken."""
+        """Return a function that brings back the fraction of a particle, what was emitted, and what is broken."""
         carry, air, effectiveness = self._law.carry, list(self.air), self.effectiveness
+        emitted, newtons = list(self._emitted), self._newtons
 
         def restore() -> None:
             self._law.carry, self.air = carry, list(air)
+            self._emitted, self._newtons = emitted, newtons
             self.weaken(effectiveness)
 
         return restore

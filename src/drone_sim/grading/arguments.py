@@ -46,13 +46,13 @@ def add_to(parser: argparse.ArgumentParser) -> None:
         "--jobs", metavar="N", type=_number(1, _MOST_JOBS), default=cores, help=f"flights at a time ({cores})"
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", default="", help="a Dask scheduler, such as tcp://host:8786")
-    parser.add_argument("--results", metavar="DIR", help=f"where results are kept as they come ({default_folder()})")
-    parser.add_argument("--fresh", action="store_true", help="fly anew what is kept there")
+    parser.add_argument("--results", metavar="DIR", help=f"the folder where results are saved ({default_folder()})")
+    parser.add_argument("--fresh", action="store_true", help="fly everything again, also saved results")
     parser.add_argument(
         "--sandbox",
         choices=("auto", "on", "off"),
         default="auto",
-        help="bubblewrap around every flight: where it works, or else not at all, or never (auto)",
+        help="use bubblewrap for every flight: if it works, always (or refuse to fly), or never (auto)",
     )
 
 

@@ -43,6 +43,7 @@ class FlightRecord:
     states: Sequence[ValueChange] = ()  # what the script says of its flight state: docs/states.md
     values: Mapping[str, Sequence[ValueChange]] = field(default_factory=dict)  # by the names of signals and topics
     other_poses: Mapping[str, np.ndarray] = field(default_factory=dict)  # (N, 7): position, quaternion xyzw, by name
+    found: Mapping[str, Sequence[str]] = field(default_factory=dict)  # names of objects, by the path that finds them
 
     @cached_property
     def columns(self) -> dict[str, np.ndarray]:

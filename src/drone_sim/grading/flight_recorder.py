@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import functools
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -14,6 +16,7 @@ from drone_sim.grading.plan import Plan
 from drone_sim.mechanics.frames import position, to_quaternion
 from drone_sim.offline.recording import COLUMNS, Recording
 from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api import object_paths
 from drone_sim.scripting.api.backend import Ask
 from drone_sim.scripting.api.control import STOP
 
@@ -39,8 +42,9 @@ class FlightRecorder:
         self._touched: set[str] = set()  # in the step that is under way
         self._values: dict[str, list[ValueChange]] = {}
         self._other_poses: dict[str, list[tuple[float, ...]]] = {}
+        self._found: dict[str, list[str]] = {}
         self.look: Callable[[int], None] | None = None  # for Simulation.step
-        self._each_step: list[Callable[[], None]] = [lambda: self._recording.add(simulation)]
+        self._each_step: list[Callable[[], None]] = [functools.partial(self._recording.add, simulation)]
         self._add_recorders(plan, backend)
 
     def _add_recorders(self, plan: Plan, backend: OfflineBackend) -> None:
@@ -54,9 +58,14 @@ class FlightRecorder:
         own = self._vehicle.bus.said
         for topic, full in backend.wanted.items():
             self._follow(topic, lambda name=full: backend.last.get(name, own.get(name)))  # type: ignore[misc]
-        for other in dict.fromkeys(name for one in plan.criteria for name in one.others):
+        others = dict.fromkeys(name for one in plan.criteria for name in one.others)
+        objects = self._simulation.context.objects
+        for path in filter(object_paths.is_path, others):
+            self._found[path] = [one.name for one in object_paths.every(objects, path)] or [path]
+        named = (self._found.get(other, [other]) for other in others)
+        for other in dict.fromkeys(itertools.chain.from_iterable(named)):
             if other not in self._simulation.vehicles:
-                self._simulation.context.objects.handle(other)  # raises ValueError where there is none
+                objects.handle(other)  # raises ValueError where there is none
             self._other_poses[other] = []
             self._each_step.append(lambda name=other: self._other_poses[name].append(self._pose(name)))  # type: ignore[misc]
 
@@ -82,6 +91,7 @@ class FlightRecorder:
             tuple(self._values.get("", ())),
             self._values,
             {name: np.array(poses) for name, poses in self._other_poses.items()},
+            self._found,
         )
 
     @property

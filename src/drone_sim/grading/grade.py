@@ -215,7 +215,7 @@ def _check_outputs(options: argparse.Namespace, scripts: int) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = GradingParser(
-        prog=PROGRAM, description="Fly scripts by a plan and grade them; exit status 0 if all pass, 1 if not."
+        prog=PROGRAM, description="Fly scripts with a plan and grade them; exit status 0 if all pass, 1 if not."
     )
     add_to(parser)
     parser.add_argument(
@@ -226,13 +226,13 @@ def _parser() -> argparse.ArgumentParser:
         help="child scripts; folders, zips or CSVs of a class (default: the plan's own, or the built-in one)",
     )
     parser.add_argument("--marks", metavar="OUT.csv", help="write the class's marks, as Moodle imports them")
-    parser.add_argument("--secret", metavar="FILE", help="fly seeds that follow from a file which only the teacher has")
+    parser.add_argument("--secret", metavar="FILE", help="compute secret seeds from a file that only the teacher has")
     parser.add_argument("--junit", metavar="OUT.xml", help="write results as JUnit's XML")
     parser.add_argument("--json", metavar="OUT.json", help="write all results and figures")
-    parser.add_argument("--key", metavar="FILE", help="sign what --json writes")
-    parser.add_argument("--verify", metavar="RESULTS.json", help="fly what --json wrote once more, and compare")
+    parser.add_argument("--key", metavar="FILE", help="sign the file of --json")
+    parser.add_argument("--verify", metavar="RESULTS.json", help="fly the flights of a --json file again, and compare")
     parser.add_argument("--gradescope", metavar="results.json", help="write one script's results for Gradescope")
-    parser.add_argument("--autograder", metavar="OUT.zip", help="fly nothing: write an autograder for Gradescope")
+    parser.add_argument("--autograder", metavar="OUT.zip", help="do not fly: write an autograder for Gradescope")
     parser.add_argument("--html", metavar="DIR", help="write a report with plots and a replay of every flight")
     return parser
 

@@ -7,12 +7,13 @@ come of a flight, whatever was called.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from typing import Any
 
 from drone_sim.grading.own_objects import OwnObjects
 from drone_sim.grading.plan import Plan
 from drone_sim.mechanics.scene_object import SceneObject
+from drone_sim.remote.control import ClientControl
 from drone_sim.run.simulation import Simulation
 from drone_sim.run.simulation_setup import script_of
 from drone_sim.scripting.api import (
@@ -39,8 +40,9 @@ from drone_sim.scripting.api.calls import declaration_of
 from drone_sim.scripting.api.constants import CONSTANTS, bare
 from drone_sim.scripting.api.ignored import MODULES
 from drone_sim.scripting.api.simulation import SimulationFunctions
+from drone_sim.vehicles.vehicle import Vehicle
 
-MOVE, PUSH, CHANGE, NEVER, READ = "move", "push", "change", "", "read"
+MOVE, PUSH, CHANGE, NEVER, READ = "move", "push", "change", "write", "read"  # NEVER: no plan allows it
 MOST_TRIED = 20  # that a result tells of
 _FREE_CLASSES: tuple[type, ...] = (
     custom_data.CustomDataFunctions,
@@ -73,6 +75,8 @@ _FREE_CLASSES: tuple[type, ...] = (
 _FREE = [
     *("callScriptFunction", "stopSimulation", "addLog", "addStatusbarMessage", "createDummy", "createPath"),
     "resamplePath",
+    # of clients outside: when the simulation begins, and steps, which does nothing to the world
+    *("startSimulation", "setStepping", "acquireLock", "releaseLock", "handleExtCalls", "testCB"),
 ]
 _READING = ("get", "is", "check", "read")  # what the names of functions begin with that only read
 # Of an object, by its handle, which comes first; a script's own marks are its own.
@@ -125,26 +129,18 @@ class Forbidden(ValueError):
     """A submission has called what the plan does not allow; one line."""
 
 
-class Permissions:
-    """Looks at each call of a submission before it is carried out, and keeps what was tried."""
+class Actions:
+    """Tells what a call needs: MOVE, PUSH, CHANGE, NEVER, or nothing."""
 
-    def __init__(self, plan: Plan, simulation: Simulation, submission: str):
-        """Hold a `plan` against a `simulation`, in which the script `submission` flies what has none of its own."""
-        self._allowed = {*plan.allowed}
-        self._simulation = simulation
+    def __init__(
+        self, simulation: Simulation, flown: Iterable[Vehicle], scripts: Set[str], marks: Iterable[SceneObject] = ()
+    ):
+        """Whoever calls flies the vehicles `flown`, is the scripts of the objects `scripts`, and may move `marks`."""
         self._objects, self._scripts = simulation.context.objects, simulation.context.scripts
-        own = [
-            one
-            for one in simulation.vehicles.values()
-            if script_of(one.parameters, simulation.parameters, submission) == submission
-        ]
-        self._own = {one.object_name for one in own}  # whose scripts are the submission
-        self._readable = OwnObjects(simulation, self._own) if plan.reads == "own" else None
-        self._propellers = {name for one in own for name in one.propulsion.script_parameters}
-        self._marks: set[int] = set()  # handles that are known to be marks'
+        self._flown, self._own = list(flown), scripts
+        self._propellers = {name for one in self._flown for name in one.propulsion.script_parameters}
+        self._marks = {self._objects.handle_of(one) for one in marks}  # handles that are known to be marks'
         self._settable: set[tuple[int, str]] = set()  # parameters that are known to be free
-        self.tried: list[str] = []  # in one line each; the first time of each thing that was tried with each object
-        self._known: set[tuple[str, str]] = set()
         looks: tuple[tuple[Sequence[str], Look], ...] = (
             (_MOVING, self._of_object),
             (_PARAMETERS, self._of_parameter),
@@ -153,25 +149,15 @@ class Permissions:
         )
         self._looks = {f"sim.{name}": look for named, look in looks for name in named}
 
-    def __call__(self, function: str, arguments: list[Any]) -> None:
-        """Raise Forbidden for a call that the submission may not make."""
+    def of(self, function: str, arguments: list[Any]) -> str | None:
+        """Return what a call needs, None for nothing."""
         look = self._looks.get(function)
-        action = look(arguments) if look is not None else _action_of(function)
-        if action is not None and action not in self._allowed:
-            what = "the scene" if _is_of_scene(function) else self._name(arguments)
-            self._refuse(function, action or "write", what, f" (allowed: [{action}] would)" if action else "")
-        other = self._readable.other_in(function, arguments) if self._readable is not None else None
-        if other is not None:
-            self._refuse(function, READ, other, " (reads: all would)")
+        return look(arguments) if look is not None else _action_of(function)
 
-    def _refuse(self, function: str, verb: str, what: str, would: str) -> None:
-        if (verb, what) not in self._known and len(self.tried) < MOST_TRIED:
-            self._known.add((verb, what))
-            self.tried.append(f"tried to {verb} {what} at {self._simulation.time:.2f} s ({function})")
-        raise Forbidden(f"the plan does not allow a script to {verb} {what}{would}")
-
-    def _name(self, arguments: list[Any]) -> str:
+    def what(self, function: str, arguments: list[Any]) -> str:
         """Return what a call is about, as a person calls it."""
+        if _is_of_scene(function):
+            return "the scene"
         one = self._object(arguments)
         if one is not None:
             return one.name
@@ -204,10 +190,7 @@ class Permissions:
     def _of_joint(self, arguments: list[Any]) -> str | None:
         """Return what turning a joint needs: nothing, of a vehicle's own propeller, whose blades are seen to turn."""
         one = self._object(arguments)
-        vehicles = self._simulation.vehicles.values()
-        is_blade = one is not None and any(
-            vehicle.propulsion.blades.has(one.name) for vehicle in vehicles if vehicle.object_name in self._own
-        )
+        is_blade = one is not None and any(vehicle.propulsion.blades.has(one.name) for vehicle in self._flown)
         return None if is_blade else MOVE
 
     def _of_motion(self, arguments: list[Any]) -> str | None:
@@ -220,10 +203,12 @@ class Permissions:
 
     def _of_parameter(self, arguments: list[Any]) -> str | None:
         """Return what setting a script's parameter needs: nothing, of its own, or of how fast a propeller turns."""
-        if len(arguments) < 2 or not _is_handle(arguments[0]) or type(arguments[1]) is not str:
+        if len(arguments) < 2:
             return CHANGE
-        handle, name = arguments[:2]
-        if handle == _SELF or (handle, name) in self._settable:
+        handle, name, *_ = arguments
+        if type(name) is not str or not _is_handle(handle):
+            return CHANGE
+        if (handle == _SELF and self._own) or (handle, name) in self._settable:
             return None
         script = self._script(handle, arguments)
         if script in self._own or (script in self._propellers and name == _DRIVES):
@@ -242,6 +227,40 @@ class Permissions:
         return one.name if one is not None and one.name in self._scripts else ""
 
 
+class Permissions(Actions):
+    """Looks at each call of a submission before it is carried out, and keeps what was tried."""
+
+    def __init__(self, plan: Plan, simulation: Simulation, submission: str):
+        """Hold a `plan` against a `simulation`, in which the script `submission` flies what has none of its own."""
+        own = [
+            one
+            for one in simulation.vehicles.values()
+            if script_of(one.parameters, simulation.parameters, submission) == submission
+        ]
+        names = {one.object_name for one in own}
+        super().__init__(simulation, own, names)
+        self._allowed, self._simulation = {*plan.allowed}, simulation
+        self._readable = OwnObjects(simulation, names) if plan.reads == "own" else None
+        self.tried: list[str] = []  # in one line each; the first time of each thing that was tried with each object
+        self._known: set[tuple[str, str]] = set()
+
+    def __call__(self, function: str, arguments: list[Any]) -> None:
+        """Raise Forbidden for a call that the submission may not make."""
+        action = self.of(function, arguments)
+        if action is not None and action not in self._allowed:
+            would = "" if action == NEVER else f" (allowed: [{action}] would)"
+            self._refuse(function, action, self.what(function, arguments), would)
+        other = self._readable.other_in(function, arguments) if self._readable is not None else None
+        if other is not None:
+            self._refuse(function, READ, other, " (reads: all would)")
+
+    def _refuse(self, function: str, verb: str, what: str, would: str) -> None:
+        if (verb, what) not in self._known and len(self.tried) < MOST_TRIED:
+            self._known.add((verb, what))
+            self.tried.append(f"tried to {verb} {what} at {self._simulation.time:.2f} s ({function})")
+        raise Forbidden(f"the plan does not allow a script to {verb} {what}{would}")
+
+
 def _is_of_scene(function: str) -> bool:
     """Tell whether what comes first in a call is not the handle of an object, or of a script."""
     name = function.partition(".")[2]
@@ -254,18 +273,18 @@ def _is_handle(value: Any) -> bool:
 
 def _action_of(function: str) -> str | None:
     """Return what the plan has to allow for a function, None for nothing, NEVER where it cannot."""
-    if function in _free():
+    if function in free():
         return None
     name = function.partition(".")[2]
     return _ACTIONS.get(name, CHANGE)
 
 
 @functools.cache
-def _free() -> frozenset[str]:
+def free() -> frozenset[str]:
     """Return the functions that are free, each as module.name."""
     found = {f"sim.{name}" for name in _FREE}
     found.update(f"{module}.{name}" for module, groups in MODULES.items() for one in groups for name in one.functions)
-    for kind in {*_FREE_CLASSES, *modules.SIM}:
+    for kind in {*_FREE_CLASSES, *modules.SIM, ClientControl}:
         for attribute in vars(kind).values():
             declaration = declaration_of(attribute)
             if declaration and (kind in _FREE_CLASSES or attribute.__name__.startswith(_READING)):

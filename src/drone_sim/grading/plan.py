@@ -85,7 +85,7 @@ class Plan(Checked):
         for index, one in enumerate(self.criteria):
             here = ("criteria", index)
             if one.called in taken:
-                raise ParameterError("comes twice; give each a `name` of its own", (*here, "name"), f"'{one.called}'")
+                raise ParameterError("comes twice: give each its own `name`", (*here, "name"), f"'{one.called}'")
             taken.add(one.called)
             for key in ("after", "until"):
                 time = getattr(one, key)
@@ -180,7 +180,7 @@ def read(path: str | Path) -> Plan:
     except yaml_files.YamlError as error:
         raise PlanError(str(error)) from None
     if not isinstance(values, dict):
-        raise PlanError(f"{path}: must hold `key: value` lines, of which one is `criteria`, not {shown(values)}")
+        raise PlanError(f"{path}: must have `key: value` lines, one of them `criteria`, not {shown(values)}")
     plan = _checked(values, Path(path))
     try:
         parameters = plan.parameters()

@@ -14,7 +14,7 @@ from pydantic import Field
 from drone_sim.config.types import Checked, Finite, Label, ParameterError, Within
 from drone_sim.message_text import near_names
 from drone_sim.run.parameters import Parameters
-from drone_sim.scene.scene_parameters import SceneParameters
+from drone_sim.scene.scene_parameters import MAX_OBJECTS, SceneParameters
 from drone_sim.vehicles.parameters import VehicleParameters
 
 _Metres = Annotated[Finite, Within(0, 1000)]
@@ -29,7 +29,7 @@ class Randomization(Checked):
 
     position: _Width = (0, 0, 0)
     yaw: Annotated[Finite, Within(0, 3.15)] = 0.0  # rad
-    objects: Annotated[dict[Label, _Width], Field(max_length=1000)] = Field(default_factory=dict)
+    objects: Annotated[dict[Label, _Width], Field(max_length=MAX_OBJECTS)] = Field(default_factory=dict)
     wind: Annotated[tuple[_Speed, _Speed, _Speed], Field(description="3 numbers, [x, y, z] in m/s")] = (0, 0, 0)
 
 

@@ -230,7 +230,7 @@ class ParameterRange:
             raise RangeError(f"--param {self.name}: --optimize looks among numbers only")
         low, high = float(min(self.values)), float(max(self.values))
         if low == high:
-            raise RangeError(f"--param {self.name}: --optimize needs two values to look between, such as 1:10:2")
+            raise RangeError(f"--param {self.name}: --optimize needs two values to search between, such as 1:10:2")
         return low, high
 
 
@@ -329,18 +329,23 @@ def _parser() -> argparse.ArgumentParser:
         metavar="KEY=VALUES",
         action="append",
         required=True,
-        help="a key of config/drone.yaml, as Kzref or control.Kzref, with START:STOP:COUNT or A,B,...; again for more",
+        help="a key of config/drone.yaml, such as Kzref, with START:STOP:COUNT or A,B,...; may be given several times",
     )
     parser.add_argument(
-        "--smallest", metavar="NAME", default="", help="among equal points the criterion whose figure decides"
+        "--smallest",
+        metavar="NAME",
+        default="",
+        help="with equal points, sort by the smallest figure of this criterion",
     )
     parser.add_argument("--csv", metavar="OUT.csv", help="write all rows of the table")
     parser.add_argument(
-        "--plot", metavar="OUT.png", help="draw points (or --smallest) as a curve, or as a heat map of two"
+        "--plot", metavar="OUT.png", help="draw points (or --smallest): a curve for one parameter, a heat map for two"
     )
-    parser.add_argument("--optimize", action="store_true", help="look for the best between the ends of the ranges")
-    parser.add_argument("--evaluations", metavar="N", type=int, default=200, help="of --optimize, about so many (200)")
-    parser.add_argument("--random-seed", metavar="N", type=int, default=0, help="of --optimize (0)")
+    parser.add_argument("--optimize", action="store_true", help="search for the best values within the ranges")
+    parser.add_argument(
+        "--evaluations", metavar="N", type=int, default=200, help="for --optimize: about how many trials (200)"
+    )
+    parser.add_argument("--random-seed", metavar="N", type=int, default=0, help="for --optimize (0)")
     return parser
 
 

@@ -33,8 +33,8 @@ _LARGEST = 2**28  # bytes
 def main(arguments: Sequence[str], guardian: Guardian | None = None) -> int:
     """Verify; return 0 where every flight comes out as the file says, 1 where one does not, 2 for what cannot be."""
     parser = GradingParser(prog=PROGRAM, description=__doc__)
-    parser.add_argument("--verify", metavar="RESULTS.json", required=True, help="what --json wrote")
-    parser.add_argument("--key", metavar="FILE", help="the key by which it was signed")
+    parser.add_argument("--verify", metavar="RESULTS.json", required=True, help="a file of --json")
+    parser.add_argument("--key", metavar="FILE", help="the key with which the file was signed")
     parser.add_argument("--jobs", metavar="N", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--sandbox", choices=("auto", "on", "off"), default="auto")
     options = parser.parse_args(arguments)

@@ -85,7 +85,7 @@ class HostedScript(ABC):
         """
         reached = [one.propulsion for one in self.reached()]
         if not reached:
-            raise ValueError(f"'{name}' is not a part of a vehicle, of which none flies")
+            raise ValueError(f"'{name}' is not a part of a vehicle: no vehicle flies")
         return next(filter(has, reached), reached[0])
 
     @property

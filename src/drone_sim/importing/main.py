@@ -45,7 +45,9 @@ def _say(imported: Imported) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = Parser(prog=_NAME, description="Make a scene of V-REP or CoppeliaSim one that flies here.")
+    parser = Parser(
+        prog=_NAME, description="Convert a scene or model of V-REP or CoppeliaSim into files for drone_sim."
+    )
     parser.add_argument("file", metavar="FILE.ttt", help="scene or model (.ttm), V-REP 3.0 to CoppeliaSim 4.9")
     parser.add_argument("out", metavar="OUT", nargs="?", help="folder to write (default: FILE without its ending)")
     parser.add_argument("--force", action="store_true", help="write into a folder that is not empty")

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import yaml
-
+from drone_sim.files import yaml_files
 from drone_sim.importing import object_collections
 from drone_sim.importing.entries import Entries
 from drone_sim.importing.folder import Folder, Report, label, number, pose_keys
@@ -313,5 +312,5 @@ class _Import:
             self._folder.write(LIST, "\n".join([said, "", *lines, ""]))
         head = f"# {said}{f' What is not as it was there: {LIST}.' if lines else ''}\n"
         head += "".join(f"# {note}.\n" for note in self._report.notes)
-        text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+        text = yaml_files.dump(content, default_flow_style=None, width=120)
         self._folder.write(SCENE, head + text)

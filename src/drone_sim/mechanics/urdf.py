@@ -12,14 +12,19 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
 from drone_sim.files import urdf_files
+from drone_sim.files.resources import is_file, read_bytes
 from drone_sim.mechanics.frames import IDENTITY, Matrix, from_rpy, multiply, position, to_rpy, transform
 from drone_sim.mechanics.inertia import Inertial, combined
+
+_MOST = 8  # URDFs that are kept in memory
 
 
 class UrdfError(ValueError):
@@ -52,13 +57,23 @@ class RigidBody:
 
 
 def read(path: str) -> RigidBody:
-    """Return the URDF at `path` as one rigid body; raises UrdfError."""
+    """Return the URDF at `path` as one rigid body, which is never changed; raises UrdfError."""
     try:
-        return _merge(urdf_files.read(path, kinds=("fixed", "continuous")))
+        content, folder = read_bytes(path, urdf_files.MAX_SIZE), Path(path).absolute().parent
+        if not all(map(is_file, _merged(content, folder)[1])):
+            _merged.cache_clear()  # read anew, it says what is missing
+        return _merged(content, folder)[0]
     except OSError as error:
         raise UrdfError(f"{path}: {error.strerror or error}") from None
     except ValueError as error:
         raise UrdfError(f"{path}: {' '.join(str(error).split())}") from None
+
+
+@lru_cache(maxsize=_MOST)  # flights of one plan have one vehicle
+def _merged(content: bytes, folder: Path) -> tuple[RigidBody, list[Path]]:
+    """Return the body of a URDF, and its meshes, which have to be there."""
+    robot = urdf_files.parsed(content, folder, ("fixed", "continuous"))
+    return _merge(robot), [Path(mesh.attrib["filename"]) for mesh in robot.iter("mesh")]
 
 
 def _merge(robot: Xml.Element) -> RigidBody:

@@ -268,7 +268,7 @@ def _summary(recording: Recording, took: float) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="fly", description="Fly the drone without ROS, as fast as the computer can.")
+    parser = Parser(prog="fly", description="Fly the drone without ROS, as fast as possible.")
     parser.add_argument("--script", metavar="FILE", help="child script (default: pilot, the built-in one)")
     parser.add_argument(
         "--scene", metavar="FILE", help="floor, objects and the drone's place, .yaml or .ttt, as scene:="
@@ -287,13 +287,15 @@ def _parser() -> argparse.ArgumentParser:
         action="extend",
         nargs="+",
         default=[],
-        help="another value for a key of config/drone.yaml, such as control.thrust_limits=null",
+        help="set a key of config/drone.yaml, such as control.thrust_limits=null",
     )
-    parser.add_argument("--vehicle", metavar="NAME", help="the one of several to record (default: the first)")
+    parser.add_argument("--vehicle", metavar="NAME", help="which of several vehicles to record (default: the first)")
     parser.add_argument("--csv", metavar="OUT.csv", help="write a row per step: state, command, propellers")
     parser.add_argument("--plot", metavar="OUT.png", help="draw path, velocities, height, attitude and propellers")
-    parser.add_argument("--video", metavar="OUT.mp4", help="film what a camera sees, with a head-up display")
-    parser.add_argument("--truth", metavar="DIR", help="what a camera saw: pictures, masks, depth, boxes (COCO)")
+    parser.add_argument("--video", metavar="OUT.mp4", help="film a camera's pictures, with a head-up display")
+    parser.add_argument(
+        "--truth", metavar="DIR", help="write a camera's pictures, masks, depth, boxes (COCO) to a folder"
+    )
     parser.add_argument(
         "--camera", metavar="NAME", help="the camera of --video and --truth, such as track (default: the first)"
     )

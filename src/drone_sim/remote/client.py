@@ -8,7 +8,7 @@ from typing import Any
 
 from drone_sim.message_text import near_names
 from drone_sim.remote.control import ClientControl, MovedObjects
-from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, name_of
+from drone_sim.remote.conversation import Call, ClientFunction, RequestRefused, Stepping, Task, Watched, name_of
 from drone_sim.remote.host import ClientHost
 from drone_sim.remote.messages import ClientRequest
 from drone_sim.run.player import Player
@@ -39,11 +39,14 @@ class Client:
         backend: Backend | None,
         everybody: Callable[[], Iterable[Stepping]],
         clock: Callable[[], float],
+        watched: Watched,
     ):
         """`player` plays the simulation, `moved` watches where objects are put, `backend` carries messages.
 
-        `everybody` returns the say that each client has in the steps; `clock` counts real seconds.
+        `everybody` returns the say that each client has in the steps; `clock` counts real seconds; `watched` is what is
+        called instead of a function, by its name.
         """
+        self._watched = watched
         self.stepping = Stepping()
         self.connections: set[int] = set()
         self.heard = clock()  # s, when it last said something
@@ -111,7 +114,7 @@ class Client:
             ros = make_sim_ros(self._bus, simulation.clock)
             self._modules = {"sim": self._sim(host), "simROS": ros, **make_plugins(host)}
             self._functions = {
-                f"{name}.{function}": one
+                f"{name}.{function}": self._watched(f"{name}.{function}", one)
                 for name, api in self._modules.items()
                 for function, one in contents(api)[1].items()
             }

@@ -14,6 +14,8 @@ import time
 from collections.abc import Callable, Generator
 from typing import Any, NamedTuple
 
+from drone_sim.scripting.api.calls import Function
+
 
 class Call(NamedTuple):
     """A function of the client's, by name."""
@@ -33,6 +35,12 @@ class RequestRefused(Exception):
 
 
 Task = Generator[Call | Until, Any, Any]
+Watched = Callable[[str, Function], Function]  # returns what is called instead of a function of a name
+
+
+def unwatched(_name: str, function: Function) -> Function:
+    """Return the function itself."""
+    return function
 
 
 class ClientFunction:

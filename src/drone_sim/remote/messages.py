@@ -95,7 +95,7 @@ def _fields(value: Any) -> Mapping[Any, Any] | None:
         return value
     if type(value) is list:
         return None
-    raise ValueError(f"a {type(value).__name__} is none of the values that scripts have")
+    raise ValueError(f"a {type(value).__name__} is not a value that scripts have")
 
 
 def _seconds(given: Any) -> float:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from drone_sim.remote.conversation import RemoteApi
+from drone_sim.remote.conversation import RemoteApi, Watched, unwatched
 from drone_sim.run.parameters import RemoteApiParameters
 from drone_sim.run.player import Player
 from drone_sim.scripting.api.backend import Backend
 
 
-def start_server(parameters: RemoteApiParameters, player: Player, backend: Backend | None = None) -> RemoteApi:
-    """Return who is outside. Raises OSError where nobody can be heard, in one line."""
+def start_server(
+    parameters: RemoteApiParameters, player: Player, backend: Backend | None = None, watched: Watched = unwatched
+) -> RemoteApi:
+    """Return who is outside; see RemoteApiServers. Raises OSError where nobody can be heard, in one line."""
     if not parameters.serve:
         return RemoteApi()
     try:
         from drone_sim.remote.servers import RemoteApiServers  # whoever serves nobody needs neither pyzmq nor cbor2
     except ImportError as error:
         raise OSError(f"the remote API needs pyzmq and cbor2 (pip install pyzmq cbor2): {error}") from None
-    return RemoteApiServers(parameters, player, backend)
+    return RemoteApiServers(parameters, player, backend, watched)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from drone_sim.remote import messages
 from drone_sim.remote.client import Client
 from drone_sim.remote.control import MovedObjects
-from drone_sim.remote.conversation import RemoteApi, Stepping, Until, returned
+from drone_sim.remote.conversation import RemoteApi, Stepping, Until, Watched, returned, unwatched
 from drone_sim.remote.endpoint import Endpoint, Incoming
 from drone_sim.remote.messages import ClientRequest
 from drone_sim.run.pacing import Throttle
@@ -40,13 +40,14 @@ class RemoteApiServer(RemoteApi):
         backend: Backend | None = None,
         clock: Callable[[], float] = time.monotonic,
         moved: MovedObjects | None = None,
+        watched: Watched = unwatched,
     ):
         """Listen for who drives a `player`, on an `address`, and a `port`, of which 0 is a free one.
 
-        `backend` carries clients' messages, `clock` counts real seconds, `moved` watches where objects are put. Raises
-        OSError.
+        `backend` carries clients' messages, `clock` counts real seconds, `moved` watches where objects are put;
+        `watched` is what clients call instead of a function. Raises OSError.
         """
-        self._player = player
+        self._player, self._watched = player, watched
         self._backend = backend
         self._moved = moved or MovedObjects(player.simulation)
         self._clients: dict[str, Client] = {}
@@ -158,7 +159,7 @@ class RemoteApiServer(RemoteApi):
         if client is None:
             if len(self._clients) >= _MOST_CLIENTS:
                 raise ValueError(f"{_MOST_CLIENTS} clients are there already")
-            client = Client(self._player, self._moved, self._backend, self.everybody, self._clock)
+            client = Client(self._player, self._moved, self._backend, self.everybody, self._clock, self._watched)
             client.patience = request.patience
             self._clients[name] = client
         client.connections.add(incoming.connection)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drone_sim.remote.control import MovedObjects
-from drone_sim.remote.conversation import RemoteApi
+from drone_sim.remote.conversation import RemoteApi, Watched, unwatched
 from drone_sim.remote.legacy.server import LegacyServer
 from drone_sim.remote.server import RemoteApiServer
 from drone_sim.run.parameters import RemoteApiParameters
@@ -14,15 +14,23 @@ from drone_sim.scripting.api.backend import Backend
 class RemoteApiServers(RemoteApi):
     """Serves both. One thread owns it, that of the simulation; `wake` alone may be called from any."""
 
-    def __init__(self, parameters: RemoteApiParameters, player: Player, backend: Backend | None = None):
+    def __init__(
+        self,
+        parameters: RemoteApiParameters,
+        player: Player,
+        backend: Backend | None = None,
+        watched: Watched = unwatched,
+    ):
         """Listen for who drives a `player`; `backend` carries the messages of the clients that have some.
 
-        Raises OSError, in one line.
+        `watched` is what clients call instead of a function. Raises OSError, in one line.
         """
-        moved = MovedObjects(player.simulation)
-        self.zeromq = RemoteApiServer(player, parameters.address, parameters.port, backend, moved=moved)
+        moved, address = MovedObjects(player.simulation), parameters.address
+        self.zeromq = RemoteApiServer(player, address, parameters.port, backend, moved=moved, watched=watched)
         try:
-            self.legacy = LegacyServer(player, parameters.address, parameters.legacy_port, moved, self.zeromq.everybody)
+            self.legacy = LegacyServer(
+                player, address, parameters.legacy_port, moved, self.zeromq.everybody, watched=watched
+            )
         except OSError:
             self.zeromq.close()
             raise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -65,7 +65,7 @@ class Batch:
         """Draw in a role that `DrawBatches.link` has linked."""
         if role.kind == "surface" and self.surface.texture is not None:
             self.surface.texture.use(0)
-        self.arrays[role].render(instances=len(self.members))
+        self.arrays[role].render(instances=len(self.members) * role.tiles)
 
 
 class DrawBatches:
@@ -131,7 +131,7 @@ class DrawBatches:
         if role not in self._linked:
             self._linked.add(role)
             for batch in self.all:
-                batch.arrays[role] = self._array(batch, programs[batch.look])
+                batch.arrays[role] = self._array(batch, programs[batch.look], role.tiles)
 
     def identify(self, instances: np.ndarray) -> None:
         """Write whose each visual is, (N,), for outputs that show it."""
@@ -150,12 +150,12 @@ class DrawBatches:
         floor = self.floors[0]
         return float(poses[floor.members[0], 2, 3] + floor.surface.top * self._scales[floor.first, 0, 2])
 
-    def glass_from_far(self, axis: np.ndarray, poses: np.ndarray) -> list[Batch]:
-        """The transparent batches, the farthest along `axis` (3,) first."""
+    def glass_from_far(self, away: Callable[[np.ndarray], float], poses: np.ndarray) -> list[Batch]:
+        """The transparent batches, the farthest first; `away` says how far a point (3,) in the world is."""
 
         def depth(batch: Batch) -> float:
             pose = poses[batch.members[0]]
-            return float(axis @ (pose[:3, :3] @ (batch.surface.centre * self._scales[batch.first, 0]) + pose[:3, 3]))
+            return away(pose[:3, :3] @ (batch.surface.centre * self._scales[batch.first, 0]) + pose[:3, 3])
 
         return sorted(self.glass, key=depth, reverse=True) if len(self.glass) > 1 else self.glass
 
@@ -241,12 +241,13 @@ class DrawBatches:
         red, green, blue, alpha = np.multiply(self.visuals[index].rgba, batch.surface.rgba)
         return (red, green, blue, SHADE if batch.floor else alpha if batch.transparent else 1.0)
 
-    def _array(self, batch: Batch, program: Any) -> moderngl.VertexArray:
+    def _array(self, batch: Batch, program: Any, times: int) -> moderngl.VertexArray:
+        """Let a program draw a batch, every instance so many times."""
         array = self._context.vertex_array(program, [], index_buffer=batch.surface.indices, index_element_size=4)
         layouts = (MOVING_LAYOUT, FIXED_LAYOUT, IDENTITY_LAYOUT, BEFORE_LAYOUT)
         for layout, buffer, first, divisor in (
             (VERTEX_LAYOUT, batch.surface.vertices, 0, 0),
-            *((layout, buffer, batch.first, 1) for layout, buffer in zip(layouts, self._buffers)),
+            *((layout, buffer, batch.first, times) for layout, buffer in zip(layouts, self._buffers)),
         ):
             stride = sum(size for _, _, size in layout)
             offset = first * stride

@@ -102,13 +102,9 @@ class Intrinsics:
         Depth near..far maps to -1..1 as in glFrustum. OpenGL counts rows from the bottom; here y down in
         the optical frame is y up in the clip space, so that a plain glReadPixels yields the top row first.
         """
-        near, far = self.near, self.far
-        clip = np.zeros((4, 4))
+        clip = _perspective(self.near, self.far)
         clip[0, 0] = 2.0 * self.fx / self.width
         clip[1, 1] = 2.0 * self.fy / self.height
-        clip[2, 2] = (far + near) / (far - near)
-        clip[2, 3] = -2.0 * far * near / (far - near)
-        clip[3, 2] = 1.0
         return clip
 
 
@@ -152,3 +148,44 @@ class Orthographic:
 
 
 Lens = Intrinsics | Orthographic
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles:
+    """Pinholes that look from one place, each into its rectangle of one picture.
+
+    width, height: of the picture, px; near, far: metres along each pinhole's own axis. projections: OpenGL clip
+    matrices of the picture, from the optical frame of the camera, (n, 4, 4). bounds: the rectangles in that picture, of
+    which x and y go from -1 to 1: the lowest x and y, the highest x and y, (n, 4).
+    """
+
+    width: int
+    height: int
+    near: float
+    far: float
+    projections: np.ndarray
+    bounds: np.ndarray
+
+    @staticmethod
+    def of_one(focal: float, centre: np.ndarray, size: tuple[int, int], within: tuple[float, float]) -> np.ndarray:
+        """Return the clip matrix (4, 4) of a pinhole in its own optical frame.
+
+        focal: px; centre: the pixel that its axis meets; size: of the picture, px; within: near and far.
+        """
+        clip = _perspective(*within)
+        clip[:2, :2] = np.diag(2.0 * focal / np.array(size))
+        clip[:2, 2] = 2.0 * (centre + 0.5) / size - 1.0
+        return clip
+
+    def projection(self) -> np.ndarray:
+        """OpenGL clip matrices (n, 4, 4) of the optical frame."""
+        return self.projections
+
+
+def _perspective(near: float, far: float) -> np.ndarray:
+    """What a clip matrix does with the optical z, as in glFrustum; nothing yet with x and y."""
+    clip = np.zeros((4, 4))
+    clip[2, 2] = (far + near) / (far - near)
+    clip[2, 3] = -2.0 * far * near / (far - near)
+    clip[3, 2] = 1.0
+    return clip

@@ -1,115 +1,111 @@
-"""What a lens sees, gathered from pictures of pinholes: one, or some faces of a cube around the camera."""
+"""What a lens sees, gathered from pictures of pinholes: one, or some tiles, each of which looks its own way.
+
+A tile is a rectangle of the lens' picture. Nearly as many pixels are drawn for it as it has: in the middle of most
+lenses they are a little larger than its own, so that it is a little softer there, and a little smaller at the border.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from drone_sim.render.distortion import Distorted
-from drone_sim.render.intrinsics import Intrinsics
+from drone_sim.render.intrinsics import Tiles
 from drone_sim.render.outputs import COLOR
-from drone_sim.render.target import Box, array
+from drone_sim.render.target import without_alpha
 
-_ONE = math.cos(math.radians(65.0))  # of the angle from the axis as far as which one pinhole sees well
-_MARGIN = 2  # pixels around a picture, from which its border is interpolated
+_WIDEST = math.radians(75.0)  # of a tile
+_SHARE = 0.85  # of the pixels of a part, so many has its tile
+_MARGIN = 2  # pixels around a tile, from which its border is interpolated
 _ALIKE = 0.03  # of a depth: what differs by more is another thing
-_FACES = np.array(  # the axes of optical frames in the camera's, by columns: ahead, right, left, down, up
-    [
-        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-        [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
-        [[0, 0, -1], [0, 1, 0], [1, 0, 0]],
-        [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
-        [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
-    ],
-    dtype=np.float64,
-)
+_NOWHERE = -16.0  # px, where there is nothing to interpolate
 
 
-class PinholeView(NamedTuple):
-    """A picture to be taken, and the axes of its optical frame in the camera's, (4, 4)."""
-
-    intrinsics: Intrinsics
-    turn: np.ndarray
-    box: Box  # the part of it that is used
+Colors = Callable[[np.ndarray], np.ndarray]  # a picture, of what is drawn of it, as `Target.read` says
+Draw = Callable[[tuple[str, ...], Colors], Mapping[str, np.ndarray]]
 
 
-Draw = Callable[[PinholeView, tuple[str, ...]], dict[str, np.ndarray]]
+class _Tile(NamedTuple):
+    """A pinhole that draws a part of what the lens sees."""
+
+    pixels: np.ndarray  # the lens' own, by their numbers
+    axes: np.ndarray  # of its optical frame, in the camera's, by columns, (3, 3)
+    slopes: np.ndarray  # x / z and y / z of its pixels' rays in that frame, (n, 2)
+    cosines: np.ndarray  # z of these rays, (n,)
+    focal: float  # px
+    size: tuple[int, int]  # of what is drawn, px
+    centre: np.ndarray  # where the axis is in it, px
+
+    @classmethod
+    def of(cls, pixels: np.ndarray, rays: np.ndarray, across: np.ndarray, most: float) -> _Tile:
+        """Look where `rays` (n, 3) lead, with x about along `across` (3,), and a focal length of `most` px at most."""
+        axis = rays.mean(axis=0)
+        axis /= np.linalg.norm(axis)
+        down = np.cross(axis, across)
+        down /= np.linalg.norm(down)
+        axes = np.column_stack([np.cross(down, axis), down, axis])
+        inside = rays @ axes
+        slopes = inside[:, :2] / inside[:, 2:]
+        low, high = slopes.min(axis=0), slopes.max(axis=0)
+        focal = min(most, math.sqrt(_SHARE * len(pixels) / max(float(np.prod(high - low)), 1e-12)))
+        wide, tall = (math.ceil(one) + 2 * _MARGIN + 1 for one in focal * (high - low))
+        return cls(pixels, axes, slopes, inside[:, 2], focal, (wide, tall), _MARGIN - focal * low)
 
 
 class LensView:
-    """Which pinholes' pictures a lens needs, and which of their pixels become its own.
+    """Which tiles a lens needs, and which of their pixels become its own.
 
-    What is used of these pictures lies one below the other in one picture, a *stack*.
+    The tiles lie one below the other in one picture, a *stack*.
     """
 
     def __init__(self, lens: Distorted):
         """Divide what `lens` sees."""
         self._sees = np.isfinite(lens.rays[..., 0])
-        rays = np.where(self._sees[..., None], lens.rays, (0.0, 0.0, 1.0))
-        faces = _FACES[:1] if rays[..., 2].min() > _ONE else _FACES
-        face = np.argmax(rays @ faces[:, :, 2].T, axis=-1)
-        used = np.flatnonzero(np.bincount(face.ravel()))
-        self._turns = faces[face]
-        inside = np.einsum("...ij,...i->...j", self._turns, rays)
-        across, down = inside[..., 0] / inside[..., 2], inside[..., 1] / inside[..., 2]
-        wide, high = (2 * math.ceil(lens.fx * np.abs(one).max()) + 2 * _MARGIN + 1 for one in (across, down))
-        self._pinhole = Intrinsics(wide, high, 2 * math.atan(wide / 2 / lens.fx), lens.near, lens.far)
-        number = np.searchsorted(used, face)
-        columns, rows = lens.fx * across + self._pinhole.cx, lens.fx * down + self._pinhole.cy
-        boxes = [_around(columns[number == one], rows[number == one]) for one in range(len(used))]
-        self.views = [PinholeView(self._pinhole, _homogeneous(faces[one]), box) for one, box in zip(used, boxes)]
-        self._starts = np.cumsum([0, *(box.height for box in boxes)])
-        lefts, tops = (np.array([one[axis] for one in boxes]) for axis in (0, 1))
-        columns, rows = columns - lefts[number], rows + (self._starts[:-1] - tops)[number]  # in the stack
-        self._exact = columns.astype(np.float32), rows.astype(np.float32)
-        whole, parts = cv2.convertMaps(*self._exact, cv2.CV_16SC2)  # sooner done
-        self._smooth = whole, parts
-        self._place = np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
-        # A face's depth is along its own axis. With a fisheye lens depths are counted along the ray.
-        self._deeper = (1.0 if lens.is_fisheye else rays[..., 2]) / inside[..., 2]
-        nearest = np.stack([(np.rint(columns) - columns) / lens.fx, (np.rint(rows) - rows) / lens.fx], axis=-1)
-        self._ray = rays / inside[..., 2:]  # where face depth is 1: of the pixel, and of its nearest one
-        self._nearest_ray = self._ray + np.einsum("...ij,...j->...i", self._turns[..., :2], nearest)
+        found = _tiles(lens, self._sees)
+        starts = np.cumsum([0, *(one.size[1] for one in found)])
+        self.tiles = _stacked(lens, found, starts)
+        places = np.full((*self._sees.shape, 2), _NOWHERE)
+        rays, self._deeper = np.zeros((*self._sees.shape, 3)), np.zeros(self._sees.shape)
+        nearest = np.zeros_like(rays)
+        for one, start in zip(found, starts):
+            there = one.focal * one.slopes + one.centre
+            beside = (np.rint(there) - there) / one.focal  # its nearest pixel, where depth is 1
+            ray = np.column_stack([one.slopes, np.ones(len(there))]) @ one.axes.T
+            places.reshape(-1, 2)[one.pixels] = there + np.array((0, start))
+            rays.reshape(-1, 3)[one.pixels] = ray
+            nearest.reshape(-1, 3)[one.pixels] = ray + beside @ one.axes[:, :2].T
+            # A tile's depth is along its own axis. With a fisheye lens depths are counted along the ray.
+            along = 1.0 if lens.is_fisheye else lens.rays.reshape(-1, 3)[one.pixels, 2]
+            self._deeper.reshape(-1)[one.pixels] = along / one.cosines
+        self._ray, self._nearest_ray = rays, nearest
+        self._exact = places[..., 0].astype(np.float32), places[..., 1].astype(np.float32)
+        self._smooth = cv2.convertMaps(*self._exact, cv2.CV_16SC2)  # sooner done
+        self._rgba = np.empty((*self._sees.shape, 4), np.uint8)
+        self._place = tuple(np.rint(np.maximum(places[..., axis], 0)).astype(np.intp) for axis in (1, 0))
 
     def seen(
-        self, names: Sequence[str], draw: Draw, turn: np.ndarray | None, into: np.ndarray | None
+        self, names: Sequence[str], draw: Draw, turn: np.ndarray | None, out: np.ndarray | None
     ) -> dict[str, np.ndarray]:
         """Return the picture and outputs of the renderer as the lens sees them, by name.
 
-        `draw` draws some of the box of a pinhole. `turn` is as for `gather`; the picture, black where the lens sees
-        nothing, is written into `into`, if it is there.
+        `draw` draws some of the tiles, the colours as it is told. `turn` is as for `gather`; the picture, black where
+        the lens sees nothing, is written into `out`, if it is there.
         """
-        drawn = tuple(names) if "before" not in names or "depth" in names else (*names, "depth")
-        parts = [draw(one, drawn) for one in self.views]
-        stacks = {name: self._stacked([part[name] for part in parts]) for name in drawn}
-        color = stacks.pop(COLOR, None)
-        found = self.gather(stacks, turn)
-        if color is not None:
-            found[COLOR] = self._colors(color, into)
+
+        def colors(stack: np.ndarray) -> np.ndarray:
+            return without_alpha(cv2.remap(stack, *self._smooth, cv2.INTER_LINEAR, dst=self._rgba), out)
+
+        drawn = dict(draw(tuple(names) if "before" not in names or "depth" in names else (*names, "depth"), colors))
+        pictures = {name: drawn.pop(name) for name in (COLOR,) if name in drawn}
+        found = {**self.gather(drawn, turn), **pictures}
         return {name: found[name] for name in names}
 
-    def _stacked(self, parts: Sequence[np.ndarray]) -> np.ndarray:
-        if len(parts) == 1:
-            return parts[0]
-        wide = max(part.shape[1] for part in parts)
-        stack = np.ones((self._starts[-1], wide, *parts[0].shape[2:]), parts[0].dtype)
-        for start, part in zip(self._starts, parts):
-            stack[start : start + len(part), : part.shape[1]] = part
-        return stack
-
-    def _colors(self, stack: np.ndarray, into: np.ndarray | None) -> np.ndarray:
-        picture = array(into, (*self._sees.shape, 3), np.uint8)
-        cv2.remap(stack, self._smooth[0], self._smooth[1], cv2.INTER_LINEAR, dst=picture)
-        if not self._sees.all():
-            picture[~self._sees] = 0
-        return picture
-
-    def gather(self, drawn: dict[str, np.ndarray], turn: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        """Return outputs of the renderer as the lens sees them, from stacks of its pinholes' pictures.
+    def gather(self, drawn: Mapping[str, np.ndarray], turn: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Return outputs of the renderer as the lens sees them, from stacks of them.
 
         With "before" there must be "depth", too, and how the camera has turned since: the optical frame of then from
         that of now, (3, 3).
@@ -122,26 +118,51 @@ class LensView:
         if "before" in drawn and turn is not None:  # what is beside the nearest pixel has come the same way
             beside = self._ray * depth[..., None] - self._nearest_ray * nearest[..., None]
             gathered["before"] = (gathered["before"] + beside @ turn.T).astype(np.float32)
-        if "normal" in drawn:
-            gathered["normal"] = np.einsum("...ij,...j->...i", self._turns, gathered["normal"]).astype(np.float32)
         for name, picture in gathered.items():
             picture[~self._sees] = np.nan if name in ("depth", "before") else 0
         return gathered
 
     def _between(self, stack: np.ndarray, nearest: np.ndarray) -> np.ndarray:
-        """Return the faces' depths at the pixels: between those of one thing the inverse is even on a plane."""
+        """Return the tiles' depths at the pixels: between those of one thing the inverse is even on a plane."""
         smooth = 1.0 / cv2.remap(1.0 / stack, self._exact[0], self._exact[1], cv2.INTER_LINEAR)
         return np.where(np.abs(smooth - nearest) < _ALIKE * nearest, smooth, nearest)
 
 
-def _around(columns: np.ndarray, rows: np.ndarray) -> Box:
-    """Return the box around places in a picture, with what is interpolated there."""
-    (left, right), (top, bottom) = ((int(one.min()) - _MARGIN, int(one.max()) + _MARGIN) for one in (columns, rows))
-    left, top = max(left, 0), max(top, 0)
-    return Box(left, top, right + 1 - left, bottom + 1 - top)
+def _tiles(lens: Distorted, sees: np.ndarray) -> list[_Tile]:
+    """Divide the picture into rectangles of about the same size, none of which is too wide for a pinhole."""
+    high, wide = sees.shape
+    middle = lens.rays[high // 2], lens.rays[:, wide // 2]
+    many_across, many_down = (max(1, math.ceil(_angle(one) / _WIDEST)) for one in middle)
+    found = []
+    for rows in np.array_split(np.arange(high), many_down):
+        for columns in np.array_split(np.arange(wide), many_across):
+            seen = sees[np.ix_(rows, columns)]
+            if not seen.any():
+                continue
+            rays = lens.rays[np.ix_(rows, columns)]
+            half = max(1, len(columns) // 2)
+            across = np.nansum(rays[:, half:], axis=(0, 1)) / max(1, seen[:, half:].sum())
+            across -= np.nansum(rays[:, :half], axis=(0, 1)) / max(1, seen[:, :half].sum())
+            pixels = (rows[:, None] * wide + columns)[seen]
+            found.append(_Tile.of(pixels, rays[seen], across, lens.fx))
+    return found
 
 
-def _homogeneous(turn: np.ndarray) -> np.ndarray:
-    whole = np.eye(4)
-    whole[:3, :3] = turn
-    return whole
+def _angle(rays: np.ndarray) -> float:
+    """Return the angle from the first of some rays to the last, from each to the next, rad."""
+    steps = np.linalg.norm(np.diff(rays[np.isfinite(rays[:, 0])], axis=0), axis=1)
+    return float(2 * np.arcsin(steps / 2).sum())
+
+
+def _stacked(lens: Distorted, found: list[_Tile], starts: np.ndarray) -> Tiles:
+    """Return how the tiles are drawn, each at its place."""
+    wide, high = max(one.size[0] for one in found), int(starts[-1])
+    projections, bounds = [], []
+    for one, start in zip(found, starts):
+        project = Tiles.of_one(one.focal, one.centre + np.array((0, start)), (wide, high), (lens.near, lens.far))
+        axes = np.eye(4)
+        axes[:3, :3] = one.axes.T
+        projections.append(project @ axes)
+        edges = np.array([[0, start], [one.size[0], start + one.size[1]]]) / (wide, high)
+        bounds.append((2 * edges - 1).ravel())
+    return Tiles(wide, high, lens.near, lens.far, np.array(projections), np.array(bounds))

@@ -1,17 +1,14 @@
 """What a picture is made of besides its colours: for each pixel a depth, an instance, a normal, a place before.
 
 An output is a line of `OUTPUTS`. Any of them are drawn in one pass, with the colours or without, into an attachment
-each: how many are asked for at once hardly matters. Attachments hold whole numbers, the bits of floats, since these are
-not blended where there is glass.
+each: how many are asked for at once hardly matters.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
-import cv2
 import numpy as np
 
 COLOR = "color"  # the picture itself, which may be asked for like an output
@@ -21,9 +18,9 @@ COLOR = "color"  # the picture itself, which may be asked for like an output
 class Output:
     """A quantity for each pixel.
 
-    components, dtype: of a pixel; all are 0 where nothing is. vertex, fragment: GLSL that computes the `value` that the
-    pixel gets, from the vertices' and instances' attributes in `inputs`, by what `declared` hands on; `point` stands
-    for the vertex's place in the world relative to the camera.
+    components, dtype: of a pixel; all are `nothing` where nothing is. vertex, fragment: GLSL that computes the `value`
+    that the pixel gets, from the vertices' and instances' attributes in `inputs`, by what `declared` hands on; `point`
+    stands for the vertex's place in the world relative to the camera.
     """
 
     components: int
@@ -33,40 +30,36 @@ class Output:
     vertex: str = ""
     uniforms: str = ""
     inputs: str = ""
+    nothing: float = 0.0
 
     @property
     def is_whole(self) -> bool:
         """Whether it counts something."""
         return bool(np.issubdtype(self.dtype, np.integer))
 
+    def held(self, most: int) -> type:
+        """The dtype that an attachment has, if numbers are at most `most`: the CPU draws bytes the soonest."""
+        return np.uint8 if self.is_whole and most <= np.iinfo(np.uint8).max else self.dtype
+
     @property
     def kind(self) -> str:
         """The GLSL type of `value`."""
-        return self.held_as if self.is_whole else _glsl("float", "vec", self.components)
-
-    @property
-    def held_as(self) -> str:
-        """The GLSL type of what the attachment holds."""
-        return _glsl("uint", "uvec", self.components)
-
-    @property
-    def bits(self) -> str:
-        """What the attachment holds of `value`."""
-        return "value" if self.is_whole else "floatBitsToUint(value)"
-
-
-def _glsl(one: str, several: str, components: int) -> str:
-    return one if components == 1 else f"{several}{components}"
+        one, several = ("uint", "uvec") if self.is_whole else ("float", "vec")
+        return one if self.components == 1 else f"{several}{self.components}"
 
 
 OUTPUTS: Mapping[str, Output] = {
     # The clip w is the optical z in perspective. Where rays are parallel, depth is `parallel.x`, the near plane's, and
-    # the buffer's part of `parallel.y`, the way to the far one.
+    # the buffer's part of `parallel.y`, the way to the far one. A choice for each pixel would take twice the time.
     "depth": Output(
         1,
         np.float32,
-        "value = parallel.y > 0.0 ? parallel.x + parallel.y * gl_FragCoord.z : 1.0 / gl_FragCoord.w;",
+        (
+            "\n#ifdef PARALLEL\n value = parallel.x + parallel.y * gl_FragCoord.z;"
+            "\n#else\n value = 1.0 / gl_FragCoord.w;\n#endif\n"
+        ),
         uniforms="uniform vec2 parallel;",
+        nothing=np.nan,
     ),
     "instance": Output(
         1,
@@ -102,6 +95,7 @@ OUTPUTS: Mapping[str, Output] = {
         ),
         uniforms="uniform mat4 optical_before_from_world;",
         inputs="in vec4 before0; in vec4 before1; in vec4 before2;",
+        nothing=np.nan,
     ),
 }
 
@@ -119,10 +113,8 @@ def with_outputs(vertex: str, fragment: str, names: Sequence[str], first: int) -
     uniforms = [one.uniforms for one in chosen]
     inputs = [one.inputs for one in chosen if one.inputs not in vertex]
     moved = ["vec3 point = world_point();", *(f"{{ {one.vertex} }}" for one in chosen)]
-    outs = [f"layout(location = {place}) out {one.held_as} out{place};" for place, one in enumerate(chosen, first)]
-    drawn = [
-        f"{{ {one.kind} value; {one.fragment} out{place} = {one.bits}; }}" for place, one in enumerate(chosen, first)
-    ]
+    outs = [f"layout(location = {place}) out {one.kind} out{place};" for place, one in enumerate(chosen, first)]
+    drawn = [f"{{ {one.kind} value; {one.fragment} out{place} = value; }}" for place, one in enumerate(chosen, first)]
     return (
         _extended(vertex, [*inputs, *uniforms, *passed("out")], moved),
         _extended(fragment, [*uniforms, *passed("in"), *outs], drawn),
@@ -133,17 +125,3 @@ def _extended(source: str, declared: Sequence[str], statements: Sequence[str]) -
     """Return a shader that declares more before its main, and does more at its end."""
     before, main, body = source.partition("void main() {")
     return "\n".join([before, *declared, main + body.rstrip().removesuffix("}"), *statements, "}"])
-
-
-def finished(name: str, drawn: np.ndarray) -> np.ndarray:
-    """Return an output as `Renderer.render_outputs` hands it out."""
-    if name == "depth":  # in half the time of an assignment by a mask
-        cv2.copyTo(_nothing(drawn.shape), (drawn == 0.0).view(np.uint8), drawn)
-    if name == "before":
-        drawn[drawn[..., 3] == 0.0] = np.nan
-    return drawn[..., :3] if drawn.ndim == 3 else drawn
-
-
-@lru_cache(maxsize=8)
-def _nothing(shape: tuple[int, ...]) -> np.ndarray:
-    return np.full(shape, np.nan, dtype=np.float32)

@@ -23,13 +23,18 @@ _SOURCES = {
 
 
 class Role(NamedTuple):
-    """What something is drawn as: a surface with its colours, bare, alone, a shadow; and with which outputs."""
+    """What something is drawn as: a surface with its colours, bare, alone, a shadow, the sky; with what outputs.
+
+    tiles: how often, each time into another part of the picture. parallel: whether the rays are, for the outputs.
+    """
 
     kind: str
     outputs: tuple[str, ...] = ()
+    tiles: int = 1
+    parallel: bool = False
 
 
-SURFACE, SHADOW, ALONE, SKY = Role("surface"), Role("shadow"), Role("alone"), Role("sky")
+ALONE = Role("alone")
 
 
 class Programs:
@@ -59,6 +64,10 @@ class Programs:
         vertex, fragment = _SOURCES[role.kind]
         if role.outputs:
             vertex, fragment = with_outputs(vertex, fragment, role.outputs, first=int(role.kind == "surface"))
+        if role.tiles > 1:
+            defined = *defined, f"TILES {role.tiles}"
+        if role.parallel:
+            defined = *defined, "PARALLEL"
         start = "\n".join(["#version 330 core", *(f"#define {name}" for name in defined)])
         vertex, fragment = (one.replace("#version 330 core", start).lstrip() for one in (vertex, fragment))
         program = self._gl.program(vertex_shader=vertex, fragment_shader=fragment)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import moderngl
@@ -18,16 +19,17 @@ import numpy as np
 from drone_sim.render import context, counting
 from drone_sim.render.batches import SHADE, Batch, DrawBatches
 from drone_sim.render.distortion import Distorted
-from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic
-from drone_sim.render.lens_view import LensView, PinholeView
-from drone_sim.render.outputs import COLOR
-from drone_sim.render.programs import ALONE, SHADOW, SKY, SURFACE, Programs, Role
+from drone_sim.render.intrinsics import Intrinsics, Lens, Orthographic, Tiles
+from drone_sim.render.lens_view import Colors, LensView
+from drone_sim.render.outputs import COLOR, OUTPUTS
+from drone_sim.render.programs import ALONE, Programs, Role
 from drone_sim.render.sky import dome
-from drone_sim.render.target import Box, Target
+from drone_sim.render.target import Box, Target, without_alpha
 from drone_sim.shapes.visual import Visual
 
 _MOST_LENSES = 16
 _ROWS = 16  # the fewest that are drawn of a picture
+_CLIP_DISTANCES = range(0x3000, 0x3004)  # OpenGL's numbers of those that keep tiles apart
 
 
 class Moment(NamedTuple):
@@ -40,12 +42,32 @@ class Moment(NamedTuple):
 class _View(NamedTuple):
     """What is to be drawn, as `Renderer.render_outputs` is asked for it."""
 
-    intrinsics: Lens
+    intrinsics: Lens | Tiles
     camera_pose: np.ndarray
     poses: np.ndarray
     instances: np.ndarray | None = None
     before: Moment | None = None
     box: Box | None = None  # which alone is drawn of the picture
+
+    @property
+    def tiles(self) -> int:
+        """How often everything is drawn, each time clipped to another part of the picture."""
+        return len(self.intrinsics.bounds) if isinstance(self.intrinsics, Tiles) else 1
+
+    @property
+    def most(self) -> int:
+        """The largest number of an instance."""
+        return 0 if self.instances is None else int(np.max(self.instances, initial=0))
+
+    def role(self, kind: str, outputs: tuple[str, ...] = ()) -> Role:
+        """What something is drawn as."""
+        return Role(kind, outputs, self.tiles, bool(outputs) and isinstance(self.intrinsics, Orthographic))
+
+    def away(self, point: np.ndarray) -> float:
+        """Tell how far a point in the world is, for the order in which transparent things are drawn, m."""
+        if self.tiles > 1:
+            return float(np.linalg.norm(point - self.camera_pose[:3, 3]))
+        return float(self.camera_pose[:3, 2] @ point)
 
 
 class Renderer:
@@ -69,8 +91,8 @@ class Renderer:
             self.description: str = gl.info["GL_RENDERER"]
             self._programs = Programs(gl)
             self._batches = DrawBatches(gl, context.is_software(gl))
-            vertices = gl.buffer(dome())
-            self._sky = gl.vertex_array(self._programs.one(SKY), [(vertices, "3f 3f", "direction", "tint")])
+            self._dome = gl.buffer(dome())
+            self._skies: dict[Role, moderngl.VertexArray] = {}
             self._targets: dict[tuple[Any, ...], Target] = {}
             self._lens_views: dict[Distorted, LensView] = {}
 
@@ -105,14 +127,14 @@ class Renderer:
         high = min(max(_ROWS, 1 << (end - first - 1).bit_length()), intrinsics.height)  # so that there are few targets
         box = Box(0, first, intrinsics.width, high)
         view = _View(intrinsics, camera_pose, poses, box=box)
-        return self._draw((COLOR,), view, None)[COLOR][: end - first]
+        return self._draw((COLOR,), view)[COLOR][: end - first]
 
     def render_depth(self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray) -> np.ndarray:
         """Depth (height, width) float32, metres along the optical z; NaN where nothing is within `far`.
 
         Transparent things count as solid. Arguments as for `render`.
         """
-        return self._draw(("depth",), _View(intrinsics, camera_pose, poses), None)["depth"]
+        return self._draw(("depth",), _View(intrinsics, camera_pose, poses))["depth"]
 
     def render_outputs(
         self,
@@ -132,7 +154,7 @@ class Renderer:
         where nothing is. "before": (height, width, 3) float32, where what is seen was at the moment `before`, in the
         optical frame of then, m; NaN where nothing is. "color" is the picture that `render` returns.
         """
-        return self._draw(tuple(names), _View(intrinsics, camera_pose, poses, instances, before), None)
+        return self._draw(tuple(names), _View(intrinsics, camera_pose, poses, instances, before))
 
     def count_alone(
         self, intrinsics: Lens, camera_pose: np.ndarray, poses: np.ndarray, instances: np.ndarray
@@ -177,35 +199,42 @@ class Renderer:
 
     # ---- drawing
 
-    def _draw(self, names: tuple[str, ...], view: _View, into: np.ndarray | None) -> dict[str, np.ndarray]:
+    def _draw(self, names: tuple[str, ...], view: _View, out: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """Draw colours, outputs or both; the colours into an array, if it is given."""
-        if isinstance(view.intrinsics, Distorted):
-            return self._draw_through(view.intrinsics, names, view, into)
         view = view._replace(poses=np.asarray(view.poses, dtype=np.float64))
+        if not isinstance(view.intrinsics, Distorted):
+            return self._draw_straight(names, view, partial(without_alpha, out=out))
+        through = self._lens_view(view.intrinsics)
+        tiled = view._replace(intrinsics=through.tiles)
+        turn = None if view.before is None else view.before.camera_pose[:3, :3].T @ view.camera_pose[:3, :3]
+        return through.seen(names, lambda drawn, colors: self._draw_straight(drawn, tiled, colors), turn, out)
+
+    def _draw_straight(self, names: tuple[str, ...], view: _View, colors: Colors) -> dict[str, np.ndarray]:
+        """Draw by pinholes, or by parallel rays."""
         outputs = tuple(name for name in names if name != COLOR)
         if len(outputs) == len(names):
             return self._draw_outputs(outputs, view)
         if outputs and self._samples:  # of several samples there is no one depth
-            return {**self._draw_picture((), view, into), **self._draw_outputs(outputs, view)}
-        return self._draw_picture(outputs, view, into)
+            return {**self._draw_picture((), view, colors), **self._draw_outputs(outputs, view)}
+        return self._draw_picture(outputs, view, colors)
 
     def _draw_outputs(self, names: tuple[str, ...], view: _View) -> dict[str, Any]:
-        role = Role("bare", names)
+        role = view.role("bare", names)
         with self._current() as gl:
             self._place(names, view)
             self._aim(role, view)
             target = self._cleared(names, view, 0.0)
             gl.enable_only(gl.DEPTH_TEST)
             self._draw_batches(gl, self._batches.all, role)
-            return target.read(None)
+            return target.read()
 
-    def _draw_picture(self, outputs: tuple[str, ...], view: _View, into: np.ndarray | None) -> dict[str, Any]:
+    def _draw_picture(self, outputs: tuple[str, ...], view: _View, colors: Colors) -> dict[str, Any]:
         """Draw solid things, floor, sky, shadows, what can be seen through; of the ground there are only outputs."""
-        batches, role = self._batches, SURFACE._replace(outputs=outputs)
+        batches, role, shadow = self._batches, view.role("surface", outputs), view.role("shadow")
         with self._current() as gl:
             self._place(outputs, view)
             self._aim(role, view)
-            self._aim(SHADOW, view)
+            self._aim(shadow, view)
             target = self._cleared((COLOR, *outputs), view, SHADE if batches.ground else 1.0)
             gl.enable_only(gl.DEPTH_TEST)
             self._draw_batches(gl, batches.solids, role)
@@ -213,26 +242,31 @@ class Renderer:
             if outputs:
                 target.use(outputs=False)
             gl.disable(gl.CULL_FACE)
-            if isinstance(view.intrinsics, Intrinsics):
-                self._programs.one(SKY)["clip_from_world"].write(_clip_from_world(view))
-                self._sky.render()
+            if not isinstance(view.intrinsics, Orthographic):
+                self._draw_sky(gl, view)
             height = batches.floor_height(view.poses)
             if height is not None:
-                self._programs.one(SHADOW)["floor_height"] = height - view.camera_pose[2, 3]
+                self._programs.one(shadow)["floor_height"] = height - view.camera_pose[2, 3]
                 gl.enable_only(gl.BLEND)
                 gl.blend_func = gl.ZERO, gl.DST_ALPHA, gl.ONE, gl.ZERO
-                self._draw_batches(gl, batches.solids, SHADOW)
+                self._draw_batches(gl, batches.solids, shadow)
             if batches.glass:
-                if outputs:
-                    target.use()
                 gl.enable_only(gl.DEPTH_TEST | gl.BLEND)
                 gl.blend_func = gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE
-                self._draw_batches(gl, batches.glass_from_far(view.camera_pose[:3, 2], view.poses), role)
-            if outputs and batches.ground:
+                self._draw_batches(gl, batches.glass_from_far(view.away, view.poses), role)
+            if outputs and (batches.glass or batches.ground):  # outputs are not blended
                 target.use(color=False)
                 gl.enable_only(gl.DEPTH_TEST)
-                self._draw_batches(gl, batches.ground, role)
-            return target.read(into)
+                self._draw_batches(gl, [*batches.glass, *batches.ground], role)
+            return target.read(colors)
+
+    def _draw_sky(self, gl: moderngl.Context, view: _View) -> None:
+        role = view.role("sky")
+        if role not in self._skies:
+            content = [(self._dome, "3f 3f", "direction", "tint")]
+            self._skies[role] = gl.vertex_array(self._programs.one(role), content)
+        self._point(self._programs.one(role), view)
+        self._skies[role].render(instances=view.tiles)
 
     def _draw_batches(self, gl: moderngl.Context, batches: Sequence[Batch], role: Role) -> None:
         """Draw the batches; the far sides of closed meshes, which nobody can see, are left out."""
@@ -258,41 +292,39 @@ class Renderer:
         """Let the batches be drawn in a role, by what depends on the camera alone."""
         programs = self._programs.of(role)
         self._batches.link(role, programs)
-        given = {"clip_from_world": _clip_from_world(view), "optical_from_world": _bytes(_turn(view.camera_pose))}
+        given = {"optical_from_world": _bytes(_turn(view.camera_pose))}
         if view.before is not None:
             given["optical_before_from_world"] = _bytes(_turn(view.before.camera_pose))
         lens = view.intrinsics
         for program in set(programs.values()):
+            self._point(program, view)
             for name, matrix in given.items():
                 if name in program:
                     program[name].write(matrix)
             if "parallel" in program:
-                program["parallel"] = lens.near, (lens.far - lens.near) * isinstance(lens, Orthographic)
+                program["parallel"] = lens.near, lens.far - lens.near
+
+    def _point(self, program: Any, view: _View) -> None:
+        """Let a program draw what the camera sees."""
+        program["clip_from_world"].write(_bytes(view.intrinsics.projection() @ _turn(view.camera_pose)))
+        if isinstance(view.intrinsics, Tiles) and "bounds" in program:
+            program["bounds"].write(view.intrinsics.bounds.astype(np.float32).tobytes())
 
     def _cleared(self, names: tuple[str, ...], view: _View, alpha: float) -> Target:
         """Return what to draw into, empty."""
         whole = view.intrinsics.width, view.intrinsics.height
         box = view.box or Box(0, 0, *whole)
         size = box.width, box.height
-        if (names, size) not in self._targets:
+        gl = self._current()
+        held = tuple(OUTPUTS[name].held(view.most) for name in names if name != COLOR)
+        if (names, held, size) not in self._targets:
             samples = self._samples if names == (COLOR,) else 0
-            self._targets[names, size] = Target(self._current(), names, size, samples)
-        target = self._targets[names, size]
+            self._targets[names, held, size] = Target(gl, names, held, size, samples)
+        target = self._targets[names, held, size]
         target.clear(alpha, box, whole)
+        for distance in _CLIP_DISTANCES:
+            (gl.enable_direct if view.tiles > 1 else gl.disable_direct)(distance)
         return target
-
-    # ---- lenses
-
-    def _draw_through(
-        self, lens: Distorted, names: tuple[str, ...], view: _View, into: np.ndarray | None
-    ) -> dict[str, np.ndarray]:
-        def draw(pinhole: PinholeView, drawn: tuple[str, ...]) -> dict[str, np.ndarray]:
-            pose = view.camera_pose @ pinhole.turn
-            turned = view._replace(intrinsics=pinhole.intrinsics, camera_pose=pose, box=pinhole.box)
-            return self._draw(drawn, turned, None)
-
-        turn = None if view.before is None else view.before.camera_pose[:3, :3].T @ view.camera_pose[:3, :3]
-        return self._lens_view(lens).seen(names, draw, turn, into)
 
     def _lens_view(self, lens: Distorted) -> LensView:
         if lens not in self._lens_views:
@@ -309,10 +341,6 @@ def _turn(camera_pose: np.ndarray) -> np.ndarray:
     return turn
 
 
-def _clip_from_world(view: _View) -> bytes:
-    return _bytes(view.intrinsics.projection() @ _turn(view.camera_pose))
-
-
 def _bytes(matrix: np.ndarray) -> bytes:
-    """A matrix as GLSL has it, column by column."""
-    return bytes(matrix.T.astype(np.float32).tobytes())
+    """A matrix, or several, as GLSL has them, column by column."""
+    return bytes(matrix.swapaxes(-1, -2).astype(np.float32).tobytes())

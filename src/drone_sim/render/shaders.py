@@ -1,9 +1,32 @@
 """The shaders, GLSL 3.30. World coordinates are relative to the camera's position, axes those of the world."""
 
-# Per instance: a world-from-mesh matrix by rows, which may scale; `paint.a` is what alpha the picture gets.
-INPUTS = """
+# Where a point, or a direction, is in the picture. Of several tiles each draws everything, clipped to its rectangle.
+VIEW = """
 #version 330 core
+#ifdef TILES
+uniform mat4 clip_from_world[TILES];
+uniform vec4 bounds[TILES];
+out float gl_ClipDistance[4];
+vec4 seen(vec4 point) {
+    int tile = gl_InstanceID % TILES;
+    vec4 p = clip_from_world[tile] * point;
+    vec4 b = bounds[tile] * p.w;
+    gl_ClipDistance[0] = p.x - b.x;
+    gl_ClipDistance[1] = p.y - b.y;
+    gl_ClipDistance[2] = b.z - p.x;
+    gl_ClipDistance[3] = b.w - p.y;
+    return p;
+}
+#else
 uniform mat4 clip_from_world;
+vec4 seen(vec4 point) { return clip_from_world * point; }
+#endif
+"""
+
+# Per instance: a world-from-mesh matrix by rows, which may scale; `paint.a` is what alpha the picture gets.
+INPUTS = (
+    VIEW
+    + """
 in vec3 position;
 in vec4 row0;
 in vec4 row1;
@@ -13,6 +36,7 @@ vec3 world_point() {
     return vec3(dot(row0, p), dot(row1, p), dot(row2, p));
 }
 """
+)
 
 # Light is computed per vertex: floors and boxes have one normal per face, and round things enough vertices.
 # FLAT spares what is level the interpolation of a colour that is the same everywhere.
@@ -38,7 +62,7 @@ void main() {
 #ifdef TEXTURED
     texel = uv;
 #endif
-    gl_Position = clip_from_world * vec4(world_point(), 1.0);
+    gl_Position = seen(vec4(world_point(), 1.0));
 }
 """
 )
@@ -68,7 +92,7 @@ BARE_VERTEX = (
     INPUTS
     + """
 void main() {
-    gl_Position = clip_from_world * vec4(world_point(), 1.0);
+    gl_Position = seen(vec4(world_point(), 1.0));
 }
 """
 )
@@ -86,7 +110,7 @@ ALONE_VERTEX = (
 uniform float only;
 in float identity;
 void main() {
-    gl_Position = identity == only ? clip_from_world * vec4(world_point(), 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+    gl_Position = identity == only ? seen(vec4(world_point(), 1.0)) : vec4(2.0, 2.0, 2.0, 1.0);
 }
 """
 )
@@ -100,7 +124,7 @@ uniform float floor_height;
 void main() {
     vec3 p = world_point();
     p.xy -= to_sun.xy * (max(p.z - floor_height, 0.0) / to_sun.z);
-    gl_Position = clip_from_world * vec4(p.xy, floor_height, 1.0);
+    gl_Position = seen(vec4(p.xy, floor_height, 1.0));
 }
 """
 )
@@ -112,17 +136,18 @@ void main() { pixel = vec4(0.0, 0.0, 0.0, 1.0); }
 """
 
 # A coarse dome around the camera, at the far plane; its vertices lie where the gradient bends.
-SKY_VERTEX = """
-#version 330 core
-uniform mat4 clip_from_world;
+SKY_VERTEX = (
+    VIEW
+    + """
 in vec3 direction;
 in vec3 tint;
 out vec3 colour;
 void main() {
     colour = tint;
-    gl_Position = (clip_from_world * vec4(direction, 0.0)).xyww;
+    gl_Position = seen(vec4(direction, 0.0)).xyww;
 }
 """
+)
 
 SKY_FRAGMENT = """
 #version 330 core

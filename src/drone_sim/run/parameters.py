@@ -189,10 +189,6 @@ class Parameters(PaceParameters, EquipmentParameters):
         made._fleet = fleet
         return made
 
-    def check_scene(self, content: dict[str, Any], file: Path) -> None:
-        """Raise ParameterError where a scene file with this content could not be loaded."""
-        _checked(self._given, str(file), scene_parameters.from_content(content, file.parent))
-
     def scene_place(self, location: Location) -> str:
         """Return where a key of the scene stands, for a message: file and line, or just `scene`."""
         if not self.scene_file:

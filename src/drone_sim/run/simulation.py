@@ -19,8 +19,10 @@ from drone_sim.hosting.child_scripts import ChildScript
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.object_tree import NO_HANDLES, Handles
 from drone_sim.mechanics.saved_state import Restore
-from drone_sim.run import saving
 from drone_sim.run.parameters import Parameters
+from drone_sim.run.rearrangement import rearrange
+from drone_sim.run.scene_document import SceneContent, SceneDocument
+from drone_sim.run.scene_settings import settings_now
 from drone_sim.run.simulation_setup import SimulationSetup, give_back_memory, script_of
 from drone_sim.run.stepping import Stepper
 from drone_sim.scripting import load
@@ -91,12 +93,14 @@ class Simulation:
         self.scenes_read = 0  # how often a scene file, or none, has taken the last one's place
         self._handles = NO_HANDLES  # of the objects as the scene began
         self._is_arranged = False  # whether that is what was made of it, not what the scene file says
+        self._before: Parameters | None = None  # what stop brings back, once it was rearranged in flight
         self.run = 0  # number of the run: another one after every start and every stop
         self.era = 0  # another number after every start, every stop, and whenever a vehicle has come or gone
         flown = [script_of(one, parameters, script) for one in parameters.fleet]
         for path in (*flown, *(one.script for one in parameters.scene.scripts)):  # one that is not there needs no world
             load.script_path(path)
         self._take(self._set_up(parameters, _world(parameters, gui)))
+        self.document = SceneDocument(parameters, self.object_handles)
         try:
             if started:
                 self.load_scripts()
@@ -162,8 +166,8 @@ class Simulation:
         goes again. Snapshots are forgotten. Raises ParameterError, UrdfError and ScriptError.
         """
         parameters = self.parameters.with_vehicles(entries)
-        if self._is_arranged:
-            parameters = parameters.varied(parameters.weather, self.parameters.scene, parameters.fleet)
+        if self._is_arranged or self._before:
+            parameters = parameters.varied(self.parameters.weather, self.parameters.scene, parameters.fleet)
         wanted = {one.name: one for one in parameters.fleet}
         came = [name for name in wanted if name not in self.vehicles]
         went = [name for name in self.vehicles if name not in wanted]
@@ -179,6 +183,8 @@ class Simulation:
                 self.era += 1
                 self._stepper.list_vehicles()
         self.parameters = parameters
+        if self._before:
+            self._before = parameters.varied(self._before.weather, self._before.scene, parameters.fleet)
         return came, went
 
     def set_pace(self, factor: Any) -> None:
@@ -208,6 +214,7 @@ class Simulation:
 
     def _read(self, scene_file: str) -> None:
         self._rebuild(self.parameters.in_scene(scene_file), NO_HANDLES)
+        self.document = SceneDocument(self.parameters, self.object_handles)
         self._is_arranged = False
         self.scenes_read += 1
 
@@ -223,9 +230,23 @@ class Simulation:
         self.parameters = parameters
         self._is_arranged = True
 
+    def rearrange(self, parameters: Parameters) -> None:
+        """In flight: let floor, weather and vehicles be as these parameters say, until stop.
+
+        Raises ParameterError, UrdfError and ScriptError, where all is as it was.
+        """
+        self._before = self._before or self.parameters
+        self.scene.is_changed = True
+        if rearrange(self._setup, self.parameters, parameters, self.script):
+            self.era += 1
+            self._stepper.list_vehicles()
+        self._stepper.lay_floor(parameters.scene.floor)
+        self.parameters = parameters
+
     def load_scripts(self) -> None:
         """Load the scripts and run their init, of a simulation that was built without. Raises ScriptError."""
         self._handles = self.context.objects.handles()
+        self._document_began = self.document.save_state()
         self.running = True
         self._setup.load_scripts(self._setup.scripts.all(), self.script)
         self._stepper.list_scripts()
@@ -239,6 +260,9 @@ class Simulation:
             self._handles, self._is_arranged = self.context.objects.handles(), True
             before, scene = self.parameters, self.scene.parameters_now()
             self.parameters = before.varied(before.weather, scene, before.fleet)
+        if self.running:
+            self._document_began()
+        self.parameters, self._before = self._before or self.parameters, None
         try:
             self._clean_up()
         finally:
@@ -343,9 +367,25 @@ class Simulation:
         if snapshot.era == self.era:
             self.world.saved_states.forget_snapshot(snapshot.world)
 
-    def save_scene(self, path: Path) -> None:
-        """Write floor, objects, vehicles and weather as they are now: a scene file. Raises ParameterError, OSError."""
-        saving.save(path, self.parameters, self.scene, self.vehicles.values(), self.context.weather.now)
+    @property
+    def object_handles(self) -> Mapping[str, int]:
+        """Handles of all objects, by name."""
+        return self.context.objects.handles().by_name
+
+    def content(self) -> SceneContent:
+        """Return what the scene is now; vehicles and weather as they begin."""
+        scene = self.scene
+        entries = {scene.tree.handle(one.name): scene.entry_now(index) for index, one in scene.entries.items()}
+        return SceneContent(entries, dict(scene.scripts), self.document.settings)
+
+    def save_scene(self, path: Path) -> str:
+        """Write floor, objects, vehicles and weather as they are now: a scene file; return its text.
+
+        Comments and order of the file that it was read from stay. Raises ParameterError and OSError, as
+        SceneDocument.write does.
+        """
+        now = settings_now(self.document.settings, self.parameters, self.vehicles, self.context.weather.now)
+        return self.document.write(path, self.content()._replace(settings=now), self.parameters)
 
 
 def _world(parameters: Parameters, gui: bool = False) -> World:

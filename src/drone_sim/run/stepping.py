@@ -60,9 +60,13 @@ class Stepper:
         self._velocities = setup.context.velocities
         self._sub_steps = setup.parameters.sub_steps
         self._vehicles = setup.vehicles
-        self._divergence_check = DivergenceCheck(setup.parameters.scene.floor, self._clock)
+        self.lay_floor(setup.parameters.scene.floor)
         self._clock.steps = 0
         self.list_vehicles()
+
+    def lay_floor(self, floor: FloorParameters) -> None:
+        """Know the floor from whose edge one falls."""
+        self._divergence_check = DivergenceCheck(floor, self._clock)
 
     def list_vehicles(self) -> None:
         """Know who flies: a vehicle has come or gone."""

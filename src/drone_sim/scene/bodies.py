@@ -83,7 +83,7 @@ class LinkBody:
 
     def move(self, pose: Pose) -> None:
         """Refuse: its joint says where it is. Raises ValueError."""
-        raise ValueError("a shape that a joint holds is put nowhere else")
+        raise ValueError("a joint holds this shape, so it cannot be moved")
 
 
 class CarriedBody:
@@ -199,7 +199,7 @@ class ShapeObject(SceneObject):
         """Put it there, and its body. Raises ValueError for what is held."""
         if self.is_held:
             above = self.parent.name if self.parent is not None else ""
-            raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move what it hangs on")
+            raise ValueError(f"'{self.name}' is held by '{above}': set that joint, or move its parent")
         super().put(matrix)
         if self.is_static:
             self.carried.follow()

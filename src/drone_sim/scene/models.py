@@ -5,16 +5,15 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import shutil
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
 from drone_sim.config.types import Checked, FoundFile, ParameterError, read_yaml
-from drone_sim.files import mesh_files, writing
+from drone_sim.files import mesh_files, writing, yaml_files
 from drone_sim.files.resources import MEBIBYTE, cache_path
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
@@ -28,6 +27,7 @@ from drone_sim.shapes.shape import DrawnShape
 
 _HEAD = "# A model, written by saveModel: metres, radians.\n"
 _FILES = ("file", "texture", "script")
+_FIRST, _PLACE = ("name", "alias", "shape", "kind", "type"), ("model", "parent", "position", "rpy")
 _MOST_MESHES, _MOST_BYTES = 1000, 256 * MEBIBYTE  # of made meshes that are kept
 
 
@@ -88,7 +88,7 @@ def _volume(part: PartParameters) -> float:
 def bounds(entry: EntryParameters) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and the highest corner (m) of a shape in its own frame. Raises ValueError for what is none."""
     if not isinstance(entry, ObjectParameters) or entry.shape == "urdf":
-        raise ValueError(f"'{entry.name}' is no shape with a box of its own around it")
+        raise ValueError(f"'{entry.name}' is not a shape with its own box around it")
     corners = []
     for shape, local, _ in parts_of(entry.to_shape(), entry.color):
         assert isinstance(shape, DrawnShape), "what is no urdf is drawn"
@@ -110,7 +110,7 @@ def mesh_file(vertices: Sequence[float], indices: Sequence[int], used: Collectio
     points = np.reshape(np.asarray(vertices, float), (-1, 3))
     corners = np.reshape(np.asarray(indices, int), (-1, 3))
     if corners.min() < 0 or corners.max() >= len(points):
-        raise ValueError(f"indices: each must be from 0 to {len(points) - 1}, which are the vertices")
+        raise ValueError(f"indices: each must be from 0 to {len(points) - 1}, the vertices")
     content = mesh_files.stl(points[corners])
     path = _made_meshes() / f"{hashlib.sha256(content).hexdigest()[:16]}.stl"
     try:
@@ -143,10 +143,10 @@ def _make_room(files: Iterable[Path], used: Collection[str]) -> None:
             one.unlink(missing_ok=True)
 
 
-def plain(values: Checked, folder: Path) -> dict[str, Any]:
+def plain(values: Checked, folder: Path | None) -> dict[str, Any]:
     """Return values as YAML has them, without defaults; their files named as a scene file in `folder` can name them.
 
-    Meshes that were made are copied beside it. Raises OSError.
+    None is any folder. Meshes that were made are copied beside the file. Raises OSError.
     """
     said = values.model_dump(mode="json", exclude_defaults=True)
     for key in _FILES:
@@ -157,9 +157,17 @@ def plain(values: Checked, folder: Path) -> dict[str, Any]:
     return said
 
 
-def file_name(value: Any, folder: Path) -> Any:
+def in_order(said: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what YAML says of an object in the order in which a person writes it: what it is, where, and the rest."""
+    own = [key for key in ("size", "file", "width", "height", "fov") if key in said]
+    keys = dict.fromkeys([*_FIRST, *own, *_PLACE, *said])
+    parts = {"parts": [in_order(one) for one in said["parts"]]} if "parts" in said else {}
+    return {**{key: said[key] for key in keys if key in said}, **parts}
+
+
+def file_name(value: Any, folder: Path | None) -> Any:
     """Return a file's name as a scene file in `folder` can name it; what is none, as it is. Raises OSError."""
-    if isinstance(value, FoundFile) and Path(value).parent == _made_meshes():
+    if folder is not None and isinstance(value, FoundFile) and Path(value).parent == _made_meshes():
         kept = folder / "meshes" / Path(value).name
         kept.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(value, kept)
@@ -177,7 +185,7 @@ def write(path: Path, entries: Sequence[EntryParameters], scripts: Sequence[Atta
     listed = {"objects": entries, "scripts": scripts}
     try:
         content = {key: [plain(one, path.parent) for one in several] for key, several in listed.items() if several}
-        text = _HEAD + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+        text = _HEAD + yaml_files.dump(content, default_flow_style=None, width=120)
         writing.write(path, text)
     except OSError as error:
         raise ParameterError(f"{path}: cannot be written ({error.strerror or error})") from None
@@ -199,7 +207,7 @@ def read(path: Path, imported: Callable[[Path], Path]) -> Model:
         raise ParameterError(f"{path}: {error.strerror or error}") from None
     said = scene_parameters.from_content(read_yaml(file), file.parent)
     if not is_own and said.get("vehicles"):
-        raise ParameterError(f"{path}: is a quadricopter, which comes by the parameter `vehicles`")
+        raise ParameterError(f"{path}: is a quadricopter: add it with the parameter `vehicles`")
     objects, scripts = said["scene"].get("objects"), said["scene"].get("scripts", [])
     for name, several in (("objects", objects), ("scripts", scripts)):
         if not isinstance(several, list) or not all(isinstance(one, dict) for one in several):
@@ -212,7 +220,7 @@ def read(path: Path, imported: Callable[[Path], Path]) -> Model:
 def inside(folder: Path | None, name: str, *suffixes: str) -> Path:
     """Return a file in a folder, with .yaml or another suffix. Raises ValueError for what is none."""
     if folder is None:
-        raise ValueError(f"'{name[:80]}': a model lies beside the scene file, and there is no scene file")
+        raise ValueError(f"'{name[:80]}': a model must be in the folder of the scene file, and there is no scene file")
     path = (folder / name).resolve()
     if path.suffix not in (".yaml", *suffixes) or not path.is_relative_to(folder.resolve()):
         known = " or ".join((".yaml", *suffixes))

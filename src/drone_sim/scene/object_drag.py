@@ -21,7 +21,7 @@ class ObjectDrag:
         self.held: dict[str, int] = {}  # the body that stands still, by what is held of it
         self._world, self._objects = context.world, context.objects
         self._things = things
-        self._floor = floor
+        self.floor = floor
 
     def hold(self, name: str) -> None:
         """Let an object stand still, whatever pulls at it. Raises ValueError for one that is not there."""
@@ -72,8 +72,8 @@ class ObjectDrag:
 
     def _check(self, now: Vector, wanted: Vector) -> None:
         """Refuse places off the floor, but for what is farther away already."""
-        half = self._floor / 2
-        for axis, before, value, low, high in zip("xyz", now, wanted, (-half, -half, 0.0), (half, half, self._floor)):
+        half = self.floor / 2
+        for axis, before, value, low, high in zip("xyz", now, wanted, (-half, -half, 0.0), (half, half, self.floor)):
             if not min(low, before) <= value <= max(high, before):
                 raise ValueError(f"position.{axis} = {value:g}: on this floor it may be within {low:g} and {high:g} m")
 
@@ -85,5 +85,5 @@ def _whole(one: SceneObject) -> SceneObject:
         while whole is not None and (not isinstance(whole, ShapeObject) or whole.is_held):
             whole = whole.parent
     if whole is None:
-        raise ValueError(f"'{one.name}' is held in its place: it hangs on no shape of the scene")
+        raise ValueError(f"'{one.name}' is held in its place: no shape of the scene is above it")
     return whole

@@ -27,7 +27,14 @@ from drone_sim.scene.kinds.kind import KindParameters
 from drone_sim.scene.object_parameters import CompoundParameters, ObjectParameters
 from drone_sim.scene.scaling import scaled
 from drone_sim.scene.scene import Scene
-from drone_sim.scene.scene_parameters import MAX_OBJECTS, check_files, entry_from, name_shapes, script_from
+from drone_sim.scene.scene_parameters import (
+    MAX_OBJECTS,
+    check_files,
+    check_parents,
+    entry_from,
+    name_shapes,
+    script_from,
+)
 
 _IN_DYNAMICS = (ObjectParameters, JointParameters, ForceSensorParameters)
 
@@ -98,6 +105,7 @@ class SceneOperations:
             if one.parent and one.parent not in tree and one.parent not in {other.name for other in entries}:
                 raise ParameterError(f"no object is named '{one.parent}', the parent of '{one.name}'")
             names.add(one.name)
+        check_parents(entries)
         shapes = [one for one in entries if isinstance(one, ObjectParameters)]
         if shapes:
             check_files(scene.parameters.floor, [*scene.entries.values(), *shapes])
@@ -256,8 +264,8 @@ class SceneOperations:
         index = self._index(handle)
         entry = self._scene.entries[index]
         checked = changed(entry, values)
-        with self._changing(bodies=False):
-            self._scene.entries[index] = entry.model_copy(update={key: getattr(checked, key) for key in values})
+        self._scene.entries[index] = entry.model_copy(update={key: getattr(checked, key) for key in values})
+        self._scene.is_changed = True
         described = self._scene.objects[index]
         described.alias, described.is_model = checked.shown, checked.model
 
@@ -342,6 +350,10 @@ class SceneOperations:
 
     def change(self, handle: int, **values: Any) -> None:
         """Let an entry say something else, such as another `mass` or `size`. Raises ParameterError."""
+        self.exchange({handle: self.entry_with(handle, values)})
+
+    def entry_with(self, handle: int, values: dict[str, Any]) -> EntryParameters:
+        """Return the entry of an object with other values, for `exchange`. Raises ParameterError."""
         entry = self.entry(handle)
         if values.get("mass") and isinstance(entry, ObjectParameters) and not entry.mass:
             values.setdefault("static", True)  # as it was
@@ -351,7 +363,7 @@ class SceneOperations:
             moments = [one * values["mass"] / entry.mass for one in entry.inertia.moments]  # how it lies stays
             values["inertia"] = {"moments": moments}
             checked = changed(entry, values)
-        self.exchange({handle: entry.model_copy(update={key: getattr(checked, key) for key in values})})
+        return entry.model_copy(update={key: getattr(checked, key) for key in values})
 
     def paint(self, handle: int, rgba: Sequence[float | None]) -> None:
         """Give a shape another color, all its parts; None among the numbers stays. Raises ValueError."""
@@ -363,8 +375,8 @@ class SceneOperations:
         values: dict[str, Any] = {"color": color}
         if isinstance(entry, CompoundParameters):
             values = {"parts": [part.model_copy(update={"color": color}) for part in entry.parts]}
-        with self._changing(bodies=False):
-            self._scene.entries[index] = entry.model_copy(update=values)
+        self._scene.entries[index] = entry.model_copy(update=values)
+        self._scene.is_changed = True
         self._scene.paint(index, color)
 
     def color(self, handle: int) -> tuple[float, ...]:

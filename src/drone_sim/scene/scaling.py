@@ -59,7 +59,7 @@ def _size(said: ObjectParameters | PartParameters, factors: Vector) -> list[floa
     size: tuple[float, ...] = getattr(said, "size", ())
     if said.shape not in _ROUND:
         if said.shape == "urdf":
-            raise ValueError(f"'{getattr(said, 'name', '')}' is a urdf, which says its own size")
+            raise ValueError(f"'{getattr(said, 'name', '')}' is a urdf, and the URDF file has its size")
         return [factor * one for factor, one in zip(factors, size)]
     if x != y or (said.shape == "sphere" and x != z):
         raise ValueError(f"'{getattr(said, 'name', '')}' is a {said.shape}: it stays round, not {x:g}, {y:g}, {z:g}")

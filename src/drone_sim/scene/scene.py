@@ -26,7 +26,7 @@ from drone_sim.scene.kinds.joint import JointParameters
 from drone_sim.scene.kinds.kind import KindParameters
 from drone_sim.scene.object_drag import ObjectDrag
 from drone_sim.scene.object_parameters import ObjectParameters
-from drone_sim.scene.scene_parameters import SceneParameters, check_files
+from drone_sim.scene.scene_parameters import FloorParameters, SceneParameters, check_files
 from drone_sim.shapes.visual import Visual
 from drone_sim.world.joints import JointDrive
 
@@ -52,11 +52,9 @@ class Scene:
         self.scripts: dict[str, AttachedScriptParameters] = {one.object: one for one in parameters.scripts}  # by object
         check_files(parameters.floor, parameters.objects)
         self._context, self.tree = context, context.objects
-        self._world = world = context.world
-        floor = parameters.floor
-        self.floor = world.add_floor(floor.size, floor.texture, ground=not floor.edge)
-        context.names[self.floor] = ("Floor", "Floor")
-        self.drag = ObjectDrag(context, self.things, floor.size)
+        self._world = context.world
+        self._add_floor(parameters.floor)
+        self.drag = ObjectDrag(context, self.things, parameters.floor.size)
         self.next_index = len(self.entries)
         self.is_changed = False  # whether anything has been done to it (operations.py) since it was made
         self.rebuilt = 0  # bodies that have come or gone by now
@@ -67,6 +65,19 @@ class Scene:
         self._began: dict[int, Matrix] = {}  # where the objects were at the beginning, by entry; empty before
         self._forget_objects()
         _warn(self.entries, self._build()[1])
+
+    def lay_floor(self, floor: FloorParameters) -> None:
+        """Let another floor take the last one's place. Raises ParameterError for a file that cannot be used."""
+        check_files(floor, self.entries.values())
+        self._world.remove(self.floor)
+        del self._context.names[self.floor]
+        self._add_floor(floor)
+        self.drag.floor = floor.size
+        self.parameters = self.parameters.model_copy(update={"floor": floor})
+
+    def _add_floor(self, floor: FloorParameters) -> None:
+        self.floor = self._world.add_floor(floor.size, floor.texture, ground=not floor.edge)
+        self._context.names[self.floor] = ("Floor", "Floor")
 
     # ---- bodies
 

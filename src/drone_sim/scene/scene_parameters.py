@@ -37,7 +37,7 @@ from drone_sim.scene.kinds import KINDS
 from drone_sim.scene.object_collections import CollectionList
 from drone_sim.scene.object_parameters import SHAPES, ObjectParameters
 
-MAX_OBJECTS = 1000
+MAX_OBJECTS = 2000
 # What a scene file may say of these comes before the parameters.
 WORLD = ("time_step", "sub_step", "gravity", "physics")
 BESIDE = ("drone", "vehicles", "weather", *WORLD)  # what a scene file holds besides the scene
@@ -96,17 +96,12 @@ class SceneParameters(Checked):
     def model_post_init(self, _context: Any) -> None:
         """Give a name to objects without one; check what concerns several objects at once."""
         name_shapes(self.objects)
-        entries = {}
+        names: set[str] = set()
         for index, one in enumerate(self.objects):
-            if one.name in entries:
+            if one.name in names:
                 raise _refused(index, "name", one.name, "comes twice")
-            entries[one.name] = index, one
-        for index, one in enumerate(self.objects):
-            above = _above(one, entries)
-            if one.name in above:
-                raise _refused(index, "parent", one.parent, f"'{one.name}' would be its own ancestor")
-            if len(above) > DEEPEST:
-                raise _refused(index, "parent", one.parent, f"more than {DEEPEST} objects above '{one.name}'")
+            names.add(one.name)
+        check_parents(self.objects)
         attached_scripts.check(self.scripts)
         object_collections.check(self.collections)
 
@@ -127,13 +122,24 @@ def _refused(index: int, key: str, value: str, why: str) -> ParameterError:
     return ParameterError(why, ("objects", index, key), f"'{value}'")
 
 
-def _above(one: EntryParameters, entries: Mapping[str, tuple[int, EntryParameters]]) -> dict[str, None]:
+def check_parents(objects: Iterable[EntryParameters]) -> None:
+    """Raise ParameterError for one of some entries that hangs on itself, or too deep below the others."""
+    entries = {one.name: one for one in objects}
+    for index, one in enumerate(entries.values()):
+        above = _above(one, entries)
+        if one.name in above:
+            raise _refused(index, "parent", one.parent, f"'{one.name}' would be its own ancestor")
+        if len(above) > DEEPEST:
+            raise _refused(index, "parent", one.parent, f"more than {DEEPEST} objects above '{one.name}'")
+
+
+def _above(one: EntryParameters, entries: Mapping[str, EntryParameters]) -> dict[str, None]:
     """Return the names of the entries that one hangs on, by way of others, too; its own where it does."""
     above: dict[str, None] = {}
     name = one.parent
     while name and name in entries and name not in above:
         above[name] = None
-        name = entries[name][1].parent
+        name = entries[name].parent
     return above
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import logging
 from collections.abc import Collection, Iterator
 
@@ -57,6 +58,7 @@ def idle(functions: Collection[str]) -> str:
     return "; ".join([f"has none of {_listed()}, {THREADS[0]}: nothing flies the drone", *bare])
 
 
+@functools.lru_cache(1000)
 def _meant(name: str) -> str | None:
     """Return the phase function that a name comes near to, None for one that is known or is none of ours."""
     if name in (*FUNCTIONS.values(), *THREADS, VISION) or name in _ELSEWHERE or len(name) > _LONGEST:

@@ -15,7 +15,7 @@ from drone_sim.sensors.pressure import PressureParameters
 from drone_sim.sensors.range import RangeParameters
 from drone_sim.sensors.wind import WindParameters
 
-AnySensor = one_of(
+SENSORS = (
     ImuParameters,
     RangeParameters,
     MagneticFieldParameters,
@@ -25,3 +25,5 @@ AnySensor = one_of(
     BatteryParameters,
     WindParameters,
 )
+
+AnySensor = one_of(*SENSORS)

@@ -18,15 +18,15 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple
 
-from drone_sim.config.types import Finite, Fraction, Name, ParameterError, Within
+from drone_sim.config.types import Finite, Fraction, Name, ParameterError, Unit, Within
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
 from drone_sim.sensors.noise import NoiseParameters
 from drone_sim.sensors.sensor import Fields, Fitting, Instrument, Output, SensorParameters, Topic
 
 _DISCHARGING, _GOOD, _DEAD, _LIPO = 2, 1, 3, 3  # sensor_msgs/BatteryState: status, health, health, technology
 _HOUR = 3600.0  # s
-_Volts = Annotated[Finite, Within(0.1, 1e3)]
-_Watts = Annotated[Finite, Within(0, 1e6)]
+_Volts = Annotated[Finite, Within(0.1, 1e3), Unit("V")]
+_Watts = Annotated[Finite, Within(0, 1e6), Unit("W")]
 
 
 class BatteryParameters(SensorParameters):
@@ -36,10 +36,10 @@ class BatteryParameters(SensorParameters):
     topic: Topic = "battery"
     frame: Name = "base_link"
     cells: Annotated[int, Within(1, 1000)]
-    capacity: Annotated[Finite, Within(1e-3, 1e4)]  # Ah
-    full: _Volts  # V a cell, without load
-    empty: _Volts  # V a cell, without load
-    resistance: Annotated[Finite, Within(0, 1e3)]  # Ω, of all of it
+    capacity: Annotated[Finite, Within(1e-3, 1e4), Unit("Ah")]
+    full: _Volts  # a cell, without load
+    empty: _Volts  # a cell, without load
+    resistance: Annotated[Finite, Within(0, 1e3), Unit("Ω")]  # of all of it
     hover_power: _Watts
     idle_power: _Watts
     charge: Fraction = 1.0  # at the start, of the capacity

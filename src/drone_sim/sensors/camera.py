@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +10,10 @@ import numpy as np
 from drone_sim.mechanics.clock import Clock
 from drone_sim.mechanics.frames import Matrix, Vector
 from drone_sim.mechanics.saved_state import Restore, in_turn, saved
+from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.render.outputs import COLOR
 from drone_sim.render.renderer import Moment
+from drone_sim.render.shutter import Shutter
 from drone_sim.sensors.camera_parameters import CameraParameters
 from drone_sim.sensors.imperfections.photography import Photography
 from drone_sim.sensors.sensor import Failure, Reading, Sensor
@@ -74,9 +75,7 @@ class Camera(Sensor):
         if kind != COLOR:
             return self._vision.picture(kind, self.intrinsics, self._matrix())
         if not self._photography.is_perfect:
-            velocity = np.concatenate(self._velocity())
-            gather = partial(self._vision.light, self.intrinsics, self._matrix(), velocity)
-            return self._photography.take(self.intrinsics, gather)
+            return self._photography.take(self.intrinsics, self._light)
         asked, self._truth = self._truth, None
         if asked is None:
             return self._vision.picture(kind, self.intrinsics, self._matrix())
@@ -91,6 +90,14 @@ class Camera(Sensor):
             truth.want((COLOR, *names))
         self._drawn = self._vision.changes, self.pose(), truth
         return truth.output(COLOR)
+
+    def meter(self, steps: int) -> None:
+        """Look how bright it is, for automatic exposure, if a picture is due after so many steps."""
+        if self._photography.is_metering and self.is_due(steps):
+            self._photography.meter(self.intrinsics, self._light)
+
+    def _light(self, lens: Intrinsics, shutter: Shutter) -> np.ndarray:
+        return self._vision.light(lens, self._matrix(), np.concatenate(self._velocity()), shutter)
 
     def _matrix(self) -> np.ndarray:
         return np.reshape((*self.pose(), 0, 0, 0, 1), (4, 4))

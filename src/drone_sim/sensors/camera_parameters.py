@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from drone_sim.config.types import TOPIC, Checked, Finite, Name, ParameterError, Switch, Within
+from drone_sim.config.types import TOPIC, Checked, Finite, Name, ParameterError, Switch, Unit, Within
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.intrinsics import Intrinsics
 from drone_sim.sensors.imperfections import Imperfections
@@ -20,6 +20,7 @@ MAX_PIXELS = 4096 * 4096  # of all cameras together
 
 TRUTH = (
     *("labels", "instances", "categories", "depth", "normals", "points", "flow", "flow_known", "boxes", "box_markers"),
+    "overlay",
     *("detections", "detections_3d"),  # where vision_msgs is installed
 )
 _lens = lru_cache(maxsize=MAX_CAMERAS)(Distorted)  # whose rays are found once
@@ -41,14 +42,14 @@ class CameraParameters(Imperfections):
     kind: Literal["color", "depth"]
     frame: Name
     mount: MountParameters | None = None
-    every: Annotated[int, Within(1, 1_000_000)]
-    width: Annotated[int, Within(1, 4096)]
-    height: Annotated[int, Within(1, 4096)]
-    horizontal_fov: Annotated[Finite, Within(0.01, WIDEST_FISHEYE)]
+    every: Annotated[int, Within(1, 1_000_000), Unit("steps")]
+    width: Annotated[int, Within(1, 4096), Unit("px")]
+    height: Annotated[int, Within(1, 4096), Unit("px")]
+    horizontal_fov: Annotated[Finite, Within(0.01, WIDEST_FISHEYE), Unit("rad")]
     lens: LensParameters | None = None
-    near: Annotated[Finite, Within(1e-4, 1e4)]
-    far: Annotated[Finite, Within(1e-3, 1e5)]
-    baseline: Annotated[Finite, Within(0, 100)] = 0.0  # m, of the right camera of a pair: how far from the left one
+    near: Annotated[Finite, Within(1e-4, 1e4), Unit("m")]
+    far: Annotated[Finite, Within(1e-3, 1e5), Unit("m")]
+    baseline: Annotated[Finite, Within(0, 100), Unit("m")] = 0.0  # of the right camera of a pair, from the left one
     truth: Switch = False  # whether it publishes what is behind its pictures, too
 
     @model_validator(mode="after")

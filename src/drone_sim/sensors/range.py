@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple
 
-from drone_sim.config.types import Finite, Length, Name, ParameterError, Within
+from drone_sim.config.types import Finite, Length, Name, ParameterError, Unit, Within
 from drone_sim.mechanics.frames import Vector, from_rpy, position, rotate_back, transform
 from drone_sim.sensors.noise import NoiseParameters
 from drone_sim.sensors.sensor import Fields, Fitting, Hit, Instrument, Output, SensorParameters, Topic
@@ -26,9 +26,9 @@ class RangeParameters(SensorParameters):
     topic: Topic = "range"
     frame: Name = "range_link"
     radiation: Literal["ultrasound", "infrared"] = "infrared"
-    field_of_view: Annotated[Finite, Within(0, math.pi)] = 0.0  # rad, for the message; it is one ray whatever it says
-    min_range: Annotated[Finite, Within(0, 1e4)]
-    max_range: Length
+    field_of_view: Annotated[Finite, Within(0, math.pi), Unit("rad")] = 0.0  # for the message; it is one ray
+    min_range: Annotated[Finite, Within(0, 1e4), Unit("m")]
+    max_range: Annotated[Length, Unit("m")]
     noise: NoiseParameters = NoiseParameters()  # m
 
     default_mount = from_rpy((0.0, 0.0, 0.0), (0.0, math.pi / 2, 0.0))

@@ -29,6 +29,7 @@ from drone_sim.config.types import (
     Name,
     ParameterError,
     Point,
+    Unit,
     Within,
 )
 from drone_sim.mechanics.frames import IDENTITY, Matrix, Vector, from_rpy, invert, multiply
@@ -68,12 +69,12 @@ class SensorParameters(Checked):
     """When a sensor samples, where it sits, and what it is called; cameras have parameters of their own."""
 
     kind: str  # each kind names its own
-    rate: Annotated[Finite, Within(1e-3, 1e5)]  # Hz of simulated time; sub_step divides its period
+    rate: Annotated[Finite, Within(1e-3, 1e5), Unit("Hz")]  # of simulated time; sub_step divides its period
     topic: Topic  # in the vehicle's namespace
     frame: Name  # of its messages
     object: Name | None = None  # its name among the objects that a script finds; the sensor's own if left out
     mount: MountParameters | None = None
-    latency: Annotated[Finite, Within(0, 60)] = 0.0  # s, whole sub-steps, from measuring to reading
+    latency: Annotated[Finite, Within(0, 60), Unit("s")] = 0.0  # whole sub-steps, from measuring to reading
     seed: Annotated[int, Within(0, 2**63 - 1)] = 0
 
     suffixes: ClassVar[tuple[str, ...]] = ("",)  # of the topics that it publishes, after `topic`

@@ -88,7 +88,7 @@ class Vision:
         with self.taking() as renderer:
             if renderer is None:
                 if shown is not None:
-                    raise ValueError("a picture of some objects alone needs OpenGL, and there is no EGL here")
+                    raise ValueError("a picture of only some objects needs OpenGL, and there is no EGL here")
                 return self._tiny_picture(kind, intrinsics, pose)
             render = renderer.render if kind == COLOR else renderer.render_depth
             return render(intrinsics, pose, self._poses(shown))
@@ -106,7 +106,7 @@ class Vision:
         """
         self._open()
         if self._renderer is None:
-            raise ValueError("a picture of whose each pixel is needs OpenGL, and there is no EGL here")
+            raise ValueError("a picture of the object of each pixel needs OpenGL, and there is no EGL here")
         self._turn_blades()
         self._renderer.set_visuals(self._subject.visuals())
         drawn = self._renderer.render_outputs(("instance",), intrinsics, pose, self._poses(shown), instances=numbers)

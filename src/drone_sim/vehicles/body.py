@@ -14,6 +14,7 @@ from drone_sim.mechanics.state import Pose, State
 from drone_sim.mechanics.urdf import RigidBody
 from drone_sim.mechanics.wrench import Wrench
 from drone_sim.sensors.sensor import Contact, Hit
+from drone_sim.world.pictures import Place
 
 _NONE: Vector = (0.0, 0.0, 0.0)
 
@@ -54,7 +55,7 @@ class Body:
         self.links = {name: (self._named(above), matrix) for name, (above, matrix) in rigid.parents.items()}
         # Of each visual: the link that it belongs to, and where it sits on that.
         self.visual_places = [(self._named(name), matrix) for name, matrix in rigid.visuals]
-        self._start = start
+        self.start = start  # where it begins
         self.reset()
 
     def _named(self, link: str) -> str:
@@ -65,16 +66,16 @@ class Body:
     def reset(self) -> None:
         """Return to the start, at rest, with nothing that pushes and nobody who holds it."""
         self.let_go()
-        self._world.set_pose(self.number, self._start)
+        self._world.set_pose(self.number, self.start)
         self._pushed: list[Pushed] = []  # in the next step
         self.refresh()
 
     def begin_on_floor(self) -> None:
         """Have its start on what is below, the floor's height where nothing is, and be there."""
-        (x, y, z), turn = self._start
+        (x, y, z), turn = self.start
         below = self._world.queries.ray((x, y, z), (x, y, 0.0), ignoring=self.number)
         ground = z - below.distance if below else 0.0
-        self._start = Pose((x, y, z - self._world.queries.lowest(self.number) + ground), turn)
+        self.start = Pose((x, y, z - self._world.queries.lowest(self.number) + ground), turn)
         self.reset()
 
     def begin_again(self) -> None:
@@ -113,8 +114,8 @@ class Body:
         self._pushed = []
         self.refresh()
 
-    def place_visuals(self, places: Mapping[int, Matrix]) -> None:
-        """Move some of its visuals, by index, to other places in the root link's frame: looks only."""
+    def place_visuals(self, places: Mapping[int, Place]) -> None:
+        """Move some of its visuals, by index, to other places: looks only."""
         self._world.pictures.place(self.number, places)
 
     # ---- what pushes it

@@ -28,6 +28,7 @@ from drone_sim.config.types import (
 )
 from drone_sim.forces import ForceParameters
 from drone_sim.forces.propellers import PropellerParameters
+from drone_sim.mechanics.frames import Matrix, from_rpy
 from drone_sim.mechanics.object_names import NO_SUFFIX
 from drone_sim.message_text import near_names
 from drone_sim.sensors import AnySensor
@@ -129,6 +130,11 @@ class PlaceParameters(Checked):
     tilt: Annotated[tuple[Angle, Angle], Field(description="2 numbers, [roll, pitch] in rad")] = (0.0, 0.0)
     suffix: Annotated[int, Within(NO_SUFFIX, 1_000_000)] | None = None
     objects: Annotated[dict[Label, ObjectPlace | None], AfterValidator(_own)] = Field(default_factory=dict)
+
+    @property
+    def matrix(self) -> Matrix:
+        """Where it begins, in the world."""
+        return from_rpy(self.position, (*self.tilt, self.yaw))
 
 
 class DroneParameters(PlaceParameters):

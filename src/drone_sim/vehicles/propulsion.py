@@ -16,6 +16,7 @@ from drone_sim.message_text import near_names
 from drone_sim.vehicles.body import Body, Pushed
 from drone_sim.vehicles.quadricopter_objects import DRONE, joint, respondable
 from drone_sim.vehicles.types.vehicle_type import VehicleType
+from drone_sim.world.pictures import Place
 
 PARTICLE_VELOCITY = "particleVelocity"
 _BLADE_TURN = 3.0  # rad per metre of air: slow enough for 20 pictures a second to show which way
@@ -52,28 +53,29 @@ class Rotors:
         """Return the angle (rad) of a propeller's blades, from 0: they turn against the torque that they leave."""
         return -self._type.rotors[number][1] * _BLADE_TURN * air
 
-    def by_joint(self, angles: Sequence[float]) -> dict[str, float]:
-        """Return the blades' angles (rad, 0 to 2 pi) by joint of the URDF."""
-        return {f"blades_{place}_joint": angle % (2 * math.pi) for (place, _), angle in zip(self._type.rotors, angles)}
+    def by_joint(self, values: Sequence[float]) -> dict[str, float]:
+        """Return values of the propellers by their blades' joint of the URDF."""
+        return {f"blades_{place}_joint": value for (place, _), value in zip(self._type.rotors, values)}
 
-    def visuals(self, angles: dict[str, float]) -> dict[int, Matrix]:
-        """Return where the blades' visuals are at these angles by joint: by index, in the root link's frame."""
+    def visuals(self, angles: dict[str, float], speeds: dict[str, float]) -> dict[int, Place]:
+        """Return where the blades' visuals are, at these angles and speeds (rad/s) by joint: by index."""
         places = {}
         for blades in self._blades:
             turned = frames.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angles.get(blades.joint_name, 0.0)))
-            places[blades.visual] = frames.multiply(frames.multiply(blades.joint, turned), blades.local)
+            place = frames.multiply(frames.multiply(blades.joint, turned), blades.local)
+            places[blades.visual] = Place(place, blades.joint, speeds.get(blades.joint_name, 0.0))
         return places
 
 
 class Blades:
     """The angles of the blades: as the air that went through turns them, or as the script says."""
 
-    def __init__(self, rotors: Rotors, body: Body, suffix: str, air: Callable[[], Sequence[float]]):
-        """Take what they look like, and how much air (m) has gone through each propeller."""
+    def __init__(self, rotors: Rotors, body: Body, suffix: str, law: Callable[[], Propellers]):
+        """Take what they look like, and the law that says how much air goes through each propeller."""
         self._rotors = rotors
         self._body = body
         self._names = [joint(number) + suffix for number, _ in enumerate(rotors.links, start=1)]
-        self._air = air
+        self._law = law
         self.reset()
 
     def reset(self) -> None:
@@ -96,17 +98,23 @@ class Blades:
             self._said[name] = angle
             self.turned = True
         number = self._names.index(name)
-        return self._said.get(name, self._rotors.angle(number, self._air()[number]))
+        return self._said.get(name, self._rotors.angle(number, self._law().air[number]))
 
     @property
     def angles(self) -> dict[str, float]:
         """Angle (rad, 0 to 2 pi) of each propeller's blades, by joint of the URDF."""
-        return self._rotors.by_joint([self.turn(name) for name in self._names])
+        return self._rotors.by_joint([self.turn(name) % (2 * math.pi) for name in self._names])
+
+    @property
+    def _speeds(self) -> dict[str, float]:
+        """How fast each propeller's blades turn (rad/s), by joint of the URDF; 0 where a script turns them."""
+        speeds = [self._rotors.angle(number, flow) for number, flow in enumerate(self._law().velocities)]
+        return self._rotors.by_joint([speed * (name not in self._said) for name, speed in zip(self._names, speeds)])
 
     def show(self) -> None:
         """Turn them in the world's pictures to where they are."""
         self.turned = False
-        self._body.place_visuals(self._rotors.visuals(self.angles))
+        self._body.place_visuals(self._rotors.visuals(self.angles, self._speeds))
 
     def save_state(self) -> Restore:
         """Return a function that brings back what a script has said."""
@@ -127,7 +135,7 @@ class Propulsion:
         self.shapes: dict[str, Matrix] = {  # inertial frame of the body from each of its dynamic shapes
             name: frames.multiply(body.inertial_from_root, link) for name, link in links.items()
         }
-        self.blades = Blades(rotors, body, suffix, lambda: self.law.air)
+        self.blades = Blades(rotors, body, suffix, lambda: self.law)
 
     def begin(self, law: PropellerParameters, time_step: float) -> None:
         """Stand still, as at the start of a run."""

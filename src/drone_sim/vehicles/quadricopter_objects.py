@@ -162,6 +162,8 @@ class QuadricopterObjects:
         above = own if own is None or own in self._objects else parent  # one of the scene, such as Floor
         if place.parent is not None:
             above = place.parent or None
+            if above is not None and above not in self._objects:
+                raise ParameterError(f"no object is named '{above}', the parent of '{name}'")
         called = [one for given in (name, *also) for one in (given, given.replace("Quadricopter_", "Quadcopter_"))]
         names = [f"{one}{self._suffix}" for one in dict.fromkeys(called)]  # V-REP 3.x's, and CoppeliaSim 4.0 to 4.2's
         if place.name and place.name not in names:
@@ -179,7 +181,9 @@ class QuadricopterObjects:
     def _add_sensor(self, links: Mapping[str, Matrix], name: str, sensor: SensorParameters) -> None:
         """Add the object of a sensor. Raises ParameterError for one that cannot be where it is said to be."""
         if sensor.mount is not None and sensor.frame in links:
-            raise ParameterError(f"sensor {name}: the URDF says where {sensor.frame} is; `mount` needs another frame")
+            raise ParameterError(
+                f"sensor {name}: the URDF has the place of {sensor.frame}; `mount` needs another frame"
+            )
         parent, matrix = sensor.placed(links)
         kind = "proximity_sensor" if sensor.kind == "range" else ""
         local = frames.multiply(matrix, sensor.from_object)

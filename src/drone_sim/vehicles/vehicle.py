@@ -209,8 +209,13 @@ class Vehicle:
         self.instruments.look(count)
 
     def take_pictures(self, steps: int, now: bool = False) -> None:
-        """Let the cameras that are watched take a picture: those that are due after so many steps, or all `now`."""
+        """Let the cameras that are watched take a picture: those that are due after so many steps, or all `now`.
+
+        Those with automatic exposure measure the light whenever they are due.
+        """
         for name, camera in self.cameras.items():
+            if not now:
+                camera.meter(steps)
             is_watched = camera.watched()
             if is_watched or camera.image is not None:
                 looks = is_watched and (now or camera.is_due(steps)) and camera.failure != "silent"

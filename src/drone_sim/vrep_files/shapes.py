@@ -63,7 +63,7 @@ def read_mesh(outside: Level, inside: Level, pools: Pools) -> VrepMesh:
     if pools.triangles > MAX_TRIANGLES:
         raise VrepFileError(f"holds more than {MAX_TRIANGLES} triangles")
     if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
-        raise VrepFileError("a face names a vertex that there is not")
+        raise VrepFileError("a face names a vertex that does not exist")
     cover = read_cover(inside, vertices, faces, pools.textures)
     placed = vertices @ turn[:, :3].T + turn[:, 3]
     return VrepMesh(placed, faces, _color(inside), _primitive(inside, pose), cover)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from typing import Any
-from xml.etree import ElementTree as Xml
 
 import pybullet
 
@@ -62,7 +61,7 @@ def _load(client: int, told: UrdfFile, pose: Pose, moves: bool) -> int:
 
 def load_rigid_body(client: int, files: BulletFiles, xml: str, pose: Pose) -> int:
     """Add a merged URDF with its root link at a pose; return its body id."""
-    path = files.urdf(Xml.fromstring(xml))
+    path = files.urdf_of(xml)
     # The merged inertia is right; what PyBullet would derive from the collision shapes' bounds is not.
     flags = pybullet.URDF_USE_INERTIA_FROM_FILE
     number = pybullet.loadURDF(path, pose.position, pose.orientation, flags=flags, physicsClientId=client)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import itertools
 import tempfile
 from pathlib import Path
@@ -71,11 +72,27 @@ class BulletFiles:
                 hull = kind == "collision" and shape.get("concave") != "yes"
                 for mesh in shape.iter("mesh"):
                     mesh.set("filename", self.mesh(mesh.attrib["filename"], hull))
-        Xml.indent(robot)  # PyBullet cuts long lines
-        return self.write(Xml.tostring(robot), ".urdf")
+        return self.write(_indented(robot), ".urdf")
+
+    def urdf_of(self, text: str) -> str:
+        """Write a URDF, given as a text, with meshes of ours; return its path. Raises what mesh_files.read raises."""
+        if "<mesh" in text:
+            return self.urdf(Xml.fromstring(text))
+        return self.write(_laid_out(text), ".urdf")
 
     def texture(self, path: str) -> str:
         """Write an image once more, as a PNG; return its path. Raises what images.read raises."""
         image = images.read(path)
         turned = cv2.cvtColor(image, cv2.COLOR_RGBA2BGRA if image.shape[2] == 4 else cv2.COLOR_RGB2BGR)
         return self.write(cv2.imencode(".png", turned, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1].tobytes(), ".png")
+
+
+@functools.lru_cache(16)
+def _laid_out(text: str) -> bytes:
+    return _indented(Xml.fromstring(text))
+
+
+def _indented(robot: Xml.Element) -> bytes:
+    Xml.indent(robot)  # PyBullet cuts long lines
+    content: bytes = Xml.tostring(robot)
+    return content

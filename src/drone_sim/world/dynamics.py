@@ -29,7 +29,8 @@ class Dynamics:
         """Take PyBullet's client, the sub-step (s), what tells contacts, and whether the gyroscopic term acts."""
         self._client, self._sub_step, self._queries = client, sub_step, queries
         self.shape_forces = ShapeForces(client)
-        self._gyroscopic_term = GyroscopicTerm(client) if gyroscopic else NoGyroscopicTerm(client)
+        self._gyroscopic_term = term = GyroscopicTerm(client) if gyroscopic else NoGyroscopicTerm(client)
+        self._end_sub_step = term.end_sub_step if isinstance(term, GyroscopicTerm) else None
         self._impacts = Impacts(client, sub_step)
         self._applied: list[tuple[int, Wrench]] = []  # through the next sub-step
         self._known: dict[int, Motion] = {}  # what has been read since PyBullet's last step
@@ -84,7 +85,8 @@ class Dynamics:
                 self._step(loads, self._impacts.parts())
             else:
                 self._step_once(loads, self._sub_step)
-            self._applied.clear()
+            if self._applied:
+                self._applied.clear()
             if between is not None:
                 between(count)
         self.all_moved()
@@ -124,7 +126,8 @@ class Dynamics:
             self.shape_forces.apply()
         self._gyroscopic_term.begin_sub_step(attitudes, duration)
         _step(client)
-        self._gyroscopic_term.end_sub_step(duration)
+        if self._end_sub_step is not None:
+            self._end_sub_step(duration)
         if known:
             known.clear()
 

@@ -57,11 +57,10 @@ class NoGyroscopicTerm:
         """
         client, past, self._before = self._client, self._before, attitudes
         for body, moments in self._roots.items():
-            now, before = attitudes.get(body), past.get(body)
-            if now and before:
-                torque = _torque_of_turn(moments, before, now, duration)
+            if body in attitudes and body in past:
+                torque = _torque_of_turn(moments, past[body], attitudes[body], duration)
             else:
-                torque = self._torque_of_velocity(moments, body, now, duration)
+                torque = self._torque_of_velocity(moments, body, attitudes.get(body), duration)
             if torque is not None:
                 _turn(body, -1, torque, _ALONG_AXES, client)
         if self._links:
@@ -84,9 +83,6 @@ class NoGyroscopicTerm:
             return None
         turn = turn or pybullet.getBasePositionAndOrientation(body, self._client)[1]
         return self._torque(moments, _seen_from(turn, velocity), duration)
-
-    def end_sub_step(self, duration: float) -> None:
-        """Do what is to be done once PyBullet has stepped."""
 
     def _torque(self, moments: Vector, velocity: Vector, _duration: float) -> Vector:
         """Return ω × Iω (N m), everything along the principal axes."""

@@ -10,7 +10,7 @@ import numpy as np
 import pybullet
 
 from drone_sim.files.resources import identity_of
-from drone_sim.mechanics.frames import Matrix, from_quaternion, multiply
+from drone_sim.mechanics.frames import IDENTITY, Matrix, from_quaternion, multiply
 from drone_sim.mechanics.state import Pose, compose
 from drone_sim.shapes import REPORTED_SHAPES
 from drone_sim.shapes.shape import DrawnShape
@@ -21,10 +21,25 @@ _TYPES = {getattr(pybullet, name): shape for name, shape in REPORTED_SHAPES.item
 _changes = itertools.count()  # of any world: what was seen in one is not mistaken for what is in another
 
 
+class Place(NamedTuple):
+    """Where a visual is in its link's frame; it turns about the z axis of a frame there, at a speed in rad/s."""
+
+    local: Matrix  # the link's frame from the visual
+    axis: Matrix = IDENTITY  # the link's frame from that which it turns in
+    speed: float = 0.0
+
+    def velocity(self, pose: np.ndarray) -> np.ndarray:
+        """Return what is added to the link's velocities (6,), in the world, where the visual is at `pose` (4, 4)."""
+        local, axis = (np.reshape((*one, 0, 0, 0, 1), (4, 4)) for one in (self.local, self.axis))
+        around = pose @ np.linalg.inv(local) @ axis  # the frame that it turns in, in the world
+        turn = self.speed * around[:3, 2]
+        return np.array([*np.cross(turn, pose[:3, 3] - around[:3, 3]), *turn])
+
+
 class _Placed(NamedTuple):
     visual: Visual
     link: int  # -1: the root link
-    local: Matrix  # the link's frame from the visual
+    place: Place
 
 
 class Pictures:
@@ -109,14 +124,14 @@ class Pictures:
         if body == self._floor:
             self._floor = -1
 
-    def place(self, body: int, places: Mapping[int, Matrix]) -> None:
-        """Move some of a body's visuals, by index, to other places in their link's frame."""
+    def place(self, body: int, places: Mapping[int, Place]) -> None:
+        """Move some of a body's visuals, by index, to other places."""
         parts = self._of(body)
-        others = {index: place for index, place in places.items() if parts[index].local != place}
+        others = {index: place for index, place in places.items() if parts[index].place != place}
         if others:
             self.moved(body)
         for index, place in others.items():
-            parts[index] = parts[index]._replace(local=place)
+            parts[index] = parts[index]._replace(place=place)
 
     def visuals(self, bodies: Iterable[int] | None = None) -> list[Visual]:
         """Return what can be drawn of these bodies, or of all, in the order of `visual_poses`."""
@@ -138,11 +153,13 @@ class Pictures:
         """Return the velocities of the visuals' origins and of their turns, (N, 6), m/s and rad/s in the world."""
         poses = self.visual_poses()
         velocities = np.zeros((len(poses), 6))
-        links = zip(self.places(), poses[:, :3, 3])
-        for number, ((body, link), origin) in enumerate(links):
+        parts = ((body, part) for body in self._inertial_from_root for part in self._of(body))
+        for number, ((body, part), pose) in enumerate(zip(parts, poses)):
             if body not in self._standing:
-                centre, linear, angular = self._motion(body, link)
-                velocities[number] = *(linear + np.cross(angular, origin - centre)), *angular
+                centre, linear, angular = self._motion(body, part.link)
+                velocities[number] = *(linear + np.cross(angular, pose[:3, 3] - centre)), *angular
+            if part.place.speed:
+                velocities[number] += part.place.velocity(pose)
         return velocities
 
     def _motion(self, body: int, link: int) -> np.ndarray:
@@ -170,7 +187,7 @@ class Pictures:
                     links[part.link] = from_quaternion(*pybullet.getLinkState(body, part.link, 0, 1, self._client)[4:6])
             local = np.tile(np.eye(4), (len(self._of(body)), 1, 1))
             local[:, :3] = np.reshape(
-                [multiply(links[part.link], part.local) for part in self._of(body)] or np.empty(0), (-1, 3, 4)
+                [multiply(links[part.link], part.place.local) for part in self._of(body)] or np.empty(0), (-1, 3, 4)
             )
             poses.append(local)
             mass = pybullet.getDynamicsInfo(body, -1, self._client)[0]
@@ -208,7 +225,7 @@ class Pictures:
             floor=floor,
             ground=ground,
         )
-        return _Placed(visual, link, from_quaternion(position, orientation))
+        return _Placed(visual, link, Place(from_quaternion(position, orientation)))
 
     def tiny_picture(
         self, camera: np.ndarray, width: int, height: int, vertical_fov: float, near: float, far: float

@@ -12,6 +12,8 @@ import pybullet
 from drone_sim.mechanics.frames import Vector
 from drone_sim.world.collision_filter import CollisionFilter
 
+_contacts = pybullet.getContactPoints
+_ANY_BODY, _ANY_LINK = -1, -2
 _NOTHING = -1  # as the body of a ray that meets none
 _PROBE = 1e-6  # m, radius of what is as good as a point
 
@@ -146,7 +148,9 @@ class Queries:
         """Return where a body was pushed by others in the last sub-step; once for each body, if that went in parts."""
         if body in self._met_in_parts:
             return list(self._met_in_parts[body].values())
-        return self._touches(body)
+        # By position: in every sub-step.
+        rows = _contacts(body, _ANY_BODY, _ANY_LINK, _ANY_LINK, self._client)
+        return self._touches(body, rows) if rows else []
 
     def begin_sub_step(self, bodies: Iterable[int] = ()) -> None:
         """Forget the last sub-step; of these bodies the contacts of its parts will be told, by `end_part`."""
@@ -155,19 +159,17 @@ class Queries:
     def end_part(self, share: float) -> None:
         """Add up what pushed those bodies through a part that is such a share of its sub-step."""
         for body, met in self._met_in_parts.items():
-            for one in self._touches(body):
+            for one in self._touches(body, _contacts(body, _ANY_BODY, _ANY_LINK, _ANY_LINK, self._client)):
                 x, y, z = met[one.body].force if one.body in met else (0.0, 0.0, 0.0)
                 force = x + one.force[0] * share, y + one.force[1] * share, z + one.force[2] * share
                 met[one.body] = one._replace(force=force)
 
-    def _touches(self, body: int) -> list[Touch]:
-        found = pybullet.getContactPoints(bodyA=body, physicsClientId=self._client)
-        if not found:
-            return []
+    def _touches(self, body: int, rows: Sequence[Any]) -> list[Touch]:
+        """Return what pushes a body, of PyBullet's contacts of it."""
         # Asked for a body, PyBullet turns the contacts round in which it is the second one: names, places and normal,
         # but not the friction. Those come once more where it is asked for as the second.
-        turned = {row[1] for row in pybullet.getContactPoints(bodyB=body, physicsClientId=self._client)}
-        return [_touch(row, -1.0 if row[2] in turned else 1.0) for row in found if row[9] > 0.0]
+        turned = {row[1] for row in _contacts(_ANY_BODY, body, _ANY_LINK, _ANY_LINK, self._client)}
+        return [_touch(row, -1.0 if row[2] in turned else 1.0) for row in rows if row[9] > 0.0]
 
     def lowest(self, body: int) -> float:
         """Return the height (m) of the lowest point that may touch something, of a body without joints."""

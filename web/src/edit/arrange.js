@@ -46,18 +46,6 @@ export class Arrange {
     if (objects.length) return this.edit.make([{ do: "copy", objects, counts, steps }], this.edit.named("Duplicate", objects), true);
   }
 
-  copy() {
-    this.copied = this.roots;
-    if (this.copied.length) this.edit.notice.say(`copied: ${this.edit.named("", this.copied).trim()}`);
-  }
-
-  paste() {
-    const objects = (this.copied ?? []).filter((one) => this.edit.objects.get(one));
-    if (!objects.length) return this.edit.wrong(this.copied?.length ? "What was copied is not there any more." : "Nothing has been copied yet.");
-    const step = 0.5;
-    return this.edit.make([{ do: "copy", objects, counts: [2, 1, 1], steps: [step, step, 0] }], this.edit.named("Paste", objects), true);
-  }
-
   remove() {
     const { edit } = this;
     const objects = edit.selected.filter((one) => edit.objects.get(one).of !== "floor");

@@ -5,6 +5,7 @@ import { keep, kept } from "../kept.js";
 import { split } from "../split.js";
 import { Arrange } from "./arrange.js";
 import { askFor } from "./ask.js";
+import { Clipboard } from "./clipboard.js";
 import { Edit } from "./edit.js";
 import { FRAMES_OF_HANDLES } from "./frames.js";
 import { Hierarchy } from "./hierarchy.js";
@@ -24,6 +25,7 @@ export class Build {
     const edit = new Edit(scene, ask, notice, (file) => (this.showText(false), showScript(true), openScript(file)));
     this.edit = edit;
     this.arrange = new Arrange(edit);
+    this.clipboard = new Clipboard(edit);
     this.files = new SceneFiles(edit);
     this.hierarchy = new Hierarchy(at("tree"), at("tree-find"), edit);
     this.models = new Models(at("models"), at("models-find"), edit);
@@ -65,7 +67,7 @@ export class Build {
       measure: () => (edit.hand.measuring ? edit.endMeasure() : edit.beginMeasure()),
       floor: () => arrange.dropToFloor(),
       remove: () => arrange.remove(), rename: () => hierarchy.rename(),
-      copy: () => arrange.copy(), paste: () => arrange.paste(), duplicate: () => arrange.duplicate(),
+      copy: () => this.clipboard.copy(), paste: () => this.clipboard.ask(), duplicate: () => arrange.duplicate(),
       array: () => this.askForArray(),
       undo: () => edit.undo("undo"), redo: () => edit.undo("redo"),
       all: () => edit.select([...edit.objects.all()].filter(({ of, parent }) => of === "scene" && parent < 0).map(({ handle }) => handle)),
@@ -90,7 +92,7 @@ export class Build {
     at("handles-frame").onchange = () => this.setFrame(at("handles-frame").value);
     at("scene-text-close").onclick = () => this.showText(false);
     const isAway = (target) => target.closest?.("#editor") && !this.text.isShown;
-    listen(this.acts, () => this.edit.isOn, isAway);
+    listen(this.acts, (text) => this.clipboard.paste(text), () => this.edit.isOn, isAway);
     window.addEventListener("keydown", (event) => this.escape(event));
     at("edit-panel").addEventListener("keydown", (event) => {
       if (event.key !== "Escape") return;

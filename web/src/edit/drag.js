@@ -67,7 +67,8 @@ export class Drag {
   cancel() {
     clearTimeout(this.saying);
     this.back();
-    if (this.isTold) this.edit.undo("undo");
+    this.isOver = true;
+    if (this.isTold) this.edit.doing.then(() => this.edit.undo("undo", this.merge));
   }
 
   back() {

@@ -185,7 +185,7 @@ export class Edit {
       const { is } = this;
       const answer = await this.assumed.during(this.ask("edit", { edit: operations, name, ...(merge ? { merge } : {}) }));
       const first = answer.until_stop && !this.hasTold;
-      if (first) this.notice.say("It flies: what you edit now is undone when it is stopped.");
+      if (first) this.notice.say("The drone flies: stop will undo your edits.");
       this.hasTold = Boolean(answer.until_stop) && is.state !== "stopped";
       return answer;
     } catch (error) {
@@ -208,9 +208,10 @@ export class Edit {
     this.notice.say(line, true);
   }
 
-  async undo(which) {
+  // `merge`: of one drag, whatever others have done since.
+  async undo(which, merge) {
     try {
-      const { said, handles = [] } = await this.ask(which);
+      const { said, handles = [] } = await this.ask(which, merge ? { merge } : {});
       this.notice.say(said);
       const there = handles.filter((one) => this.objects.get(one));
       if (there.length) this.select(there);

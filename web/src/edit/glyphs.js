@@ -38,7 +38,7 @@ export class Glyphs {
   }
 
   put({ handle, name, type, matrix, values }) {
-    const looks = JSON.stringify([type, name, values.fov, values.width, values.height, values.size, values.range, values.angle, values.type]);
+    const looks = JSON.stringify([type, name, values.fov, values.horizontal_fov, values.width, values.height, values.size, values.range, values.max_range, values.angle, values.type]);
     if (this.there.get(handle)?.looks !== looks) {
       this.there.get(handle)?.made.removeFromParent();
       const made = KINDS[type](values);
@@ -85,6 +85,11 @@ function camera({ fov = 1, width = 640, height = 480 }) {
   return new THREE.Group().add(box([EYE, EYE, EYE], BODY, [0, 0, -EYE / 2]), lines(rim));
 }
 
+// A vehicle's: its angle is from left to right.
+function vehicleCamera({ horizontal_fov: fov, width, height }) {
+  return camera({ fov: width < height ? 2 * Math.atan((Math.tan(fov / 2) * height) / width) : fov, width, height });
+}
+
 function proximity({ range = 1, angle = 0.3, type }) {
   const far = Math.min(range, 0.5);
   const wide = type === "ray" ? 0 : far * Math.tan(Math.min(angle, 2.6) / 2);
@@ -104,4 +109,6 @@ function joint() {
 
 const force = () => new THREE.Group().add(box([0.06, 0.06, 0.02], [0.2, 0.6, 0.3, 1]));
 
-const KINDS = { dummy, camera, vision_sensor: camera, proximity_sensor: proximity, joint, force_sensor: force };
+const range = ({ max_range: range }) => proximity({ range, type: "ray" }); // a vehicle's
+
+const KINDS = { dummy, camera, vision_sensor: camera, vehicle_camera: vehicleCamera, proximity_sensor: proximity, range_sensor: range, joint, force_sensor: force };

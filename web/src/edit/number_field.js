@@ -2,25 +2,28 @@
 import { create } from "../dom.js";
 
 export const shown = (value, digits = 4) => (Number.isFinite(value) ? String(Number(value.toFixed(digits))) : "");
+const fine = (value, digits) => (value && Math.abs(value) < 0.1 ? String(Number(value.toPrecision(digits))) : shown(value, digits));
 
 // `take(value)` gets a new number, `wrong(line)` what is said of a bad one. The element's `fill(value)` shows one,
-// unless somebody writes there.
-export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, high, isWhole = false, ...more }) {
+// unless somebody writes there. `isFine` shows small numbers, too; `mayBeEmpty`: nothing is null.
+export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, high, isWhole = false, isFine = false, mayBeEmpty = false, ...more }) {
+  const asText = (value) => (isFine ? fine : shown)(value, digits);
   const field = create("input", { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false, "aria-label": label, ...more });
   let holds;
   field.fill = (value) => {
-    const isWritten = document.activeElement === field && field.value !== shown(holds, digits);
+    const isWritten = document.activeElement === field && field.value !== asText(holds);
     holds = value;
-    if (!isWritten) field.value = shown(value, digits);
+    if (!isWritten) field.value = asText(value);
   };
   const enter = () => {
     const text = field.value.trim().replace(",", ".");
-    if (text === shown(holds, digits)) return;
+    if (text === asText(holds)) return;
+    if (text === "" && mayBeEmpty) return void take(null);
     const value = text === "" ? NaN : Number(text);
     const isIn = Number.isFinite(value) && !(value < low) && !(value > high) && !(isWhole && value % 1);
     if (isIn) return void take(value);
     wrong(`${label} = ${field.value.slice(0, 40)}: must be a ${isWhole ? "whole " : ""}number${range(low, high)}`);
-    field.value = shown(holds, digits);
+    field.value = asText(holds);
   };
   field.onchange = enter;
   field.onfocus = () => field.select();
@@ -28,12 +31,12 @@ export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, h
     const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (way && Number.isFinite(holds)) {
       event.preventDefault();
-      field.value = shown(Number(field.value) + way * step, digits);
+      field.value = asText(Number(field.value) + way * step);
       enter();
     }
     if (event.key === "Enter") enter();
     if (event.key !== "Escape") return;
-    field.value = shown(holds, digits);
+    field.value = asText(holds);
     field.blur();
     event.stopPropagation();
   };

@@ -11,7 +11,7 @@ const ANGLES = [["Alpha", "α"], ["Beta", "β"], ["Gamma", "γ"]];
 export class PosePanel {
   constructor(element, edit) {
     this.edit = edit;
-    this.relative = create("select", { "aria-label": "Relative to", title: "Whose axes and origin the numbers are of" });
+    this.relative = create("select", { "aria-label": "Relative to", title: "The axes and origin of the numbers" });
     this.relative.append(...Object.entries(FRAMES_OF_NUMBERS).map(([value, words]) => new Option(words, value)));
     this.relative.value = kept("edit/relative", "world");
     this.relative.onchange = () => {
@@ -53,6 +53,7 @@ export class PosePanel {
     this.fields.forEach((field, at) => {
       field.fill(numbers[at]);
       field.disabled = isFixed;
+      field.title = isFixed ? "Where a part of a vehicle sits is written in the text" : "";
     });
   }
 

@@ -4,12 +4,15 @@ import { numberField } from "./number_field.js";
 import { volumeOf } from "./volumes.js";
 
 // What is changed most comes first; all else as the node tells it.
-const FIRST = ["size", "color", "texture", "mass", "static", "respondable", "visible", "friction", "restitution", "script", "width", "height", "fov", "near", "far", "rate", "noise"];
+const FIRST = ["size", "color", "texture", "mass", "static", "respondable", "visible", "friction", "restitution", "script", "width", "height", "fov", "horizontal_fov", "near", "far", "every", "rate", "min_range", "max_range"];
 const FINE = { size: 0.1, mass: 0.1 }; // steps of the arrow keys
 const STEP = 0.1;
 const WHITE = [1, 1, 1, 1];
 
-const words = (key) => key.replaceAll("_", " ");
+const words = (key) => key.replaceAll(/[_.]/g, " ");
+const inner = (key) => words(key.slice(key.lastIndexOf(".") + 1));
+const groupOf = (key) => words(key.slice(0, Math.max(0, key.lastIndexOf("."))).replaceAll(".", ": "));
+const MOST_SHOWN = 1e9; // what is beyond is no limit that anybody meets
 const hex = (color) => `#${color.slice(0, 3).map((one) => Math.round(255 * one).toString(16).padStart(2, "0")).join("")}`;
 const numbers = (text) => [1, 3, 5].map((from) => Number((parseInt(text.slice(from, from + 2), 16) / 255).toFixed(3)));
 const isPlain = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
@@ -60,19 +63,34 @@ export class Properties {
 
   build(one) {
     this.fills = [];
-    const isPart = this.ones.some(({ of, root }) => of === "vehicle" && !root);
-    const keys = one && !isPart ? this.keys() : [];
-    const rows = keys.map((said) => this.row(said));
+    const isPlain = this.ones.some(({ of, root, values }) => of === "vehicle" && !root && !Object.keys(values).length);
+    const keys = one && !isPlain ? this.keys() : [];
+    const rows = this.grouped(keys, one);
     if (one && this.ones.length === 1) rows.unshift(...this.names(one));
     if (one && keys.some(({ key }) => key === "mass")) rows.splice(rows.findIndex(({ dataset }) => dataset.key === "mass") + 1, 0, this.density());
     if (one?.script && this.ones.length === 1) rows.push(this.parameters(one));
-    if (isPart) rows.push(create("p", { textContent: "A part of a vehicle: what it is like stands at the vehicle, in the text." }));
+    if (isPlain) rows.push(create("p", { textContent: "A part of a vehicle: it has no properties of its own." }));
     this.element.replaceChildren(...rows.filter(Boolean));
     this.element.parentElement.scrollTop = 0;
   }
 
+  // Keys that are inside another one stand folded below that, unless one of them says something.
+  grouped(keys, { values = {} } = {}) {
+    const rows = [];
+    const groups = new Map();
+    for (const said of keys) {
+      const name = groupOf(said.key);
+      if (!groups.has(name)) groups.set(name, name ? create("details", {}, create("summary", { textContent: name })) : null);
+      const group = groups.get(name);
+      if (!group) rows.push(this.row(said));
+      else group.append(this.row(said));
+      if (group && !same(values[said.key] ?? said.default, said.default)) group.open = true;
+    }
+    return [...rows, ...[...groups.values()].filter(Boolean)];
+  }
+
   line(key, hint, ...parts) {
-    const row = create("div", { className: "field", title: hint }, create("span", { textContent: words(key) }), ...parts);
+    const row = create("div", { className: "field", title: hint }, create("span", { textContent: inner(key) }), ...parts);
     row.dataset.key = key;
     return row;
   }
@@ -101,9 +119,10 @@ export class Properties {
   }
 
   row(said) {
-    const { key, kind, what = "" } = said;
+    const { key, kind, unit } = said;
     const made = (KINDS[kind] ?? other)(this, said);
-    const row = this.line(key, what, ...[made].flat());
+    const row = this.line(key, hintOf(said), ...[made].flat());
+    if (unit) row.firstChild.append(create("small", { textContent: ` ${unit}` }));
     row.classList.add(kind);
     return row;
   }
@@ -155,11 +174,19 @@ export class Properties {
   }
 }
 
+// What a value is, and what is allowed.
+function hintOf({ what, unit, least, most }) {
+  const isLimited = typeof least === "number" && most < MOST_SHOWN;
+  return [what, isLimited && [least, "to", most, unit].filter((one) => one !== "").join(" ")].filter(Boolean).join("; ");
+}
+
 // ---- the kinds of values
 
-function number(panel, { key, default: otherwise, least, most, what }) {
-  const isWhole = /whole/.test(what ?? "");
-  const field = numberField(words(key), { take: (value) => panel.set(key, value), wrong: (line) => panel.edit.wrong(line), low: least, high: most, step: isWhole ? 1 : FINE[key] ?? STEP, isWhole });
+function number(panel, { key, default: otherwise, least, most, whole: isWhole }) {
+  const field = numberField(words(key), {
+    take: (value) => panel.set(key, value), wrong: (line) => panel.edit.wrong(line), low: least, high: most, isWhole,
+    step: isWhole ? 1 : FINE[key] ?? STEP, isFine: true, mayBeEmpty: otherwise === null,
+  });
   panel.follow(key, otherwise, (value) => field.fill(value));
   return field;
 }
@@ -191,8 +218,22 @@ function text(panel, { key, default: otherwise }) {
   return field;
 }
 
+// Numbers, as many as somebody wants.
+function list(panel, { key, default: otherwise }) {
+  const shown = (value) => (value ?? []).join(", ");
+  const field = create("input", { type: "text", "aria-label": words(key), placeholder: "numbers, with commas", spellcheck: false });
+  field.onchange = () => {
+    const entered = field.value.split(/[\s,]+/).filter(Boolean).map(Number);
+    if (entered.every(Number.isFinite)) return panel.set(key, entered.length ? entered : null);
+    panel.edit.wrong(`${words(key)} = ${field.value.slice(0, 40)}: must be numbers, with commas between them`);
+    field.value = shown(panel.ones.at(-1)?.values[key]);
+  };
+  panel.follow(key, otherwise, (value) => document.activeElement === field || (field.value = shown(value)));
+  return field;
+}
+
 function choice(panel, { key, default: otherwise, choices }) {
-  const select = create("select", { "aria-label": words(key) }, ...(otherwise === null ? [new Option("", "")] : []), ...choices.map((one) => new Option(one, one)));
+  const select = create("select", { "aria-label": words(key) }, ...(otherwise === null ? [new Option("none", "")] : []), ...choices.map((one) => new Option(one, one)));
   select.onchange = () => panel.set(key, select.value || null);
   panel.follow(key, otherwise, (value) => (select.value = value ?? ""));
   return select;
@@ -222,4 +263,4 @@ function other(panel, { key, default: otherwise }) {
   return button;
 }
 
-const KINDS = { number, numbers: several, switch: onOff, text, file: text, choice, color };
+const KINDS = { number, numbers: several, list, switch: onOff, text, file: text, choice, color };

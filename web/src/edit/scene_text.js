@@ -33,7 +33,7 @@ export class SceneText {
   begin() {
     const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && this.change());
     const label = EditorView.contentAttributes.of({ "aria-label": "Text of the scene; Escape and then Tab leaves it" });
-    const extensions = [basicSetup, StreamLanguage.define(yaml), syntaxHighlighting(colors), keymap.of([indentWithTab]), indentUnit.of("  "), label, changed];
+    const extensions = [basicSetup, EditorView.lineWrapping, StreamLanguage.define(yaml), syntaxHighlighting(colors), keymap.of([indentWithTab]), indentUnit.of("  "), label, changed];
     return new EditorView({ parent: this.parts.text, state: EditorState.create({ extensions }) });
   }
 
@@ -57,7 +57,7 @@ export class SceneText {
       this.parts.title.textContent = file.split("/").pop() || "not saved yet";
       this.parts.title.title = file;
       this.filling = true;
-      fillWith(this.view, text, Transaction.addToHistory.of(false)); // the scene has its own undo
+      fillWith(this.view, text, Transaction.addToHistory.of(false)); // done: the scene is as the text sayss own undo
       this.filling = false;
       this.say("");
     } catch (error) {
@@ -88,7 +88,7 @@ export class SceneText {
       this.revision = answer.revision;
       this.dirty = text !== this.text;
       this.mark(null);
-      this.say("the scene has it");
+      this.say("done: the scene is as the text says");
       this.ask(null);
     } catch (error) {
       this.refused(error);

@@ -66,7 +66,8 @@ class FlightPart(NamedTuple):
         return places
 
     def poses(self, name: str) -> np.ndarray:
-        """Return the poses of another vehicle or object, (M, 7). Raises Missed."""
+        """Return the poses of another vehicle or object, (M, 7); of a path the first that it finds. Raises Missed."""
+        name = self.flight.found.get(name, [name])[0]
         if name not in self.flight.other_poses:
             raise Missed(f"nothing was seen of '{name}'; {near_names(name, self.flight.other_poses)}")
         poses = self.flight.other_poses[name][self.rows]
@@ -106,7 +107,7 @@ class Criterion(Checked):
 
     @property
     def others(self) -> tuple[str, ...]:
-        """Names of vehicles and objects that it asks for in FlightRecord.other_poses."""
+        """Names and paths of vehicles and objects that it asks for in FlightRecord.other_poses."""
         return ()
 
     @property

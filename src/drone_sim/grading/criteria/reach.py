@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -21,7 +22,7 @@ def _place(value: Any) -> Any:
     try:
         return TypeAdapter(Point).validate_python(value)
     except ValidationError:
-        raise ValueError("must be 3 numbers, [x, y, z] in m, or the name of an object or vehicle") from None
+        raise ValueError("must be 3 numbers, [x, y, z] in m, or the name or path of an object or vehicle") from None
 
 
 _Place = Annotated[tuple[float, float, float] | str, PlainValidator(_place)]
@@ -30,8 +31,9 @@ _Place = Annotated[tuple[float, float, float] | str, PlainValidator(_place)]
 class Reach(Criterion):
     """`places` [x, y, z] (m) are to be reached in this order, `within` so many metres, before `until`.
 
-    The name of an object or vehicle is where that is at the end of the part. With `partial` every place that is reached
-    in order gives its share of the points.
+    The name of an object or vehicle is where that is at the end of the part; a path, such as /Gate, is where each is
+    that it finds at the beginning, in their order. With `partial` every place that is reached in order gives its share
+    of the points.
     """
 
     kind: Literal["reach"]
@@ -49,30 +51,32 @@ class Reach(Criterion):
     @property
     def allowed(self) -> str:
         """What passes."""
-        return f"all {len(self.places)} within {figure(self.within, 'm')}"
+        return f"all within {figure(self.within, 'm')}"
 
     def _judged(self, part: FlightPart) -> Outcome:
-        way, here = _way(part), _Here(0, 0.0, 0.0)
+        way, here, places = _way(part), _Here(0, 0.0, 0.0), self._places(part)
         last: float | None = None
-        for number, place in enumerate(self.places):
-            there = part.poses(place)[-1, :3] if isinstance(place, str) else np.array(place)
+        for number, there in enumerate(places):
             here = _first_within(way, here, there, self.within)
             if here.distance > self.within:
-                return self._short(number, last, here.distance)
+                near, allowed = figure(here.distance, "m"), figure(self.within, "m")
+                said = f"it came to {near} of place {number + 1}, {allowed} are allowed"
+                return self._reached(number, len(places), f"reached {number} of {len(places)}; {said}", last)
             last = way.time(here)
-        return self._reached(len(self.places), f"reached all {len(self.places)}, the last at {last:.2f} s", last)
+        return self._reached(len(places), len(places), f"reached all {len(places)}, the last at {last:.2f} s", last)
 
-    def _short(self, reached: int, last: float | None, nearest: float) -> Outcome:
-        said = (
-            f"reached {reached} of {len(self.places)}; it came to {figure(nearest, 'm')} of place {reached + 1}, "
-            f"{figure(self.within, 'm')} are allowed"
-        )
-        return self._reached(reached, said, last)
+    def _places(self, part: FlightPart) -> list[np.ndarray]:
+        """Return every place, (3,) in m. Raises Missed."""
+        found = part.flight.found
+        each = (found.get(one, [one]) if isinstance(one, str) else [one] for one in self.places)
+        return [
+            part.poses(one)[-1, :3] if isinstance(one, str) else np.array(one)
+            for one in itertools.chain.from_iterable(each)
+        ]
 
-    def _reached(self, reached: int, said: str, at: float | None) -> Outcome:
-        outcome = self._outcome(reached == len(self.places), said, float(reached), "places", at)
-        share = self.points * reached / len(self.places)
-        return replace(outcome, points=share) if self.partial else outcome
+    def _reached(self, reached: int, of: int, said: str, at: float | None) -> Outcome:
+        outcome = self._outcome(reached == of, said, float(reached), "places", at)
+        return replace(outcome, points=self.points * reached / of) if self.partial else outcome
 
 
 class _Here(NamedTuple):

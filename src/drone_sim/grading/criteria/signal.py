@@ -18,7 +18,7 @@ _Words = Annotated[str, Field(max_length=200)]
 
 def _of_words(field: str) -> str:
     if not all(field.split(".")):
-        raise ValueError("must be names parted by dots, such as pose.position.x")
+        raise ValueError("must be names with dots between them, such as pose.position.x")
     return field
 
 

@@ -32,7 +32,7 @@ class StepCriterion(AtMostCriterion):
         """Refuse a step of nothing."""
         super().model_post_init(context)
         if self.start == self.to:
-            raise ParameterError("is where it comes from; there would be no step", ("to",), f"{self.to:g}")
+            raise ParameterError("is the same as `from`: there would be no step", ("to",), f"{self.to:g}")
 
     def response(self, part: FlightPart) -> Response:
         """Return the response in a part of the flight. Raises Missed."""

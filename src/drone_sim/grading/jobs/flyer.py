@@ -108,7 +108,7 @@ class Flyer:
             for one in ends:
                 one.close()
         reply, rows = json.loads(self._judge.receive(patience)), self._judge.receive(_GRACE)
-        ended = self._scripts.end()
+        ended = self._scripts.end(reply.get("is_gone", False))
         if ended["is_last"]:
             self._scripts.close()
         return reply, rows, ended["end"]

@@ -17,6 +17,7 @@ from typing import Any
 
 from drone_sim.command_line import format_error
 from drone_sim.files.resources import FileCache, ReadFile
+from drone_sim.grading import permissions
 from drone_sim.grading import plan as plans
 from drone_sim.grading.flight import Flight, grade, ungraded, write_to
 from drone_sim.grading.jobs.limited_process import LimitedProcess, stay_on_one_processor
@@ -84,6 +85,7 @@ def _read_plan(path: str) -> ReadFile:
     plan = plans.read(path)
     with contextlib.suppress(Exception):
         grade(plan.model_copy(update={"duration": 0.1}), "pilot")  # what this reads and compiles, forks have
+    permissions.free()
     connect_ahead()  # which forks need not do, either
     gc.collect()
     gc.freeze()

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 _BLOCK = 2**18
+_ENDING = 5.0  # s, for the kernel to take down a process, on a busy machine
 _LOOKS = 0.1  # s between two looks at how many processes there are, and what they take
 _ROUNDS = 10_000  # of killing what is left
 _MIB = 2**20
@@ -104,6 +105,10 @@ class LimitedProcess:
             self._look(deadline, not ready)
         self._take_all()
         return True
+
+    def ends(self) -> bool:
+        """Tell whether it ends by itself: the kernel closes its descriptors some time before it is gone."""
+        return bool(select.select([self._end], [], [], _ENDING)[0])
 
     def _take_all(self) -> None:
         for descriptor in self._read:

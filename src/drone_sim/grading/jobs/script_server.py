@@ -22,8 +22,9 @@ from typing import Any
 import numpy as np
 
 from drone_sim.grading.jobs.limited_process import LimitedProcess, open_to_itself
-from drone_sim.grading.jobs.server import GONE, HANDED_IN, Requests
+from drone_sim.grading.jobs.server import GONE, HANDED_IN, HUNG_UP, Requests
 from drone_sim.scripting.door import script_process
+from drone_sim.scripting.door.script_process import ScriptEnd
 
 DOOR = 3  # its descriptor, beside which nothing is open
 
@@ -31,29 +32,37 @@ DOOR = 3  # its descriptor, beside which nothing is open
 def main() -> None:
     """Serve: each request names a script, and files to be laid down for it; how its process ended goes back.
 
-    A message ends the process, whatever it does.
+    A message ends the process, whatever it does; HUNG_UP says that it has closed its door, and may be ending already.
     """
     is_alone = sys.argv[1:] == ["alone"]  # in a sandbox, where it sees its own processes only
-    script_process.import_all()
+    script_end = script_process.prepared()
     requests = Requests()
     folders = [tempfile.gettempdir(), *([HANDED_IN] if is_alone else [])]
     with contextlib.suppress(*GONE):
         for request, door in requests:
             for path in request["handed_in"]:
                 _lay(f"{HANDED_IN}{path}", requests.receive())
-            run = functools.partial(_run, request, door)
+            run = functools.partial(_run, script_end, request, door)
             process = LimitedProcess(request["limits"], run, {}, [door.fileno()], is_alone)
             door.close()
-            with process:
-                has_ended = process.watch(requests.fileno())
-            requests.receive()
+            end = _end_of(process, requests)
             is_last = not all([_cleared(folder) for folder in folders])  # what cannot be removed here, its client does
-            requests.reply(json.dumps({"end": process.end if has_ended else "", "is_last": is_last}).encode())
+            requests.reply(json.dumps({"end": end, "is_last": is_last}).encode())
             if is_last:
                 break
 
 
-def _run(request: dict[str, Any], door: socket.socket, _outputs: Mapping[str, int]) -> None:
+def _end_of(process: LimitedProcess, requests: Requests) -> str:
+    """Watch a flight's process until it has ended, or is not needed any more; return how it ended, or ''."""
+    with process:
+        is_over = process.watch(requests.fileno())
+        has_ended = is_over or (requests.receive() == HUNG_UP and process.ends())
+    if is_over:
+        requests.receive()
+    return process.end if has_ended else ""
+
+
+def _run(script_end: ScriptEnd, request: dict[str, Any], door: socket.socket, _outputs: Mapping[str, int]) -> None:
     """Serve the script's end of the door, in a process of its own."""
     given = door.detach()
     if given != DOOR:
@@ -62,7 +71,7 @@ def _run(request: dict[str, Any], door: socket.socket, _outputs: Mapping[str, in
     open_to_itself()
     random.seed(request["random"])
     np.random.seed(request["random"] % 2**32)
-    script_process.serve(socket.socket(fileno=DOOR), request["script"])
+    script_process.serve(script_end, socket.socket(fileno=DOOR), request["script"])
 
 
 def _lay(path: str, content: bytes) -> None:

@@ -21,6 +21,7 @@ from drone_sim.grading.jobs.limited_process import guard
 
 HANDED_IN = "/handed_in"  # below which the files of a script are laid in a sandbox, each under its whole path
 READY = b"ready"  # said once, after the imports
+HUNG_UP = b"hung up"  # said of a script's process at the end of a flight; else nothing is
 GONE = (EOFError, ConnectionError)  # raised once nobody wants anything any more, however they ended
 _IDLE = 120.0  # s
 

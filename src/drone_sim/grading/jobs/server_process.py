@@ -15,7 +15,7 @@ from typing import Any
 
 from drone_sim.files.resources import python_path
 from drone_sim.grading.jobs import sandbox
-from drone_sim.grading.jobs.server import READY
+from drone_sim.grading.jobs.server import HUNG_UP, READY
 
 _START = 60.0  # s for the imports, on a busy machine; they take one
 _GRACE = 10.0  # s
@@ -86,10 +86,10 @@ class ServerProcess:
                 raise ServerDied
             return connection.recv_bytes(_LARGEST)
 
-    def end(self) -> dict[str, Any]:
-        """Have the process of the last request ended; return the reply. Raises ServerDied."""
+    def end(self, has_hung_up: bool) -> dict[str, Any]:
+        """Have the process of the last request ended, which may have hung up; return the reply. Raises ServerDied."""
         with _told():
-            self._open().send_bytes(b"")
+            self._open().send_bytes(HUNG_UP if has_hung_up else b"")
         reply: dict[str, Any] = json.loads(self.receive(_GRACE))
         return reply
 

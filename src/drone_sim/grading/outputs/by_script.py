@@ -59,10 +59,13 @@ class ScriptResults:
 
     @property
     def errors(self) -> list[str]:
-        """What went wrong in the flights beside criteria, each once, with the script's name instead of its path."""
-        errors = (trouble for one in self.flights for trouble in one.troubles)
+        """What went wrong in the flights beside criteria, each once."""
+        return list(dict.fromkeys(line for one in self.flights for line in self.told(one)))
+
+    def told(self, flight: Result) -> list[str]:
+        """Return what went wrong in a flight beside criteria, with the script's name instead of its path."""
         name = PurePath(self.script).name
-        return list(dict.fromkeys(one.replace(self.script, name) if self.script else one for one in errors))
+        return [one.replace(self.script, name) if self.script else one for one in flight.troubles]
 
 
 def by_script(results: Iterable[Result], names: Mapping[str, str] | None = None) -> list[ScriptResults]:

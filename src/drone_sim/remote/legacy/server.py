@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from drone_sim.message_text import printable
 from drone_sim.remote.client import Client
 from drone_sim.remote.control import MovedObjects
-from drone_sim.remote.conversation import RemoteApi, Stepping, Task, Until
+from drone_sim.remote.conversation import RemoteApi, Stepping, Task, Until, Watched, unwatched
 from drone_sim.remote.legacy.connection import Connection
 from drone_sim.remote.legacy.doors import Doors
 from drone_sim.remote.legacy.session import Session
@@ -58,13 +58,15 @@ class LegacyServer(RemoteApi):
         moved: MovedObjects | None = None,
         others: Callable[[], Iterable[Stepping]] = tuple,
         clock: Callable[[], float] = time.monotonic,
+        watched: Watched = unwatched,
     ):
         """Listen for who drives a `player`, on an `address` ("*": all), and a `port`, of which 0 is a free one.
 
         `moved` watches where objects are put; `others` returns the say in the steps that clients of other servers have,
-        who are let go when the simulation stops; `clock` counts real seconds. Raises OSError, in one line.
+        who are let go when the simulation stops; `clock` counts real seconds; `watched` is what clients call instead of
+        a function. Raises OSError, in one line.
         """
-        self._player, self._clock, self._others = player, clock, others
+        self._player, self._clock, self._others, self._watched = player, clock, others, watched
         self._moved = moved or MovedObjects(player.simulation)
         self._selected: list[int] = []
         self._seldom, self._rarely, self._unsaid = Throttle(_SELDOM, clock), Throttle(_SELDOM, clock), 0
@@ -154,7 +156,7 @@ class LegacyServer(RemoteApi):
         return False
 
     def _seat(self, connection: Connection) -> None:
-        client = Client(self._player, self._moved, None, self._others, self._clock)
+        client = Client(self._player, self._moved, None, self._others, self._clock, self._watched)
         name = f"the remote API's client {connection.name}"
         session = Session(name, client, self._player, self._selected, self._clock)
         port = connection.port

@@ -59,8 +59,8 @@ def _serve() -> None:
     parameters = read_parameters(rospy.get_param("~", {}))
     server = PageServer(parameters.address, parameters.port)
     with address_file(server.address, server.port) as where:
-        print_to_terminal(f"the cockpit is at {server.addresses}")
         rospy.loginfo(f"the cockpit listens at {server.address.partition('?')[0]}; {where}")
+        print_to_terminal(f"the cockpit is at {server.addresses}")
 
         from drone_sim.ros.cockpit.cockpit import Cockpit  # which takes a second and more
 

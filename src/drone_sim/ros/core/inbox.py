@@ -5,8 +5,11 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
+from functools import partial
 from queue import SimpleQueue
 from typing import Any
+
+from drone_sim.ros.core.intervention import Intervention
 
 _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
 
@@ -19,23 +22,28 @@ class Inbox:
         patience: float = _PATIENCE,
         sleep: Callable[[float], Any] | None = None,
         wake: Callable[[], Any] = lambda: None,
+        tell: Callable[[Intervention], None] = lambda _: None,
     ):
         """Start empty; whoever asks waits for `patience` (s).
 
-        `wait` sleeps by `sleep`, which `wake` ends, where others are to be heard meanwhile.
+        `wait` sleeps by `sleep`, which `wake` ends, where others are to be heard meanwhile. `tell` is called before a
+        job that is an intervention.
         """
+        self._tell = tell
         self._patience = patience
         self._jobs: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._came = threading.Event()
         self._sleep, self._wake = sleep or self._came.wait, wake
 
-    def put(self, job: Callable[[], None]) -> None:
+    def put(self, job: Callable[[], None], intervention: Intervention | None = None) -> None:
         """Leave a job and go on."""
+        if intervention is not None:
+            self._jobs.put(partial(self._tell, intervention))
         self._jobs.put(job)
         self._came.set()
         self._wake()
 
-    def ask(self, job: Callable[[], str]) -> str:
+    def ask(self, job: Callable[[], str], intervention: Intervention | None = None) -> str:
         """Leave a job, wait until it is done, and return its answer; raises what it raised.
 
         Raises TimeoutError where the answer does not come in time; a job that has not begun by then never will.
@@ -49,7 +57,7 @@ class Inbox:
                 except Exception as error:
                     answer.set_exception(error)
 
-        self.put(carry_out)
+        self.put(carry_out, intervention)
         if not wait([answer], self._patience).done:
             late = "it will not be carried out" if answer.cancel() else "it is still being carried out"
             raise TimeoutError(f"no answer within {self._patience:g} s: {late}")

@@ -1,4 +1,4 @@
-"""`rosrun drone_sim doctor`: checks the set-up, a line each: ok, or what to do."""
+"""`rosrun drone_sim doctor`: checks the set-up; each line says ok, or what to do."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from drone_sim.ros.doctor.master import Master, simulator
 _SECONDS = 10.0  # for a check
 _AT_THE_END = 2.0  # s, for saying goodbye to the master
 _SOON = 1e-3  # s; 0 would be never
-_EPILOG = "Its exit status is 0, or 1 where something is WRONG. No master needs to run."
+_EPILOG = "The exit status is 0, or 1 if something is WRONG. It works without a master."
 
 
 Check = Callable[[], Iterable[Line]]
@@ -80,7 +80,7 @@ def _limited(seconds: float) -> Iterator[None]:
 def main() -> int:
     """Print the lines; return the exit status."""
     parser = argparse.ArgumentParser(prog="doctor", description=__doc__, epilog=_EPILOG)
-    parser.add_argument("--quick", action="store_true", help="leave out packages, pictures and the test flight")
+    parser.add_argument("--quick", action="store_true", help="skip packages, pictures and the test flight")
     given = [one for one in sys.argv[1:] if ":=" not in one]  # roslaunch's and rosrun's
     thorough = not parser.parse_args(given).quick
     socket.setdefaulttimeout(PATIENCE)

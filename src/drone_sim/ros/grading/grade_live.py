@@ -141,12 +141,11 @@ class _Live:
         self._timeline = plan.timeline_of(wanted)
         self._sender = TimelineSender(self._timeline.entries, parameters, simulator.node)
         self.listener = FlightListener(plan, parameters, simulator.node, self._follow)
-        names = [one.name for one in parameters.fleet]
-        self.rules = LiveRules(plan, simulator.node, names, lambda: self.listener.time)
+        self.rules = LiveRules(plan, simulator.node)
 
     def is_connected(self) -> bool:
         """Whether the simulator hears all that is said, and the other way round."""
-        return self._sender.is_heard and self.listener.is_connected()
+        return self._sender.is_heard and self.listener.is_connected() and self.rules.is_connected()
 
     def _follow(self, now: float) -> None:
         """Send what is due after a step that ended at this time (s)."""
@@ -234,10 +233,10 @@ def _from_here(name: str) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = Parser(prog=_NAME, description="Grade what flies on a running simulator by a plan.")
+    parser = Parser(prog=_NAME, description="Grade a node or a script on a running simulator, with a plan.")
     parser.add_argument("plan", metavar="PLAN.yaml", help="the plan, as for `grade`")
     parser.add_argument("--seed", metavar="N", type=_seed, default=0, help="start and wind of this seed (default: 0)")
-    parser.add_argument("--node", metavar="NAME", default="", help="the node that flies: it is waited for")
+    parser.add_argument("--node", metavar="NAME", default="", help="the node that flies; grade_live waits for it")
     parser.add_argument("--simulator", metavar="NODE", default="drone_sim", help="(default: %(default)s)")
     parser.add_argument(
         "--patience", metavar="S", type=float, default=_PATIENCE, help="real seconds to wait for both (default: 30)"

@@ -1,44 +1,35 @@
-"""The rules of the game, as far as topics tell: who else has asked for what the plan does not allow."""
+"""The rules of the game: who else has done to the world what the plan does not allow, as the simulator says it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import partial
-
 import rospy
+from std_msgs.msg import String
 
-from drone_sim.grading.permissions import CHANGE, MOST_TRIED, MOVE, PUSH
+from drone_sim.grading.permissions import MOST_TRIED
 from drone_sim.grading.plan import Plan
 
-_HANDLES = ("objects/feedback", "markers/feedback")  # rviz's, of a vehicle that is alone, or of all
-_OF_A_VEHICLE = {  # what a topic asks for
-    **dict.fromkeys(("set_pose", "initialpose", "reset", *_HANDLES), MOVE),
-    "push": PUSH,
-    **dict.fromkeys(("weather", "set_wind", "faults"), CHANGE),
-}
-_OF_THE_SCENE = ("set_object_pose", *_HANDLES)
+_QUEUE = 1000  # messages
 
 
 class LiveRules:
-    """Hears what others than whoever grades ask the simulator for; the first time of each thing is kept."""
+    """Hears what others than whoever grades do to the world; docs/interface.md says what `interventions` holds."""
 
-    def __init__(self, plan: Plan, simulator: str, vehicles: Iterable[str], clock: Callable[[], float]):
-        """Subscribe to what a `plan` does not allow of these vehicles; `clock` returns the simulated time in s."""
-        self._clock = clock
+    def __init__(self, plan: Plan, simulator: str):
+        """Hear what a `plan` does not allow of the node `simulator`."""
+        self._allowed = {*plan.allowed}
         self.tried: list[str] = []
-        self._known: set[str] = set()
-        asked = [(f"/{name}/{topic}", action, name) for name in vehicles for topic, action in _OF_A_VEHICLE.items()]
-        asked += [(f"{simulator}/{topic}", MOVE, "the scene") for topic in _OF_THE_SCENE]
-        for topic, action, what in asked:
-            if action not in plan.allowed:
-                rospy.Subscriber(topic, rospy.AnyMsg, partial(self._hear, topic, f"{action} {what}"))
+        self._topic = rospy.Subscriber(f"{simulator}/interventions", String, self._hear, queue_size=_QUEUE)
+
+    def is_connected(self) -> bool:
+        """Whether the simulator is heard."""
+        return bool(self._topic.get_num_connections())
 
     def clear(self) -> None:
-        """Forget what was asked for before the flight."""
-        self.tried, self._known = [], set()
+        """Forget what was done before the flight."""
+        self.tried = []
 
-    def _hear(self, topic: str, said: str, message: rospy.AnyMsg) -> None:
-        sender = message._connection_header.get("callerid", "?")
-        if sender != rospy.get_name() and topic not in self._known and len(self.tried) < MOST_TRIED:
-            self._known.add(topic)
-            self.tried.append(f"tried to {said} at {self._clock():.2f} s ({topic}, by {sender})")
+    def _hear(self, message: String) -> None:
+        said = message.data
+        is_own = said.endswith(f", by {rospy.get_name()})")
+        if not is_own and said.partition(" ")[0] not in self._allowed and len(self.tried) < MOST_TRIED:
+            self.tried.append(f"tried to {said}")

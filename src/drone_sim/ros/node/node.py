@@ -27,6 +27,7 @@ from drone_sim.ros.core.startup import init_node, release_name, reported
 from drone_sim.ros.core.validation import parameters_of, use_sim_time
 from drone_sim.ros.node.diagnostics import Diagnostics
 from drone_sim.ros.node.inspection import InspectionTopics
+from drone_sim.ros.node.interventions import Interventions
 from drone_sim.ros.node.object_poses import ObjectPoses
 from drone_sim.ros.node.scene_editing import SceneEditing
 from drone_sim.ros.node.services import Services
@@ -80,10 +81,12 @@ class Node:
         self._time = StepTime(self.simulation, use_sim_time())
         self._state = rospy.Publisher("~state", String, queue_size=10, latch=True)
         self.player = Player(self.simulation, self._step_and_show, self._state.publish, self._time.simulated)
-        self._outside = start_server(parameters.remote_api, self.player, backend)
+        self._interventions = Interventions(self.simulation)
+        self._outside = start_server(parameters.remote_api, self.player, backend, self._interventions.watched)
         self._pacer = Pacer(period(parameters), sleep=self._outside.wait)
         others = self._outside  # who are to be heard while the inbox waits
-        self._inbox = Inbox(sleep=others.wait, wake=others.wake) if others.address else Inbox()
+        sleep = others.wait if others.address else None
+        self._inbox = Inbox(sleep=sleep, wake=others.wake, tell=self._interventions.tell)
         self._topics = FleetTopics(self.simulation, self._inbox, self._time.stamp)
         self._tuning = TuningServer(rospy.get_name(), Pace(self.simulation, self._pacer), self._inbox, "simulation")
         self._services = Services(self.player, self._inbox, self._topics.follow)
@@ -252,6 +255,7 @@ class Node:
         self._signals.update()
         self._inspection.update()
         self._editing.update()
+        self._interventions.update()
         if self._parameters.gui:
             for track in [vehicle.track.matrix() for vehicle in self._first()]:
                 self.simulation.world.pictures.look_from_behind(position(track), to_euler(track)[2])

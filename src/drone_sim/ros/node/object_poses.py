@@ -7,9 +7,11 @@ from collections.abc import Callable
 import rospy
 from geometry_msgs.msg import TransformStamped
 
+from drone_sim.grading.permissions import MOVE
 from drone_sim.mechanics.frames import to_rpy
 from drone_sim.offline.timeline import ObjectMove
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.intervention import intervention
 from drone_sim.ros.core.message_conversion import xyz, xyzw
 from drone_sim.ros.core.validation import check_frame
 from drone_sim.run.simulation import Simulation
@@ -38,7 +40,8 @@ class ObjectPoses:
         except checks.Refused as refused:
             rospy.logwarn_throttle(1, f"set_object_pose of '{name}' refused: {refused}")
             return
-        self._inbox.put(self._putting(ObjectMove(name, pose.position, to_rpy(pose.matrix) if is_turned else None)))
+        move = ObjectMove(name, pose.position, to_rpy(pose.matrix) if is_turned else None)
+        self._inbox.put(self._putting(move), intervention(MOVE, name, "~set_object_pose", message))
 
     def _putting(self, move: ObjectMove) -> Callable[[], None]:
         def put() -> None:

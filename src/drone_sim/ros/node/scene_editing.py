@@ -12,14 +12,19 @@ from typing import Any
 
 import rospkg
 import rospy
-from diagnostic_msgs.srv import AddDiagnostics  # of ROS's own services the one that takes a text and answers with one
+from diagnostic_msgs.srv import (  # of ROS's own services the one that takes a text and answers with one
+    AddDiagnostics,
+    AddDiagnosticsRequest,
+)
 from std_srvs.srv import Trigger
 
 from drone_sim.config.types import ParameterError
 from drone_sim.editing.editor import SceneEditor
 from drone_sim.editing.rows import SceneRows
 from drone_sim.files.resources import locate, package_path
+from drone_sim.grading.permissions import CHANGE
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.intervention import intervention
 from drone_sim.ros.node.inspection import LatchedText
 from drone_sim.ros.node.services import Services, scene_parameter
 from drone_sim.run.pacing import Throttle
@@ -30,6 +35,7 @@ _SCENES = (".yaml", ".yml")
 _PERIOD = 0.1  # s of real time, between two messages of the tree
 _WAITING = 50  # messages of the tree, each of which goes on with the one before
 _LONGEST = 8 << 20  # characters of a request
+_READING = {"text", "text_of"}  # requests
 _REFUSED = (ParameterError, ScriptError, ValueError, OSError, RuntimeError, RecursionError)
 
 
@@ -46,17 +52,19 @@ class SceneEditing:
         self._throttle = Throttle(_PERIOD)
         self._version = 0
         self._said: dict[str, Any] = {}
-        rospy.Service("~edit_scene", AddDiagnostics, lambda request: self._answer(request.load_namespace))
-        rospy.Service("~save_scene", Trigger, lambda _: self._attempt(self._save))
+        rospy.Service("~edit_scene", AddDiagnostics, self._answer)
+        rospy.Service("~save_scene", Trigger, lambda request: self._attempt(self._save, "~save_scene", request))
 
-    def _answer(self, text: str) -> tuple[bool, str]:
+    def _answer(self, request: AddDiagnosticsRequest) -> tuple[bool, str]:
+        text = request.load_namespace
         if len(text) > _LONGEST:
             return False, f"edit_scene: a request has at most {_LONGEST} characters"
         try:
             said = json.loads(text)
         except (json.JSONDecodeError, RecursionError) as error:
             return False, f"edit_scene: no JSON: {error}"
-        return self._attempt(lambda: self._do(said))
+        is_reading = isinstance(said, dict) and said.keys() <= _READING
+        return self._attempt(lambda: self._do(said), "" if is_reading else "~edit_scene", request)
 
     def _save(self) -> str:
         """Write the scene as it stands now, to the file that the parameter `scene_file` names."""
@@ -64,9 +72,11 @@ class SceneEditing:
         is_other = Path(name).suffix in _SCENES and package_path() not in locate(name).resolve().parents
         return str(self.editor.answer({"save": name if is_other else True})["said"])
 
-    def _attempt(self, job: Callable[[], str]) -> tuple[bool, str]:
+    def _attempt(self, job: Callable[[], str], changing: str, request: Any) -> tuple[bool, str]:
+        """Do a job for a request; `changing` is the service that changes the scene by it, '' for none."""
+        done = intervention(CHANGE, "the scene", changing, request) if changing else None
         try:
-            return True, self._inbox.ask(job)
+            return True, self._inbox.ask(job, done)
         except _REFUSED as error:
             return False, " ".join((error.text if isinstance(error, ParameterError) else str(error)).split())
 

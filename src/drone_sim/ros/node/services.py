@@ -10,7 +10,9 @@ from typing import Any
 import rospy
 from std_srvs.srv import SetBool, Trigger
 
+from drone_sim.grading.permissions import CHANGE
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.intervention import intervention
 from drone_sim.ros.core.startup import MASTER_GONE, from_shell
 from drone_sim.run.parameters import ParameterError, Parameters
 from drone_sim.run.player import Player
@@ -41,8 +43,10 @@ class Services:
         self._snapshot: Snapshot | None = None
         jobs = ("start", "stop", "restart", "step", "load_scene", "set_vehicles", "snapshot", "restore")
         for name in jobs:
-            rospy.Service(f"~{name}", Trigger, partial(self._answer, getattr(self, name)))
-        rospy.Service("~pause", SetBool, lambda request: self._answer(lambda: player.pause(request.data)))
+            rospy.Service(f"~{name}", Trigger, partial(self._answer, name, getattr(self, name)))
+        rospy.Service(
+            "~pause", SetBool, lambda request: self._answer("pause", lambda: player.pause(request.data), request)
+        )
 
     def close(self) -> None:
         """Leave the parameters as they were given."""
@@ -53,9 +57,10 @@ class Services:
         self._vehicles.tell(self._player.simulation.parameters)
         self._follow()
 
-    def _answer(self, job: Callable[[], str], _request: Any = None) -> tuple[bool, str]:
+    def _answer(self, name: str, job: Callable[[], str], request: Any) -> tuple[bool, str]:
+        done = intervention(CHANGE, "the scene", f"~{name}", request) if name != "snapshot" else None
         try:
-            answer = self._inbox.ask(job)
+            answer = self._inbox.ask(job, done)
             rospy.logdebug(answer)
             return True, answer
         except (ParameterError, ScriptError, ValueError, OSError, RuntimeError) as error:

@@ -12,11 +12,13 @@ from typing import NamedTuple
 import rospy
 from visualization_msgs.msg import InteractiveMarkerFeedback, Marker
 
+from drone_sim.grading.permissions import MOVE
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Matrix
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.intervention import intervention
 from drone_sim.ros.core.validation import checked_pose
 from drone_sim.ros.rviz.marker_server import HeldHandles, MarkerServer, level, new_handle
 from drone_sim.ros.rviz.marker_topics import namespace
@@ -52,6 +54,7 @@ class ObjectHandles:
         self._inbox = inbox
         self._held = HeldHandles()
         self._throttle, self._warnings = Throttle(_PERIOD), Throttle(_QUIET)
+        self._topic = f"{namespace(simulation)}/objects/feedback"
         self._server = MarkerServer(f"{namespace(simulation)}/objects")
         self._shown: dict[str, _ShownHandle] = {}
         self._chosen = ""
@@ -106,7 +109,8 @@ class ObjectHandles:
     def _on_feedback(self, feedback: InteractiveMarkerFeedback) -> None:
         self._held.on_feedback(feedback)
         if feedback.event_type in (_Drag.MOUSE_DOWN, _Drag.POSE_UPDATE):
-            self._inbox.put(lambda: self._drag(feedback))
+            done = intervention(MOVE, feedback.marker_name, self._topic, feedback)
+            self._inbox.put(lambda: self._drag(feedback), done)
         elif feedback.event_type == _Drag.MOUSE_UP:
             self._chosen = feedback.marker_name
 

@@ -102,7 +102,8 @@ class VehicleMarkers:
         self._topic.repeat()
         if self._simulation.era != self._shown and self._topic.due():
             self._shown = self._simulation.era
-            self._topic.show([one for vehicle in self._simulation.vehicles.values() for one in self._looks(vehicle)])
+            looks = [one for vehicle in self._simulation.vehicles.values() for one in self._looks(vehicle)]
+            self._topic.show([Marker(action=Marker.DELETEALL), *looks])  # some have gone, or have another name
 
     def _looks(self, vehicle: Vehicle) -> list[Marker]:
         markers = []

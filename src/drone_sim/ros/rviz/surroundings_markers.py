@@ -40,16 +40,16 @@ class SurroundingsMarkers:
         """Advertise for the scene of `simulation`; its floor is written among `files`."""
         self._simulation = simulation
         self._files = files
-        self._shown: Scene | None = None
+        self._shown: tuple[Scene, int] | None = None  # of which scene the floor, by its body
         self._topic = MarkerTopic(f"{namespace(simulation)}/view/surroundings", WORDS)
 
     def update(self) -> None:
         """Publish what is new, if anybody listens."""
         self._topic.repeat()
         scene = self._simulation.scene
-        if scene is self._shown or not self._topic.due():
+        if self._shown == (scene, scene.floor) or not self._topic.due():
             return
-        self._shown = scene
+        self._shown = scene, scene.floor
         dome: Any = sky.dome().reshape(-1, 6).tolist()
         markers = [_painted("sky", _SKY, dome), _ground(self._simulation.parameters.scene.floor.size / 2)]
         markers += [self._floor(visual) for visual in self._simulation.world.pictures.visuals() if visual.floor]

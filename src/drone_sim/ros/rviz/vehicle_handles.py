@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 from visualization_msgs.msg import InteractiveMarkerFeedback, Marker
 
+from drone_sim.grading.permissions import MOVE
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.core import message_conversion
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.intervention import intervention
 from drone_sim.ros.core.validation import checked_pose
 from drone_sim.ros.rviz.marker_server import HeldHandles, MarkerServer, level, new_handle
 from drone_sim.ros.rviz.marker_topics import band, namespace, new_marker
@@ -44,6 +46,7 @@ class VehicleHandles:
         self._inbox = inbox
         self._held = HeldHandles()
         self._throttle = Throttle(_PERIOD)
+        self._topic = f"{namespace(simulation)}/markers/feedback"
         self._server = MarkerServer(f"{namespace(simulation)}/markers")
         self._looks = {True: new_marker(Marker.SPHERE, (0.0, 0.8, 0.0, 0.9), [0.12] * 3), False: _ring()}
         self._shown: dict[str, _Handle] = {}
@@ -88,15 +91,16 @@ class VehicleHandles:
         handle = self._shown.get(feedback.marker_name)
         if handle is None:  # it has gone meanwhile
             return
+        done = None if handle.is_target else intervention(MOVE, handle.vehicle, self._topic, feedback)
         if feedback.event_type == InteractiveMarkerFeedback.MOUSE_DOWN:
-            self._inbox.put(lambda: self._hold(feedback.marker_name, handle))
+            self._inbox.put(lambda: self._hold(feedback.marker_name, handle), done)
         if feedback.event_type != InteractiveMarkerFeedback.POSE_UPDATE:
             return
         try:
             pose = checked_pose(feedback.header.frame_id, feedback.pose, handle.limits)
         except checks.Refused:
             return  # dragged below the floor, or to the horizon: it stays where it was
-        self._inbox.put(lambda: self._carry_out(feedback.marker_name, handle, pose))
+        self._inbox.put(lambda: self._carry_out(feedback.marker_name, handle, pose), done)
 
     def _carry_out(self, name: str, handle: _Handle, pose: Pose) -> None:
         self._hold(name, handle)  # after a restart it would be free

@@ -1,4 +1,4 @@
-"""Write what a vehicle was told in a bag as a timeline, with which `fly --commands` flies it again, step by step."""
+"""Write the commands in a bag as a timeline: `fly --commands` flies them again, step by step."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ _Action = dict[str, Any]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write it; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
     parser = Parser(prog=_NAME, description=__doc__)
-    parser.add_argument("bag", metavar="BAG", help="what rosbag recorded, odometry among it")
+    parser.add_argument("bag", metavar="BAG", help="a bag with odometry")
     parser.add_argument("timeline", metavar="OUT.yaml")
-    parser.add_argument("--vehicle", metavar="NAME", help="the one of several (default: the first)")
+    parser.add_argument("--vehicle", metavar="NAME", help="which of several vehicles (default: the first)")
     options = parser.parse_args(arguments)
     return status_of(_NAME, lambda: _write(options))
 

@@ -24,9 +24,11 @@ _SLOWEST = 1.0  # pictures per second
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make it; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
     parser = Parser(prog=_NAME, description=__doc__)
-    parser.add_argument("bag", metavar="BAG", help="what rosbag recorded, pictures among it (record_images:=true)")
+    parser.add_argument("bag", metavar="BAG", help="a bag with pictures (record_images:=true)")
     parser.add_argument("video", metavar="OUT.mp4")
-    parser.add_argument("--topic", metavar="NAME", help="of the pictures, such as /drone/front (default: the first)")
+    parser.add_argument(
+        "--topic", metavar="NAME", help="the topic of the pictures, such as /drone/front (default: the first)"
+    )
     options = parser.parse_args(arguments)
     return status_of(_NAME, lambda: _film(options))
 

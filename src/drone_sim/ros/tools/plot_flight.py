@@ -1,4 +1,4 @@
-"""Draw a flight from a bag, or from a table that `fly --csv` wrote: commands against flown, path, attitude, sensors."""
+"""Draw a flight from a bag, or from a table of `fly --csv`: commands and flown values, path, attitude, sensors."""
 
 from __future__ import annotations
 
@@ -19,9 +19,11 @@ _TABLES, _BAG = (".csv", ".txt"), ".bag"
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw; return 0, or 1 after a line on stderr for a file that cannot be read or written."""
     parser = Parser(prog=_NAME, description=__doc__)
-    parser.add_argument("flight", metavar="FLIGHT", help="what was recorded: a .bag, or a .csv of fly")
-    parser.add_argument("plot", metavar="OUT.png", nargs="?", help="(default: the name of FLIGHT, here)")
-    parser.add_argument("--vehicle", metavar="NAME", help="the one of several in a bag (default: the first)")
+    parser.add_argument("flight", metavar="FLIGHT", help="the recording: a .bag, or a .csv of fly")
+    parser.add_argument(
+        "plot", metavar="OUT.png", nargs="?", help="the plot (default: the name of FLIGHT, in this folder)"
+    )
+    parser.add_argument("--vehicle", metavar="NAME", help="which of several vehicles in a bag (default: the first)")
     options = parser.parse_args(arguments)
     return status_of(_NAME, lambda: _draw(options))
 

@@ -1,4 +1,4 @@
-"""Record what is flown: `rosbag record` of all topics but pictures, of those the compressed ones where they are wanted.
+"""Record a flight: `rosbag record` of all topics except pictures; compressed pictures on request.
 
 What is for rviz alone is not recorded, either. It waits for the simulator, asks the master which topics there are, and
 then becomes rosbag's own recorder: topics that come later, as of a vehicle that comes in flight, are not recorded.
@@ -37,7 +37,7 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is recorded yet
     parser = Parser(prog=_NAME, description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--images", choices=("true", "false"), default="false", help="record compressed pictures, too")
-    parser.add_argument("--folder", metavar="DIR", default="", help="where the bag comes (default: ~/.ros)")
+    parser.add_argument("--folder", metavar="DIR", default="", help="the folder for the bag (default: ~/.ros)")
     parser.add_argument("--simulator", metavar="NODE", default="drone_sim", help="(default: %(default)s)")
     options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
     remappings = [one for one in sys.argv[1:] if ":=" in one]

@@ -1,4 +1,4 @@
-"""Keep what a camera sees and the truth behind it (`truth: true`) as files, until Ctrl-C: pictures, masks, boxes.
+"""Write a camera's pictures and the truth behind them (`truth: true`) to files until Ctrl-C: pictures, masks, boxes.
 
 What belongs together has the same stamp. Pictures that come while one is written are left out, and counted.
 """
@@ -68,8 +68,8 @@ class _Moments:
 def main() -> int:
     """Record until a signal comes; return the exit status."""
     parser = Parser(prog=_NAME, description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("topic", metavar="TOPIC", help="of the camera's pictures, such as /drone/front")
-    parser.add_argument("folder", metavar="DIR", help="empty, or not there")
+    parser.add_argument("topic", metavar="TOPIC", help="the topic of the camera's pictures, such as /drone/front")
+    parser.add_argument("folder", metavar="DIR", help="the folder for the files: a new one, or an empty one")
     options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
     return run_tool(_NAME, lambda over: _record(options, over))
 
@@ -104,7 +104,7 @@ def _check_topic(topic: str, over: Callable[[], bool]) -> None:
             return
         if time.monotonic() > until:
             known = near_names(topic, cameras) if cameras else "no camera has `truth: true`"
-            raise ValueError(f"{topic}: nobody publishes its truth; {known}")
+            raise ValueError(f"{topic}: no node publishes its truth; {known}")
         time.sleep(_PERIOD)
 
 

@@ -1,4 +1,4 @@
-"""Open rviz on what flies: on all of it, whatever its names are, from behind the first vehicle.
+"""Open rviz with all vehicles, whatever their names are, seen from behind the first one.
 
 It waits for the simulator, asks the master where the topics for rviz are and /tf_static which vehicle is the first,
 lays those names over rviz/drone.rviz, or over rviz/fleet.rviz where several fly, and then becomes rviz.
@@ -46,7 +46,7 @@ def main() -> int:
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is to be put in order
     parser = Parser(prog=_NAME, description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--config", metavar="FILE", default="", help="what rviz shows instead, as that file says it")
+    parser.add_argument("--config", metavar="FILE", default="", help="your own rviz file instead")
     parser.add_argument("--simulator", metavar="NODE", default=_SIMULATOR, help="(default: %(default)s)")
     options = parser.parse_args(rosgraph.myargv(sys.argv)[1:])
     remappings = [one for one in sys.argv[1:] if ":=" in one]
@@ -136,7 +136,7 @@ def _first_vehicle(simulator: str) -> str:
     in_time = come.wait(_PATIENCE)
     rospy.signal_shutdown("done")
     if not in_time:
-        raise OSError(f"nobody broadcasts the frame {first}")
+        raise OSError(f"no node publishes the frame {first}")
     return found[-1]
 
 

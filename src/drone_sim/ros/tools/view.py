@@ -1,4 +1,4 @@
-"""Show cameras: a window with the pictures of image topics or, without a display, a PNG file of them."""
+"""Show cameras: a window with the pictures of image topics or, without a display, a PNG file."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def _window() -> Any:
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog=_NAME, description=__doc__)
     parser.add_argument("topics", metavar="TOPIC", nargs="*", default=["drone/front"], help="default: drone/front")
-    parser.add_argument("--png", metavar="FILE", help="write one PNG of the next pictures, and end")
+    parser.add_argument("--png", metavar="FILE", help="write the next pictures to one PNG file, and end")
     return parser.parse_args(rosgraph.myargv(sys.argv)[1:])
 
 

@@ -14,6 +14,8 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
+from drone_sim.render.outputs import COLOR
+from drone_sim.ros.core.mask_colors import painted
 from drone_sim.ros.core.message_conversion import image
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.sensors.camera import Camera
@@ -62,22 +64,24 @@ class TruthOutput:
             rospy.Publisher(f"{topic}/truth/{name}", kind, subscriber_listener=new_subscribers, queue_size=1): make
             for name, (kind, make) in kinds.items()
         }
-        self._flow, self._flow_known = (
+        self._flow, self._flow_known, self._overlay = (
             rospy.Publisher(f"{topic}/truth/{name}", Image, subscriber_listener=new_subscribers, queue_size=1)
-            for name in ("flow", "flow_known")
+            for name in ("flow", "flow_known", "overlay")
         )
 
     @property
     def _publishers(self) -> list[Any]:
-        return [self._labels, *self._made, self._flow, self._flow_known]
+        return [self._labels, *self._made, self._flow, self._flow_known, self._overlay]
 
     def publish(self, camera: Camera, stamp: Stamp) -> None:
         """Publish what somebody listens to, of what the camera sees now."""
         heard = [one for one in self._made if one.get_num_connections()]
         flows = any(one.get_num_connections() for one in (self._flow, self._flow_known))
-        if not (heard or flows or self._labels.get_num_connections()):
+        overlays = self._overlay.get_num_connections() > 0
+        if not (heard or flows or overlays or self._labels.get_num_connections()):
             self._depth_before = None
             return
+        picture = camera.look(COLOR) if overlays else None  # before the truth, which comes with it
         truth = camera.truth()
         if truth is None:
             return
@@ -85,6 +89,8 @@ class TruthOutput:
         self._publish_labels(truth)
         if flows:
             self._publish_flow(truth, header)
+        if picture is not None:
+            self._overlay.publish(image(painted(picture, truth.categories), "rgb8", header))
         for one in heard:
             one.publish(self._made[one](truth, header))
 

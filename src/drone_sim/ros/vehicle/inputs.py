@@ -14,8 +14,10 @@ from std_msgs.msg import Empty
 from drone_sim.config.errors import changed
 from drone_sim.config.types import ParameterError
 from drone_sim.forces.weather import WeatherParameters
+from drone_sim.grading.permissions import CHANGE, MOVE, PUSH
 from drone_sim.mechanics.state import Pose
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.intervention import intervention, sender
 from drone_sim.ros.core.message_conversion import xyz
 from drone_sim.ros.core.validation import check_changes, check_frame, checked_pose, read_changes
 from drone_sim.run.diagnosis.command_log import CommandLog
@@ -27,6 +29,12 @@ from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
 _QUIET = 5.0  # s, between two warnings
+_QUEUES = {"push": 100, "weather": 100, "faults": 100}  # messages; each counts: of all others only the last one does
+_INTERVENTIONS = {  # what is more than flying
+    **dict.fromkeys(("set_pose", "initialpose", "reset"), MOVE),
+    "push": PUSH,
+    **dict.fromkeys(("weather", "set_wind", "faults"), CHANGE),
+}
 _Job = Callable[[Vehicle], Any]
 
 
@@ -47,7 +55,7 @@ class VehicleInputs:
         self._limits = _Limits(parameters, simulation.parameters.weather)
         self.log = CommandLog(senders=self._commanders)
         self._subscribers = [
-            rospy.Subscriber(f"{self._name}/{topic}", kind, self._taking(topic, read), queue_size=1, tcp_nodelay=True)
+            self._subscriber(topic, kind, read)
             for topic, kind, read in (
                 ("cmd_vel", TwistMessage, self._twist),
                 ("goto", PoseStamped, self._posing(lambda vehicle, pose: vehicle.ask("goto", pose))),
@@ -61,6 +69,10 @@ class VehicleInputs:
                 ("faults", KeyValue, self._faults),
             )
         ]
+
+    def _subscriber(self, topic: str, kind: type, read: Callable[[Any], _Job]) -> rospy.Subscriber:
+        name, take, queue = f"{self._name}/{topic}", self._taking(topic, read), _QUEUES.get(topic, 1)
+        return rospy.Subscriber(name, kind, take, queue_size=queue, tcp_nodelay=True)
 
     def _commanders(self) -> list[str]:
         """Return the nodes that are connected to cmd_vel."""
@@ -78,19 +90,20 @@ class VehicleInputs:
     def _taking(self, topic: str, read: Callable[[Any], _Job]) -> Callable[[Any], None]:
         """Return a callback that leaves what a message asks for to the simulation's thread, or says why not."""
         kept = ", the last good one is kept" if topic == "cmd_vel" else ""
-        throttle = Throttle(_QUIET)
+        throttle, action = Throttle(_QUIET), _INTERVENTIONS.get(topic)
 
         def take(message: Any) -> None:
             try:
                 job = read(message)
             except (checks.Refused, ParameterError) as refused:
                 said = refused.text if isinstance(refused, ParameterError) else str(refused)
-                self.log.refuse(topic, _sender(message), said)
+                self.log.refuse(topic, sender(message), said)
                 if throttle.passes():
                     rospy.logwarn(f"{topic} refused{kept}: {said}")
                 return
-            self.log.take(topic, _sender(message))
-            self._inbox.put(lambda: self._carry_out(job))
+            self.log.take(topic, sender(message))
+            done = intervention(action, self._name, f"{self._name}/{topic}", message) if action else None
+            self._inbox.put(lambda: self._carry_out(job), done)
 
         return take
 
@@ -143,8 +156,3 @@ class VehicleInputs:
         changes = read_changes(message, parameters.faults)
         parameters.model_copy(update={"faults": changed(parameters.faults, changes)}).check_faults()
         return lambda vehicle: vehicle.change_faults(changes)
-
-
-def _sender(message: Any) -> str:
-    header = getattr(message, "_connection_header", {})  # rospy's, of what came over a wire
-    return str(header.get("callerid", "?"))

@@ -18,8 +18,10 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest, Reconfigure
 
 from drone_sim.config.fields import ParameterField
 from drone_sim.config.types import ParameterError
+from drone_sim.grading.permissions import CHANGE
 from drone_sim.hosting.tuning import TOPIC, Tuning
 from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.core.intervention import intervention
 from drone_sim.run.pacing import Pace
 
 _GROUPS = ("control", "weather", "faults", "cameras", "sensors", "script_parameters")
@@ -81,8 +83,11 @@ class TuningServer:
         """Answer with what holds afterwards: a refusal is in the log, and has no place in the answer."""
         given = request.config
         changes = {one.name: one.value for kind in (given.bools, given.ints, given.strs, given.doubles) for one in kind}
+        done = None
+        if changes and isinstance(self._tuning, Tuning):  # the pace changes nothing in the world
+            done = intervention(CHANGE, self._name.rpartition("/")[2], f"{self._name}/set_parameters", request)
         try:
-            self._inbox.ask(lambda: self._change(changes))
+            self._inbox.ask(lambda: self._change(changes), done)
         except (ValueError, TimeoutError) as error:
             said = error.text if isinstance(error, ParameterError) else error
             rospy.logwarn(f"{self._name} refused, nothing is changed: {said}")

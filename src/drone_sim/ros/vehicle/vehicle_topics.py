@@ -17,6 +17,7 @@ from drone_sim.ros.vehicle.outputs import SensorOutput, VehicleOutputs
 from drone_sim.ros.vehicle.transforms import Transforms
 from drone_sim.ros.vehicle.tuning_server import TuningServer
 from drone_sim.run.diagnosis.command_log import CommandLog
+from drone_sim.run.scene_settings import PLACE
 from drone_sim.run.simulation import Simulation
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
@@ -103,7 +104,7 @@ class FleetTopics:
         self._era = self._simulation.era
         vehicles = self._simulation.vehicles
         for name, topics in list(self._topics.items()):
-            if name not in vehicles or topics.vehicle.parameters != vehicles[name].parameters:
+            if name not in vehicles or _told(topics.vehicle.parameters) != _told(vehicles[name].parameters):
                 del self._topics[name]
                 topics.close()
         for name, vehicle in vehicles.items():
@@ -148,6 +149,21 @@ class FleetTopics:
         """Publish the commands in force; they may change while the simulation stands."""
         for topics in self._topics.values():
             topics.outputs.publish_command(topics.vehicle, self._stamp)
+
+
+def _told(parameters: VehicleParameters) -> tuple[str, Any]:
+    """Return what a vehicle's topics may depend on: not where it begins, nor the seeds of what is random.
+
+    Topics that are advertised anew lose the first steps: nobody is connected to them yet.
+    """
+    said = parameters.model_dump(exclude={*PLACE})
+    return parameters.frame_prefix, _without_seeds(said)
+
+
+def _without_seeds(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_seeds(one) for key, one in value.items() if key != "seed"}
+    return value
 
 
 def _set_description(parameters: VehicleParameters) -> None:

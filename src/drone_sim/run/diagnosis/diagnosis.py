@@ -40,7 +40,7 @@ def cameras(simulation: Simulation, since: Since | None) -> Finding:
             problems.append(Problem(WARN, f"{vehicle}/{name} comes at {rate:.1f} of {nominal:.1f} Hz"))
     watched = [key for vehicle in simulation.vehicles.values() for key, one in vehicle.cameras.items() if one.watched()]
     values["looked at"] = f"{len(watched)} of {sum(len(one.cameras) for one in simulation.vehicles.values())} cameras"
-    fine = f"{len(watched)} looked at; time of a picture: {mean}" if watched else "nobody looks"
+    fine = f"{len(watched)} looked at; time of a picture: {mean}" if watched else "no camera is in use"
     return finding("cameras", fine, problems, values)
 
 

@@ -13,6 +13,7 @@ that it stands in is a section.
 
 from __future__ import annotations
 
+import functools
 import inspect
 import itertools
 import sys
@@ -85,11 +86,16 @@ def functions_of(*parts: object) -> dict[str, Function]:
     """Return the functions that were declared in the classes of some objects, under each of their names."""
     found: dict[str, Function] = {}
     for part in parts:
-        for attribute in dir(type(part)):
-            declaration = declaration_of(getattr(type(part), attribute))
-            if declaration is not None:
-                found.update(dict.fromkeys(declaration.names, getattr(part, attribute)))
+        for attribute, names in _declared_in(type(part)):  # type: ignore[arg-type] # a class has a hash
+            found.update(dict.fromkeys(names, getattr(part, attribute)))
     return found
+
+
+@functools.cache
+def _declared_in(kind: type) -> list[tuple[str, Mapping[str, str]]]:
+    """Return the methods of a class that were declared, each with the names that it has in the API."""
+    declared = ((attribute, declaration_of(getattr(kind, attribute))) for attribute in dir(kind))
+    return [(attribute, declaration.names) for attribute, declaration in declared if declaration is not None]
 
 
 def flat_name(module: str, name: str) -> str:

@@ -77,7 +77,7 @@ class CustomDataFunctions:
 
     @sim("345", writeCustomBufferData="5", writeCustomStringData="5")
     def writeCustomDataBlock(self, handle: Handle, tag: Name, data: Any) -> None:
-        """Leave a string, or a number written out, under a tag on an object, or sim.handle_scene; '' forgets it."""
+        """Store a string, or a number as text, under a tag of an object, or sim.handle_scene; '' removes it."""
         data = written(data)
         if not isinstance(data, (str, bytes, type(None))):
             raise WrongValue("a string is expected")
@@ -85,7 +85,7 @@ class CustomDataFunctions:
 
     @sim("345", readCustomBufferData="5", readCustomStringData="5")
     def readCustomDataBlock(self, handle: Handle, tag: Name) -> Any:
-        """Return the string under a tag; nothing where there is none.
+        """Return the string under a tag; nothing if there is none.
 
         A path of the scene has its points under PATH, and under PATHCTRLPTS: 7 doubles each.
         """
@@ -104,27 +104,27 @@ class CustomDataFunctions:
 
     @sim("5")
     def writeCustomTableData(self, handle: Handle, tag: Name, data: Any, _options: Any = None) -> None:
-        """Leave a table under a tag on an object; {} forgets it."""
+        """Store a table under a tag of an object; {} removes it."""
         self._data.set(self._target(handle), _CUSTOM + tag, data or None)
 
     @sim("5")
     def readCustomTableData(self, handle: Handle, tag: Name, _options: Any = None) -> Any:
-        """Return the table under a tag; an empty one where there is none."""
+        """Return the table under a tag; an empty table if there is none."""
         return copy.deepcopy(self._data.values.get((self._target(handle), _CUSTOM + tag), {}))
 
     @sim("345")
     def persistentDataWrite(self, tag: Name, data: Any, _options: int = 0) -> None:
-        """Leave a string under a tag until the simulation stops; '' forgets it."""
+        """Store a string under a tag until the simulation stops; '' removes it."""
         self.writeCustomDataBlock(_APP, tag, data)
 
     @sim("345")
     def persistentDataRead(self, tag: Name) -> Any:
-        """Return a string that persistentDataWrite left; nothing where there is none."""
+        """Return a string of persistentDataWrite; nothing if there is none."""
         return self.readCustomDataBlock(_APP, tag)
 
     @sim("345")
     def getPersistentDataTags(self) -> list[str]:
-        """Return the tags that persistentDataWrite left something under."""
+        """Return the tags that persistentDataWrite has used."""
         return self.readCustomDataBlockTags(_APP)
 
     @sim("5", **_SETTERS)

@@ -44,7 +44,7 @@ class DistanceFunctions:
     def checkDistance(
         self, entity1: Handle, entity2: Handle = _ALL, threshold: Number = 0.0
     ) -> tuple[int, list[float], list[int]]:
-        """Return whether two entities are nearer than a threshold (m, 0 is none), the shortest way, and their objects.
+        """Return whether two entities are nearer than a threshold (m; 0: none), the shortest line, and the objects.
 
         Each is an object or a collection, the second may be sim.handle_all. The way has 7 numbers: both ends (m,
         world), and its length, 0 where they overlap. A vehicle is one solid; dummies, sensors and targets are points,
@@ -58,7 +58,7 @@ class DistanceFunctions:
 
     @sim("")
     def checkCollision(self, entity1: Handle, entity2: Handle = _ALL) -> tuple[int, list[int]]:
-        """Return whether two objects or collections overlap (1, or 0), and the handles of the objects that do.
+        """Return 1 if two objects or collections overlap, otherwise 0, and the handles of these objects.
 
         The second entity may be sim.handle_all.
 

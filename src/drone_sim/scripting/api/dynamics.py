@@ -99,7 +99,7 @@ class Dynamics(Functions):
 
     @sim("345")
     def resetDynamicObject(self, handle: Handle) -> None:
-        """Let the body that carries an object (sim.handle_all: every body) begin anew where it is, at rest."""
+        """Stop the body that carries an object (sim.handle_all: every body): it starts again from rest at its place."""
         handles = list(self._objects) if handle in _EVERYTHING else [handle]
         bodies = {id(one): one for one in map(_carrier, (self._objects[one] for one in handles)) if one is not None}
         for one in bodies.values():
@@ -108,12 +108,12 @@ class Dynamics(Functions):
 
     @sim("45")
     def isDynamicallyEnabled(self, handle: Handle) -> bool:
-        """Return whether the dynamics move an object, or what carries it."""
+        """Return whether the dynamics moves an object, or its carrier."""
         return _carrier(self._objects[handle]) is not None
 
     @sim("45")
     def getShapeMass(self, handle: Handle) -> float:
-        """Return the mass of a shape in kg; 0 where the dynamics do not move it."""
+        """Return the mass of a shape in kg; 0 if the dynamics does not move it."""
         found = self._objects[handle]
         return float(getattr(found, "mass", 0.0)) or self._surroundings.masses().get(found.name, 0.0)
 
@@ -121,7 +121,7 @@ class Dynamics(Functions):
     def getShapeMassAndInertia(
         self, handle: Handle, transform: TwelveNumbers | None = None
     ) -> tuple[float, list[float], list[float]]:
-        """Return mass (kg), inertia about the centre of mass (kg m², 9 numbers), and that centre (m) of a shape (3.x).
+        """Return a shape's mass (kg), inertia about its center of mass (kg m², 9 numbers), and this center (m) (3.x).
 
         All in the frame of `transform`, the world's without one. What the dynamics do not move has 0 and nine zeros.
         """
@@ -134,7 +134,7 @@ class Dynamics(Functions):
 
     @sim("45")
     def getShapeInertia(self, handle: Handle) -> tuple[Numbers, TwelveNumbers]:
-        """Return the inertia of a shape about its centre of mass (kg m², 9 numbers), and in which frame that is (4.x).
+        """Return a shape's inertia about its center of mass (kg m², 9 numbers), and the frame of these (4.x).
 
         The frame is a transform in the shape's own. A propeller's shape is without its blades, as its mass is.
         """
@@ -152,7 +152,7 @@ class Dynamics(Functions):
 
     @sim("5", getObjectIntParam="")
     def getObjectInt32Param(self, handle: Handle, parameter: int) -> int:
-        """Return a parameter of an object, 0 for one that is not known here.
+        """Return a parameter of an object, 0 for an unknown parameter.
 
         Those of any object are sim.shapeintparam_static (0 or 1), _respondable and sim.objintparam_visibility_layer.
         """
@@ -160,7 +160,7 @@ class Dynamics(Functions):
 
     @sim("345", getObjectIntParameter="35")
     def getObjectInt32Parameter(self, handle: Handle, parameter: int) -> tuple[int, int]:
-        """Return 1 and what getObjectInt32Param does; 0 and 0 for a parameter that is not known here."""
+        """Return 1 and the value of getObjectInt32Param; 0 and 0 for an unknown parameter."""
         found = self._objects[handle]
         known: dict[str, Callable[[], float]] = {
             "shapeintparam_static": lambda: int(_carrier(found) is None),
@@ -189,7 +189,7 @@ class Dynamics(Functions):
 
     @sim("345")
     def getObjectFloatParameter(self, handle: Handle, parameter: int) -> tuple[int, float]:
-        """Return 1 and what getObjectFloatParam does; 0 and 0 for a parameter that is not known here."""
+        """Return 1 and the value of getObjectFloatParam; 0 and 0 for an unknown parameter."""
         found, velocities = self._objects[handle], self._context.velocities
         known: dict[str, Callable[[], float]] = {
             "shapefloatparam_mass": lambda: self.getShapeMass(handle),

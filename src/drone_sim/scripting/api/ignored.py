@@ -23,11 +23,11 @@ _TABLE = {
         "particles are not simulated one by one": """
             345 addParticleObjectItem removeParticleObject addParticleObject=handle
         """,
-        "there is no window of CoppeliaSim's; rviz and rosrun drone_sim view look": """
+        "CoppeliaSim's window does not exist here: use the cockpit or rviz": """
             345 cameraFitToView setNavigationMode setPage removeBanner refreshDialogs getNavigationMode=0 getPage=0
                 addBanner=handle announceSceneContentChange=0
         """,
-        "colours are those of the scene file and the URDF": """
+        "colors come from the scene file and the URDF": """
             345 setShapeTexture setLightParameters getShapeTextureId=-1
             5 setObjectColor getObjectColor=(0,[0.0,0.0,0.0])
         """,
@@ -41,12 +41,12 @@ _TABLE = {
                 getUIProperty=0 getUISlider=0 getUIButtonLabel='' getUIPosition=[0,0]
             - setUIButtonTexture
         """,
-        "nobody selects anything here, and no key is pressed": """
+        "there is no selection here, and no keys are pressed": """
             345 addObjectToSelection removeObjectFromSelection getObjectSelection=[] getSimulatorMessage=-1
             5 setObjectSel getObjectSel=[]
             35 getObjectLastSelection=-1
         """,
-        "what an object is stands in the scene file": """
+        "the scene file has the properties of objects": """
             345 setObjectProperty setObjectSpecialProperty setModelProperty setExplicitHandling getObjectProperty=0
                 getObjectSpecialProperty=0 getModelProperty=0 getExplicitHandling=0
             - setModelBase
@@ -64,17 +64,17 @@ _TABLE = {
         "propellers are rigidly attached, and nothing breaks": """
             345 breakForceSensor
         """,
-        "dummies are not linked to each other: what hangs on a link does not hang here": """
+        "dummies cannot be linked to each other: a link holds nothing here": """
             345 setLinkDummy getLinkDummy=-1
             - setDummyLinkType getDummyLinkType=0
         """,
-        "a picture is what the sensor sees; publish another one instead": """
+        "a picture always shows what the sensor sees: publish your own picture instead": """
             345 setVisionSensorCharImage setVisionSensorImage resetVisionSensor
             5 setVisionSensorImg
         """,
     },
     "simUI": {
-        "there are no windows of scripts; rqt and rviz have what one needs": """
+        "scripts have no windows here: use rqt or rviz": """
             345 colorDialog inputDialog destroy setPosition setSize setTitle setEnabled setWindowEnabled show hide
                 setLabelText setButtonText setSliderValue setSpinboxValue setCheckboxValue setRadiobuttonValue
                 setComboboxItems setComboboxSelectedIndex setEditValue setCurrentTab setCurrentEditWidget setImageData

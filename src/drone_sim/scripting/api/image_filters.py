@@ -68,7 +68,7 @@ class ImageFilters(Functions):
     def intensityScaleOnWorkImg(self, handle: Handle, start: Number, end: Number, greyScale: bool) -> None:
         """Let every pixel be as grey as it is bright, of which 0 becomes `start` and 1 `end`."""
         if not greyScale:
-            raise ValueError("there is no scale of colours here: greyScale = true is expected")
+            raise ValueError("there is no color scale here: greyScale = true is expected")
         low, high = numbers((start, end), 2)
         grey = low + (high - low) * self._image(handle).mean(2)
         self._keep(handle, np.repeat(grey[:, :, None], 3, axis=2))

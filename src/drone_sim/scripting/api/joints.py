@@ -30,13 +30,13 @@ class JointFunctions(Functions):
 
     @sim("345")
     def getJointPosition(self, handle: Handle) -> float:
-        """Return how far a joint is turned or slid; of a propeller's, the angle of the blades."""
+        """Return the position of a joint; for a propeller's joint, the angle of the blades."""
         found = self._objects[handle]
         return found.value if isinstance(found, Joint) else self._host.turn_joint(found.name, None)
 
     @sim("345")
     def setJointPosition(self, handle: Handle, position: Number) -> None:
-        """Put a joint somewhere, within its limits; of a propeller's, turn the blades: looks only."""
+        """Set the position of a joint, within its limits; for a propeller's joint, turn the shown blades."""
         (value,) = numbers((position,), 1)
         found = self._objects[handle]
         if isinstance(found, Joint):
@@ -51,18 +51,18 @@ class JointFunctions(Functions):
 
     @sim("345", getSphericalJointMatrix="")
     def getJointMatrix(self, handle: Handle) -> list[float]:
-        """Return the transform between a joint's own frame and what hangs on it."""
+        """Return the transform between a joint's own frame and its children."""
         return list(self._joint(handle).motion_matrix())
 
     @sim("5")
     def getObjectChildPose(self, handle: Handle) -> list[float]:
-        """Return the pose that a joint gives to what hangs on it, in its own frame; of another object none."""
+        """Return the pose that a joint gives to its children, in its own frame; for other objects the identity."""
         found = self._objects[handle]
         return to_pose(found.motion_matrix() if isinstance(found, Joint) else IDENTITY)
 
     @sim("345")
     def setSphericalJointMatrix(self, handle: Handle, matrix: TwelveNumbers) -> None:
-        """Turn a spherical joint; of the transform only the rotation counts."""
+        """Turn a spherical joint; only the rotation of the transform counts."""
         joint, m = self._joint(handle), numbers(matrix, 12)
         if joint.motion != SPHERICAL:
             raise WrongValue(f"'{joint.name}' is a {joint.motion} joint: a spherical one is expected")
@@ -81,13 +81,13 @@ class JointFunctions(Functions):
 
     @sim("345")
     def getJointInterval(self, handle: Handle) -> tuple[bool, list[float]]:
-        """Return whether a joint has no end, and its lowest position and its range."""
+        """Return whether a joint has no limits, and its lowest position and its range."""
         limits = self._joint(handle).limits
         return (True, list(_WITHOUT_END)) if limits is None else (False, [limits[0], limits[1] - limits[0]])
 
     @sim("345")
     def setJointInterval(self, handle: Handle, cyclic: bool, interval: Numbers = ()) -> None:
-        """Give a joint its lowest position and its range, or, if cyclic, no end."""
+        """Set a joint's lowest position and its range; a cyclic joint has no limits."""
         joint = self._moving(handle)
         if cyclic and joint.motion == PRISMATIC:
             raise WrongValue(f"'{joint.name}' is prismatic: only revolute joints are cyclic")
@@ -103,7 +103,7 @@ class JointFunctions(Functions):
 
     @sim("345")
     def setJointMode(self, handle: Handle, mode: int, _options: Any = 0) -> None:
-        """Let a joint be moved by scripts alone (0), or by the dynamics (5), as it was before."""
+        """Let only scripts move a joint (0), or let the dynamics move it (5), in its last mode."""
         joint = self._joint(handle)
         if mode not in (_KINEMATIC_MODE, _DYNAMIC_MODE):
             raise WrongValue("sim.jointmode_kinematic (0) or sim.jointmode_dynamic (5) is expected")
@@ -114,43 +114,43 @@ class JointFunctions(Functions):
 
     @sim("345")
     def getJointTargetPosition(self, handle: Handle) -> float:
-        """Return where a joint is to go."""
+        """Return a joint's target position."""
         return self._joint(handle).control.position
 
     @sim("345")
     def setJointTargetPosition(self, handle: Handle, position: Number, _motion: Any = None) -> None:
-        """Let a joint go to a position; one that scripts move is there at once."""
+        """Set a joint's target position; a joint that only scripts move is there at once."""
         (value,) = numbers((position,), 1)
         if not self._is_propellers(handle, "setJointTargetPosition"):
             self._moving(handle).change(position=value)
 
     @sim("345")
     def getJointTargetVelocity(self, handle: Handle) -> float:
-        """Return how fast a joint is to move."""
+        """Return a joint's target velocity."""
         return self._joint(handle).control.velocity
 
     @sim("345")
     def setJointTargetVelocity(self, handle: Handle, velocity: Number, _motion: Any = None) -> None:
-        """Let a joint move at a velocity, in the mode for that."""
+        """Set a joint's target velocity, for the velocity mode."""
         (value,) = numbers((velocity,), 1)
         if not self._is_propellers(handle, "setJointTargetVelocity"):
             self._moving(handle).change(velocity=value)
 
     @sim("345", jointGetForce="3")
     def getJointForce(self, handle: Handle) -> float:
-        """Return what a joint's motor gave in the last sub-step."""
+        """Return the force of a joint's motor in the last sub-step."""
         drive = self._joint(handle).drive
         return 0.0 if drive is None else drive.state()[2]
 
     @sim("5")
     def getJointTargetForce(self, handle: Handle) -> float:
-        """Return the force that a joint in force mode is given, else the most that its motor gives."""
+        """Return the target force of a joint in force mode, otherwise the largest force of its motor."""
         control = self._joint(handle).control
         return control.force if control.mode == FORCE else control.max_force
 
     @sim("5")
     def setJointTargetForce(self, handle: Handle, force: Number, signedValue: bool = True) -> None:
-        """Give a joint in force mode a force, signed or in the direction of before; else set the most of its motor."""
+        """Set a joint's force in force mode, signed or in the last direction; otherwise its motor's largest force."""
         (value,) = numbers((force,), 1)
         if self._is_propellers(handle, "setJointTargetForce"):
             return
@@ -164,12 +164,12 @@ class JointFunctions(Functions):
 
     @sim("45")
     def getJointMaxForce(self, handle: Handle) -> float:
-        """Return the most that a joint's motor gives (3.x)."""
+        """Return the largest force of a joint's motor (3.x)."""
         return abs(self.getJointTargetForce(handle))
 
     @sim("345", setJointMaxForce="45")
     def setJointForce(self, handle: Handle, force: Number) -> None:
-        """Set the most that a joint's motor gives (3.x)."""
+        """Set the largest force of a joint's motor (3.x)."""
         self.setJointTargetForce(handle, force, False)
 
     def _is_propellers(self, handle: int, function: str) -> bool:

@@ -74,7 +74,7 @@ def for_editors() -> dict[str, Any]:
     """
     found = apis()
     rows = [
-        [module, name, flat_name(module, name), generations, _arguments(function), _sentence(function), page]
+        [module, name, flat_name(module, name), generations, arguments_of(function), _sentence(function), page]
         for module, api in found.items()
         for declaration, function in declared(api)
         for name, generations in declaration.names.items()
@@ -89,7 +89,7 @@ def _sentence(function: Any) -> str:
     return first_paragraph(inspect.getdoc(function) or "")
 
 
-def _arguments(function: Any) -> str:
+def arguments_of(function: Any) -> str:
     """Return 'objectHandle, relativeTo=-1': what a function takes, without the kinds of the values."""
     if is_ignored(function):
         return "..."

@@ -30,7 +30,7 @@ class Matrices:
 
     @sim("345")
     def multiplyVector(self, matrix: Numbers, vector: Numbers) -> list[float]:
-        """Return matrix · vector, of one vector or of several, one after the other.
+        """Return matrix · vector, for one vector or for a list of several.
 
         `matrix` may be a pose (7 numbers), or a quaternion (x, y, z, w).
         """
@@ -49,7 +49,7 @@ class Matrices:
 
     @sim("345")
     def buildIdentityMatrix(self) -> list[float]:
-        """Return the transform that changes nothing."""
+        """Return the identity transform."""
         return list(IDENTITY)
 
     @sim("345")
@@ -84,7 +84,7 @@ class Matrices:
 
     @sim("345")
     def invertMatrix(self, matrix: TwelveNumbers) -> list[float]:
-        """Invert a transform where it stands, in the table that is given, and return it."""
+        """Invert a transform in place, in the given table, and return it."""
         inverse = list(frames.invert(numbers(matrix, 12)))
         if isinstance(matrix, list):
             matrix[:] = inverse
@@ -92,7 +92,7 @@ class Matrices:
 
     @sim("345")
     def interpolateMatrices(self, first: TwelveNumbers, second: TwelveNumbers, part: Number) -> list[float]:
-        """Return the transform so far (0 to 1) between two, the rotation on the shortest way."""
+        """Return the transform at a share (0 to 1) between two, with the shortest rotation."""
         return list(between(numbers(first, 12), numbers(second, 12), numbers((part,), 1)[0]))
 
     @sim("345")
@@ -198,7 +198,7 @@ class Poses:
 
     @sim("5")
     def interpolatePoses(self, first: SevenNumbers, second: SevenNumbers, part: Number) -> list[float]:
-        """Return the pose so far (0 to 1) between two, the rotation on the shortest way."""
+        """Return the pose at a share (0 to 1) between two, with the shortest rotation."""
         return to_pose(between(from_pose(first), from_pose(second), numbers((part,), 1)[0]))
 
     @sim("5")

@@ -42,7 +42,7 @@ class NameFunctions:
 
     @sim("5")
     def getObject(self, path: Name, options: Mapping[str, Any] | None = None) -> int:
-        """Return the handle of an object by path or name; -1 for none with the option noError, or name@silentError.
+        """Return the handle of an object by path or name; with the option noError, or name@silentError, -1 for none.
 
         The option `index` takes the i-th of several of a path, from 0; `proxy` is the object from which relative paths
         begin, in the place of the script's own. sim.handle_self is what the script is on.
@@ -82,7 +82,7 @@ class NameFunctions:
 
     @sim("345")
     def getObjectName(self, handle: Handle) -> str:
-        """Return the 3.x name of an object, with its suffix; the path where sim.handleflag_altname is added (4.2)."""
+        """Return the 3.x name of an object, with its suffix; with sim.handleflag_altname, the path (4.2)."""
         return self._objects.path(bare(handle)) if handle != bare(handle) else self._objects[handle].name
 
     @sim("5")

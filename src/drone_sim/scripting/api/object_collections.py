@@ -34,7 +34,7 @@ class CollectionFunctions:
 
     @sim("45")
     def addItemToCollection(self, collection: Handle, what: int, object: Handle = -1, options: int = 0) -> None:
-        """Add an object (sim.handle_single), what hangs on it (_tree), what it hangs on (_chain), or all (_all).
+        """Add an object (sim.handle_single), with all below it (_tree), with its parents (_chain), or all (_all).
 
         `options`: 1 removes them from what was added before, 2 leaves out the object itself. A tree is that of the
         moment at which the collection is asked for.
@@ -56,7 +56,7 @@ class CollectionFunctions:
 
     @sim("345")
     def getCollectionHandle(self, name: Name) -> int:
-        """Return the handle of a collection by its name (3.x); -1 for none with name@silentError."""
+        """Return the handle of a collection by its name (3.x); with name@silentError, -1 if there is none."""
         if not isinstance(name, str):
             raise WrongValue("the name of a collection is expected")
         name, _, flag = name.partition("@")
@@ -80,13 +80,13 @@ class CollectionFunctions:
 
     @sim("345")
     def emptyCollection(self, collection: Handle) -> None:
-        """Take all objects out of a collection, of sim.handle_all out of all."""
+        """Remove all objects from a collection; with sim.handle_all, from all collections."""
         for one in self._these(collection):
             self._collections.empty(one)
 
     @sim("5", removeCollection="345")
     def destroyCollection(self, collection: Handle) -> None:
-        """Forget a collection, of sim.handle_all all of them; its objects stay."""
+        """Remove a collection, or all with sim.handle_all; the objects stay."""
         for one in self._these(collection):
             self._collections.remove(one)
 

@@ -38,18 +38,30 @@ def find(
 
     `own` is where paths begin that are relative (None: nowhere), `above` what `..` means there.
     """
+    found = every(objects, path, own, above, index + 1) if index >= 0 else []
+    return found[index] if len(found) > index else None
+
+
+def every(
+    objects: ObjectTree,
+    path: str,
+    own: SceneObject | None = None,
+    above: SceneObject | None = None,
+    most: int | None = None,
+) -> list[SceneObject]:
+    """Return the objects that a path means, the first ones, or all of them; the rest is as for `find`."""
     first, *rest = path.split("/")
     model = None if own is None else own.model()
     model_above = None if model is None or model.parent is None else model.parent.model()
     begins = {".": own, "..": above, ":": model, "::": model_above}
     elements = [one for one in (rest if first in begins else [first, *rest]) if one not in ("", ".")]
-    if index < 0 or len(elements) > _MOST:
-        return None
+    if len(elements) > _MOST:
+        return []
     for fits in (_has_alias, SceneObject.is_called):  # names of 3.x, too, where nothing has the alias
-        found = [*itertools.islice(_Search(objects, fits).below(begins.get(first), elements), index + 1)]
+        found = [*itertools.islice(_Search(objects, fits).below(begins.get(first), elements), most)]
         if found:
-            return found[index] if len(found) > index else None
-    return None
+            return found
+    return []
 
 
 def _has_alias(one: SceneObject, name: str) -> bool:

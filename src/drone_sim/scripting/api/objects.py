@@ -41,7 +41,7 @@ class Objects(Functions):
 
     @sim("345")
     def setObjectParent(self, handle: Handle, parent: Handle = WORLD, keepInPlace: bool = True) -> None:
-        """Hang an object on another one, or on nothing (-1). A joint that the dynamics moves holds what hangs on it."""
+        """Give an object another parent, or none (-1). A joint that the dynamics moves holds its child."""
         operations = self._surroundings.operations
         if operations is None:
             self._objects.set_parent(handle, parent, bool(keepInPlace))
@@ -88,7 +88,7 @@ class Objects(Functions):
 
     @sim("45")
     def getObjectPose(self, handle: Handle, relativeTo: Handle = WORLD) -> list[float]:
-        """Return position and quaternion of an object, 7 numbers; the latter is as getObjectQuaternion returns it."""
+        """Return an object's position and quaternion, 7 numbers; the quaternion is that of getObjectQuaternion."""
         m = self._matrix(handle, relativeTo)
         return [*frames.position(m), *_to_script(handle, frames.to_quaternion(m))]
 
@@ -135,7 +135,7 @@ class Objects(Functions):
 
     @sim("345")
     def getVelocity(self, handle: Handle) -> tuple[list[float], list[float]]:
-        """Return what linear (m/s) and angular velocity (rad/s) an object has reached by now, in the world frame."""
+        """Return an object's current linear (m/s) and angular velocity (rad/s), in the world frame."""
         linear, angular = self._objects[handle].velocity()
         return list(linear), list(angular)
 
@@ -143,7 +143,7 @@ class Objects(Functions):
     def addForceAndTorque(
         self, handle: Handle, force: ThreeNumbers = (0, 0, 0), torque: ThreeNumbers = (0, 0, 0)
     ) -> None:
-        """Let a force (N) at a body's centre of mass and a torque (N m) act in the next step.
+        """Apply a force (N) at a body's center of mass, and a torque (N m), in the next step.
 
         Both are in the world frame, and keep their direction through the sub-steps of the step, whatever the body does.
         sim.handleflag_resetforce and _resettorque, or both, _resetforcetorque, added to the handle, forget what was
@@ -158,7 +158,7 @@ class Objects(Functions):
 
     @sim("345")
     def addForce(self, handle: Handle, position: ThreeNumbers, force: ThreeNumbers) -> None:
-        """Let a force (N) act in the next step at a position (m); both in the frame of the body.
+        """Apply a force (N) at a position (m) in the next step; both in the frame of the body.
 
         For a shape of the scene the position is from its centre of mass. sim.handleflag_resetforcetorque, added to the
         handle, forgets what was added before.
@@ -216,13 +216,13 @@ class ObjectKinds(Functions):
 
     @sim("345")
     def getObjects(self, index: int, kind: int = _ALL) -> int:
-        """Return the handle of the index-th object of a kind, from 0; -1 where there are no more."""
+        """Return the handle of an object of a kind by its index, from 0; -1 if there are no more."""
         found = self._of_kind(iter(self._objects), kind)
         return found[int(index)] if 0 <= index < len(found) else -1
 
     @sim("345")
     def getObjectsInTree(self, root: Handle, kind: int = _ALL, options: int = 0) -> list[int]:
-        """Return the objects of a kind below another (sim.handle_scene: all), itself first.
+        """Return an object and all objects of a kind below it (sim.handle_scene: all objects).
 
         `options`: 1 leaves out the root, 2 takes its children alone.
         """
@@ -235,23 +235,23 @@ class ObjectKinds(Functions):
 
     @sim("345")
     def getObjectChild(self, handle: Handle, index: int) -> int:
-        """Return the handle of an object's index-th child, from 0; -1 where there are no more."""
+        """Return the handle of an object's child by its index, from 0; -1 if there are no more."""
         children = [child for child, _ in self._objects.children(self._objects[handle])]
         return children[int(index)] if 0 <= index < len(children) else -1
 
     @sim("5")
     def isHandle(self, handle: Handle, _kind: int = -1) -> bool:
-        """Return whether an object has that handle (4.x)."""
+        """Return whether an object has this handle (4.x)."""
         return bare(handle) in set(self._objects)
 
     @sim("345")
     def isHandleValid(self, handle: Handle, _kind: int = -1) -> int:
-        """Return 1 where an object has that handle, else 0 (3.x)."""
+        """Return 1 if an object has this handle, otherwise 0 (3.x)."""
         return int(self.isHandle(handle))
 
     @sim("5", getObjectUniqueIdentifier="345")
     def getObjectUid(self, handle: Handle) -> int:
-        """Return a number that no other object of the run has had: its handle."""
+        """Return an object's handle: it is unique in the whole run."""
         self._objects[handle]
         return int(handle)
 

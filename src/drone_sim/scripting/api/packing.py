@@ -151,7 +151,7 @@ class Bits:
 
     @sim("345", boolXor16="345")
     def boolXor32(self, first: int, second: int) -> int:
-        """Return the bits that one number alone has."""
+        """Return the bits that only one of the numbers has."""
         return _whole(first) ^ _whole(second)
 
 

@@ -36,7 +36,7 @@ class Paths(Functions):
 
     @sim("345")
     def getPathLength(self, handle: Handle) -> float:
-        """Return the length of a path in m, as it counts: of a curved one turns may count, too (docs/scenes.md)."""
+        """Return the length of a path in m; a curved path may also count turns (docs/scenes.md)."""
         return self._path(handle).length
 
     @sim("345")
@@ -54,13 +54,13 @@ class Paths(Functions):
 
     @sim("34")
     def getDataOnPath(self, handle: Handle, relativeDistance: Number) -> tuple[int, list[float]]:
-        """Return flags and four numbers that the control points of a curved path carry; 0 of any other."""
+        """Return the flags and four numbers of the control points of a curved path; 0 for other paths."""
         path = self._path(handle)
         return path.carried(numbers((relativeDistance,), 1)[0] * path.length)
 
     @sim("34")
     def getClosestPositionOnPath(self, handle: Handle, position: Sequence[float]) -> float:
-        """Return the share of a path, from 0 to 1, at which it comes nearest to a place in the world."""
+        """Return the share of a path, from 0 to 1, of the point nearest to a place in the world."""
         path = self._path(handle)
         place = frames.transform(frames.invert(path.matrix()), numbers(position, 3))
         return path.nearest(place) / path.length if path.length else 0.0
@@ -69,7 +69,7 @@ class Paths(Functions):
     def createPath(
         self, ctrlPts: Numbers | int = -1, options: Any = 0, subdiv: Any = 100, smoothness: Any = 1.0, *_: Any
     ) -> int:
-        """Make a path through poses of 7 numbers each, one after the other; return its handle.
+        """Make a path through a list of poses of 7 numbers each; return its handle.
 
         `options`: 2 closed, 16 it looks along itself, not as the poses do. It has `subdiv` points, and its corners are
         rounded off over `smoothness` (0 to 1) of each piece. In 3.x: (sim.pathproperty_..., intParams, floatParams),
@@ -133,7 +133,7 @@ class Paths(Functions):
 
     @sim("34")
     def cutPathCtrlPoints(self, handle: Handle, startIndex: int, ptCnt: int) -> int:
-        """Take so many control points from a curved path, from one on, counted from 0; all for -1. Return 1."""
+        """Remove a number of control points from a curved path, from an index (from 0) on; -1: all. Return 1."""
         there = [one.said for one in self._curved(handle).control_points]
         first, count = int(startIndex), int(ptCnt)
         if first < 0 or count < 0:
@@ -152,12 +152,12 @@ class Paths(Functions):
 
     @sim("345")
     def getPathPosition(self, handle: Handle) -> float:
-        """Return what setPathPosition has set, m."""
+        """Return the value of setPathPosition, m."""
         return self._path(handle).position_along
 
     @sim("345")
     def setPathPosition(self, handle: Handle, position: Number) -> None:
-        """Keep how far along (m) somebody is who follows a path."""
+        """Store the distance (m) along a path of an object that follows it."""
         (self._path(handle).position_along,) = numbers((position,), 1)
 
     def _on_path(self, handle: int, share: float) -> Matrix:
@@ -171,7 +171,7 @@ class Paths(Functions):
 
     @sim("45")
     def getPathLengths(self, path: Numbers, dof: int, _callback: Any = None) -> tuple[list[float], float]:
-        """Return how far along each point of a table lies, and the length; `dof` numbers a point, of which 3 are m."""
+        """Return each point's distance along a path table, and its length; a point has `dof` numbers, 3 in m."""
         points = _points(path, dof)
         pieces = (math.dist(one[:3], other[:3]) for one, other in itertools.pairwise(points))
         lengths = list(itertools.accumulate(pieces, initial=0.0))
@@ -181,7 +181,7 @@ class Paths(Functions):
     def getPathInterpolatedConfig(
         self, path: Numbers, lengths: Numbers, t: Number, _method: Any = None, _types: Any = None
     ) -> list[float]:
-        """Return the numbers of a table's point so far along as getPathLengths counts, between two straight on."""
+        """Return the point of a path table at a distance, as in getPathLengths, interpolated between two points."""
         ends = numbers(lengths, len(lengths))
         if len(ends) < 2 or len(path) % len(ends):
             raise WrongValue(f"a path of {len(ends)} points has as many numbers for each, not {len(path)} in all")
@@ -194,7 +194,7 @@ class Paths(Functions):
 
     @sim("45")
     def getClosestPosOnPath(self, path: Numbers, lengths: Numbers, absPt: ThreeNumbers) -> float:
-        """Return how far along a table, as getPathLengths counts, it comes nearest to a place."""
+        """Return the distance along a path table, as in getPathLengths, to the point nearest to a place."""
         ends = numbers(lengths, len(lengths))
         if len(ends) < 2 or len(path) % len(ends) or len(path) < 3 * len(ends):
             raise WrongValue(f"3 numbers or more for each of {len(ends)} points are expected, not {len(path)} in all")
@@ -206,7 +206,7 @@ class Paths(Functions):
     def resamplePath(
         self, path: Numbers, lengths: Numbers, finalConfigCnt: int, method: Any = None, types: Any = None
     ) -> list[float]:
-        """Return a table of so many points, at equal distances along another one."""
+        """Return a path table with a number of points, at equal distances along another path table."""
         count = int(finalConfigCnt)
         if not 2 <= count <= _MOST_POINTS:
             raise WrongValue(f"2 to {_MOST_POINTS} points are expected, not {count}")

@@ -82,7 +82,7 @@ class SceneObjects:
     def createMeshShape(
         self, _options: int, _shadingAngle: Number, vertices: Numbers, indices: Numbers, *_: Any
     ) -> int:
-        """Make a static shape of triangles, of vertices (m) and three of these each, from 0; return its handle."""
+        """Make a static shape from vertices (m) and triangles, three indices from 0 each; return its handle."""
         corners = [int(one) for one in indices]
         if not vertices or len(vertices) % 3 or not corners or len(corners) % 3:
             raise WrongValue("three numbers for each vertex, and three indices for each triangle, are expected")
@@ -161,7 +161,7 @@ class SceneObjects:
 
     @sim("345")
     def copyPasteObjects(self, handles: Sequence[Handle], options: int = 0) -> list[int]:
-        """Make copies of objects, in the same places; return their handles. What hung on another hangs on its copy.
+        """Copy objects at the same places; return the copies' handles. Copies of children have the copied parent.
 
         `options`: 1 each with all that hangs on it. The copies of Ball are named Ball#0, Ball#1 and so on; a child
         script on it is copied, too, and begins before the scripts are called the next time.
@@ -173,7 +173,7 @@ class SceneObjects:
 
     @sim("345")
     def setObjectName(self, handle: Handle, name: Name) -> int:
-        """Give an object another name, which nothing else has (3.x). Return 1.
+        """Set the name of an object; it must be unique (3.x). Return 1.
 
         With sim.handleflag_altname it is the alias (4.2).
         """
@@ -184,23 +184,23 @@ class SceneObjects:
 
     @sim("5")
     def setObjectAlias(self, handle: Handle, alias: Name) -> None:
-        """Give an object another alias, which others may have, too (4.x)."""
+        """Set the alias of an object; other objects may have the same alias (4.x)."""
         self._do(lambda scene: scene.set_alias(handle, alias))
 
     @sim("345")
     def removeObject(self, handle: Handle) -> int:
-        """Take away an object, after its script's cleanup; what hangs on it stays. Return 1."""
+        """Remove an object, after its script's cleanup; its children stay. Return 1."""
         return self.removeObjects([handle])
 
     @sim("5")
     def removeObjects(self, handles: Sequence[Handle], _later: bool = False) -> int:
-        """Take away objects; what hangs on them stays. Return 1."""
+        """Remove objects; their children stay. Return 1."""
         self._do(lambda scene: scene.remove(_handles(handles)))
         return 1
 
     @sim("345")
     def removeModel(self, handle: Handle, _later: bool = False) -> int:
-        """Take away an object with all that hangs on it. Return how many objects are gone."""
+        """Remove an object with all objects below it. Return the number of removed objects."""
 
         def remove(scene: Operations) -> int:
             going = scene.model(handle)
@@ -221,7 +221,7 @@ class SceneObjects:
 
     @sim("345")
     def saveModel(self, handle: Handle, filename: Name) -> int:
-        """Write an object and all that hangs on it into a file (.yaml) beside the scene file; return 1."""
+        """Write an object and all objects below it to a file (.yaml) in the scene file's folder; return 1."""
         self._do(lambda scene: scene.save_model(handle, filename))
         return 1
 
@@ -235,7 +235,7 @@ class Shapes:
 
     @sim("345")
     def setShapeColor(self, handle: Handle, _colorName: Any, colorComponent: int, rgbData: Numbers) -> int:
-        """Give a shape, and all of its parts, another color: red, green, blue from 0 to 1. Return 1.
+        """Set the color of a shape and all of its parts: red, green, blue from 0 to 1. Return 1.
 
         sim.colorcomponent_transparency takes one number, how opaque it is; other components change nothing.
         """
@@ -250,12 +250,12 @@ class Shapes:
     def getShapeColor(
         self, handle: Handle, _colorName: Any = None, _colorComponent: int = 0
     ) -> tuple[int, list[float]]:
-        """Return 1, and the color of a shape, of its first part: red, green, blue from 0 to 1."""
+        """Return 1, and the color of a shape (of its first part): red, green, blue from 0 to 1."""
         return 1, list(self._do(lambda scene: scene.color(handle))[:3])
 
     @sim("345")
     def setShapeMass(self, handle: Handle, mass: Number) -> None:
-        """Let a shape weigh so many kg; how they lie in it stays. What is static stays static."""
+        """Set the mass of a shape (kg); its distribution does not change. A static shape stays static."""
         self._do(lambda scene: scene.change(handle, mass=numbers((mass,), 1)[0]))
 
     @sim("45")
@@ -278,13 +278,13 @@ class Shapes:
 
     @sim("345")
     def scaleObject(self, handle: Handle, xScale: Number, yScale: Number, zScale: Number, _options: int = 0) -> None:
-        """Let an object be so many times as large along x, y and z; its mass grows with its volume."""
+        """Scale an object along x, y and z; its mass grows with its volume."""
         factors = numbers((xScale, yScale, zScale), 3)
         self._do(lambda scene: scene.scale([handle], factors))
 
     @sim("345")
     def scaleObjects(self, handles: Sequence[Handle], scaleFactor: Number, scalePositionsToo: bool) -> None:
-        """Let objects be so many times as large, and as far from their parents if `scalePositionsToo`."""
+        """Scale objects; with `scalePositionsToo`, also the distances from their parents."""
         (factor,) = numbers((scaleFactor,), 1)
         self._do(lambda scene: scene.scale(_handles(handles), (factor, factor, factor), bool(scalePositionsToo)))
 
@@ -300,12 +300,12 @@ class Shapes:
 
     @sim("345")
     def groupShapes(self, handles: Sequence[Handle], _merge: bool = False) -> int:
-        """Make one rigid shape of several, with the name and the frame of the first; return its handle."""
+        """Make one rigid shape from several, with the name and the frame of the first one; return its handle."""
         return self._do(lambda scene: scene.group(_handles(handles)))
 
     @sim("345")
     def ungroupShape(self, handle: Handle) -> list[int]:
-        """Make a shape of each part of one; return their handles. Each weighs as much of it as it fills."""
+        """Make a shape from each part of a shape; return their handles. Each gets its share of the mass, by volume."""
         return self._do(lambda scene: scene.ungroup(handle))
 
 

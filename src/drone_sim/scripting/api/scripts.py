@@ -90,7 +90,7 @@ class ScriptFunctions(_OnScripts):
 
     @sim("345")
     def getScriptHandle(self, name: Name | None = None) -> int:
-        """Return the handle of the script that is attached to an object; of this one without a name."""
+        """Return the handle of the script that is attached to an object; without a name, of this script."""
         if name is None or name == _SELF:
             return self._own.handle
         try:
@@ -106,7 +106,7 @@ class ScriptFunctions(_OnScripts):
 
     @sim("345")
     def getScriptSimulationParameter(self, script: Handle, name: Name, _as_string: bool = False) -> Any:
-        """Return a simulation parameter of a script; for sim.handle_tree, _chain or _all, of the first that has it."""
+        """Return a simulation parameter of a script; for sim.handle_tree, _chain or _all, of the first with it."""
         several = self._several(script)
         found = next((one for one in several if name in one.parameters), None)
         found = found or (several or [self._script(script)])[0]
@@ -188,7 +188,7 @@ class ScriptFunctions(_OnScripts):
 
     @sim("45")
     def addLog(self, verbosity: int, message: Any) -> None:
-        """Write a line to the log: an error, a warning, or a word, by its verbosity."""
+        """Write a line to the log: an error, a warning or information, by its verbosity."""
         say(message, _LEVELS.get(verbosity, logging.INFO))
 
 
@@ -256,7 +256,7 @@ class ScriptCalls(_OnScripts):
 
     @sim("345")
     def getScriptExecutionCount(self) -> int:
-        """Return in how many steps this script has been called before: 0 in the first one (3.0)."""
+        """Return the number of steps in which this script was called before: 0 in the first step (3.0)."""
         return round((self._context.clock.script_time - self._own.began) / self._context.clock.time_step)
 
     @sim("345")
@@ -275,7 +275,7 @@ class ScriptCalls(_OnScripts):
 
     @sim("345")
     def executeScriptString(self, stringToExecute: Any, scriptHandle: Any = _SELF) -> tuple[Any, ...]:
-        """Run a text in another script, in its language, within its globals; return 0 and what it returns.
+        """Run a text in another script, in its language and with its globals; return 0 and the text's value.
 
         That is its value where it is an expression, and an empty table where nothing is returned. In 3.x and 4.2 it is
         'text@object' and a sim.scripttype_...; since 4.9 the script's handle comes first. A text is run in a Python
@@ -336,7 +336,7 @@ class ScriptCalls(_OnScripts):
 
     @sim("5")
     def getScriptFunctions(self, script: Handle) -> Any:
-        """Return what calls a script's functions as its own: `functions:name(...)` in Lua, `functions.name(...)`."""
+        """Return an object that calls a script's functions: `it:name(...)` in Lua, `it.name(...)` in Python."""
         return FunctionsOfScript(self.callScriptFunction, self._script(script).handle)
 
     def _attached(self, object: Handle | Name) -> Attachment | None:

@@ -36,7 +36,7 @@ class Sensors(Functions):
 
     @sim("345")
     def readForceSensor(self, handle: Handle) -> tuple[int, list[float], list[float]]:
-        """Return 1, and force (N) and torque (N m) by which what hangs on a force sensor acts on it, in its frame."""
+        """Return 1, and the force (N) and torque (N m) of the object below a force sensor on it, in its frame."""
         found = self._objects[handle]
         if not isinstance(found, _ForceSensor):
             raise WrongValue(f"'{found.name}' is not a force sensor of the scene")
@@ -45,7 +45,7 @@ class Sensors(Functions):
 
     @sim("")
     def readSensor(self, handle: Handle) -> dict[str, Any] | None:
-        """Return the last reading of a sensor of any kind, by the names of its message's fields; nothing before it.
+        """Return the last reading of any sensor as the fields of its message; nothing before the first reading.
 
         The stamp in its `header` is the simulated time in s at which it was measured.
         """
@@ -93,7 +93,7 @@ class ProximitySensors(Functions):
 
     @sim("345")
     def handleProximitySensor(self, handle: Handle) -> _Detection:
-        """Return what readProximitySensor does; of sim.handle_all, and _all_except_explicit, the nearest of all."""
+        """Do what readProximitySensor does; for sim.handle_all, and _all_except_explicit, return the nearest of all."""
         if handle not in EVERY_SENSOR:
             return self.readProximitySensor(handle)
         every = [self._objects[one] for one in self._objects]
@@ -102,7 +102,7 @@ class ProximitySensors(Functions):
 
     @sim("345")
     def checkProximitySensor(self, handle: Handle, entity: Handle) -> _Detection:
-        """Return what readProximitySensor does of one object or collection alone, or of sim.handle_all."""
+        """Do what readProximitySensor does, but only for one object or collection, or for sim.handle_all."""
         sensor = self._objects[handle]
         if not isinstance(sensor, Detector):
             raise WrongValue(f"'{sensor.name}' is no proximity sensor of the scene: {self._known()}")
@@ -112,13 +112,13 @@ class ProximitySensors(Functions):
     def checkProximitySensorEx(
         self, handle: Handle, entity: Handle, _mode: int = 0, threshold: Number = 0.0, _maxAngle: Number = 0.0
     ) -> _Detection:
-        """Return what checkProximitySensor does, nothing beyond a distance (m) unless that is 0."""
+        """Do what checkProximitySensor does, but only up to a distance (m); 0 is no limit."""
         found = self.checkProximitySensor(handle, entity)
         return found if not threshold or found[1] <= threshold else self._seen(None)
 
     @sim("345")
     def resetProximitySensor(self, handle: Handle) -> None:
-        """Forget what a sensor has read: there is nothing to forget, it looks when it is read."""
+        """Do nothing: a sensor measures when it is read, and keeps no reading."""
         if handle not in EVERY_SENSOR:
             self._objects[handle]
 

@@ -36,7 +36,7 @@ class ShapeMasses(Functions):
         centerOfMass: ThreeNumbers,
         transform: TwelveNumbers | None = None,
     ) -> int:
-        """Let a shape weigh so many kg, with 9 numbers of inertia (kg m²) about its centre of mass, which is there, m.
+        """Set the mass (kg) of a shape, its inertia (kg m², 9 numbers) about the center of mass, and this center (m).
 
         Both in the frame of `transform`, the world's without one (3.x). What is static stays static. Return 1.
         """
@@ -48,7 +48,7 @@ class ShapeMasses(Functions):
 
     @sim("45")
     def setShapeInertia(self, handle: Handle, inertiaMatrix: Numbers, transform: TwelveNumbers) -> int:
-        """Let the mass of a shape lie so in it: an inertia (kg m², 9 numbers) in a frame, whose origin is its centre.
+        """Set the inertia (kg m², 9 numbers) of a shape, in a frame whose origin is the center of mass.
 
         That frame is in the shape's own (4.x). Return 1.
         """
@@ -75,7 +75,7 @@ class ShapeMasses(Functions):
 
     @sim("345")
     def getShapeGeomInfo(self, handle: Handle) -> tuple[int, int, list[float]]:
-        """Return of what form a shape is: bits, the form, and its full extents along x, y and z (m), and 0.
+        """Return the form of a shape: bits, the form, its full sizes along x, y and z (m), and 0.
 
         Bits are 1 a compound, 2 of simple forms, 4 convex. The form is sim.primitiveshape_cuboid, _spheroid, _cylinder
         or _capsule; _none, without extents, for compounds, meshes and the shapes of vehicles.

@@ -99,7 +99,7 @@ class SignalFunctions:
 
     @sim("345", setBufferSignal="5")
     def setStringSignal(self, name: Name, value: Text) -> None:
-        """Set a string; a number is written out, with up to 14 digits."""
+        """Set a string; a number becomes a text with up to 14 digits."""
         value = written(value)
         if not isinstance(value, (str, bytes)):
             raise WrongValue("a string is expected")
@@ -115,7 +115,7 @@ def _add_kind(word: str, kind: type[Any], what: str, generations: str = "345", *
     def clear(self: SignalFunctions, name: Name | None = None) -> None:
         self._signals.forget(kind, name)
 
-    docs = {get: f"Return {what}, or nothing where it is not set.", clear: f"Forget {what}, or all of them."}
+    docs = {get: f"Return {what}, or nothing if it is not set.", clear: f"Forget {what}, or all of them."}
     for function, doc in docs.items():
         verb = function.__name__
         names = {f"{verb}{other}Signal": since for other, since in others.items()}
@@ -207,13 +207,13 @@ class TubeFunctions:
 
     @sim("345")
     def tubeStatus(self, handle: Handle) -> tuple[int, int, int]:
-        """Return 1 where both ends are open, else 0, and how many packets wait at this end and at the other."""
+        """Return 1 if both ends are open, otherwise 0, and how many packets wait at this end and at the other."""
         here, other = self._tubes.waiting(handle), self._tubes.waiting_at_other(handle)
         return int(other is not None), len(here), len(other or ())
 
     @sim("345")
     def tubeWrite(self, handle: Handle, data: Text) -> int:
-        """Send a string to the other end, where the oldest goes if there are too many; return 1, 0 for no other end."""
+        """Send a string to the other end, which drops its oldest if it is full; return 1, or 0 without another end."""
         if not isinstance(data, (str, bytes)):
             raise WrongValue("a string is expected")
         refuse_if_too_large(data)
@@ -224,6 +224,6 @@ class TubeFunctions:
 
     @sim("345")
     def tubeRead(self, handle: Handle, _wait: Any = False) -> Any:
-        """Return the oldest string that waits at this end; nothing where none does."""
+        """Return the oldest string that waits at this end; nothing if there is none."""
         waiting = self._tubes.waiting(handle)
         return waiting.popleft() if waiting else None

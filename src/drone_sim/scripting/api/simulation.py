@@ -71,13 +71,13 @@ class SimulationFunctions(Functions):
 
     @sim("345")
     def startSimulation(self) -> int:
-        """Take back what was asked for in this step: whoever can call this runs already; return 1."""
+        """Cancel a stop or pause of this step (the simulation runs already); return 1."""
         self._context.control.asked = ""
         return 1
 
     @sim("345")
     def getSimulationTime(self) -> float:
-        """Return the simulated time in seconds; in the sensing phase that at which the step began."""
+        """Return the simulated time in seconds; in the sensing phase, the time at which the step began."""
         return self._context.clock.script_time
 
     @sim("345")
@@ -87,23 +87,23 @@ class SimulationFunctions(Functions):
 
     @sim("345")
     def getSystemTime(self) -> float:
-        """Return the simulated time in seconds: a flight is the same however fast it is computed."""
+        """Return the simulated time in seconds, so that a flight is the same at any speed of the computer."""
         return self._context.clock.time
 
     @sim("345", getSystemTimeInMilliseconds="3")
     def getSystemTimeInMs(self, since: Number = -1) -> int:
-        """Return the simulated time in ms, or the ms since such a time; -1 and -2 are no such times."""
+        """Return the simulated time in ms, or the ms since such a time; -1 and -2 are not times."""
         now = round(1000 * self._context.clock.time)
         return now if since < 0 else now - int(since)
 
     @sim("345")
     def getModuleName(self, index: int) -> tuple[str | None, int]:
-        """Return name and version of a plugin, from 0, as scripts ask whether there is one; nothing beyond the last."""
+        """Return name and version of a plugin by its index, from 0; nothing after the last."""
         return (_PLUGINS[int(index)], 1) if 0 <= index < len(_PLUGINS) else (None, 0)
 
     @sim("345")
     def getRandom(self, seed: Number | None = None) -> float:
-        """Return a random number from 0 to 1, the same ones in every run; a seed begins another series."""
+        """Return a random number from 0 to 1; the series is the same in every run, and a seed starts another series."""
         if seed is not None:
             self._random = random.Random(float(seed))
         return self._random.random()
@@ -124,7 +124,7 @@ class SimulationFunctions(Functions):
 
     @sim("5", getBoolParameter="345", getBooleanParameter="3")
     def getBoolParam(self, parameter: int) -> bool:
-        """Return whether the simulator does what a sim.boolparam_... names: dynamics and vision sensors."""
+        """Return whether the simulator has what a sim.boolparam_... names: dynamics and vision sensors."""
         return bool(self._read("boolparam", parameter, False))
 
     @sim("5", getStringParameter="345")
@@ -139,7 +139,7 @@ class SimulationFunctions(Functions):
 
     @sim("5", setFloatParameter="345", setFloatingParameter="3")
     def setFloatParam(self, parameter: int, value: Any) -> None:
-        """Accept any sim.floatparam_... and ignore it; sim.floatparam_simulation_time_step is what it is."""
+        """Accept any sim.floatparam_... and ignore it; sim.floatparam_simulation_time_step does not change."""
         if parameter == CONSTANTS["floatparam_simulation_time_step"]:
             self.setSimulationTimeStep(value)
         else:
@@ -147,7 +147,7 @@ class SimulationFunctions(Functions):
 
     @sim("")
     def setSimulationTimeStep(self, step: Number) -> None:
-        """Raise an error where another time step (s) is wanted than the one there is (3.x)."""
+        """Raise an error if the time step (s) differs from the current one (3.x)."""
         (wanted,), there = numbers((step,), 1), self._context.clock.time_step
         if abs(wanted - there) > _ROUNDED:
             raise ValueError(f"the time step stays {there:g} s, not {wanted:g}: `time_step` of the scene file says it")

@@ -62,7 +62,7 @@ class VisionSensors(Functions):
     def getVisionSensorCharImage(
         self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0, *_options: Any
     ) -> tuple[bytes, int, int]:
-        """Return image, width and height of a part of a picture, all of it where width and height are 0.
+        """Return image, width and height of a part of a picture; the whole picture if width and height are 0.
 
         With sim.handleflag_greyscale added to the handle the image is grey, one byte for each pixel.
         """
@@ -76,7 +76,7 @@ class VisionSensors(Functions):
     def getVisionSensorImg(
         self, handle: Handle, options: int = 0, _cutoff: Number = 0.0, pos: Any = _ALL, size: Any = _ALL
     ) -> tuple[bytes, list[int]]:
-        """Return image and [width, height] of a part of a picture; `options` 1: grey."""
+        """Return image and [width, height] of a part of a picture; `options` 1: gray."""
         flag = GREYSCALE if int(options) & _GREY else 0
         image, width, height = self.getVisionSensorCharImage(bare(handle) + flag, *_two(pos), *_two(size))
         return image, [width, height]
@@ -85,7 +85,7 @@ class VisionSensors(Functions):
     def getVisionSensorImage(
         self, handle: Handle, x: Number = 0, y: Number = 0, width: Number = 0, height: Number = 0, as_string: int = 0
     ) -> Any:
-        """Return an image as numbers from 0 to 1, or as a string where `as_string` is 1 (3.x)."""
+        """Return an image as numbers from 0 to 1, or as a string if `as_string` is 1 (3.x)."""
         image = self.getVisionSensorCharImage(handle, x, y, width, height)[0]
         return image if as_string else (np.frombuffer(image, np.uint8) / np.float32(255)).tolist()
 
@@ -120,7 +120,7 @@ class VisionSensors(Functions):
 
     @sim("345")
     def handleVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
-        """Return what readVisionSensor does; of sim.handle_all, and _all_except_explicit, how many sensors trigger."""
+        """Do what readVisionSensor does; for sim.handle_all, and _all_except_explicit, count those that trigger."""
         if handle not in EVERY_SENSOR:
             return self.readVisionSensor(handle)
         every = [self._objects[one] for one in self._objects]
@@ -128,7 +128,7 @@ class VisionSensors(Functions):
 
     @sim("345")
     def readVisionSensor(self, handle: Handle) -> tuple[Any, ...]:
-        """Return whether the sensor's own script triggers, 1 or 0, 15 numbers, and what that script found: its packets.
+        """Return whether the sensor's own script triggers (1 or 0), 15 numbers, and the packets of that script.
 
         They are intensity, red, green, blue and depth (0 to 1): the least, the largest, and the mean of each. Depth is
         0 at the near plane, and 1 at the far one. Where colours are handles, the numbers are those of what is seen.
@@ -149,7 +149,7 @@ class VisionSensors(Functions):
 
     @sim("345")
     def checkVisionSensorEx(self, handle: Handle, entity: Handle, returnImage: bool) -> list[float]:
-        """Return the image (0 to 1), or else the depths (0 to 1), of an object or collection as if it were alone.
+        """Return the image (0 to 1), or the depths (0 to 1), of only one object or collection.
 
         The bottom row comes first. A depth of 1 is where it is not: the others are its mask.
         """

@@ -217,7 +217,7 @@ class Dialogs:
 
     @sim("345")
     def getDialogResult(self, handle: int) -> int:
-        """Return which button was pressed, sim.dlgret_still_open before; sim.dlgret_ok where nobody could press one."""
+        """Return the pressed button; sim.dlgret_still_open before; sim.dlgret_ok if nobody can see the dialog."""
         dialog = self._windows.dialogs.get(handle)
         if dialog is not None and dialog.buttons and not dialog.answer:
             if self._windows.can_answer():
@@ -229,13 +229,13 @@ class Dialogs:
 
     @sim("345")
     def getDialogInput(self, handle: int) -> str:
-        """Return what was written into a dialog that has been answered, '' where nobody has."""
+        """Return the text that was typed into a dialog; '' before an answer."""
         dialog = self._windows.dialogs.get(handle)
         return dialog.typed or "" if dialog is not None and dialog.answer else ""
 
     @sim("345")
     def endDialog(self, handle: int) -> int:
-        """Close a dialog; return 1, or 0 where there is none."""
+        """Close a dialog; return 1, or 0 if there is none."""
         return int(self._windows.close(self._windows.dialogs, handle))
 
     @sim("345")
@@ -256,7 +256,7 @@ class Dialogs:
 
     @sim("345")
     def auxiliaryConsoleShow(self, handle: int, show: Any = True) -> int:
-        """Show or hide a console; return 1, or 0 where there is none."""
+        """Show or hide a console; return 1, or 0 if there is none."""
         if handle not in self._windows.consoles:
             return 0
         self._windows.show_console(handle, bool(show))
@@ -264,7 +264,7 @@ class Dialogs:
 
     @sim("345")
     def auxiliaryConsoleClose(self, handle: int) -> int:
-        """Close a console; return 1, or 0 where there is none."""
+        """Close a console; return 1, or 0 if there is none."""
         return int(self._windows.close(self._windows.consoles, handle))
 
 
@@ -283,14 +283,14 @@ class Views:
 
     @sim("345")
     def floatingViewAdd(self, *_place: Any) -> int:
-        """Open a floating view, which shows nothing before sim.adjustView has said what; return a handle."""
+        """Open a floating view; it is empty until sim.adjustView; return a handle."""
         handle = self._new_handle()
         self._windows.add_view(handle)
         return handle
 
     @sim("345")
     def adjustView(self, view: int, sensor: int, _options: Any = 0, label: Any = None) -> int:
-        """Let a floating view show what a vision sensor sees, -1 for nothing; return 1, or 0 for another view."""
+        """Let a floating view show a vision sensor's picture, -1 for nothing; return 1, or 0 for another view."""
         if view not in self._windows.views:
             return 0
         name = "" if sensor == -1 else self._objects[sensor].name
@@ -299,5 +299,5 @@ class Views:
 
     @sim("345")
     def floatingViewRemove(self, view: int) -> int:
-        """Close a floating view; return 1, or 0 where there is none."""
+        """Close a floating view; return 1, or 0 if there is none."""
         return int(self._windows.close(self._windows.views, view))

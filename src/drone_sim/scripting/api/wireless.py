@@ -52,7 +52,7 @@ class Wireless(Functions):
     def receiveData(
         self, header: int | None = None, name: Name | None = None, antenna: Handle | None = None, index: int = -1
     ) -> tuple[Text, int, int, str] | None:
-        """Return the oldest data that this script has not received, its sender, header and name; nothing for none.
+        """Return the oldest data that this script has not received, its sender, header and name; nothing if none.
 
         With a header or a name only those; with an `index` from 0 the one of that number, which then still waits.
         """

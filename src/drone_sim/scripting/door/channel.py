@@ -7,7 +7,7 @@ import struct
 
 LARGEST = 128 * 2**20  # bytes of a message: a picture of the largest size, as text
 _LENGTH = struct.Struct("<I")
-_BLOCK = 2**18
+_BLOCK = 2**16  # bytes, which are allocated for every message
 
 
 class Disconnected(ConnectionError):
@@ -36,7 +36,7 @@ class Channel:
     def receive(self) -> bytes | None:
         """Return the next message; None where none has come in time. Raises Disconnected."""
         came = self._came
-        while (end := self._end()) is None or len(came) < end:
+        while (end := self._end() if came else None) is None or len(came) < end:
             try:
                 block = self._socket.recv(_BLOCK)
             except BlockingIOError:

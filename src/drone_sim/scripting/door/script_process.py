@@ -13,21 +13,21 @@ from typing import Any
 from drone_sim.scripting import load
 from drone_sim.scripting.api.control import Turns
 from drone_sim.scripting.api.scripts import FunctionsOfScript
-from drone_sim.scripting.door import stand_ins, values
+from drone_sim.scripting.door import values
 from drone_sim.scripting.door.channel import Channel, Disconnected
 from drone_sim.scripting.door.functions import ERRORS
 from drone_sim.scripting.door.stand_ins import NO_ANSWERS, Answers, StandIns
 from drone_sim.scripting.errors import ScriptError
 from drone_sim.scripting.time_limit import TimeLimit
 
-_MOST_WAITING = 2**18  # characters, about, of items that wait for the next message
+_MOST_WAITING = 1000  # items, for the next message
 _FIRST = "pilot"  # that is loaded, once, before any other
 _MOST_FUNCTIONS = 100_000  # that a script has handed over
 
 
-def serve(end: socket.socket, path: str) -> None:
+def serve(script_end: ScriptEnd, end: socket.socket, path: str) -> None:
     """Load and call the script in a file as the other end of a connection says, until that is closed."""
-    script_end = ScriptEnd(Channel(end), path)
+    script_end.open(Channel(end), path)
     try:
         while True:
             script_end.obey(script_end.receive())
@@ -38,16 +38,22 @@ def serve(end: socket.socket, path: str) -> None:
 class ScriptEnd:
     """The door, seen from the script: of one file, from which several scripts may be loaded."""
 
-    def __init__(self, channel: Channel, path: str):
-        """Take what messages come and go by, and the script's file."""
-        self._channel, self._path = channel, path
+    _channel: Channel
+    path: str  # of the script's file
+
+    def __init__(self) -> None:
+        """Be ready for the first script; `open` comes before anything else."""
         self._hosted: dict[int, _Hosted] = {}  # by the number that the simulation has given it
+        self._next = _Hosted(self)
         self._waiting: list[list[Any]] = []
-        self._size = 0
         self._functions: list[Any] = []
         self._numbers: dict[int, int] = {}  # by id()
         self._caller: _Hosted | None = None  # the script that runs
         self._asked = 0  # questions in the call that runs
+
+    def open(self, channel: Channel, path: str) -> None:
+        """Take what messages come and go by, and the script's file."""
+        self._channel, self.path = channel, path
 
     # ---- messages
 
@@ -62,12 +68,11 @@ class ScriptEnd:
     def leave(self, item: list[Any]) -> None:
         """Leave an item for the next message."""
         self._waiting.append(item)
-        self._size += 64 + 20 * len(item)
-        if self._size > _MOST_WAITING:
+        if len(self._waiting) > _MOST_WAITING:
             self._send()
 
     def _send(self) -> None:
-        items, self._waiting, self._size = self._waiting, [], 0
+        items, self._waiting = self._waiting, []
         self._channel.send(values.written(items))
 
     def ask(self, item: list[Any]) -> tuple[Any, Answers]:
@@ -114,7 +119,7 @@ class ScriptEnd:
         _, number, what, arguments, (answers, places), may_go_on = message
         hosted = self._hosted.get(number)
         if hosted is None:
-            hosted = self._hosted[number] = _Hosted(self, self._path, *arguments)
+            hosted = self._hosted[number] = self._next if not self._hosted else _Hosted(self)
         before, self._caller = self._caller, hosted
         try:
             self._asked = 0
@@ -144,9 +149,9 @@ class ScriptEnd:
 class _Hosted:
     """One script, and what stands in for the API there."""
 
-    def __init__(self, end: ScriptEnd, path: str, seconds: float, _processor: int | None):
-        self._end, self._path = end, path
-        self._limit, self._turns = TimeLimit(seconds), Turns()
+    def __init__(self, end: ScriptEnd):
+        self._end = end
+        self._limit, self._turns = TimeLimit(0.0), Turns()
         self._stand_ins = StandIns(end, self._limit.outside, self._turns)
         self._script: load.Script = load.no_script()
         self._snapshots: list[Callable[[], None]] = []
@@ -160,8 +165,8 @@ class _Hosted:
 
     def do(self, what: str, arguments: list[Any], answers: Any) -> Any:
         """Do what the simulation says. Raises ScriptError."""
-        phase = f"{what} {arguments[0] if arguments and isinstance(arguments[0], str) else ''}"
-        self._stand_ins.begin(phase, answers)
+        named = arguments[0] if arguments and isinstance(arguments[0], str) else ""
+        self._stand_ins.begin(f"{what} {named}", answers)
         try:
             if what in ("load", "save", "restore"):
                 return getattr(self, f"_{what}")(*arguments)
@@ -169,11 +174,12 @@ class _Hosted:
         finally:
             self._stand_ins.end()
 
-    def _load(self, _seconds: float, processor: int | None) -> list[Any]:
+    def _load(self, seconds: float, processor: int | None) -> list[Any]:
         if processor is not None:
             with contextlib.suppress(OSError):
                 os.sched_setaffinity(0, {processor})
-        self._script = load.load(self._path, self._stand_ins.modules, self._limit, self._turns)
+        self._limit.seconds = seconds
+        self._script = load.load(self._end.path, self._stand_ins.modules, self._limit, self._turns)
         return [self._script.idle, self._script.is_empty]
 
     def _save(self) -> int:
@@ -188,11 +194,13 @@ def _sent(value: Any) -> Any:
     return value if isinstance(value, int) else str(value)
 
 
-def import_all() -> None:
-    """Import what scripts of either language need, before there are many of this process."""
+def prepared() -> ScriptEnd:
+    """Return an end for each fork of this process, which has imported what scripts of either language need."""
     for name in ("drone_sim.scripting.lua.script", "drone_sim.scripting.python.thread"):
         importlib.import_module(name)
-    stand_ins.prepare()
     here, there = socket.socketpair()
     with here, there:  # what the first script of a process reads and compiles, forks have
-        ScriptEnd(Channel(there), _FIRST).obey(("go", 1, "load", [0.0, None], NO_ANSWERS, False))
+        first = ScriptEnd()
+        first.open(Channel(there), _FIRST)
+        first.obey(("go", 1, "load", [0.0, None], NO_ANSWERS, False))
+    return ScriptEnd()

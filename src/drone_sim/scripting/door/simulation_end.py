@@ -33,7 +33,8 @@ _LOOK = 0.5  # s between two looks at the clock, while nothing comes
 _MOST_WAITS = 1000
 _MOST_EXPECTED = 200  # reads that are expected, at a time, and lists of them
 _MOST_FUNCTIONS = 100_000
-_ALL_PLAIN = frozenset((float, int, bool, str, type(None))).issuperset
+_PLAIN = frozenset((float, int, bool, str, type(None)))
+_ALL_PLAIN = _PLAIN.issuperset
 _PLACED = f"sim.{effects.PLACED[-1]}"  # which reads all of an object's place
 _NOTHING: tuple[list[Any], list[int]] = ([], [])
 _LONGEST = 1000  # characters of a text that says what went wrong
@@ -60,7 +61,7 @@ class SimulationEnd:
         self._channel = Channel(end, _LOOK)
         self.processor = processor
         self.permit: Permit = _all_permitted
-        self._items: deque[list[Any]] = deque()  # that have come, and are not carried out
+        self.items: deque[list[Any]] = deque()  # that have come, and are not carried out
         self._numbers = 0
         self.why_closed = ""  # in one line; '' while it is open
         self.is_gone = False  # whether the script's process has ended, or hears nothing
@@ -96,14 +97,13 @@ class SimulationEnd:
 
     def next_item(self, deadline: float) -> list[Any]:
         """Return what comes next. Raises NoMessage, Disconnected, and TimeoutError where nothing has by then."""
-        items = self._items
-        while not items:
+        while not self.items:
             if monotonic() > deadline:
                 raise TimeoutError
             message = self._channel.receive()
             if message is not None:
-                items.extend(values.read(message))
-        return items.popleft()
+                self.items.extend(values.read(message))
+        return self.items.popleft()
 
 
 class ScriptThere:
@@ -204,7 +204,7 @@ class ScriptThere:
         """Carry out what it has asked for in an actuation that it has run already."""
         self._has_gone_on = False
         self._phase = "call actuation"
-        self._guarded("actuation", lambda: None)
+        self._guarded("actuation")
 
     def _do(self, what: str, arguments: list[Any], may_go_on: bool = False) -> Any:
         """Let the script do something; carry out what it asks for meanwhile; return what it returned.
@@ -222,13 +222,15 @@ class ScriptThere:
             raise DoorClosed(said, self._path, 0, self._door.why_closed)
         given = [values.outgoing(one) for one in arguments]
         message = "go", self._number, what, given, self._reads(phase, 0), may_go_on
-        return self._guarded(said, lambda: self._door.send(message))
+        return self._guarded(said, message)
 
-    def _guarded(self, said: str, begin: Callable[[], None]) -> Any:
-        """Begin, and carry out what comes until the script has returned; `said` is the phase in an error."""
-        outer, self._deadline = self._deadline, self._until()
+    def _guarded(self, said: str, message: tuple[Any, ...] | None = None) -> Any:
+        """Send a message, and carry out what comes until the script has returned; `said` is the phase in an error."""
+        limit = self._limit.seconds
+        outer, self._deadline = self._deadline, monotonic() + (limit + GRACE if limit else 1e9)
         try:
-            begin()
+            if message is not None:
+                self._door.send(message)
             return self._until_end(said)
         except TimeoutError:
             self._end(said, f"did not return after {self._limit.seconds:g} s (script_time_limit)")
@@ -240,9 +242,6 @@ class ScriptThere:
         finally:
             self._deadline = outer
 
-    def _until(self) -> float:
-        return monotonic() + (self._limit.seconds + GRACE if self._limit.seconds else 1e9)
-
     def _end(self, phase: str, why: str) -> NoReturn:
         self._door.close(why)
         raise DoorClosed(phase, self._path, 0, why) from None
@@ -250,10 +249,10 @@ class ScriptThere:
     def _until_end(self, phase: str) -> Any:
         """Carry out what comes until the script has returned."""
         self._failure, outer = None, self._failure
-        next_item = self._door.next_item
+        door, came = self._door, self._door.items
         try:
             while True:
-                item = next_item(self._deadline)
+                item = came.popleft() if came else door.next_item(self._deadline)
                 how = item[0]
                 if how == "set" and len(item) > 1:
                     self._set(item)
@@ -277,7 +276,7 @@ class ScriptThere:
         self.threaded = item[1] is True
         if self._failure is not None:
             raise ScriptError(phase, self._path, 0, self._explained(*self._failure))
-        return self._value(item[2])
+        return None if item[2] is None else self._value(item[2])
 
     def _failed(self, item: list[Any]) -> NoReturn:
         if len(item) != 6 or [type(one) for one in item[2:]] != [str, str, int, str]:
@@ -290,14 +289,14 @@ class ScriptThere:
 
     def _set(self, item: list[Any]) -> None:
         """Carry out a call that returns nothing, and for which the script does not wait."""
-        _, name, *arguments = item
+        name, arguments = item[1], item[2:]
         function = self._changes.get(name) if type(name) is str else None
         if function is None:
             raise NoMessage("a call that has to be waited for")
         if self._failure is not None:
             return
         if not _ALL_PLAIN(map(type, arguments)):
-            arguments = [self._value(one) for one in arguments]
+            arguments = [one if type(one) in _PLAIN else self._value(one) for one in arguments]
         try:
             self._door.permit(name, arguments)
             function(*arguments)

@@ -158,11 +158,14 @@ class StandIns:
 
         def read(*arguments: Any, **named: Any) -> Any:
             stretch, key = stretches[-1], (name, arguments)
-            if named or kind in stretch.changed or not _is_hashable(arguments):
+            if named or kind in stretch.changed:
+                return self._ask(name, arguments, named)
+            try:
+                found = stretch.known.get(key, _NOT_KNOWN)
+            except TypeError:  # of a list, for example, there is no hash
                 return self._ask(name, arguments, named)
             if len(stretch.reads) < MOST_EXPECTED:
                 stretch.reads[key] = None
-            found = stretch.known.get(key, _NOT_KNOWN)
             if found is _NOT_KNOWN:
                 found = stretch.known[key] = self._send(name, arguments, named, -1)[0]
             return _copied(found)
@@ -194,11 +197,10 @@ class StandIns:
 
         def put(*arguments: Any, **named: Any) -> Any:
             stretch = stretches[-1]
-            if named or effects.PLACES in stretch.changed or not arguments or not _is_hashable(arguments[:1]):
+            if named or effects.PLACES in stretch.changed or not arguments or type(arguments[0]) is not int:
                 return change(*arguments, **named)
             handle = arguments[0]
-            if type(handle) is int:
-                stretch.handles[handle] = None
+            stretch.handles[handle] = None
             if not places.is_mark(handle) or _form(name, arguments) not in succeeded:
                 return change(*arguments, **named)
             try:
@@ -283,18 +285,6 @@ class _WaitThere(Wait):
             answer = yield Call(rest[0], list(rest[1])) if how == "call" else None
 
 
-def _is_hashable(arguments: tuple[Any, ...]) -> bool:
-    return all(type(one) is not list and type(one) is not dict for one in arguments) and _has_hash(arguments)
-
-
-def _has_hash(arguments: tuple[Any, ...]) -> bool:
-    try:
-        hash(arguments)
-    except TypeError:
-        return False
-    return True
-
-
 def _form(name: str, arguments: tuple[Any, ...]) -> Any:
     """Return what calls have in common that differ in their last finite number, or list of such, alone; else None."""
     others = arguments[:-1]
@@ -350,13 +340,6 @@ def _empty(kind: type) -> Any:
 
 def _functions_of(kinds: tuple[type, ...]) -> dict[str, Function]:
     return functions_of(*map(_empty, kinds))
-
-
-def prepare() -> None:
-    """Look at all functions, once for many processes."""
-    for _, functions, _ in declared():
-        for one in functions.values():
-            _signature(one)
 
 
 def _own_functions(turns: Turns) -> dict[Function, Function]:

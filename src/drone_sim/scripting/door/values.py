@@ -30,7 +30,7 @@ _MARKS = {"b": str, "f": int, "t": list, "d": list, "o": list}
 _KEPT = frozenset((*_PLAIN, bytes))
 _ALL_KEPT = _KEPT.issuperset
 _encode = json.JSONEncoder(check_circular=False, separators=(",", ":")).encode
-_decode = json.JSONDecoder().decode
+_decode = json.JSONDecoder().raw_decode
 
 
 class NoMessage(ValueError):
@@ -158,11 +158,15 @@ def written(items: list[Any]) -> bytes:
 def read(message: bytes) -> list[Any]:
     """Return the items of a message of the script's process, each a list that begins with a text. Raises NoMessage."""
     try:
-        items = _decode(message.decode())
+        text = message.decode()
+        items, end = _decode(text)
     except (ValueError, RecursionError):
         raise NoMessage("no JSON") from None
-    if type(items) is not list or not all(type(one) is list and one and type(one[0]) is str for one in items):
+    if type(items) is not list or end != len(text):
         raise NoMessage("no list of items")
+    for one in items:
+        if type(one) is not list or not one or type(one[0]) is not str:
+            raise NoMessage("no list of items")
     return items
 
 

@@ -45,13 +45,15 @@ class Helpers:
         """Forget the modules; may be called twice."""
         if self in sys.meta_path:
             sys.meta_path.remove(self)
+        if self.package not in sys.modules:  # closed before
+            return
         for name in [*self.modules(), self.package]:
             sys.modules.pop(name, None)
 
     def modules(self) -> dict[str, ModuleType]:
         """Return the modules that were imported, by their names in sys.modules."""
-        found = list(sys.modules.items())
-        return {name: one for name, one in found if name.startswith(self.package + ".") and isinstance(one, ModuleType)}
+        own = [name for name in list(sys.modules) if name.startswith(f"{self.package}.")]
+        return {name: one for name in own if isinstance(one := sys.modules.get(name), ModuleType)}
 
     def forget(self, name: str) -> None:
         """Let a module be read anew by the next import."""

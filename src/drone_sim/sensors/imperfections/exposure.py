@@ -4,7 +4,8 @@
 
 Automatically, the product follows what brings the mean luminance (ITU-R BT.709) to 18 %, middle grey, so that it would
 be there after `settling` but for 1/e of the way, in stops: first by the time, up to the one that is set, then by the
-gain, likewise. A picture is exposed as those before it have shown, as in cameras; the first one by itself.
+gain, likewise. A picture is exposed as what was there before has shown, as in cameras; the first one by itself. The
+light is measured in a small picture whenever one is due, so that it does not matter who looks.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from drone_sim.config.types import Finite, ParameterError, Switch, Within
+from drone_sim.config.types import Finite, ParameterError, Switch, Unit, Within
 from drone_sim.mechanics.saved_state import Restore, saved
 from drone_sim.sensors.imperfections.imperfection import Imperfection, Shot
 
@@ -29,16 +30,16 @@ _SHORTEST = 1e-6  # s
 class ExposureParameters(Imperfection):
     """Exposure time and gain."""
 
-    time: Annotated[Finite, Within(1e-6, 1, or_zero=True)] = Field(
-        default=0.0, description="s; what moves is blurred by it; 0: an instant, as bright as it is drawn"
+    time: Annotated[Finite, Within(1e-6, 1, or_zero=True), Unit("s")] = Field(
+        default=0.0, description="moving things are blurred over this time; 0: an instant, as bright as it is drawn"
     )
-    gain: Annotated[Finite, Within(0, 60)] = Field(default=0.0, description="dB")
-    automatic: Switch = Field(default=False, description="time and gain are then the most that it takes")
-    reference: Annotated[Finite, Within(1e-6, 1)] = Field(
-        default=0.01, description="s, of the exposure that is as bright as what is drawn, without gain"
+    gain: Annotated[Finite, Within(0, 60), Unit("dB")] = 0.0
+    automatic: Switch = Field(default=False, description="true: time and gain are the largest values that it uses")
+    reference: Annotated[Finite, Within(1e-6, 1), Unit("s")] = Field(
+        default=0.01, description="the exposure time with normal brightness, without gain"
     )
-    settling: Annotated[Finite, Within(0, 60)] = Field(
-        default=0.2, description="s, in which it follows what it sees, when it is automatic"
+    settling: Annotated[Finite, Within(0, 60), Unit("s")] = Field(
+        default=0.2, description="how slowly the automatic exposure follows the picture"
     )
 
     def model_post_init(self, _context: Any) -> None:

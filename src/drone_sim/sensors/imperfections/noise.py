@@ -16,18 +16,18 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from drone_sim.config.types import Finite, ParameterError, Within
+from drone_sim.config.types import Finite, ParameterError, Unit, Within
 from drone_sim.sensors.imperfections.imperfection import Imperfection, Shot
 
 
 class PixelNoiseParameters(Imperfection):
     """How much a pixel's value varies from picture to picture."""
 
-    full_well: Annotated[Finite, Within(100, 1e6, or_zero=True)] = Field(
-        default=0.0, description="electrons that a pixel holds, from which the shot noise follows; 0: no noise"
+    full_well: Annotated[Finite, Within(100, 1e6, or_zero=True), Unit("electrons")] = Field(
+        default=0.0, description="of a white pixel, which give the shot noise; 0: no noise"
     )
-    read: Annotated[Finite, Within(0, 1e4)] = Field(
-        default=0.0, description="electrons, standard deviation of what reading adds"
+    read: Annotated[Finite, Within(0, 1e4), Unit("electrons")] = Field(
+        default=0.0, description="standard deviation of the noise from reading"
     )
     seed: Annotated[int, Within(0, 2**63 - 1)] = 0
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import replace
+from functools import lru_cache, partial
 
 import cv2
 import numpy as np
@@ -16,6 +17,10 @@ from drone_sim.render.shutter import Shutter
 from drone_sim.sensors.imperfections import Imperfections
 from drone_sim.sensors.imperfections.exposure import ExposureControl
 from drone_sim.sensors.imperfections.imperfection import Imperfection, Shot
+
+_METERED = 64  # px, the width of the picture in which light is measured
+
+Gather = Callable[[Intrinsics, Shutter], np.ndarray]
 
 
 class Photography:
@@ -31,26 +36,42 @@ class Photography:
         self._parameters = parameters
         every: list[Imperfection] = [getattr(parameters, name) for name in Imperfections.model_fields]
         self._imperfections = [one for one in every if one.is_on]
+        self.is_metering = parameters.exposure.automatic  # whether it looks how bright it is, whoever looks at that
 
     @property
     def is_perfect(self) -> bool:
         """Whether there is nothing to do."""
         return not self._imperfections
 
-    def take(self, lens: Intrinsics, gather: Callable[[Shutter], np.ndarray]) -> np.ndarray:
-        """Return a picture (height, width, 3) uint8 RGB; `gather` returns the light for a shutter."""
-        own, now = self._parameters, self._clock.time
-        if own.exposure.automatic and self._exposure.has_seen_nothing:
-            self._exposure.meter(gather(Shutter(0.0, 0.0)), None, now)
-        brightness = self._exposure.brightness(own.exposure, now)
-        time, gain = own.exposure.settings(brightness)
+    def take(self, lens: Intrinsics, gather: Gather) -> np.ndarray:
+        """Return a picture (height, width, 3) uint8 RGB; `gather` returns the light for a lens and a shutter."""
+        own = self._parameters
+        time, gain = own.exposure.settings(self._brightness(lens, gather))
         shot = Shot(lens, time, gain, partial(self._normal, (lens.height, lens.width, 3)))
-        light = gather(Shutter(time, own.shutter.readout))
+        light = gather(lens, Shutter(time, own.shutter.readout))
         for one in self._imperfections:
-            if one is own.exposure and one.automatic:
-                self._exposure.meter(light, brightness, now)
             light = one.apply(light, shot)
         return encoded(light)
+
+    def meter(self, lens: Intrinsics, gather: Gather) -> None:
+        """Look how bright it is where a picture is due."""
+        own, now = self._parameters.exposure, self._clock.time
+        taken = None if self._exposure.has_seen_nothing else self._exposure.brightness(own, now)
+        self._exposure.meter(self._metered(lens, gather), taken, now)
+
+    def _brightness(self, lens: Intrinsics, gather: Gather) -> float:
+        own, now, control = self._parameters.exposure, self._clock.time, self._exposure
+        if own.automatic and control.has_seen_nothing:
+            control = ExposureControl()  # before the first that is due, which begins by itself
+            control.meter(self._metered(lens, gather), None, now)
+        return control.brightness(own, now)
+
+    def _metered(self, lens: Intrinsics, gather: Gather) -> np.ndarray:
+        small, vignette = _small(lens), self._parameters.vignette
+        light = gather(small, Shutter(0.0, 0.0))
+        if not vignette.is_on:
+            return light
+        return vignette.apply(light, Shot(small, 0.0, 1.0, partial(self._normal, (small.height, small.width, 3))))
 
     def _normal(self, shape: tuple[int, int, int], seed: int) -> np.ndarray:
         words = [seed, *self._name.encode(), self._clock.steps]
@@ -65,4 +86,11 @@ class Photography:
 
     def save_state(self) -> Restore:
         """Return a function that brings back imperfections and exposure."""
-        return in_turn(saved(self, "_parameters", "_imperfections"), self._exposure.save_state())
+        return in_turn(saved(self, "_parameters", "_imperfections", "is_metering"), self._exposure.save_state())
+
+
+@lru_cache(maxsize=16)
+def _small(lens: Intrinsics) -> Intrinsics:
+    """Return a lens that sees the same in few pixels."""
+    width = min(_METERED, lens.width)
+    return replace(lens, width=width, height=max(1, round(lens.height * width / lens.width)))

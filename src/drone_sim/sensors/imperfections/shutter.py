@@ -6,15 +6,15 @@ from typing import Annotated
 
 from pydantic import Field
 
-from drone_sim.config.types import Finite, Within
+from drone_sim.config.types import Finite, Unit, Within
 from drone_sim.sensors.imperfections.imperfection import Imperfection
 
 
 class ShutterParameters(Imperfection):
     """How the rows of a picture are exposed."""
 
-    readout: Annotated[Finite, Within(0, 1)] = Field(
-        default=0.0, description="s, from the first row to the last; 0: all at once"
+    readout: Annotated[Finite, Within(0, 1), Unit("s")] = Field(
+        default=0.0, description="from the first row to the last; 0: all rows at once"
     )
 
     @property

@@ -23,7 +23,7 @@ class VignetteParameters(Imperfection):
     """How much darker the corners are."""
 
     power: Annotated[Finite, Within(0, 20)] = Field(
-        default=0.0, description="of the cosine of the angle from the optical axis; 4: a thin lens; 0: none"
+        default=0.0, description="power of the cosine of the angle from the optical axis; 4: a thin lens; 0: none"
     )
 
     @property

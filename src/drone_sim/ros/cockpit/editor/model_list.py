@@ -32,7 +32,7 @@ SHAPES: dict[str, _Operation] = {
     "Capsule": _shape("Capsule", "capsule", size=[0.15, 0.4]),
     "Cone": {"do": "add_model", "model": "cone"},
     "Plane": _shape("Plane", "box", size=[1, 1, 0.002], respondable=False),
-    "Wall": _shape("Wall", "box", size=[3, 0.1, 2], color=[0.86, 0.82, 0.74]),
+    "Wall": _shape("Wall", "box", size=[0.1, 3, 2], color=[0.86, 0.82, 0.74]),
 }
 ARENA = ("gate", "landing_pad", "pole", "ramp", "table", "window_frame")
 _SIGN = {"do": "add_sign", "text": "START"}

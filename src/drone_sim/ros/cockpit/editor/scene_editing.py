@@ -82,7 +82,7 @@ class SceneEditing:
         return {
             "tree": lambda _: self._tree(),
             "edit": lambda one: self._ask({key: one[key] for key in ("edit", "name", "merge") if key in one}),
-            "undo": lambda _: self._ask({"undo": True}),
+            "undo": lambda one: self._ask({"undo": True, **{key: one[key] for key in ("merge",) if key in one}}),
             "redo": lambda _: self._ask({"redo": True}),
             "properties": lambda _: {"types": properties()},
             "models": lambda _: {"groups": self._models.groups()},
@@ -93,6 +93,7 @@ class SceneEditing:
             "save_scene": self._save,
             "save_model": lambda one: self._ask({"save_model": one.get("object"), "file": self._path(one, "file")}),
             "scene_text": lambda _: self._ask({"text": True}),
+            "objects_text": lambda one: self._ask({"text_of": one.get("objects")}),
             "write_scene_text": self._write,
             "draft": lambda one: self._ask({"draft": one.get("draft")}),
         }

@@ -8,10 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from drone_sim.config.types import merged, named_in, read_yaml
-from drone_sim.files import writing
+from drone_sim.files import writing, yaml_files
 from drone_sim.files.resources import package_path, resolve
 from drone_sim.grading import plan as plans
 from drone_sim.grading import tasks
@@ -47,7 +45,7 @@ def scene_of(plan: Plan, folder: Path | None = None) -> str:
     file = (folder or _TASK_SCENES.expanduser()) / f"{plan.name}.yaml"
     file.parent.mkdir(parents=True, exist_ok=True)
     # Through JSON: what is a special kind of text to us is none to YAML.
-    text = yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False)
+    text = yaml_files.dump(json.loads(json.dumps(content)))
     writing.write(file, f"# Made of {plan.path}\n{text}", through_links=False)
     return str(file)
 

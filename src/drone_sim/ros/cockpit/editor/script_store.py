@@ -309,7 +309,7 @@ def _write_text(name: str, path: Path, text: str, is_new: bool = False) -> str:
         content = text.encode("utf-8")
     except UnicodeEncodeError as error:
         line = text.count("\n", 0, error.start) + 1
-        raise ScriptStoreError(f"{name}: line {line}: holds half of a character, which no file can hold") from None
+        raise ScriptStoreError(f"{name}: line {line}: has half of a character, which cannot be saved") from None
     if len(content) > LARGEST:
         raise ScriptStoreError(f"{name}: has {len(content)} bytes; at most {LARGEST} are kept")
     if not is_new and _has_windows_line_ends(path):

@@ -61,9 +61,9 @@ class TimelinePlayer:
                 return
             self._stamp, self._steps = rospy.Time(), 0
             on_odometry = partial(self._on_odometry, self._sender)
-            self._listening = [
-                rospy.Subscriber(f"/{self._first}/odom", Odometry, on_odometry, queue_size=_QUEUE),
+            self._listening = [  # the first of them hears at once what was said last, before this flight
                 rospy.Subscriber(f"{self._node}/state", String, self._on_state, queue_size=1),
+                rospy.Subscriber(f"/{self._first}/odom", Odometry, on_odometry, queue_size=_QUEUE),
             ]
 
     def end(self) -> None:
@@ -85,7 +85,7 @@ class TimelinePlayer:
             self.end()
 
     def _on_state(self, message: String) -> None:
-        if message.data == _STOPPED:
+        if message.data == _STOPPED and self._steps:
             self.end()
 
 

@@ -58,7 +58,7 @@ def one_of(message: Mapping[str, Any], key: str, allowed: Sequence[str]) -> str:
     value = message.get(key)
     if not isinstance(value, str) or value not in allowed:
         known = near_names(str(value)[:80], allowed) if allowed else "there is none now"
-        raise ValueError(f"{key} = {shown(value)}: is none of those that there are; {known}")
+        raise ValueError(f"{key} = {shown(value)}: does not exist; {known}")
     return value
 
 

@@ -46,6 +46,7 @@ class CameraSwitches:
         self._names: dict[str, str] = {}
         self._shown: dict[str, _CameraListener] = {}
         self._views: frozenset[str] = frozenset()
+        self._gone: set[str] = set()  # that were shown when they went, as while a scene is loaded
         self._resting = True
 
     @property
@@ -59,9 +60,11 @@ class CameraSwitches:
             before, self._sources = self._sources.keys(), {one.topic: one for one in sources}
             self._names = {topic: camera_name(topic, vehicles) for topic in self._sources}
             self._board.show("cameras", [{"topic": topic, "name": name} for topic, name in self._names.items()])
+            self._gone |= self._shown.keys() - self._sources.keys()
             for topic in before - self._sources.keys():
                 self.turn(topic, False)
-            for topic in self._views & (self._sources.keys() - before):
+            for topic in (self._views | self._gone) & (self._sources.keys() - before):
+                self._gone.discard(topic)
                 self.turn(topic, True)
             for topic, camera in self._shown.items():
                 if camera.source != self._sources[topic]:  # another scene: there is truth now, or none any more
@@ -207,7 +210,7 @@ class ScriptWindows:
     def _answer(self, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Hand on which button was pressed; the simulation checks it."""
         if self._answering is None:
-            raise ValueError("there is no simulation that hears the answer")
+            raise ValueError("there is no simulation for the answer")
         until = time.monotonic() + _CONNECTING
         while not self._answering.get_num_connections() and time.monotonic() < until:
             time.sleep(0.05)  # the first message of a new publisher is heard by nobody
@@ -271,7 +274,7 @@ def _depths(depths: np.ndarray) -> tuple[bytes, str]:
 
 def _as_bgr(image: np.ndarray, encoding: str) -> np.ndarray:
     if image.dtype != np.uint8:
-        raise ValueError(f"encoding '{encoding[:40]}' is none of colours with 8 bits, grey, or depth")
+        raise ValueError(f"encoding '{encoding[:40]}' must be colors with 8 bits, gray, or depth")
     if image.ndim == 3 and image.shape[2] in (3, 4) and encoding.startswith("rgb"):
         return np.ascontiguousarray(image[:, :, 2::-1])
     return np.ascontiguousarray(image[:, :, :3] if image.ndim == 3 else image)

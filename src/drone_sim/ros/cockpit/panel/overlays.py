@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import colorsys
 import json
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -15,12 +14,12 @@ from cv_bridge import CvBridge
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
+from drone_sim.ros.core import mask_colors
+
 BOXES, MASK = KINDS = ("boxes", "mask")
 _KEPT = 8  # messages, among which is that of the picture's stamp
 _BUFFER = 1 << 24  # bytes: more than a picture
 _EVERYWHERE = "Floor"  # whose box is the picture
-_GOLDEN = 0.618034  # of the circle of hues: no two numbers in a row look alike
-_SHARE = 0.55  # of the mask's color in a pixel
 _LONGEST = 1 << 21  # characters of a message
 _bridge = CvBridge()
 
@@ -96,19 +95,13 @@ class Overlay:
             return picture
         mask = _bridge.imgmsg_to_cv2(message)
         mask = cv2.resize(mask, image.shape[1::-1], interpolation=cv2.INTER_NEAREST)
-        colors = np.array([_rgb(number)[::-1] for number in range(int(mask.max()) + 1)], np.float32)
-        there = mask > 0
-        image[there] = (1 - _SHARE) * image[there] + _SHARE * 255 * colors[mask[there]]
-        return bytes(cv2.imencode(".jpg", image)[1])
+        over = mask_colors.painted(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), mask)
+        return bytes(cv2.imencode(".jpg", cv2.cvtColor(over, cv2.COLOR_RGB2BGR))[1])
 
 
 def color_of(number: int) -> str:
     """Return the color of a category's number, as CSS has it."""
-    return "#" + "".join(f"{round(255 * one):02x}" for one in _rgb(number))
-
-
-def _rgb(number: int) -> tuple[float, float, float]:
-    return colorsys.hsv_to_rgb(number * _GOLDEN % 1.0, 0.75, 1.0)
+    return "#" + "".join(f"{round(255 * one):02x}" for one in mask_colors.color_of(number))
 
 
 def _nearest(messages: deque[tuple[float, Any]], stamp: float) -> Any:

@@ -68,7 +68,7 @@ def _is_free(family: socket.AddressFamily, host: str, port: int) -> bool:
             one.bind((host, port))
             one.listen()
         except PermissionError:
-            raise AddressError(f"port = {port}: is for root alone; those from 1024 on are for everybody") from None
+            raise AddressError(f"port = {port}: only root may use it; everybody may use those from 1024 on") from None
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
                 raise

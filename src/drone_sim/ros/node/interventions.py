@@ -1,0 +1,81 @@
+"""~interventions: what somebody outside does to the world beyond flying.
+
+In one line each, the first time in a flight: `push drone at 3.20 s (/drone/push, by /flyer)`.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from typing import Any
+
+import rospy
+from std_msgs.msg import String
+
+from drone_sim.grading.permissions import CHANGE, MOST_TRIED, Actions, free
+from drone_sim.message_text import MAX_NAME, printable
+from drone_sim.ros.core.intervention import Intervention
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.calls import Function
+
+_CLIENT = "a client of the remote API"
+_WAITING = 100  # messages
+
+
+class Interventions:
+    """Says them. The simulation's thread calls all of it."""
+
+    def __init__(self, simulation: Simulation):
+        """Advertise for `simulation`."""
+        self._simulation = simulation
+        self._topic = rospy.Publisher("~interventions", String, queue_size=_WAITING)
+        self._run = self._era = -1
+
+    def update(self) -> None:
+        """Begin anew in another run; say what was tuned before it, and stays so."""
+        simulation = self._simulation
+        if self._run == simulation.run:
+            return
+        self._run = simulation.run
+        self._told: set[Intervention] = set()
+        self._count: Counter[tuple[str, str]] = Counter()  # of what each has done, by the action
+        for name, one in simulation.child_scripts.items() if simulation.running else ():
+            if one.tuning.chosen:
+                self._say(CHANGE, name, f"{', '.join(one.tuning.chosen)}, tuned before")
+
+    def tell(self, one: Intervention) -> None:
+        """Say what is done now."""
+        self.update()
+        kind = one.action, one.by
+        if one not in self._told and self._count[kind] < MOST_TRIED:
+            self._told.add(one)
+            self._count[kind] += 1
+            self._say(one.action, one.what, f"{one.way}, by {one.by}")
+
+    def _say(self, action: str, what: str, how: str) -> None:
+        self._topic.publish(printable(f"{action} {what:.{MAX_NAME}} at {self._simulation.time:.2f} s ({how})"))
+
+    # ---- clients of the remote APIs
+
+    def watched(self, name: str, function: Function) -> Function:
+        """Return a function of clients' that says what is done by it; itself where it does nothing to the world."""
+        if name in free():
+            return function
+
+        @functools.wraps(function)
+        def told(*arguments: Any) -> Any:
+            actions, given = self._clients(), [*arguments]
+            action = actions.of(name, given)
+            if action is not None:
+                self.tell(Intervention(action, actions.what(name, given), name, _CLIENT))
+            return function(*arguments)
+
+        return told
+
+    def _clients(self) -> Actions:
+        """Return what tells what clients do: they fly all vehicles, by the green spheres, too, and are no scripts."""
+        if self._era != self._simulation.era:
+            self._era = self._simulation.era
+            flown = self._simulation.vehicles.values()
+            self._actions = Actions(self._simulation, flown, frozenset(), [one.target for one in flown])
+        return self._actions

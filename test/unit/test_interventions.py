@@ -1,0 +1,196 @@
+"""What somebody outside does to the world beyond flying is said: once in a flight, with who and how."""
+
+from contextlib import closing, suppress
+from types import SimpleNamespace
+from unittest import mock
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+import rospy
+from diagnostic_msgs.msg import KeyValue
+from dynamic_reconfigure.msg import Config, DoubleParameter
+from geometry_msgs.msg import WrenchStamped
+from legacy_client import BLOCKING, command, floats, ints
+from legacy_client import Client as LegacyClient
+from remote_client import Client, Refusal
+
+from drone_sim.remote.legacy.server import LegacyServer
+from drone_sim.remote.server import RemoteApiServer
+from drone_sim.ros.core.inbox import Inbox
+from drone_sim.ros.node import interventions, services
+from drone_sim.ros.vehicle import inputs, tuning_server
+from drone_sim.run import parameters
+from drone_sim.run.pacing import Pace, Pacer
+from drone_sim.run.player import Player
+from drone_sim.run.simulation import Simulation
+from drone_sim.scripting.api.constants import CONSTANTS
+
+CRATE = {"shape": "box", "name": "Crate", "size": [0.2] * 3, "position": [3, 0, 0.1], "mass": 1.0}
+SET_POSITION, CUBOID = 0x101B, CONSTANTS["primitiveshape_cuboid"]
+OUTSIDE = "by a client of the remote API"
+
+
+class Stage:
+    """A simulation that flies, and what is said of it."""
+
+    def __init__(self, monkeypatch):
+        self.said, self.callbacks = [], {}
+        topic = mock.MagicMock()
+        topic.publish = self.said.append
+        monkeypatch.setattr(rospy, "Publisher", lambda *_, **_named: topic)
+        for kind in ("Subscriber", "Service"):
+            monkeypatch.setattr(rospy, kind, self.listen)
+        for name in ("get_param", "set_param", "delete_param"):
+            monkeypatch.setattr(rospy, name, lambda *_: None)
+        given = {"vehicles": {"drone": {}, "other": {"position": [1, 1, 0.8]}}, "scene": {"objects": [CRATE]}}
+        self.simulation = Simulation(parameters.load(given))
+        self.player = Player(self.simulation, self.simulation.step, lambda _: None, simulated_time=False)
+        self.interventions = interventions.Interventions(self.simulation)
+        self.inbox = Inbox(tell=self.interventions.tell)
+        self.simulation.step()
+
+    def listen(self, name, _kind, callback, **_):
+        self.callbacks[name] = callback
+        return mock.MagicMock()
+
+    def hear(self, name, message, sender="/flyer"):
+        """Take a message, or a request, of a node."""
+        message._connection_header = {"callerid": sender}
+        with mock.patch.object(self.inbox, "ask", self.inbox.put):
+            self.callbacks[name](message)
+        self.inbox.empty()
+
+    def lines(self):
+        found = self.said[:]
+        self.said.clear()
+        return found
+
+
+@pytest.fixture(name="stage")
+def _stage(monkeypatch):
+    stage = Stage(monkeypatch)
+    yield stage
+    stage.simulation.close()
+
+
+@pytest.fixture(name="client")
+def _client(stage):
+    with closing(RemoteApiServer(stage.player, "127.0.0.1", 0, watched=stage.interventions.watched)) as server:
+        client = Client(server)
+        yield client
+        client.vanish()
+
+
+def test_a_client_that_flies_does_nothing_else(stage, client):
+    drone, wheel = (client.sim("getObject", f"/{name}") for name in ("Drone", "Quadricopter_propeller_respondable1"))
+    script = client.sim("getScriptAssociatedWithObject", wheel)
+    client.sim("setScriptSimulationParameter", script, "particleVelocity", 5.0)
+    client.sim("setObjectPosition", client.sim("createDummy", 0.1), -1, [1, 1, 1])
+    client.sim("setObjectPosition", client.sim("getObject", "/target"), -1, [1, 1, 1])
+    client.sim("setFloatSignal", "x", 1.0)
+    client.sim("getObjectPosition", drone, -1)
+    for name in ("startSimulation", "getSimulationState", "getSystemTime", "acquireLock", "releaseLock"):
+        client.sim(name)
+    client.sim("setStepping", True)
+    client.sim("addDrawingObject", 0, 5, 0, -1, 1, [1, 0, 0])
+    assert stage.lines() == []
+
+
+@pytest.mark.parametrize(
+    ("function", "of", "arguments", "said"),
+    [
+        ("addForce", "Drone", ([0, 0, 0], [0, 0, 0.1]), "push Drone"),
+        ("addForceAndTorque", "Drone#0", ([0, 0, 0.1], [0, 0, 0]), "push Drone#0"),
+        ("setObjectPosition", "Drone", (-1, [1, 0, 1]), "move Drone"),
+        ("setObjectPosition", "Crate", (-1, [1, 0, 1]), "move Crate"),
+        ("setObjectParent", "Crate", (-1, True), "move Crate"),
+        ("setShapeMass", "Drone", (0.1,), "change Drone"),
+        ("removeObject", "Crate", (), "change Crate"),
+        ("createPrimitiveShape", "", (0, [1, 1, 1]), "change the scene"),
+        ("setSimulationTimeStep", "", (0.1,), "change the scene"),
+        ("pauseSimulation", "", (), "change the scene"),
+        ("loadScene", "", ("",), "change the scene"),
+        ("saveModel", "Crate", ("mine.ttm",), "write Crate"),
+        (
+            "setScriptSimulationParameter",
+            "",
+            (-4, "Kzref", 1.0),
+            "change the scene",
+        ),  # of the drone's, not the client's
+    ],
+)
+def test_what_a_client_does_beyond_that_is_said_once(stage, client, function, of, arguments, said):
+    handle = [client.sim("getObject", f"/{of}")] if of else []
+    for _ in range(3):
+        with suppress(Refusal):  # it has tried
+            client.sim(function, *handle, *arguments)
+    assert stage.lines()[0] == f"{said} at 0.05 s (sim.{function}, {OUTSIDE})"
+    assert not [one for one in stage.said if one.startswith(said)]
+
+
+def test_a_flood_is_few_lines_and_hides_nothing_of_another_kind(stage, client):
+    for _ in range(50):
+        client.sim("setObjectPosition", client.sim("createPrimitiveShape", CUBOID, [0.1] * 3), -1, [5, 5, 5])
+    lines = stage.lines()
+    assert len(lines) == 21 and len(set(lines)) == 21  # the shapes are one line, each that is moved another
+    client.sim("addForce", client.sim("getObject", "/Drone"), [0, 0, 0], [0, 0, 0.1])
+    assert [one.split(" at ")[0] for one in stage.lines()] == ["push Drone"]
+    stage.simulation.start()
+    client.sim("addForce", client.sim("getObject", "/Drone"), [0, 0, 0], [0, 0, 0.1])
+    assert stage.lines() == [f"push Drone at 0.00 s (sim.addForce, {OUTSIDE})"]
+
+
+def test_a_client_of_the_legacy_api_is_told_of_too(stage):
+    objects = stage.simulation.context.objects
+    with closing(LegacyServer(stage.player, "127.0.0.1", 0, watched=stage.interventions.watched)) as server:
+        client = LegacyClient(server.port, server.wait)
+        for name in ("DronePosition", "Crate"):
+            where = ints(-1) + floats(1, 1, 1)
+            client.ask(command(SET_POSITION | BLOCKING, ints(objects.handle(name)), where))
+        client.peer.close()
+    assert stage.lines() == [f"move Crate at 0.05 s (sim.setObjectPosition, {OUTSIDE})"]
+
+
+def test_messages_are_told_with_their_sender(stage):
+    own = stage.simulation.vehicles["other"].parameters
+    inputs.VehicleInputs(stage.simulation, own, stage.inbox)
+    for sender in ("/flyer", "/flyer", "/other\n"):
+        stage.hear("other/push", WrenchStamped(), sender)
+    stage.hear("other/weather", KeyValue("wind", "[1, 0, 0]"))
+    stage.hear("other/weather", KeyValue("winds", "[1, 0, 0]"))  # refused
+    assert stage.lines() == [
+        "push other at 0.05 s (/other/push, by /flyer)",
+        "push other at 0.05 s (/other/push, by /other?)",
+        "change other at 0.05 s (/other/weather, by /flyer)",
+    ]
+
+
+def test_tuning_is_told_and_what_stays_of_it_at_every_start(stage):
+    tuning = stage.simulation.child_scripts["drone"].tuning
+    tuning_server.TuningServer("/drone", tuning, stage.inbox)
+    pacer = Pacer(0.05)
+    tuning_server.TuningServer("/drone_sim", Pace(stage.simulation, pacer), stage.inbox)
+
+    def asked(name, value):
+        return SimpleNamespace(config=Config(doubles=[DoubleParameter(name, value)]))
+
+    stage.hear("/drone_sim/set_parameters", asked("real_time_factor", 2.0))
+    stage.hear("/drone/set_parameters", SimpleNamespace(config=Config()))
+    stage.lines()  # what holds
+    stage.hear("/drone/set_parameters", asked("Kzref", 4.0))
+    assert "change drone at 0.05 s (/drone/set_parameters, by /flyer)" in stage.lines()
+    stage.player.restart()
+    stage.interventions.update()
+    assert stage.lines() == ["change drone at 0.00 s (Kzref, tuned before)"]
+    stage.interventions.update()
+    assert stage.lines() == []
+
+
+def test_services_are_told_but_a_snapshot(stage):
+    services.Services(stage.player, stage.inbox, lambda: None)
+    for name in ("snapshot", "restore", "pause"):
+        stage.hear(f"~{name}", SimpleNamespace(data=True))
+    said = [(one.split(" (")[0], one.rpartition("/")[0].rpartition("/")[2]) for one in stage.lines()]
+    assert said == [("change the scene at 0.05 s", "restore, by "), ("change the scene at 0.05 s", "pause, by ")]

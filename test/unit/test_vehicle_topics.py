@@ -1,0 +1,72 @@
+"""Which vehicles keep their topics when another scene is loaded."""
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS")
+
+from drone_sim.grading import plan as plans
+from drone_sim.ros.grading import seeds
+from drone_sim.ros.vehicle import vehicle_topics
+from drone_sim.run import parameters
+from drone_sim.run.simulation import Simulation
+
+PLAN = """
+duration: 1
+spread: {position: [0.2, 0.2, 0], yaw: 0.2}
+criteria: [{kind: reach, places: [[1, 0, 1]], within: 0.3}]
+"""
+
+
+class Topics:
+    """Those of one vehicle, without a master."""
+
+    def __init__(self, _simulation, vehicle, _inbox):
+        self.vehicle, self.is_open = vehicle, True
+
+    def follow(self, vehicle):
+        self.vehicle = vehicle
+
+    def close(self):
+        self.is_open = False
+
+
+class Transforms:
+    def publish_static(self, _vehicles, _stamp):
+        pass
+
+
+@pytest.fixture(name="fleet")
+def _fleet(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(vehicle_topics, "VehicleTopics", Topics)
+    monkeypatch.setattr(vehicle_topics, "Transforms", Transforms)
+    simulation = Simulation(parameters.load(), started=False)
+    yield vehicle_topics.FleetTopics(simulation, None, None)
+    simulation.close()
+
+
+def test_a_vehicle_that_begins_elsewhere_keeps_its_topics(fleet, tmp_path):
+    simulation, (topics,) = fleet._simulation, fleet._topics.values()
+    (tmp_path / "plan.yaml").write_text(PLAN)
+    simulation.load_scene(seeds.scene_file(plans.read(tmp_path / "plan.yaml"), 3))
+    fleet.follow()
+    assert simulation.drone.parameters.position != parameters.load().drone.position
+    assert (topics.is_open, topics.vehicle) == (True, simulation.drone)
+
+
+@pytest.mark.parametrize(
+    ("said", "stays"),
+    [
+        ("position: [2, 1, 1], yaw: 1, tilt: [0.1, 0]", True),
+        ("faults: {seed: 7}", True),
+        ("cameras: {front: {width: 320}}", False),
+        ("script: target", False),
+    ],
+)
+def test_what_topics_depend_on(fleet, tmp_path, said, stays):
+    (topics,) = fleet._topics.values()
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(f"vehicles: {{drone: {{{said}}}}}\n")
+    fleet._simulation.load_scene(str(scene))
+    fleet.follow()
+    assert topics.is_open == stays
