@@ -20,6 +20,7 @@ MAX_SIZE = MEBIBYTE  # bytes of a file
 MAX_DEPTH = 32  # lists and mappings within each other
 MAX_VALUES = 100_000  # keys and values, each alias counted with all that it stands for
 _MAX_DIGITS = 400  # of a number
+_TOO_DEEP = f"lists and mappings are more than {MAX_DEPTH} deep"
 _OTHER = ("int", "float", "timestamp")  # what YAML 1.1 reads in ways of its own
 _INT = re.compile(r"[-+]?(?:[0-9]+|0x[0-9a-fA-F]+)$")
 _FLOAT = re.compile(
@@ -65,6 +66,8 @@ def parse(text: str) -> Any:
             loader.dispose()
     except yaml.MarkedYAMLError as error:
         said = " ".join(filter(None, (error.context, error.problem)))
+        if "maximum nesting depth" in said:  # libyaml's own limit, which it may meet first, for it reads ahead
+            said = _TOO_DEEP
         mark = error.problem_mark or error.context_mark
         raise YamlError(f"{' '.join(said.split())}{_at(mark)}") from None
     except yaml.YAMLError as error:
@@ -157,7 +160,7 @@ def _refused(node: Any, problem: str) -> yaml.MarkedYAMLError:
 
 
 def _too_deep(node: Any) -> yaml.MarkedYAMLError:
-    return _refused(node, f"lists and mappings are more than {MAX_DEPTH} deep")
+    return _refused(node, _TOO_DEEP)
 
 
 def _too_much(node: Any) -> yaml.MarkedYAMLError:

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from concurrent.futures import Future, wait
 from functools import partial
 from queue import SimpleQueue
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from drone_sim.ros.core.intervention import Intervention
+if TYPE_CHECKING:  # it imports rospy, which this file does without
+    from drone_sim.ros.core.intervention import Intervention
 
 _PATIENCE = 30.0  # s; a step, or a scene that is read anew, takes far less
 
