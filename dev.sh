@@ -323,7 +323,8 @@ find_python() { # find_python VERSION
   done
 }
 
-# The unit tests that need no ROS, each time in an environment without ROS: what they leave out, they print.
+# The unit tests that need no ROS, each time in an environment without ROS: what they leave out, they print. Those that
+# take long without being different on another Python are counted only, as deselected.
 test_pythons() { # test_pythons VERSION...
   local version found=()
   for version in $PYTHONS; do
@@ -344,7 +345,7 @@ test_pythons() { # test_pythons VERSION...
     venv=$cache/python$version
     make_venv "${ALL[@]}"
     say "the unit tests that need no ROS, on $("$python" --version)"
-    "$venv/bin/python" -m pytest -n auto --dist worksteal -rs test/unit
+    "$venv/bin/python" -m pytest -n auto --dist worksteal -rs -m "not long" test/unit
   done
 }
 

@@ -9,6 +9,8 @@ from drone_sim.mechanics.state import Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
+pytestmark = pytest.mark.long
+
 WALL = {"shape": "box", "size": [0.2, 60, 4], "position": [2.1, 0, 2]}
 BOX = {"shape": "box", "size": [1, 1, 0.4], "position": [0, 0, 0.2]}
 EDGE = {**BOX, "position": [0.45, 0, 0.2]}

@@ -24,6 +24,8 @@ from drone_sim.run.simulation import Simulation
 from drone_sim.shapes.mesh import Mesh
 from drone_sim.shapes.visual import Visual
 
+pytestmark = pytest.mark.long
+
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 HANGS = 120.0  # s for all files of a kind; they take a few
 MEMORY = 4 * 2**30  # bytes

@@ -12,6 +12,8 @@ from test_renderer_outputs import cast, inner, random_scene
 from drone_sim.render.distortion import Distorted
 from drone_sim.render.renderer import Renderer
 
+pytestmark = pytest.mark.long
+
 BLACK, WHITE = (0.05, 0.05, 0.05, 1.0), (0.95, 0.95, 0.95, 1.0)
 COLUMNS, ROWS, SQUARE = 9, 6, 0.08  # inner corners of the board, and m
 WIDE = Distorted(640, 480, 1.1, 0.02, 50.0, "plumb_bob", (-0.25, 0.08, 0.001, -0.0007, 0.0))

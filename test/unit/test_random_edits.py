@@ -10,12 +10,15 @@ from pathlib import Path
 
 import moderngl
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from living import KINDS, SCENE, sizes
 from scene_edits import assert_same, editor_of, state, text_of
 
 from drone_sim.editing.changes import change_between
+
+pytestmark = pytest.mark.long
 
 EDITS = int(os.environ.get("DRONE_SIM_EDITS", "20"))  # in a row: 500 by hand
 OPENGL = (moderngl.Buffer, moderngl.Framebuffer, moderngl.Program, moderngl.Texture, moderngl.VertexArray)

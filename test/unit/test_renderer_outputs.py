@@ -92,6 +92,7 @@ def inner(labels):
     return same
 
 
+@pytest.mark.long
 def test_masks_depths_and_normals_are_what_rays_meet(renderer):
     """In 100 random scenes, at every pixel that is not at an edge."""
     random, compared = np.random.RandomState(29), 0

@@ -9,6 +9,8 @@ from carried import Carried
 from drone_sim.sensors.magnetic_field import MagneticFieldParameters
 from drone_sim.sensors.noise import Noise, NoiseParameters
 
+pytestmark = pytest.mark.long
+
 HOUR = 72_000  # samples
 INTERVAL = 0.05  # s: an hour of them
 AXES = 16  # at once, to average over

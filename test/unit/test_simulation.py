@@ -75,6 +75,7 @@ def resources():
     return resident, len(os.listdir("/proc/self/fd")), len(clients)
 
 
+@pytest.mark.long
 def test_100_runs_fly_alike_and_leak_nothing(simulate):
     simulation = simulate(scene={"objects": CLUTTER})
     first, measured = None, []

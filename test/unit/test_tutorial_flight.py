@@ -9,6 +9,8 @@ from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.run import parameters
 from drone_sim.run.simulation import Simulation
 
+pytestmark = pytest.mark.long
+
 FORWARD, LEFT, UP = Twist(Vector3(1, 0, 0)), Twist(Vector3(0, 1, 0)), Twist(Vector3(0, 0, 1))
 TURN = Twist(Vector3(), Vector3(0, 0, 1))
 COMMANDS = {"vx": (FORWARD, 0), "vy": (LEFT, 1), "vz": (UP, 2), "wz": (TURN, 5)}  # and where it shows
