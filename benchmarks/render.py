@@ -31,6 +31,7 @@ Drawn = tuple[list[Visual], np.ndarray]  # and their poses, world from visual (N
 
 CAMERA = Intrinsics(640, 480, np.radians(60.0), 0.02, 100.0)
 LENS = Distorted(640, 480, np.radians(60.0), 0.02, 100.0, "plumb_bob", (-0.28, 0.07))
+EQUIDISTANT = Distorted(640, 480, np.radians(60.0), 0.02, 100.0, "equidistant", (-0.05, 0.01))
 FISHEYE = Distorted(640, 480, np.radians(170.0), 0.02, 100.0, "equidistant")
 AHEAD = np.array([[0.0, 0.0, 1.0, 0.2], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.8], [0.0, 0.0, 0.0, 1.0]])
 DOWNWARD = np.array(  # 1 m above the floor, 30 degrees down: floor to the last pixel, and the quadrotor's shadow
@@ -144,6 +145,7 @@ def compare(folder: Path, seconds: float = 2.0) -> list[Row]:
         ours("drone_sim, 4 samples", scene, seconds, samples=4),
         ours("drone_sim, nothing but floor", build(folder, things=0), seconds, view=DOWNWARD),
         ours("drone_sim, through a lens (plumb_bob)", scene, seconds, camera=LENS),
+        ours("drone_sim, through a lens (equidistant)", scene, seconds, camera=EQUIDISTANT),
         ours("drone_sim, through a fisheye of 170 degrees", scene, seconds, camera=FISHEYE),
         with_truth("drone_sim, with depth and instances", scene, seconds),
     ]
