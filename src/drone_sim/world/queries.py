@@ -177,16 +177,18 @@ class Queries:
 
     def overlaps(self) -> int:
         """Return how many pairs of moving bodies have bounds that overlap."""
-        bounds, moves = [], []
+        bounds = []
         for index in range(pybullet.getNumBodies(self._client)):
             body = pybullet.getBodyUniqueId(index, self._client)
             joints = pybullet.getNumJoints(body, self._client)
-            boxes = [pybullet.getAABB(body, link, self._client) for link in range(-1, joints)]
-            bounds.append((np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)))
-            moves.append(joints > 0 or pybullet.getDynamicsInfo(body, -1, self._client)[0] > 0)
-        low, high, moving = np.array(bounds)[:, 0], np.array(bounds)[:, 1], np.array(moves)
+            if joints or pybullet.getDynamicsInfo(body, -1, self._client)[0]:
+                boxes = [pybullet.getAABB(body, link, self._client) for link in range(-1, joints)]
+                bounds.append((np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)))
+        if len(bounds) < 2:  # most often
+            return 0
+        low, high = np.array(bounds)[:, 0], np.array(bounds)[:, 1]
         meet = (low[:, None] <= high[None]).all(axis=2)
-        return int(np.triu(meet & meet.T & moving[:, None] & moving, k=1).sum())
+        return int(np.triu(meet & meet.T, k=1).sum())
 
 
 def _normal(start: Vector, end: Vector, hit: Any) -> Vector:
