@@ -89,16 +89,22 @@ def script_path(script: str) -> str:
     """
     name = script or DEFAULT
     if "/" not in name and not Path(name).suffix:
-        known = {path.stem: path for path in BUILT_IN.glob("*.py") if path.stem != "__init__"}
+        known = _built_in()
         if name not in known:
             raise ScriptError("load", name, 0, f"no built-in script of that name; {near_names(name, known)}")
-        return str(known[name])
+        return known[name]
     if Path(name).suffix not in (".py", ".lua"):
         raise ScriptError("load", name, 0, "a child script's name ends in .py or .lua")
     try:
         return str(resolve(name))
     except FileNotFoundError as error:
         raise ScriptError("load", name, 0, str(error)) from None
+
+
+@functools.cache  # asked several times for every flight
+def _built_in() -> dict[str, str]:
+    """Return the paths of the built-in scripts, by name."""
+    return {path.stem: str(path) for path in BUILT_IN.glob("*.py") if path.stem != "__init__"}
 
 
 def load(
