@@ -70,10 +70,10 @@ def _judge(plan: Plan, request: dict[str, Any], door: socket.socket, outputs: Ma
     try:
         flight = Flight(plan, script, seed, changes, end)
         result = flight.grade()
-        rows, is_gone = flight.rows, end.is_gone
+        rows, is_gone = flight.rows if request["table"] else None, end.is_gone
     except BaseException as error:
         result = ungraded(plan, script, seed, changes, _format_error(error))
-    if request["table"] and rows is not None:
+    if rows is not None:
         with open(outputs["table"], "w") as file:
             write_to(file, rows)
     with open(outputs["result"], "wb") as file:
