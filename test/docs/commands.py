@@ -15,6 +15,7 @@ _PROMPT = "$ "
 KEYBOARD = "needs a keyboard: test/ros/key_teleop.test"
 GAMEPAD = "needs a gamepad: test/unit/test_joy.py"
 DISPLAY = "needs a display, and a package that setup does not install"
+PACKAGE = "needs a package that setup does not install"
 WORKSPACE = "needs a catkin workspace and the network"
 INSTALLS = "installs packages"
 ANOTHER = "needs another package, or another machine"
@@ -28,6 +29,9 @@ NOT_RUN = {  # with the reason
     "rosrun demo_teleop key_teleop.py cmd_vel:=/drone1/cmd_vel": ANOTHER,
     "rosrun image_view image_view image:=/drone/front": DISPLAY,
     "rosrun image_view image_view image:=/drone/floor/image __name:=view2": DISPLAY,
+    "rosrun image_view image_saver image:=/drone/front _filename_format:=front%04d.png": PACKAGE,
+    "rosrun image_view video_recorder image:=/drone/front _filename:=front.avi _fps:=20": PACKAGE,
+    "rosrun image_transport republish raw in:=/drone/front raw out:=/camera/image_raw": PACKAGE,
     "cd my_ros_ws/src": WORKSPACE,
     "vcs import < drone_sim/drone_sim.rosinstall": WORKSPACE,
     "drone_sim/dev.sh setup --all": WORKSPACE,
@@ -41,6 +45,10 @@ NOT_RUN = {  # with the reason
     'echo "deb [trusted=yes] file:/srv/drone_sim ./" | sudo tee /etc/apt/sources.list.d/drone_sim.list': INSTALLS,
     "sudo apt update && sudo apt install ros-drone-sim": INSTALLS,
     "client/bin/pip install coppeliasim-zmqremoteapi-client": INSTALLS,
+    "readers/bin/pip install rosbags": INSTALLS,
+    "readers/bin/python read_bag.py flight.bag": PACKAGE,
+    "readers/bin/rosbags-convert --src flight.bag --dst flight_mcap --dst-storage mcap": PACKAGE,
+    "readers/bin/python read_bag.py flight_mcap": PACKAGE,
     "client/bin/python": "test/unit/test_docs_remote.py types what comes after it",
     "sudo apt update && sudo apt install -y git": CONTAINER,
     "git clone URL-OF-DRONE_SIM drone_sim": CONTAINER,

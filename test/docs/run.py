@@ -37,6 +37,7 @@ ENDLESS = (
     *("rostopic echo ", "rosrun drone_sim view", "rosrun drone_sim record_truth"),
     "python3 $(rospack find drone_sim)/docs/fleet/follow.py",
 )
+FROM_A_BAG = " -b "
 NEEDS_NONE = ("rosrun drone_sim ", "cat ", "source ", "rosbag info")  # a simulator
 NEEDS_ONE = ("rosrun drone_sim view", "rosrun drone_sim record_truth", "rosrun drone_sim doctor")
 WRONG = re.compile(r"Traceback|\[(?:ERROR|FATAL)\]|\bERROR:")
@@ -188,7 +189,7 @@ class Page:
         if self._simulator is not None and "record_to:=." in self._simulator.command.text:
             self._end()  # then the bag is whole
         self.run_commands.append(command)
-        if command.text.startswith(ENDLESS):
+        if command.text.startswith(ENDLESS) and FROM_A_BAG not in command.text:
             running = Background(command, self._folder, self.environment)
             running.wait_for("\n")
             running.end()
