@@ -413,13 +413,22 @@ def test_saved_as_another_file_it_is_that_scene(course, tmp_path):
 def test_in_flight_it_is_saved_as_it_stands_and_stays_the_scene_that_it_was(course):
     course.simulation.start()
     course.simulation.drone.body.move(Pose((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)))
-    course.answer({"save": True})
+    said = course.answer({"save": True})["said"]
     file = course.scene.document.file
+    assert said == f"saved {file} as it is in flight"
     was, now = changed_lines(COURSE, file.read_text(encoding="utf-8"))
     assert (was, now) == (["drone: {position: [0, 0, 1.50]}"], ["drone: {position: [1, 2, 3]}"])
     course.simulation.stop()
     course.follow()
     assert text_of(course) == COURSE
+
+
+def test_saved_as_another_file_in_flight_it_is_a_copy_and_the_answer_says_so(course, tmp_path):
+    course.simulation.start()
+    other = tmp_path / "other.yaml"
+    said = course.answer({"save": str(other)})["said"]
+    assert said == f"saved {other} as it is in flight: a copy. To save the scene itself, stop first"
+    assert course.scene.document.file == tmp_path / "course.yaml"
 
 
 def test_a_start_reads_what_somebody_has_written_since_it_was_saved(course):

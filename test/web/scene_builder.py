@@ -93,8 +93,11 @@ class Builder:
         field.fill(str(value))
         field.press("Enter")
 
-    def save_as(self, name):
+    def ask_to_save_as(self, name):
         self.menu("Scene file", "Save as …")
         self.page.get_by_label("Name", exact=True).fill(name)
         self.page.get_by_role("button", name="Save", exact=True).click()
+
+    def save_as(self, name):
+        self.ask_to_save_as(name)
         wait_until(self.page, lambda: self.page.inner_text("#scene-file") == name)

@@ -147,6 +147,17 @@ def test_an_arena_is_built_with_the_mouse_and_flown_by_the_gates_tasks_solution(
     assert [one.value for one in result.outcomes if one.kind == "reach"] == [3], "each of the three gates"
 
 
+def test_saved_in_flight_it_is_a_copy_and_the_page_says_so(cockpit, browser):
+    cockpit.scripts.mkdir(exist_ok=True)
+    with open_page(cockpit, browser) as page:
+        builder = Builder(page)
+        before = page.inner_text("#scene-file")
+        builder.ask_to_save_as("flown.yaml")
+        Panel(page).wait_for("flown.yaml as it is in flight: a copy. To save the scene itself, stop first")
+        assert page.inner_text("#scene-file") == before == "new scene"
+    assert (cockpit.scripts / "flown.yaml").is_file()
+
+
 def test_a_drag_is_one_step_of_undo_and_the_text_is_the_same_scene(cockpit, browser):
     with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
         builder = Builder(page)

@@ -217,7 +217,8 @@ class SceneEditor:
     def _save(self, request: records.Save) -> dict[str, Any]:
         path = self.files.save(None if request.save is True else str(request.save))
         if self.simulation.running:
-            return self._answer(f"saved {path} as it stands in flight", file=str(path))
+            copied = "" if path == self.scene.document.file else ": a copy. To save the scene itself, stop first"
+            return self._answer(f"saved {path} as it is in flight{copied}", file=str(path))
         self._saved = self.revision
         return self._answer(f"saved {path}", file=str(path))
 

@@ -223,7 +223,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="SCRIPT",
         nargs="*",
         default=[],
-        help="child scripts; folders, zips or CSVs of a class (default: the plan's own, or the built-in one)",
+        help="child scripts; folders, zips or CSVs of a class (default: the plan's own, or the built-in script pilot)",
     )
     parser.add_argument("--marks", metavar="OUT.csv", help="write the class's marks, as Moodle imports them")
     parser.add_argument("--secret", metavar="FILE", help="compute secret seeds from a file that only the teacher has")

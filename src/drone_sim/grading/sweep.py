@@ -322,7 +322,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = GradingParser(prog=PROGRAM, description="Fly a plan with every combination of values, and show a table.")
     add_to(parser)
     parser.add_argument(
-        "script", metavar="SCRIPT", nargs="?", help="child script (default: the plan's, or the built-in one)"
+        "script", metavar="SCRIPT", nargs="?", help="child script (default: the plan's, or the built-in script pilot)"
     )
     parser.add_argument(
         "--param",

@@ -269,7 +269,7 @@ def _summary(recording: Recording, took: float) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="fly", description="Fly the drone without ROS, as fast as possible.")
-    parser.add_argument("--script", metavar="FILE", help="child script (default: pilot, the built-in one)")
+    parser.add_argument("--script", metavar="FILE", help="child script (default: the built-in script pilot)")
     parser.add_argument(
         "--scene", metavar="FILE", help="floor, objects and the drone's place, .yaml or .ttt, as scene:="
     )
