@@ -27,7 +27,7 @@ def fly(sim, seconds):
     """Return the positions of the sphere and of the drone after every step."""
     drone, sphere = sim.getObject("/Quadcopter/base"), sim.getObject("/target")
     led, flown = [], []
-    sim.setStepping(True)  # from now on, nothing moves but by sim.step()
+    sim.setStepping(True)  # from now on, only sim.step() moves anything
     sim.startSimulation()
     try:
         while (time := sim.getSimulationTime()) < seconds - 1e-9:

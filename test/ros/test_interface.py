@@ -262,7 +262,7 @@ class Interface(unittest.TestCase):
         self.assertIn("script error", next(line.said for line in lines if line.what == "vehicle drone"))
         hint = next(line for line in lines if line.what == "commands")
         self.assertEqual(hint.mark, HINT)
-        self.assertIn("/cmd_vel, which nobody hears: start it with cmd_vel:=/drone/cmd_vel", hint.said)
+        self.assertIn("/cmd_vel, which nobody receives: start it with cmd_vel:=/drone/cmd_vel", hint.said)
 
 
 def links(message):

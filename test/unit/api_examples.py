@@ -18,7 +18,7 @@ STRING = "'\\1\\0\\0\\0\\2\\0\\0\\0'"
 NO_THREAD = "in sysCall_thread, sysCall_threadmain, or a coroutine"
 NO_FUNCTION = "the script has no function 'nothing' to call back"
 ANY = object()  # whatever comes
-STEP_STAYS = "`time_step` of the scene file says it"
+STEP_STAYS = "`time_step` in the scene file sets it"
 NO_SCENE_FILE = "a model must be in the folder of the scene file, and there is no scene file"
 
 

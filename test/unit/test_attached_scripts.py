@@ -151,7 +151,7 @@ def test_nobody_calls_a_script_that_has_failed(build):
 @pytest.mark.parametrize(
     "name, words",
     [
-        ("Quadricopter", "'Quadricopter' has the script that the key `script` of its vehicle names"),
+        ("Quadricopter", "'Quadricopter' already has a script: that of the key `script` of its vehicle"),
         ("DronePositon", "no object named 'DronePositon'; near names are DronePosition"),
     ],
 )
@@ -335,7 +335,7 @@ def test_a_script_calls_its_own_functions(build, language):
     assert failed.endswith("no")
     assert "the script has no function 'nothing' to call back" in nothing
     assert "deep" in deep, "and it ends"
-    assert customization.endswith("'Floor': those of V-REP's files are not brought")
+    assert customization.endswith("'Floor': V-REP's are not imported")
 
 
 LUA_RUNS = """
@@ -397,7 +397,7 @@ def test_a_text_is_run_in_another_script(build, asks, answers):
         ("'while true do end', sim.getScriptHandle('DronePosition')", LUA_RUNS, "stopped after 0.2 s"),
         ("'1', sim.getScriptHandle('DronePosition')", PYTHON_RUNS, "in Python: only Python scripts run a text"),
         ("'1@python', sim.getScriptHandle('DronePosition')", LUA_RUNS, "'DronePosition' is in Lua, not Python"),
-        ("'1@', sim.scripttype_sandboxscript", LUA_RUNS, "there are no scripts but those of objects"),
+        ("'1@', sim.scripttype_sandboxscript", LUA_RUNS, "every script belongs to an object"),
         ("'1@Floor', sim.scripttype_customizationscript", LUA_RUNS, "no customization script is attached to 'Floor'"),
         ("'return return', sim.getScriptHandle('DronePosition')", LUA_RUNS, "unexpected symbol"),
         ("'\\27Lua', sim.getScriptHandle('DronePosition')", LUA_RUNS, "precompiled code"),

@@ -186,8 +186,8 @@ def test_a_damaged_picture_among_others_is_left_out(tmp_path, capsys):
     [
         (b"", "is empty"),
         (b"#ROSBAG V2.0\n", "was cut off"),
-        (b"#ROSBAG V9.0\n", "is no bag that can be read"),
-        (b"picture", "is no bag that can be read"),
+        (b"#ROSBAG V9.0\n", "is not a bag that can be read"),
+        (b"picture", "is not a bag that can be read"),
         (4096 + 2000, "was cut off"),
         (0.5, "was cut off"),
         (0.999, "was cut off"),
@@ -217,7 +217,7 @@ def test_what_is_no_whole_bag_gets_one_line(flown, tmp_path, capsys, content, sa
         (plot_flight, ["flight.csv", "--vehicle", "drone"], "--vehicle 'drone': a table is of one vehicle"),
         (bag_video, ["BAG", "out.avi"], "out.avi: must end in .mp4"),
         (bag_video, ["BAG", "out.mp4", "--topic", "/drone/front"], "near names are /drone/front/compressed"),
-        (bag_video, [".", "out.mp4"], ".: is no regular file"),
+        (bag_video, [".", "out.mp4"], ".: is not a regular file"),
     ],
 )
 def test_a_mistake_gets_one_line(flown, tmp_path, monkeypatch, capsys, program, arguments, said):

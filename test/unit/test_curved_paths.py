@@ -224,7 +224,7 @@ def test_a_path_is_brought_with_its_control_points(imported, version):
 
 def test_what_is_not_brought_of_a_path_is_said(imported):
     imported(path_object(0, "Way", control_point((0, 0, 0), speed=0.5), control_point((1, 0, 0))))
-    assert "Way: a path: its velocity profile is not brought" in imported.said
+    assert "Way: a path: its velocity profile is not imported" in imported.said
 
 
 def test_more_points_than_can_be_kept_are_brought_as_fewer(imported):

@@ -138,7 +138,7 @@ def test_a_port_with_something_else_on_it(monkeypatch):
         ({}, OK, "real time"),
         ({"use_sim_time": False}, OK, "real time"),
         ({"use_sim_time": True}, WRONG, "nobody publishes /clock"),
-        ({"use_sim_time": True, "published": [("/clock", ["/a"])]}, OK, "told by /a"),
+        ({"use_sim_time": True, "published": [("/clock", ["/a"])]}, OK, "from /a"),
         ({"use_sim_time": True, "published": [("/clock", ["/a", "/b"])]}, WRONG, "/a, /b all publish /clock"),
         ({"published": [("/clock", ["/a"])]}, HINT, "/use_sim_time is not true"),
     ],
@@ -155,7 +155,7 @@ def test_commands_that_nobody_hears(known):
     master, _ = known(published=published, subscribed=[("/drone/cmd_vel", ["/drone_sim"])])
     (line,) = master.commands()
     assert line.mark == HINT
-    assert line.said == "/teleop publishes /cmd_vel, which nobody hears: start it with cmd_vel:=/drone/cmd_vel"
+    assert line.said == "/teleop publishes /cmd_vel, which nobody receives: start it with cmd_vel:=/drone/cmd_vel"
 
 
 def test_nodes_that_have_gone(known, closed):

@@ -86,7 +86,7 @@ def test_entries_change_what_they_name_alone(fly):
         ({"a": {"controll": {}}}, r"parameter vehicles/a/controll: unknown key; known are control"),
         ({"a": {"control": {"Kzref": -1}}}, r"parameter vehicles/a/control/Kzref = -1: .*greater than or equal to 0"),
         ({"a b": {}}, r"parameter vehicles/a b.*: must be a letter and then letters, digits or _"),
-        ({"a": {"name": "b"}}, r"parameter vehicles/a/name: unknown key; the entry's own key is its name"),
+        ({"a": {"name": "b"}}, r"parameter vehicles/a/name: unknown key; the key of the entry is its name"),
         ({"a": 3}, r"parameter vehicles/a = 3: must hold `key: value` lines"),
         (2.5, r"parameter vehicles = 2\.5: must be a whole number from 0 to 256"),
         (257, r"parameter vehicles = 257: must be a whole number from 0 to 256"),

@@ -180,7 +180,7 @@ def test_formation_turns_with_the_leader_where_it_is_to():
     assert turned.passed
     assert "no such" not in turned.said
     assert (
-        "nothing was seen of 'led'; near names are lead"
+        "the flight has no 'led'; near names are lead"
         in judged(flown(T, **behind), "formation", to="led", at_most=1).said
     )
 
@@ -286,7 +286,7 @@ def test_a_table_with_what_is_no_number_says_so():
         ("steady_error", {"of": "z", "to": 1, "at_most": 3, "over": 5}),
         ("rise_time", {"of": "z", "to": 3, "at_most": 3}),
     ):
-        assert judged(broken, kind, **values).said == "z is no finite number at 5.00 s"
+        assert judged(broken, kind, **values).said == "z is not a finite number at 5.00 s"
     for kind, values in (("drift", {"at_most": 9}), ("path", {"along": [[0, 0, 0], [1, 0, 0]], "at_most": 9})):
         assert not judged(broken, kind, **values).passed
 

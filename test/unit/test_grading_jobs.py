@@ -275,12 +275,12 @@ def test_a_plan_that_is_replaced_is_flown_as_it_is_by_then(server, folder, tmp_p
 # ---- what cannot be read
 
 ODD = {  # what is handed in, and what is said of it
-    "a FIFO": (os.mkfifo, "is no regular file"),
-    "a folder": (os.mkdir, "is no regular file"),
-    "a link to nothing": (lambda path: path.symlink_to("nowhere.py"), "a link to none"),
-    "a link in a circle": (lambda path: path.symlink_to(path.name), "a link to none"),
+    "a FIFO": (os.mkfifo, "is not a regular file"),
+    "a folder": (os.mkdir, "is not a regular file"),
+    "a link to nothing": (lambda path: path.symlink_to("nowhere.py"), "nor a link to one"),
+    "a link in a circle": (lambda path: path.symlink_to(path.name), "nor a link to one"),
     "a link to a password": (lambda path: path.symlink_to("/etc/shadow"), "a link that leads out of its folder"),
-    "a link to a device": (lambda path: path.symlink_to("/dev/zero"), "is no regular file"),
+    "a link to a device": (lambda path: path.symlink_to("/dev/zero"), "is not a regular file"),
     "5 GB": (lambda path: path.touch() or os.truncate(path, 5 * 10**9), "larger than 64 MiB"),
     "2 MB": (lambda path: path.write_bytes(b"#" * 2 * 10**6), "larger than 1 MiB"),
     "no UTF-8": (lambda path: path.write_bytes(b"x = '\xff'"), "can't decode byte"),
@@ -436,7 +436,7 @@ def test_a_scheduler_that_is_lost_is_told_in_one_line(plan):
     ):
         closing = threading.Thread(target=close_once_it_waits)
         closing.start()
-        with pytest.raises(PoolError, match="the scheduler of the flights is lost"):
+        with pytest.raises(PoolError, match="the connection to the scheduler is lost"):
             list(pool._flown_by_dask([job], options, client))
         closing.join()
 

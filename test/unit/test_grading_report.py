@@ -95,7 +95,7 @@ def test_another_report_takes_the_place_of_the_first_and_nothing_else(tmp_path):
     report.write(plan, [result("a.py"), result("b.py")], lambda _: None, tmp_path / "out")
     report.write(plan, [result("c.py")], lambda _: None, tmp_path / "out")
     assert [one.name for one in (tmp_path / "out/scripts").iterdir()] == ["01-c"]
-    with pytest.raises(ValueError, match="holds other files"):
+    with pytest.raises(ValueError, match="has other files"):
         report.check(tmp_path)
     with pytest.raises(ValueError, match="is a file"):
         report.check(tmp_path / "steps.yaml")

@@ -159,10 +159,10 @@ HOSTILE = {  # what a student's zip holds, and what is said of it
     "many files": ({f"{number}.txt": "" for number in range(1001)}, "holds more than 1000 files"),
     "a path outside": ({"../../evil.py": SCRIPT}, "holds a path that leads out of it: '../../evil.py'"),
     "an absolute path": ({"/tmp/evil.py": SCRIPT}, "holds a path that leads out of it: '/tmp/evil.py'"),
-    "a link": ({_link(): "/etc/passwd"}, "holds what is no regular file: 'link.py'"),
+    "a link": ({_link(): "/etc/passwd"}, "holds something that is not a regular file: 'link.py'"),
     "too long a name": ({"x" * 300: ""}, "cannot be unpacked: File name too long"),
     "a file that is a folder": ({"a": "", "a/b": ""}, "cannot be unpacked: "),
-    "no zip": (b"PK\x03\x04 and nothing more", "is no zip that can be read: File is not a zip file"),
+    "no zip": (b"PK\x03\x04 and nothing more", "is not a zip that can be read: File is not a zip file"),
 }
 
 
@@ -181,7 +181,7 @@ def test_hostile_zips_cost_their_own_marks_and_leave_nothing_outside(tmp_path, m
     assert not any("\n" in one.error for one in submissions.values())
     assert {*tmp_path.iterdir()} - before == {tmp_path / "store"}
     (tmp_path / "broken.zip").write_bytes(whole.read_bytes()[:-30])
-    with pytest.raises(ValueError, match=r"broken.zip': is no zip that can be read"):
+    with pytest.raises(ValueError, match=r"broken.zip': is not a zip that can be read"):
         submissions_of(str(tmp_path / "broken.zip"), tmp_path / "store")
 
 
@@ -246,8 +246,8 @@ def test_an_autograder_has_what_gradescope_runs_and_no_solution(tmp_path, capsys
     (tmp_path / "room.yaml").write_text("objects: []\n")
     laid(tmp_path, own__plan_dot_yaml=f"scene: {tmp_path}/room.yaml\nduration: 1\ncriteria: [{{kind: no_contact}}]\n")
     for arguments, said in (
-        (["hover", "my.py"], "takes a plan and --seeds alone"),
-        ([str(tmp_path / "own/plan.yaml")], "room.yaml: the plan needs it, and it does not lie in the plan's folder"),
+        (["hover", "my.py"], "takes only a plan and --seeds"),
+        ([str(tmp_path / "own/plan.yaml")], "room.yaml: the plan needs it, but it is not in the plan's folder"),
     ):
         assert grade.main([*arguments, "--autograder", str(path)]) == 2
         assert said in capsys.readouterr().err

@@ -75,7 +75,7 @@ def test_what_is_not_what_it_was_is_named(graded, tmp_path, capsys):
 def test_what_is_no_file_of_results_gets_a_line(tmp_path, capsys, text):
     (tmp_path / "odd.json").write_text(text)
     status, _, err = verified(None, tmp_path / "odd.json", capsys)
-    assert status == 2 and err == f"grade: {tmp_path / 'odd.json'}: is no file that grade --json has written\n"
+    assert status == 2 and err == f"grade: {tmp_path / 'odd.json'}: is not a file that grade --json has written\n"
 
 
 def test_hashes_are_of_contents(graded, tmp_path):

@@ -279,9 +279,9 @@ def test_what_cannot_be_brought_is_said_object_by_object(imported):
     imported(*own, script(2, "x = 1", kind=6), script(2, "y = 1", switches=10))
     listed = (imported.scene.parent / "IMPORT.txt").read_text()
     for line in (
-        "Points: a point cloud: only its place is brought",
+        "Points: a point cloud: only its place is imported",
         "Drone: is called Drone#0 here",
-        "Drone: its customization script is not brought",
+        "Drone: its customization script is not imported",
     ):
         assert line in listed and line in imported.said
     assert "No quadricopter is in the file: none flies, unless `vehicles` says so" in imported.said
@@ -440,7 +440,7 @@ def test_collections_are_found_by_their_names(imported, tmp_path):
             "items": [{"what": "tree", "object": "Robot"}, {"what": "single", "object": "Eye", "removes": True}],
         }
     ]
-    assert "arm: a collection: some of its objects are not brought" in imported.said
+    assert "arm: a collection: some of its objects are not imported" in imported.said
     simulation = Simulation(parameters.load({"scene_file": str(imported.scene)}))
     simulation.save_scene(tmp_path / "saved.yaml")
     found = [name for name in simulation.context.objects.names if simulation.context.signals.find(name)]

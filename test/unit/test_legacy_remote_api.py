@@ -512,7 +512,7 @@ def test_a_function_of_a_script_is_called(stage):
     ):
         assert client.call(0x3401, wrong, data) == FAILED
     said = client.errors()
-    assert "there are child scripts alone" in said[0] and "returned something else" in said[1]
+    assert "there are only child scripts" in said[0] and "returned something else" in said[1]
     assert len(said) == 6 and not any("\n" in one for one in said)
 
 

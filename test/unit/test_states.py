@@ -124,8 +124,8 @@ def test_landed_stands_on_what_is_below(caplog):
     for topic in ("takeoff", "takeoff", "reset"):
         simulation.drone.ask(topic)
     assert [one.getMessage() for one in caplog.records if one.levelno == logging.WARNING] == [
-        "takeoff: nothing happens: the simulation is stopped; `start` it first",
-        "reset: nothing happens: the simulation is stopped; `start` it first",
+        "takeoff: no effect: the simulation is stopped; `start` it first",
+        "reset: no effect: the simulation is stopped; `start` it first",
     ]
     simulation.start()
     assert str(simulation.drone.flight_state) == "landed"
@@ -319,7 +319,7 @@ def test_another_script_has_no_states_and_that_is_said(caplog):
         simulation.drone.ask(topic)
     assert str(simulation.drone.flight_state) == "unknown: the script does not subscribe to takeoff"
     assert [one.getMessage() for one in caplog.records] == [
-        "takeoff: nothing happens: the child script does not subscribe to it; `pilot` does"
+        "takeoff: no effect: the child script does not subscribe to it; `pilot` does"
     ]
     simulation.close()
 

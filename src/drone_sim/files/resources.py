@@ -69,7 +69,7 @@ def resolve(name: str) -> Path:
     try:
         if path.is_file():
             return path.resolve()
-        odd = " (it is no regular file)" if path.exists() else ""
+        odd = " (it is not a regular file)" if path.exists() else ""
     except (OSError, ValueError):  # too long a name, a NUL in it
         odd = ""
     named = f": {name}" if name.isprintable() and len(name) < 300 else ""

@@ -16,7 +16,7 @@ def replacing(path: str | Path, binary: bool = False, through_links: bool = True
     """Give a file to write, which takes the place of `path` at the end; on an OSError the old one stays.
 
     It is a temporary file in the same folder until then. Another exception (a flight that fails) keeps what was
-    written up to there. A `path` that is no regular file, such as /dev/stdout or a FIFO, is written directly. Text
+    written up to there. A `path` that is not a regular file, such as /dev/stdout or a FIFO, is written directly. Text
     is UTF-8 with \\n. Where not `through_links`, a link or a FIFO of that name is replaced itself, and nothing behind
     it is touched. Raises OSError, in one line that names the file.
     """

@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None, guardian: Guardian | None = Non
 
 def _write_autograder(options: argparse.Namespace) -> int:
     if options.script or options.secret:
-        raise ValueError("--autograder: takes a plan and --seeds alone; who hands in can read whatever is in the zip")
+        raise ValueError("--autograder: takes only a plan and --seeds; students can read everything in the zip")
     plan = plans.read(tasks.find(options.plan))
     autograder.write(plan, options.seeds or plan.seeds, options.autograder)
     return 0
@@ -206,7 +206,7 @@ def _check_outputs(options: argparse.Namespace, scripts: int) -> None:
         if path := getattr(options, option):
             writing.check(path)
     if options.gradescope and scripts > 1:
-        raise ValueError(f"--gradescope: is for one script; here are {scripts}")
+        raise ValueError(f"--gradescope: is for one script, not {scripts}")
     if options.html:
         from drone_sim.grading.outputs.html import report
 

@@ -138,7 +138,7 @@ class _Sweep:
         if not file.endswith((".png", ".svg", ".pdf")):
             raise ValueError(f"--plot {shown(file)}: must end in .png, .svg or .pdf")
         if len(self._ranges) > 2:
-            raise ValueError(f"--plot: shows one parameter or two; here are {len(self._ranges)}")
+            raise ValueError(f"--plot: shows one parameter or two, not {len(self._ranges)}")
 
     def _all(self) -> Iterator[Trial]:
         return self._flown(list(itertools.product(*(one.values for one in self._ranges))))

@@ -72,9 +72,9 @@ def _content(path: str) -> dict[str, Any]:
         if any(one["changes"] for one in content["results"]):
             raise ValueError
     except (KeyError, TypeError, UnicodeDecodeError, json.JSONDecodeError):
-        raise ValueError(f"{path}: is no file that grade --json has written") from None
+        raise ValueError(f"{path}: is not a file that grade --json has written") from None
     except ValueError as error:
-        raise ValueError(str(error) or f"{path}: is no file that grade --json has written") from None
+        raise ValueError(str(error) or f"{path}: is not a file that grade --json has written") from None
     return dict(content)
 
 

@@ -193,7 +193,7 @@ class Tuning:
         try:
             self.change({name: one for name, one in self.chosen.items() if name in known})
         except ParameterError as error:
-            _LOG.warning("%s is not tuned as it was: %s", self._vehicle.name, error)
+            _LOG.warning("%s does not keep all of its tuned values: %s", self._vehicle.name, error)
 
     def begin(self, before: Mapping[str, Any]) -> None:
         """Give the script's parameters the values that files or tuning say: those of its init are only defaults.

@@ -73,10 +73,10 @@ class Entries:
         try:
             keys = form(one.name, shape, self._writer, is_solid=moves)
         except TooLarge as error:
-            self._report.add(one.name, f"only its place is brought: {error}")
+            self._report.add(one.name, f"only its place is imported: {error}")
             return None
         if keys is None:
-            self._report.add(one.name, "only its place is brought: it has no surface")
+            self._report.add(one.name, "only its place is imported: it has no surface")
             return None
         if moves:
             keys["mass"] = number(max(shape.mass, _LEAST_MASS))
@@ -100,7 +100,7 @@ class Entries:
             turns = [numbers([one / length for one in point[3:]]) for point, length in zip(of.path, lengths)]
             return {**points, "turns": turns}
         if of.linked >= 0:
-            self._report.add(one.name, "its link to another dummy is not brought")
+            self._report.add(one.name, "its link to another dummy is not imported")
         return {"kind": "dummy", "size": number(of.size)} if of.size > 0 else {"kind": "dummy"}
 
     def _path(self, one: Placed) -> dict[str, Any]:
@@ -165,7 +165,7 @@ class Entries:
     def _other(self, one: Placed) -> dict[str, Any]:
         kind = getattr(one.object.of, "kind", "object")
         if kind not in (*_WITHOUT_LOSS, "light"):
-            self._report.add(one.name, f"a {kind}: only its place is brought")
+            self._report.add(one.name, f"a {kind}: only its place is imported")
         return {"kind": _WITHOUT_LOSS.get(kind, "dummy")}
 
 

@@ -38,7 +38,7 @@ def _say(imported: Imported) -> None:
     for note in imported.report.notes:
         print(note)
     if imported.report:
-        print(f"Not as it was in the file (all of it in {LIST}):")
+        print(f"What differs from the file (the whole list is in {LIST}):")
         for line in imported.report.lines(most=8):
             print(f"  {line}")
     print(f"roslaunch drone_sim drone.launch scene:={imported.scene}")

@@ -22,7 +22,7 @@ def entries(
         items: list[dict[str, Any]] = []
         for item in one.items:
             if item.what != "all" and item.object not in names:
-                report.add(one.name, "a collection: some of its objects are not brought")
+                report.add(one.name, "a collection: some of its objects are not imported")
                 continue
             said = {"what": item.what, "object": names.get(item.object, "")}
             switches = {"removes": item.removes, "without": item.without}

@@ -36,14 +36,14 @@ def curved_path(name: str, path: VrepPath, report: Report) -> dict[str, Any]:
     }
     keys.update(_unusual(said, {**usual, "metres_per_pause": 1.0, "along": 0.0}))
     if path.switches & paths.VELOCITY_PROFILE or any(one.speed != 1 for one in path.points):
-        report.add(name, "a path: its velocity profile is not brought")
+        report.add(name, "a path: its velocity profile is not imported")
     broken = path.broken + len(path.points) - len(there)
     if broken:
         report.add(name, f"a path: {broken} of its control points are nowhere: left out")
     if share < 1:
         report.add(name, f"a path: its curves have fewer points, of which a path has {MAX_LINE} at most")
     if path.has_surface:
-        report.add(name, "a path: the surface along it is not brought")
+        report.add(name, "a path: the surface along it is not imported")
     return keys
 
 

@@ -172,7 +172,7 @@ class _Import:
         if settings.gravity is not None and abs(settings.gravity[2] - _GRAVITY) > 1e-6:
             world["gravity"] = number(settings.gravity[2])
         if settings.gravity is not None and any(settings.gravity[:2]):
-            self._report.add("", "gravity is not vertical in the file: only what is vertical of it is brought")
+            self._report.add("", "gravity is not vertical in the file: only its vertical part is imported")
         if self._floor:
             world["floor"] = {"size": max(number(floor_size(self._floor), 3), 0.01)}
         elif settings.time_step is not None:
@@ -191,11 +191,11 @@ class _Import:
             name = on.object.name if on is not None else ""
             if script.kind == "main":
                 if not script.is_stock_main:
-                    self._report.add("", "the file's own main script is not brought: the phases are V-REP's")
+                    self._report.add("", "the file's own main script is not imported: the phases are V-REP's")
             elif script.kind != "child" or on is None:
-                self._report.add(name, f"its {script.kind} script is not brought")
+                self._report.add(name, f"its {script.kind} script is not imported")
             elif not script.is_enabled or not on.runs_scripts:
-                self._report.add(name, "its child script does not run in the file: not brought")
+                self._report.add(name, "its child script does not run in the file: not imported")
             else:
                 found[script.object].append(script)
         return found
@@ -216,13 +216,13 @@ class _Import:
             if id(one) in built_in:
                 continue
             if own and id(one) not in kept:
-                self._report.add(one.name, "its child script is not brought: neither is the object")
+                self._report.add(one.name, "its child script is not imported, because the object is not")
                 continue
             for script in own:
                 places = (one, self._by_handle.get(script.own_object))  # another script may be on the first already
                 on = next((place for place in places if place is not None and id(place) not in scripted), None)
                 if on is None:
-                    self._report.add(one.name, "has a second child script: not brought")
+                    self._report.add(one.name, "has a second child script: not imported")
                     continue
                 scripted.add(id(on))
                 if on is not one or id(one) not in roots:

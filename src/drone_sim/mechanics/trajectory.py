@@ -57,7 +57,7 @@ class Trajectory:
             raise ValueError(f"1 to {_MOST_DEGREES} degrees of freedom are expected, not {len(velocity)}")
         for most in (limits.velocity, limits.acceleration, limits.jerk):
             if not all(one > 0 for one, taken in zip(most, self._selected) if taken):
-                raise ValueError("the most of velocity, acceleration and jerk must be greater than 0")
+                raise ValueError("the limits of velocity, acceleration and jerk must be greater than 0")
         self._found = self._compute(limits, synchronization)
         self.elapsed = 0.0  # s
 

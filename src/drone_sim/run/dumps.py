@@ -33,14 +33,14 @@ def read_config(path: Path, below: Mapping[str, Any]) -> dict[str, Any]:
     try:
         values = yaml_files.parse("#\n" + rest.decode("utf-8"))  # lines are counted from the first
     except ValueError as error:
-        raise ParameterError(f"{path}: as what dynparam has dumped: {error}") from None
+        raise ParameterError(f"{path}: not a file of dynparam dump: {error}") from None
     values = values.get(_VALUES) if isinstance(values, dict) else None
     if not isinstance(values, dict):
-        raise ParameterError(f"{path}: what dynparam has dumped holds `{_VALUES}:` with a value for each name")
+        raise ParameterError(f"{path}: a file of dynparam dump has `{_VALUES}:` with a value for each name")
     keys = _keys(values, path)
     strange = [str(one) for one in keys.get("sensors", ()) if one not in below.get("sensors", ())]
     if strange:
-        said = f"it was dumped of a drone with other sensors: {', '.join(map(shown, strange[:8]))}"
+        said = f"it was dumped from a drone with other sensors: {', '.join(map(shown, strange[:8]))}"
         raise ParameterError(f"{path}: {said}; name the file that has them before it, config:=FILE,{path.name}")
     return keys
 
@@ -54,7 +54,7 @@ def _keys(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
         return nested(known, {}, values)
     except KeyError as missing:
         name = missing.args[0]
-        raise ParameterError(f"{path}: parameter {name}: missing beside the other parts of its list") from None
+        raise ParameterError(f"{path}: parameter {name}: missing; the other numbers of its list are there") from None
     except (TypeError, AttributeError):
         raise ParameterError(f"{path}: a name is the beginning of others, and has a value itself") from None
 

@@ -38,7 +38,7 @@ class DivergenceCheck:
                 where = f"position {x:g} {y:g} {z:g} m, velocity {vx:g} {vy:g} {vz:g} m/s"
                 who = "" if vehicle.parameters.is_alone else f"{vehicle.name}: "
                 raise Diverged(
-                    f"the simulation has diverged at t = {self._clock.time:.2f} s: {who}{where}; `start` begins anew"
+                    f"the simulation has diverged at t = {self._clock.time:.2f} s: {who}{where}; `start` begins again"
                 )
             if self._edge is not None and max(abs(x), abs(y)) > self._edge:
                 self._tell(vehicle, x, y)
@@ -47,7 +47,7 @@ class DivergenceCheck:
         if vehicle.name not in self._past:
             self._past.add(vehicle.name)
             who = "the drone" if vehicle.parameters.is_alone else vehicle.name
-            LOG.warning("%s is past the edge of the floor, at %.2f %.2f m: nothing carries it there", who, x, y)
+            LOG.warning("%s is past the edge of the floor, at %.2f %.2f m: there is nothing below it", who, x, y)
 
 
 class Stepper:

@@ -149,13 +149,13 @@ class FlightState:
         if not self.is_flown:
             if topic not in self._dropped:
                 self._dropped.add(topic)
-                _LOG.warning("%s: nothing happens: the simulation is stopped; `start` it first", topic)
+                _LOG.warning("%s: no effect: the simulation is stopped; `start` it first", topic)
             return
         hearing = [bus for bus in self._commands.buses if bus.hears(topic)]
         if hearing:
             before()
         elif not self._missing:
             self._missing = f"{UNKNOWN}: the script does not subscribe to {topic}"
-            _LOG.warning("%s: nothing happens: the child script does not subscribe to it; `pilot` does", topic)
+            _LOG.warning("%s: no effect: the child script does not subscribe to it; `pilot` does", topic)
         for bus in hearing:
             bus.post(topic, message)

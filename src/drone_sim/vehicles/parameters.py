@@ -105,7 +105,7 @@ def _own(places: Mapping[str, ObjectPlace | None]) -> Mapping[str, ObjectPlace |
         if name not in OWN_NAMES:
             raise ValueError(f"'{name}' is no object of a vehicle; {near_names(name, OWN_NAMES)}")
         if place is None and name not in REMOVABLE:
-            raise ValueError(f"'{name}': a vehicle can be without {', '.join(REMOVABLE)} alone")
+            raise ValueError(f"'{name}': a vehicle needs it; null removes only {', '.join(REMOVABLE)}")
     return places
 
 
@@ -207,7 +207,7 @@ def laid_over(entry: Mapping[str, Any], name: str, everything: Mapping[str, Any]
     Raises ParameterError.
     """
     if "name" in entry:
-        raise ParameterError("unknown key; the entry's own key is its name", ("vehicles", name, "name"))
+        raise ParameterError("unknown key; the key of the entry is its name", ("vehicles", name, "name"))
     drone = everything.get("drone")
     base = {key: everything[key] for key in EquipmentParameters.model_fields if key in everything}
     place = {key: value for key, value in drone.items() if key != "name"} if isinstance(drone, Mapping) else {}

@@ -32,7 +32,7 @@ export class Clipboard {
     try {
       await this.paste(await navigator.clipboard.readText());
     } catch {
-      this.edit.wrong("The browser does not show the page its clipboard: press Ctrl+V.");
+      this.edit.wrong("The browser does not let the page read the clipboard: press Ctrl+V.");
     }
   }
 }

@@ -23,7 +23,7 @@ export class PosePanel {
       const cells = [...(from ? ANGLES : AXES)].map(([, sign], at) => create("label", {}, create("span", { textContent: sign }), this.fields[from + at]));
       return create("div", { className: "triple" }, create("span", { className: "what" }, words, create("small", { textContent: ` ${unit}` })), ...cells);
     };
-    const title = "About the own x, then y, then z: V-REP's Euler angles. A scene file's rpy turns about the parent's axes";
+    const title = "About its own x, then y, then z: V-REP's Euler angles. A scene file's rpy turns about the parent's axes";
     const turn = row("Orientation", "°", 3);
     turn.title = title;
     element.append(create("div", { className: "line" }, "Relative to", this.relative), row("Position", "m", 0), turn);

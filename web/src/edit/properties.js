@@ -113,7 +113,7 @@ export class Properties {
       return this.line(label, hint, input);
     };
     const here = () => this.edit.objects.get(one.handle) ?? one;
-    const name = field("name", ({ name }) => name, (wanted) => this.edit.rename(here(), wanted), "By which V-REP 3.x's scripts find it; no other object has it");
+    const name = field("name", ({ name }) => name, (wanted) => this.edit.rename(here(), wanted), "V-REP 3.x's scripts find it by this name; no other object has it");
     if (one.of !== "scene") return [name];
     return [name, field("alias", ({ alias }) => alias, (wanted) => this.set("alias", wanted), "Its name in 4.x paths, which siblings may share")];
   }

@@ -61,7 +61,7 @@ export class SceneFiles {
 
   saveModel() {
     const one = this.edit.objects.get(this.edit.last);
-    if (!one) return this.edit.wrong("Nothing is selected: a model is an object with all that hangs on it.");
+    if (!one) return this.edit.wrong("Nothing is selected: a model is an object with all its children.");
     this.askForFile(`Save ${one.name} as a model`, { label: "Name", value: `${one.name}.yaml` }, "save_model", { object: one.handle });
   }
 

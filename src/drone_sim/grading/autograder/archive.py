@@ -56,4 +56,4 @@ def _plan(plan: Plan) -> Iterator[tuple[str, Path]]:
         elif path.is_relative_to(plan.folder):
             yield f"plan/{path.relative_to(plan.folder)}", path
         elif not any(path.is_relative_to(one) for one in (_SOURCE, *(package_path() / name for name in _OF_PACKAGE))):
-            raise ValueError(f"--autograder: {path}: the plan needs it, and it does not lie in the plan's folder")
+            raise ValueError(f"--autograder: {path}: the plan needs it, but it is not in the plan's folder")

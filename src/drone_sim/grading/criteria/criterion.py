@@ -55,21 +55,21 @@ class FlightPart(NamedTuple):
         values = self.flight.columns[name][self.rows]
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
-            raise Missed(f"{name} is no finite number at {self.times[bad[0]]:.2f} s")
+            raise Missed(f"{name} is not a finite number at {self.times[bad[0]]:.2f} s")
         return values
 
     def places(self) -> np.ndarray:
         """Return where the vehicle was, (M, 3) in m. Raises Missed where that is no place."""
         places = self.flight.rows[self.rows, 1:4]
         if not np.isfinite(places).all():
-            raise Missed("the table says at some time that the vehicle was nowhere")
+            raise Missed("a row of the table has no place of the vehicle")
         return places
 
     def poses(self, name: str) -> np.ndarray:
         """Return the poses of another vehicle or object, (M, 7); of a path the first that it finds. Raises Missed."""
         name = self.flight.found.get(name, [name])[0]
         if name not in self.flight.other_poses:
-            raise Missed(f"nothing was seen of '{name}'; {near_names(name, self.flight.other_poses)}")
+            raise Missed(f"the flight has no '{name}'; {near_names(name, self.flight.other_poses)}")
         poses = self.flight.other_poses[name][self.rows]
         gone = np.flatnonzero(~np.isfinite(poses).all(axis=1))
         if len(gone):

@@ -88,7 +88,7 @@ def given_script(given: str) -> str:
         found = script_path(given)
     except ScriptError:
         if Path(given).suffix in _SCRIPTS and os.path.lexists(path):
-            raise Unreadable(f"{path}: is no regular file, or a link to none") from None
+            raise Unreadable(f"{path}: is not a regular file, nor a link to one") from None
         raise
     if path.is_symlink() and not Path(found).is_relative_to(path.parent.resolve()):
         raise Unreadable(f"{path}: is a link that leads out of its folder")

@@ -83,7 +83,7 @@ def _flown(
     for future in as_completed(batches):
         batch = batches.pop(future)
         if future.cancelled():
-            raise PoolError("the scheduler of the flights is lost; what came of them by now is kept")
+            raise PoolError("the connection to the scheduler is lost; the results so far are kept")
         error = future.exception()
         if error is None:
             yield from future.result()

@@ -43,7 +43,7 @@ def unpack(path: Path, store: Path, arrange: Arrange) -> tuple[Path, dict[str, s
             with zipfile.ZipFile(path) as archive:
                 refused = _laid(archive, Path(unfinished, "all"), arrange)
         except _BROKEN as error:
-            raise Refused(f"is no zip that can be read: {_line(error)}") from None
+            raise Refused(f"is not a zip that can be read: {_line(error)}") from None
         if not folder.exists():  # another run of the same zip may fly what is there
             os.rename(Path(unfinished, "all"), folder)
     return folder, refused
@@ -115,7 +115,7 @@ def _check(info: zipfile.ZipInfo, parts: Parts, number: int) -> None:
     if PurePosixPath(info.filename).is_absolute() or ".." in parts or "\\" in info.filename:
         raise Refused(f"holds a path that leads out of it: {shown(info.filename)}")
     if stat.S_IFMT(info.external_attr >> 16) not in (0, stat.S_IFREG):
-        raise Refused(f"holds what is no regular file: {shown(info.filename)}")
+        raise Refused(f"holds something that is not a regular file: {shown(info.filename)}")
 
 
 def _line(error: Exception) -> str:

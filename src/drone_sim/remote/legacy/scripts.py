@@ -16,7 +16,7 @@ _CHILD = 1  # sim.scripttype_childscript
 def _call(ask: Asked) -> bytes:
     kind, name, function = ask.key
     if kind & 0xF != _CHILD:
-        raise ask.refused(f"there are child scripts alone (sim_scripttype_childscript, {_CHILD}), not {kind}")
+        raise ask.refused(f"there are only child scripts (sim_scripttype_childscript, {_CHILD}), not {kind}")
     called, _, below = function.partition("@")  # older programs name the object behind the function
     script = ask.sim("getScriptHandle", name or below)
     returned = ask.sim("callScriptFunction", called, script, *_given(ask))

@@ -117,7 +117,7 @@ def _check_own_address() -> None:
         addresses(host)
     except OSError:
         what = f"{given or 'the name of this machine'} = '{host}'"
-        raise ValueError(f"{what}: is not known here; ROS_HOSTNAME=localhost will do on one machine") from None
+        raise ValueError(f"{what}: is not known here; ROS_HOSTNAME=localhost works on one machine") from None
 
 
 def reported(name: str, action: Callable[[], Any]) -> int:

@@ -23,7 +23,7 @@ def python() -> Iterator[Line]:
     """Is it a Python that will do, and the one that other packages' nodes find?"""
     version = "{}.{}.{}".format(*sys.version_info)
     if sys.version_info < _OLDEST:
-        yield Line(WRONG, "Python", f"{version}, but 3.10 is the oldest that will do")
+        yield Line(WRONG, "Python", f"{version}, but 3.10 is the oldest that works")
         return
     first, own = shutil.which("python3"), package_path() / ".venv/bin"
     if own.is_dir() and Path(sys.executable).parent != own:
@@ -108,7 +108,7 @@ def host_names() -> Iterator[Line]:
         )
     host, given = own_host()
     if {"ROS_HOSTNAME", "ROS_IP"} <= os.environ.keys():
-        yield Line(HINT, "host names", f"ROS_IP = '{os.environ['ROS_IP']}' counts for nothing beside ROS_HOSTNAME")
+        yield Line(HINT, "host names", f"ROS_IP = '{os.environ['ROS_IP']}' has no effect, because ROS_HOSTNAME is set")
     try:
         addresses(host)
     except OSError:

@@ -74,12 +74,12 @@ class Master:
         if simulated is True and not tellers:
             cure = "`rosparam set /use_sim_time false`, or use_sim_time:=true for drone.launch; then start them anew"
             yield Line(
-                WRONG, "clock", f"/use_sim_time is true, and nobody publishes /clock: nodes wait for ever: {cure}"
+                WRONG, "clock", f"/use_sim_time is true, and nobody publishes /clock: nodes wait forever: {cure}"
             )
         elif simulated is True and len(tellers) > 1:
             yield Line(WRONG, "clock", f"{', '.join(tellers)} all publish /clock: time jumps; end all but one")
         elif simulated is True:
-            yield Line(OK, "clock", f"simulated time, told by {tellers[0]}")
+            yield Line(OK, "clock", f"simulated time, from {tellers[0]}")
         elif tellers:
             said = f"{', '.join(tellers)} publishes /clock, but /use_sim_time is not true: nodes go by real time"
             yield Line(HINT, "clock", f"{said}; set it before they start")
@@ -103,7 +103,7 @@ class Master:
         for topic, nodes in self.published.items():
             if topic.endswith("cmd_vel") and topic not in self.subscribed:
                 cure = f"start it with cmd_vel:={heard[0]}" if heard else "no drone is there to hear it"
-                yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which nobody hears: {cure}")
+                yield Line(HINT, "commands", f"{', '.join(nodes)} publishes {topic}, which nobody receives: {cure}")
 
 
 def simulator(master: Master) -> Iterator[Line]:
@@ -117,7 +117,7 @@ def simulator(master: Master) -> Iterator[Line]:
         message = _wait_for_diagnostics(node)
         if message is None:
             yield Line(
-                WRONG, "simulator", f"{node} says nothing on /diagnostics in {_DIAGNOSTICS:g} s: end it, and start anew"
+                WRONG, "simulator", f"{node} says nothing on /diagnostics in {_DIAGNOSTICS:g} s: end and restart it"
             )
             continue
         yield from _diagnosed(node, message)

@@ -65,7 +65,7 @@ class GradedSimulator(Simulator):
             # Who flies is told there, with its place in the scene that is flown in now: the plan's may have another.
             running = parameters_of(self.node, scene_file=wanted.scene_file, vehicles=0)
         if plan.timeline and not self._factor():
-            raise Mismatch("real_time_factor = 0: a timeline by topics comes too late without a pace; 1 to 5 is well")
+            raise Mismatch("real_time_factor = 0: without a pace, a timeline by topics is too late; 1 to 5 works well")
         found = [one for one in _differences(wanted.model_dump(), running.model_dump(), ()) if one]
         if found:
             more = f", and {len(found) - _MOST} more" if len(found) > _MOST else ""
@@ -84,7 +84,7 @@ class GradedSimulator(Simulator):
         try:
             message = rospy.wait_for_message(f"{self.node}/parameter_updates", Config, self._patience)
         except rospy.ROSException:
-            raise Mismatch(f"no simulator {self.node} says at what real_time_factor it goes") from None
+            raise Mismatch(f"no simulator {self.node} publishes its real_time_factor") from None
         return float(decode_config(message)["real_time_factor"])
 
     def start(self, scene: str) -> None:

@@ -90,4 +90,4 @@ def check_others(vehicles: Iterable[str], simulated: bool) -> None:
             raise ValueError(f"vehicle {name} flies already, in {there[0]}: give one of the two {cure}")
     if simulated and others(_CLOCK):
         cure = "only in real time can two run under one master (use_sim_time:=false)"
-        raise ValueError(f"/use_sim_time is true, and {others(_CLOCK)[0]} tells the time already: {cure}")
+        raise ValueError(f"/use_sim_time is true, and {others(_CLOCK)[0]} publishes /clock already: {cure}")

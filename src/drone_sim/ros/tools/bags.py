@@ -58,7 +58,7 @@ class Bag:
         self.path = path
         if not os.path.isfile(path):
             os.stat(path)
-            raise BagError(f"{path}: is no regular file")
+            raise BagError(f"{path}: is not a regular file")
         if not os.path.getsize(path):
             raise BagError(f"{path}: is empty")
         with self._reading():
@@ -120,7 +120,7 @@ class Bag:
             raise BagError(f"{self.path}: {why}") from None
         except Exception as error:  # rosbag lets through what struct, bz2, genpy and the like raise
             said = " ".join(str(error).split()) or type(error).__name__
-            raise BagError(f"{self.path}: is no bag that can be read: {said:.120}") from None
+            raise BagError(f"{self.path}: is not a bag that can be read: {said:.120}") from None
 
 
 class BagFlight:

@@ -80,7 +80,7 @@ def pace(player: Player, pacer: Pacer, since: Since | None, simulated_time: bool
         "real-time factor": f"{factor:.2f}" if factor is not None else "not known",
         "real-time factor asked for": f"{asked:g}" if asked else "as fast as it can",
         "late steps": f"{late}{pacer.overruns} in all, by {pacer.worst * 1e3:.0f} ms at most",
-        "stamps": "simulated time, told by /clock" if simulated_time else "real time",
+        "stamps": "simulated time, from /clock" if simulated_time else "real time",
         "scene": shown(simulation.parameters.scene_file) if simulation.parameters.scene_file else "of the parameters",
         "PyBullet": f"{_PYBULLET}, {'with its window' if simulation.parameters.gui else 'without a window'}",
     }

@@ -94,7 +94,7 @@ class VehicleDiagnosis:
         if not self._player.playing or said in (FLYING, HELD, UPSIDE_DOWN) or said != situation(self._vehicle.body):
             return []
         is_touched = said.startswith("touches")
-        return [Problem(WARN, said if is_touched else f"{said}: nothing carries it; `restart` begins anew")]
+        return [Problem(WARN, said if is_touched else f"{said}: nothing is below it; `restart` begins again")]
 
     def _cannot(self) -> list[Problem]:
         problems = []

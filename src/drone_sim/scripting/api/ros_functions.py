@@ -21,7 +21,7 @@ _MOST = 100  # service clients
 
 
 class TopicFunctions:
-    """Topics as a child script sees them, `simROS`, with or without ROS behind."""
+    """Topics as a child script sees them, `simROS`, with or without ROS."""
 
     def __init__(self, bus: MessageBus):
         """`bus`: what the script subscribes to and publishes."""
@@ -91,7 +91,7 @@ class TopicFunctions:
 
 
 class ServiceFunctions:
-    """Services that a script offers to others, with or without ROS behind."""
+    """Services that a script offers to others, with or without ROS."""
 
     def __init__(self, bus: MessageBus):
         """`bus` keeps the services that the script offers."""
@@ -117,7 +117,7 @@ class ServiceFunctions:
 
 
 class RosFunctions:
-    """Time, frames, parameters and services of others, with or without ROS behind."""
+    """Time, frames, parameters and services of others, with or without ROS."""
 
     def __init__(self, bus: MessageBus, clock: Clock):
         """`bus` reaches ROS and resolves names; `clock` is the simulation's."""

@@ -302,7 +302,7 @@ class ScriptCalls(_OnScripts):
         elif at and script in _TYPES:
             callee, text = self._of_type(self._find(of), script), code
         elif script in _TYPES_OF_NONE:
-            raise ValueError("there are no scripts but those of objects: name one, as 'text@object', or by its handle")
+            raise ValueError("every script belongs to an object: name one, as 'text@object', or by its handle")
         else:
             callee, text = self._script(script), text if of else code or text
         known = callee.script.language if callee.script is not None else ""
@@ -331,7 +331,7 @@ class ScriptCalls(_OnScripts):
         """Return the script of a type on an object. Raises ValueError."""
         if kind == _CUSTOMIZATION:
             name = self._objects[handle].name
-            raise ValueError(f"no customization script is attached to '{name}': those of V-REP's files are not brought")
+            raise ValueError(f"no customization script is attached to '{name}': V-REP's are not imported")
         return self._script_of(handle)
 
     @sim("5")

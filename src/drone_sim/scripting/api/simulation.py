@@ -150,7 +150,7 @@ class SimulationFunctions(Functions):
         """Raise an error if the time step (s) differs from the current one (3.x)."""
         (wanted,), there = numbers((step,), 1), self._context.clock.time_step
         if abs(wanted - there) > _ROUNDED:
-            raise ValueError(f"the time step stays {there:g} s, not {wanted:g}: `time_step` of the scene file says it")
+            raise ValueError(f"the time step stays {there:g} s, not {wanted:g}: `time_step` in the scene file sets it")
 
     def _read(self, kind: str, parameter: int, otherwise: Any) -> Any:
         """Return a parameter; raises ValueError for a number that is none of that kind."""

@@ -91,9 +91,7 @@ def check(folder: str | Path) -> None:
     path = Path(folder)
     if path.is_dir():
         if any(path.iterdir()) and not (path / _OURS).is_file():
-            raise ValueError(
-                f"{folder}: holds other files than a report's; name an empty folder, or one that is not there"
-            )
+            raise ValueError(f"{folder}: has other files than those of a report; name an empty folder, or a new one")
     elif path.exists():
         raise ValueError(f"{folder}: is a file; a report is a folder")
     elif not path.absolute().parent.is_dir():
