@@ -45,7 +45,7 @@ class Served:
     def __init__(self):
         self.sent = []
         self.flying = HeldCommands(self.sent.append, lambda: 0.0)
-        self.socket = PageSocket(self.flying, {"double": lambda message: {"twice": 2 * message["number"]}})
+        self.socket = PageSocket(self.flying, {"double": self.double})
         self.loop = asyncio.new_event_loop()
         threading.Thread(target=self.loop.run_forever, daemon=True).start()
         pages = {**page_files(), "/manual/search.html": ("text/html", b"")}
@@ -53,6 +53,10 @@ class Served:
         self.server = asyncio.run_coroutine_threadsafe(serving, self.loop).result(10)
         self.port = next(iter(self.server.sockets)).getsockname()[1]
         self.host = f"127.0.0.1:{self.port}"
+
+    def double(self, message):
+        threading.Event().wait(message.get("seconds", 0))
+        return {"twice": 2 * message["number"]}
 
     def stop(self):
         self.server.close()
@@ -197,6 +201,13 @@ def test_a_browser_that_vanishes_leaves_a_stopped_drone(served):
     while len(served.sent) < 2:
         gone.wait(0.01)
     assert served.sent[-1] == Command()
+
+
+def test_what_a_browser_asks_is_done_in_turn(served):
+    with served.connect() as socket:
+        for number, seconds in enumerate((0.2, 0.1, 0)):
+            socket.send(json.dumps({"id": number, "ask": "double", "number": number, "seconds": seconds}))
+        assert [json.loads(socket.recv(timeout=5))["id"] for _ in range(3)] == [0, 1, 2]
 
 
 @pytest.mark.parametrize(

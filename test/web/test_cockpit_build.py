@@ -1,5 +1,6 @@
 """The scene is built with the mouse: the V-REP tutorial's first scene, and an arena; saved, begun anew, and flown."""
 
+import json
 import math
 import os
 
@@ -8,7 +9,9 @@ import yaml
 
 pytest.importorskip("rospy", reason="needs ROS")
 
+import rospy
 from cockpit_page import STARTED, Panel, open_page, ready, wait_for, wait_until
+from diagnostic_msgs.srv import AddDiagnostics
 from launched import launched
 from scene_builder import Builder
 
@@ -32,6 +35,29 @@ window.acts = 0;
 for (const kind of ["pointerdown", "input"]) addEventListener(kind, () => window.acts++, true);
 """
 MOST_ACTS = 40
+# Keeps what the page asks for in `asked`; what is answered, the page hears so late (ms).
+LATE = """late => {
+    const { editing } = scene, { ask } = editing;
+    window.asked = [];
+    editing.ask = async (...one) => {
+        window.asked.push(one[0]);
+        const answer = await ask(...one);
+        await new Promise(done => setTimeout(done, late));
+        return answer;
+    };
+}"""
+# A tree that is asked for, and two messages that come before the answer: one is lost, and this is the other.
+OVERTAKEN = """() => {
+    const { editing } = scene, { ask } = editing;
+    window.asked = 0;
+    editing.ask = async (...one) => {
+        window.asked++;
+        const answer = await ask(...one), { version } = answer.tree;
+        if (window.asked === 1) editing.take({ ...answer.tree, version: version + 2, since: version + 1 });
+        return answer;
+    };
+    editing.connected();
+}"""
 COURSE = ({"X": 3, "Y": 0}, {"X": 6, "Y": 1, "Gamma": 30}, {"X": 8, "Y": 4, "Gamma": 90})  # m, degrees
 
 
@@ -113,6 +139,65 @@ def test_the_tutorials_first_scene_is_clicked_saved_and_flown_from_its_file(cock
         flies(page)
         Panel(page).press("Stop", "stopped")  # which puts back what the script has unparented
         check(Builder(page))
+
+
+def test_a_start_comes_after_the_numbers_that_were_written_before_it(cockpit, browser):
+    written = (0.5, 0.4, 2)
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder, panel = Builder(page), Panel(page)
+        builder.menu("Scene file", "New")
+        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        gate = builder.drop("Gate", [1, 1, 0])
+        builder.wait(gate, lambda one: one["position"][:2] == [1, 1])
+        page.evaluate(LATE, 1000)
+        builder.write(**dict(zip("XYZ", written)))
+        panel.press("Start", "started")
+        builder.wait(gate, lambda one: near(one, written))
+        assert page.evaluate("asked") == ["edit"] * 3, "each number is taken once"
+        panel.press("Stop", "stopped")
+        wait_for(page, "scene.editing.is.state === 'stopped'")
+        assert near(builder.object(gate), written), "stop takes back what was done in flight, and no more"
+    cockpit.load("")
+
+
+def test_a_start_comes_after_the_text_that_was_written_before_it(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder, panel = Builder(page), Panel(page)
+        panel.press("Stop", "stopped")
+        page.click("[data-edit=text]")
+        text = page.get_by_label("Text of the scene; Escape and then Tab leaves it")
+        wait_until(page, lambda: page.inner_text("#scene-text-title"))
+        text.fill("objects:\n  - {name: Ball, shape: sphere, size: [0.2], position: [1, 1, 0.2]}\n")
+        panel.press("Start", "started")
+        builder.row("Ball").wait_for()
+        panel.press("Stop", "stopped")
+        wait_for(page, "scene.editing.is.state === 'stopped'")
+        assert builder.object("Ball"), "stop takes back what was done in flight, and no more"
+    cockpit.load("")
+
+
+def test_what_another_does_meanwhile_is_seen_in_the_numbers(cockpit, browser):
+    with open_page(cockpit, browser, viewport={"width": 1440, "height": 900}) as page:
+        builder, numbers = Builder(page), page.locator("#pose")
+        builder.menu("Scene file", "New")
+        wait_until(page, lambda: page.get_by_role("treeitem").count() == 1)
+        gate = builder.drop("Gate", [1, 1, 0])
+        _, _, height = builder.wait(gate, lambda one: one["position"][:2] == [1, 1])["position"]
+        page.evaluate(LATE, 3000)
+        builder.write(X=0.5)
+        builder.wait(gate, lambda one: one["position"][0] == 0.5)
+        move = {"do": "move", "object": gate, "position": [0.9, 1, height], "relative_to": "world"}
+        rospy.ServiceProxy("/drone_sim/edit_scene", AddDiagnostics)(json.dumps({"edit": [move]}))
+        builder.wait(gate, lambda one: one["position"][0] == 0.9)
+        wait_until(page, lambda: numbers.get_by_label("X, m", exact=True).input_value() == "0.9")
+    cockpit.load("")
+
+
+def test_a_tree_that_is_older_than_what_was_missed_meanwhile_is_asked_for_once_more(opened):
+    Builder(opened)
+    wait_until(opened, lambda: not opened.evaluate("scene.editing.asking"))
+    opened.evaluate(OVERTAKEN)
+    wait_for(opened, "asked === 2")
 
 
 def build_arena(builder):

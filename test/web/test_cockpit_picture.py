@@ -52,6 +52,11 @@ LOOK = """([center, yaw, pitch, far]) => {
     scene.show({ labels: false, path: false, command: false, handles: false });
 }"""
 UNTIL_PAINTED = "new Promise(done => scene.canvas.then(done))"
+# The frame of a camera whose vehicle has gone.
+LEFT = """name => {
+    scene.tree.hang(scene.tree.frames.length, name, -1);
+    scene.sort();
+}"""
 # Where the camera, the drone and the words above it are in the world, in the picture that was painted last.
 PLACES = """(() => {
     const at = (one) => [...one.matrixWorld.elements].slice(12, 15);
@@ -265,7 +270,10 @@ def test_what_hangs_on_the_drone_does_not_trail_it(cockpit, opened):
 
 def test_a_cameras_view_is_the_cameras_and_a_drag_makes_it_free(cockpit, opened):
     hover(cockpit, opened)
-    assert opened.evaluate("scene.views") == ["behind", "free", "floor_optical", "front_optical", "track_optical"]
+    views = ["behind", "free", "floor_optical", "front_optical", "track_optical"]
+    assert opened.evaluate("scene.views") == views
+    opened.evaluate(LEFT, "other/front_optical")
+    assert opened.evaluate("scene.views") == views, "no other vehicle's, whose frames stay when it goes"
     opened.evaluate("scene.look('front_optical')")
     opened.evaluate(UNTIL_PAINTED)
     places = opened.evaluate(PLACES)

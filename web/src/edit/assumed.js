@@ -4,13 +4,18 @@ export class Assumed {
   constructor(objects) {
     this.objects = objects;
     this.busy = 0; // edits that are not answered
+    this.known = 0; // the revision that has been told
+    this.told = new Map(); // what has been told of objects that are shown otherwise, by handle
     this.clear();
   }
 
+  // Lets what has been told be seen.
   clear() {
+    for (const { one, ...told } of this.told.values()) Object.assign(one, told);
     this.reached = 0; // the revision of the last answer
     this.matrices = new Map(); // of the world, by handle
     this.values = new Map(); // by handle
+    this.told.clear();
   }
 
   put(handle, matrix) {
@@ -36,20 +41,31 @@ export class Assumed {
       throw error;
     } finally {
       this.busy--;
+      this.settle();
     }
   }
 
   // Hears what the node tells, up to this revision.
-  told(revision) {
-    if (!this.busy && revision >= this.reached) this.clear();
-    else this.apply();
+  tell(revision) {
+    this.known = revision;
+    this.settle();
+    this.apply();
+  }
+
+  // The answer to an edit may come before the node tells of it, or after that.
+  settle() {
+    if (!this.busy && this.known >= this.reached) this.clear();
   }
 
   apply() {
-    for (const [handle, matrix] of this.matrices) if (this.objects.get(handle)) this.objects.get(handle).matrix = matrix;
-    for (const [handle, values] of this.values) {
-      const one = this.objects.get(handle);
-      if (one) one.values = { ...one.values, ...values };
-    }
+    for (const [handle, matrix] of this.matrices) this.show(handle, { matrix });
+    for (const [handle, values] of this.values) this.show(handle, { values: { ...this.objects.get(handle)?.values, ...values } });
+  }
+
+  show(handle, assumed) {
+    const one = this.objects.get(handle);
+    if (!one) return;
+    if (this.told.get(handle)?.one !== one) this.told.set(handle, { one, matrix: one.matrix, values: one.values });
+    Object.assign(one, assumed);
   }
 }

@@ -68,7 +68,7 @@ export class Drag {
     clearTimeout(this.saying);
     this.back();
     this.isOver = true;
-    if (this.isTold) this.edit.doing.then(() => this.edit.undo("undo", this.merge));
+    if (this.isTold) this.edit.undo("undo", this.merge);
   }
 
   back() {

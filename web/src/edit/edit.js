@@ -69,10 +69,14 @@ export class Edit {
 
   connected() {
     if (!this.isOn || this.asking) return;
-    this.asking = true; // once, however much is missed meanwhile
+    Object.assign(this, { asking: true, missed: undefined }); // once, however much is missed meanwhile
     // What has been told meanwhile may be newer.
     const take = ({ tree }) => tree.version >= (this.objects.version ?? tree.version) && this.take(tree);
-    return this.ask("tree").then(take, (error) => this.wrong(error.message)).finally(() => (this.asking = false));
+    const end = () => {
+      this.asking = false;
+      if (this.missed > this.objects.version) this.connected(); // the answer was on its way before
+    };
+    return this.ask("tree").then(take, (error) => this.wrong(error.message)).finally(end);
   }
 
   lost() {
@@ -89,10 +93,13 @@ export class Edit {
   take(told) {
     if (!this.isOn) return void (this.objects.version = null);
     const changed = this.objects.take(told);
-    if (changed === "missed") return void this.connected();
+    if (changed === "missed") {
+      this.missed = told.version;
+      return void this.connected();
+    }
     const { objects, gone, version, since, ...is } = told;
     this.is = is;
-    this.assumed.told(is.revision);
+    this.assumed.tell(is.revision);
     for (const one of [...this.expected]) if (this.objects.get(one)) this.expected.delete(one);
     const still = this.selected.filter((one) => this.objects.get(one) || this.expected.has(one));
     if (changed === "tree") this.emit("tree");
@@ -174,16 +181,13 @@ export class Edit {
 
   // ---- what is done
 
-  // Does some operations as one edit, after all before it; returns the answer, undefined where it was refused.
-  do(operations, name, merge) {
-    this.doing = (this.doing ?? Promise.resolve()).then(() => this.doNow(operations, name, merge));
-    return this.doing;
-  }
-
-  async doNow(operations, name, merge) {
+  // Does some operations as one edit; returns the answer, undefined where it was refused. It is asked for at once: the
+  // node does in turn what a page asks, so a start, a save or an undo that is asked for later comes after it.
+  async do(operations, name, merge) {
     try {
       const { is } = this;
       const answer = await this.assumed.during(this.ask("edit", { edit: operations, name, ...(merge ? { merge } : {}) }));
+      this.emit("objects"); // what was told meanwhile counts now
       const first = answer.until_stop && !this.hasTold;
       if (first) this.notice.say("The drone flies: stop will undo your edits.");
       this.hasTold = Boolean(answer.until_stop) && is.state !== "stopped";

@@ -9,21 +9,28 @@ const fine = (value, digits) => (value && Math.abs(value) < 0.1 ? String(Number(
 export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, high, isWhole = false, isFine = false, mayBeEmpty = false, ...more }) {
   const asText = (value) => (isFine ? fine : shown)(value, digits);
   const field = create("input", { type: "text", inputMode: "decimal", autocomplete: "off", spellcheck: false, "aria-label": label, ...more });
-  let holds;
+  let holds, taken; // the number that is told, and the text that has been taken since
+  const written = () => field.value.trim().replace(",", ".");
+  const counts = () => taken ?? asText(holds);
+  const isNew = () => written() !== counts();
   field.fill = (value) => {
-    const isWritten = document.activeElement === field && field.value !== asText(holds);
+    const isWritten = document.activeElement === field && isNew();
     holds = value;
+    taken = undefined;
     if (!isWritten) field.value = asText(value);
   };
   const enter = () => {
-    const text = field.value.trim().replace(",", ".");
-    if (text === asText(holds)) return;
-    if (text === "" && mayBeEmpty) return void take(null);
+    if (!isNew()) return; // the browser itself tells of a change after Enter
+    const text = written();
+    const isNothing = text === "" && mayBeEmpty;
     const value = text === "" ? NaN : Number(text);
     const isIn = Number.isFinite(value) && !(value < low) && !(value > high) && !(isWhole && value % 1);
-    if (isIn) return void take(value);
+    if (isNothing || isIn) {
+      taken = text;
+      return void take(isNothing ? null : value);
+    }
     wrong(`${label} = ${field.value.slice(0, 40)}: must be a ${isWhole ? "whole " : ""}number${range(low, high)}`);
-    field.value = asText(holds);
+    field.value = counts();
   };
   field.onchange = enter;
   field.onfocus = () => field.select();
@@ -36,7 +43,7 @@ export function numberField(label, { take, wrong, digits = 4, step = 0.1, low, h
     }
     if (event.key === "Enter") enter();
     if (event.key !== "Escape") return;
-    field.value = asText(holds);
+    field.value = counts();
     field.blur();
     event.stopPropagation();
   };

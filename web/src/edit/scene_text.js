@@ -9,7 +9,7 @@ import { EditorView, keymap } from "@codemirror/view";
 import { create } from "../dom.js";
 import { colors, fillWith } from "../editor.js";
 
-const QUIET = 700; // ms without a key before it is taken
+const QUIET = 700; // ms without a key before it is taken; at once where one leaves it
 
 export class SceneText {
   // `parts`: part (the whole), text, said, title, question.
@@ -32,8 +32,9 @@ export class SceneText {
 
   begin() {
     const changed = EditorView.updateListener.of((update) => update.docChanged && !this.filling && this.change());
+    const left = EditorView.domEventHandlers({ blur: () => void this.write() }); // before what one goes on with, as a start
     const label = EditorView.contentAttributes.of({ "aria-label": "Text of the scene; Escape and then Tab leaves it" });
-    const extensions = [basicSetup, EditorView.lineWrapping, StreamLanguage.define(yaml), syntaxHighlighting(colors), keymap.of([indentWithTab]), indentUnit.of("  "), label, changed];
+    const extensions = [basicSetup, EditorView.lineWrapping, StreamLanguage.define(yaml), syntaxHighlighting(colors), keymap.of([indentWithTab]), indentUnit.of("  "), label, left, changed];
     return new EditorView({ parent: this.parts.text, state: EditorState.create({ extensions }) });
   }
 
@@ -57,7 +58,7 @@ export class SceneText {
       this.parts.title.textContent = file.split("/").pop() || "not saved yet";
       this.parts.title.title = file;
       this.filling = true;
-      fillWith(this.view, text, Transaction.addToHistory.of(false)); // done: the scene is as the text sayss own undo
+      fillWith(this.view, text, Transaction.addToHistory.of(false)); // which the scene's own undo has
       this.filling = false;
       this.say("");
     } catch (error) {

@@ -118,7 +118,9 @@ export class Scene {
 
   offerViews() {
     const prefix = this.bodies.get(this.vehicle) ?? "";
-    const eyes = [...this.tree.byName.keys()].filter((name) => name.endsWith(EYE) && name.startsWith(prefix)).sort();
+    // Frames stay, of vehicles that have gone, too: those have a prefix that the only one may lack.
+    const isOwn = (name) => name.startsWith(prefix) && !name.slice(prefix.length).includes("/");
+    const eyes = [...this.tree.byName.keys()].filter((name) => name.endsWith(EYE) && isOwn(name)).sort();
     const views = [BEHIND, FREE, ...eyes];
     if (String(views) === String(this.views)) return;
     this.views = views;
