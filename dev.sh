@@ -41,6 +41,7 @@ venv_options=--system-site-packages
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/drone_sim
 wheels=$cache/wheels
 PYTHONS="3.10 3.11 3.12 3.13"
+at_once=$(($(nproc) + 1)) # tests, which wait a third of their time, for a master of their own or for a limit
 FEW=4 FEW_SUITES=2 # tests in a browser, and suites of the others, that may fail once
 ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 
@@ -283,8 +284,7 @@ hint_at_the_browser() { # hint_at_the_browser ROSLAUNCH-ARGS...
 run_tests() {
   make_venv "${ALL[@]}"
   say "left out: the tests in a browser (./dev.sh test-web), the commands of README and docs (./dev.sh docs-commands)"
-  # Tests wait a third of their time, for a master of their own or for a limit: one more of them at once than cores.
-  local at_once=$(($(nproc) + 1)) failed=()
+  local failed=()
   run_suites "-j$at_once" "-n $at_once --dist worksteal" && return
   # Nodes, limits and clients share the cores: where but a few suites fail, they are named, and what failed is run once more.
   mapfile -t failed < <(sed 's/^[0-9]*://' build/Testing/Temporary/LastTestsFailed.log)
@@ -342,7 +342,7 @@ test_pythons() { # test_pythons VERSION...
     venv=$cache/python$version
     make_venv "${ALL[@]}"
     say "the unit tests that need no ROS, on $("$python" --version)"
-    "$venv/bin/python" -m pytest -n auto --dist worksteal -rs -m "not long" test/unit
+    "$venv/bin/python" -m pytest -n "$at_once" --dist worksteal -rs -m "not long" test/unit
   done
 }
 
