@@ -51,7 +51,7 @@ ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 packages() {
   echo bubblewrap python3-scipy python3-venv python3-dev python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri \
     catkin ros-environment librostest-dev python3-rospy python3-roslaunch python3-rostest rosbash \
-    python3-rosbag python3-rostopic python3-rosnode python3-rosmsg python3-rosservice python3-cv-bridge python3-tf2-ros \
+    python3-rosbag python3-rostopic python3-rosnode python3-rosmsg python3-rosservice python3-tf2-ros \
     python3-tf2-msgs rviz python3-diagnostic-msgs python3-dynamic-reconfigure python3-geometry-msgs \
     python3-nav-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs python3-interactive-markers \
     python3-visualization-msgs python3-setuptools python3-yaml libdynamic-reconfigure-config-init-mutex-dev
@@ -356,7 +356,7 @@ case "$command" in
     if [ $# = 1 ]; then make_venv "${ALL[@]}"; fi
     say "ready: source $root/devel/setup.bash" ;;
   run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; PYTHONUNBUFFERED=1 exec roslaunch drone_sim drone.launch "$@" ;;
-  test) setup; run_tests ;;
+  test) install_packages python3-cv-bridge; setup; run_tests ;; # which reads pictures as well
   test-web)
     install_packages chromium
     setup

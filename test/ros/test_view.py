@@ -12,9 +12,10 @@ import cv2
 import numpy as np
 import rospy
 import rostest
-from cv_bridge import CvBridge
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
+
+from drone_sim.ros.core.image_messages import image
 
 HANGS = 90.0  # s; nothing here takes nearly as long unless it hangs
 RED = np.full((48, 64, 3), (0, 0, 255), np.uint8)
@@ -31,10 +32,10 @@ class View(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        depth = CvBridge().cv2_to_imgmsg(np.full((48, 64), 3.0, np.float32), "32FC1")
+        depth = image(np.full((48, 64), 3.0, np.float32), "32FC1")
         jpeg = CompressedImage(format="jpeg", data=cv2.imencode(".jpg", RED)[1].tobytes())
         cls.publishers = [
-            publisher("/drone/front", Image, CvBridge().cv2_to_imgmsg(RED, "bgr8")),
+            publisher("/drone/front", Image, image(RED, "bgr8")),
             publisher("/drone/front/compressed", CompressedImage, jpeg),
             publisher("/drone/depth/image", Image, depth),
             publisher("/drone/name", String, "Quadricopter"),

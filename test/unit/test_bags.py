@@ -12,7 +12,6 @@ pytest.importorskip("rosbag", reason="needs ROS")
 import genpy
 import rosbag
 import rospy
-from cv_bridge import CvBridge
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from matplotlib.figure import Figure
 from nav_msgs.msg import Odometry
@@ -23,6 +22,7 @@ from drone_sim.forces.pushes import Push
 from drone_sim.mechanics.state import Pose, Twist, Vector3
 from drone_sim.offline.recording import Recording
 from drone_sim.ros.core import message_conversion as messages
+from drone_sim.ros.core.image_messages import image
 from drone_sim.ros.tools import bag_commands, bag_video, bags, plot_flight, record
 from drone_sim.ros.tools.bags import Bag, BagError, BagFlight
 from drone_sim.ros.tools.record import chosen
@@ -152,7 +152,7 @@ def test_a_video_waits_where_no_picture_came(tmp_path):
     path, out = str(tmp_path / "gap.bag"), tmp_path / "out.mp4"
     with rosbag.Bag(path, "w") as bag:
         for at in (1.0, 1.1, 1.2, 2.2, 2.3, 100.0):
-            message = CvBridge().cv2_to_imgmsg(RED, "bgr8")
+            message = image(RED, "bgr8")
             message.header.stamp = rospy.Time.from_sec(at)
             bag.write("/camera/image", message, message.header.stamp)
     assert bag_video.main([path, str(out)]) == 0
@@ -270,7 +270,7 @@ def test_topics_of_another_kind_are_left_out(tmp_path, capsys, program, out):
         for second in (1, 2, 3):
             drone.header.stamp = rospy.Time(second)
             bag.write("/drone/odom", drone, rospy.Time(second))
-            bag.write("/drone/front", CvBridge().cv2_to_imgmsg(RED, "bgr8"), rospy.Time(second))
+            bag.write("/drone/front", image(RED, "bgr8"), rospy.Time(second))
             for name in kinds:
                 bag.write(f"/drone/{name}", String("x") if name != "state" else Range(), rospy.Time(second))
         raw = ("os/path", b"", "0" * 32, None, String)

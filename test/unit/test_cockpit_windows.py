@@ -12,7 +12,6 @@ pytest.importorskip("rospy", reason="needs ROS")
 
 import cv2
 import rospy
-from cv_bridge import CvBridge
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
@@ -22,6 +21,7 @@ from drone_sim.ros.cockpit.panel.cameras import CameraSwitches, ScriptWindows, c
 from drone_sim.ros.cockpit.panel.overlays import color_of
 from drone_sim.ros.cockpit.server.page_socket import SendQueue
 from drone_sim.ros.cockpit.topics import ImageTopic, find_topics
+from drone_sim.ros.core import image_messages
 
 
 async def taken(box):
@@ -72,7 +72,7 @@ def picture(content):
 
 
 def message(image, encoding):
-    return CvBridge().cv2_to_imgmsg(np.ascontiguousarray(image), encoding)
+    return image_messages.image(image, encoding)
 
 
 def test_compressed_pictures_go_as_they_came():

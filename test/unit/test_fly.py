@@ -385,7 +385,7 @@ def test_what_a_script_says_is_shown_whatever_it_is(script, encoding):
 def test_it_needs_no_ros(tmp_path):
     program = (
         "import sys\n"
-        "for name in ('rospy', 'rospkg', 'roslib', 'genpy', 'geometry_msgs', 'cv_bridge'): sys.modules[name] = None\n"
+        "for name in ('rospy', 'rospkg', 'roslib', 'genpy', 'geometry_msgs'): sys.modules[name] = None\n"
         "from drone_sim.offline.fly import main\n"
         "sys.exit(main(['--duration', '1', '--plot', 'out.png']))\n"
     )

@@ -104,7 +104,7 @@ def test_the_node_imports_neither_what_takes_long_nor_what_setup_leaves_out():
     )
     imported_by_then = {name.partition(".")[0] for name in done.stdout.split()}
     assert "pybullet" in imported_by_then
-    slow = {"collada", "cv_bridge", "lxml", "scipy", "trimesh", "cbor2", "zmq"}
+    slow = {"collada", "lxml", "scipy", "trimesh", "cbor2", "zmq"}
     assert not imported_by_then & {*slow, *SEPARATE, "tkinter"}
     assert "drone_sim.importing.scene_folder" not in done.stdout.split()
 

@@ -4,25 +4,21 @@ import cv2
 import numpy as np
 import pytest
 
-pytest.importorskip("cv_bridge", reason="needs ROS")
+pytest.importorskip("rospy", reason="needs ROS")
 
-from cv_bridge import CvBridge
 from sensor_msgs.msg import CompressedImage, Image
 
+from drone_sim.ros.core.image_messages import image
 from drone_sim.ros.tools import pictures
 
 BLUE = np.full((4, 6, 3), (255, 0, 0), np.uint8)
 
 
-def raw(array, encoding):
-    return CvBridge().cv2_to_imgmsg(array, encoding)
-
-
 @pytest.mark.parametrize(
     "message",
     [
-        raw(BLUE, "bgr8"),
-        raw(np.ascontiguousarray(BLUE[:, :, ::-1]), "rgb8"),
+        image(BLUE, "bgr8"),
+        image(np.ascontiguousarray(BLUE[:, :, ::-1]), "rgb8"),
         CompressedImage(format="rgb8; png compressed bgr8", data=cv2.imencode(".png", BLUE)[1].tobytes()),
     ],
 )
@@ -32,17 +28,17 @@ def test_colours_are_what_they_are(message):
 
 def test_grey_becomes_grey():
     grey = np.arange(24, dtype=np.uint8).reshape(4, 6)
-    assert np.array_equal(pictures.decode(raw(grey, "mono8")), np.repeat(grey[:, :, None], 3, axis=2))
+    assert np.array_equal(pictures.decode(image(grey, "mono8")), np.repeat(grey[:, :, None], 3, axis=2))
 
 
 def test_depth_is_the_darker_the_farther_and_black_without_any():
     metres = np.array([[0.0, 3.0, 100.0, np.nan, np.inf, -1.0]], np.float32)
-    near, three, far, nothing, infinite, absurd = pictures.decode(raw(metres, "32FC1"))[0, :, 0]
+    near, three, far, nothing, infinite, absurd = pictures.decode(image(metres, "32FC1"))[0, :, 0]
     assert (near, three, absurd) == (255, 127, 255)
     assert 0 < far < 10
     assert (nothing, infinite) == (0, 0)
     millimetres = np.array([[3000, 0]], np.uint16)
-    assert pictures.decode(raw(millimetres, "16UC1"))[0, :, 0].tolist() == [127, 0]
+    assert pictures.decode(image(millimetres, "16UC1"))[0, :, 0].tolist() == [127, 0]
 
 
 @pytest.mark.parametrize(

@@ -7,19 +7,17 @@ from __future__ import annotations
 
 import difflib
 import importlib
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import genpy
-import numpy as np
 import roslib.message
 import rospkg
 import rospy
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, TwistStamped, Vector3
 from geometry_msgs.msg import Twist as TwistMessage
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import CameraInfo, Image, JointState
+from sensor_msgs.msg import CameraInfo, JointState
 from std_msgs.msg import Float32MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 
 from drone_sim.mechanics import frames
@@ -72,16 +70,6 @@ def transform(stamp: rospy.Time, parent: str, child: str, matrix: Matrix) -> Tra
 def pose(matrix: Matrix) -> Pose:
     """Return a place."""
     return Pose(Point(*frames.position(matrix)), Quaternion(*frames.to_quaternion(matrix)))
-
-
-def image(picture: np.ndarray, encoding: str, header: Header | None = None) -> Image:
-    """Return a picture (height, width) or (height, width, channels), of the type that `encoding` says.
-
-    As cv_bridge does, which takes an eighth of a second to import.
-    """
-    height, width = picture.shape[:2]
-    is_big = sys.byteorder == "big"
-    return Image(header or Header(), height, width, encoding, is_big, picture[0].nbytes, picture.tobytes())
 
 
 def camera_info(intrinsics: Intrinsics, frame: str) -> CameraInfo:

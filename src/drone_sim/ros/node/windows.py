@@ -16,7 +16,7 @@ from std_msgs.msg import String
 
 from drone_sim.mechanics import frames
 from drone_sim.mechanics.frames import Vector
-from drone_sim.ros.core import message_conversion
+from drone_sim.ros.core import image_messages
 from drone_sim.ros.core.inbox import Inbox
 from drone_sim.ros.core.publishing import Stamp
 from drone_sim.run.pacing import Throttle
@@ -102,7 +102,7 @@ class ViewPictures:
         for name in watched:
             eye = self._eye(name)
             if eye is not None:
-                message = message_conversion.image(eye.picture("color"), "rgb8")
+                message = image_messages.image(eye.picture("color"), "rgb8")
                 message.header.stamp = stamp()
                 self._publishers[name].publish(message)
 

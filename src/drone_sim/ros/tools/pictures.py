@@ -7,11 +7,11 @@ import math
 
 import cv2
 import numpy as np
-from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 
 from drone_sim.files import images
 from drone_sim.offline.pictures import depth_to_grey
+from drone_sim.ros.core import image_messages
 
 _GREY, _WHITE = (60, 60, 60), (255, 255, 255)
 _EMPTY = (240, 320)  # px, height and width of what is not there yet
@@ -43,10 +43,10 @@ def decode(message: Image | CompressedImage) -> np.ndarray:
 def _decode_raw(message: Image) -> np.ndarray:
     try:
         if message.encoding not in _DEPTHS:
-            return CvBridge().imgmsg_to_cv2(message, "bgr8")
-        depth = CvBridge().imgmsg_to_cv2(message).astype(float)
-    except (CvBridgeError, TypeError, ValueError, cv2.error) as error:
-        raise ValueError(f"encoding '{message.encoding}': {' '.join(str(error).split())}") from None
+            return image_messages.bgr(message)
+        depth = image_messages.pixels(message).astype(float)
+    except (ValueError, cv2.error) as error:
+        raise ValueError(f"encoding '{message.encoding[:40]}': {' '.join(str(error).split())}") from None
     if message.encoding == "16UC1":
         depth = np.where(depth == 0, np.nan, depth * _MILLIMETRES)
     return depth_to_grey(depth)

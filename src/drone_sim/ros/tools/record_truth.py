@@ -16,13 +16,13 @@ from typing import Any
 
 import rosgraph
 import rospy
-from cv_bridge import CvBridge
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
 from drone_sim.command_line import Parser
 from drone_sim.message_text import near_names
 from drone_sim.offline import dataset
+from drone_sim.ros.core.image_messages import pixels
 from drone_sim.ros.core.shutdown import run_tool
 from drone_sim.ros.tools import pictures
 
@@ -34,7 +34,6 @@ _BUFFER = 1 << 24  # bytes; rospy's default makes large pictures late
 _MOST = 20  # stamps that wait for the rest of their messages
 _PERIOD = 0.1  # s, between two looks at whether to end
 _PATIENCE = 3.0  # s, for somebody to publish
-_bridge = CvBridge()
 
 
 class _Moments:
@@ -124,7 +123,7 @@ def _subscribed(topic: str, moments: _Moments) -> list[rospy.Subscriber]:
 
 
 def _add(made: dataset.Dataset, stamp: float, parts: dict[str, Any]) -> None:
-    arrays = {name: _bridge.imgmsg_to_cv2(parts[name]) for name in _ARRAYS}
-    arrays["flow_known"] = _bridge.imgmsg_to_cv2(parts["flow_known"]) > 0
-    mask = _bridge.imgmsg_to_cv2(parts["instances"])
+    arrays = {name: pixels(parts[name]) for name in _ARRAYS}
+    arrays["flow_known"] = pixels(parts["flow_known"]) > 0
+    mask = pixels(parts["instances"])
     made.add(stamp, pictures.decode(parts["color"]), mask, parts["boxes"], arrays)

@@ -15,8 +15,8 @@ from std_msgs.msg import ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from drone_sim.render.outputs import COLOR
+from drone_sim.ros.core.image_messages import image
 from drone_sim.ros.core.mask_colors import painted
-from drone_sim.ros.core.message_conversion import image
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.sensors.camera import Camera
 from drone_sim.sensors.truth import PictureTruth, Seen, described, quaternion_of

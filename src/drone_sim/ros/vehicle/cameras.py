@@ -14,7 +14,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from drone_sim.config.fields import ParameterField
-from drone_sim.ros.core import message_conversion
+from drone_sim.ros.core import image_messages, message_conversion
 from drone_sim.ros.core.publishing import NewSubscribers, Stamp
 from drone_sim.ros.vehicle.camera_truth import TruthOutput
 from drone_sim.ros.vehicle.tuning_server import described
@@ -91,7 +91,7 @@ class CameraOutput:
             return
         header = Header(stamp=stamp(camera.age), frame_id=self._frame)
         if self._image.get_num_connections():
-            self._image.publish(message_conversion.image(camera.image, _ENCODINGS[camera.kind], header))
+            self._image.publish(image_messages.image(camera.image, _ENCODINGS[camera.kind], header))
         if self._compressed is not None:
             self._compressed.publish(header, camera.image)
 

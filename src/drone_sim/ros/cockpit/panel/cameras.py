@@ -13,7 +13,6 @@ from typing import Any
 import cv2
 import numpy as np
 import rospy
-from cv_bridge import CvBridge, CvBridgeError
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import String
 
@@ -22,6 +21,7 @@ from drone_sim.ros.cockpit.panel import overlays
 from drone_sim.ros.cockpit.panel.board import Board, one_of
 from drone_sim.ros.cockpit.server.page_socket import Answer, PageSocket
 from drone_sim.ros.cockpit.topics import ImageTopic
+from drone_sim.ros.core import image_messages
 
 _BUFFER = 1 << 24  # bytes: more than a picture, or old ones wait in it
 _WIDEST, _WIDEST_DEPTHS = 640, 320  # px; of a larger one, every other pixel, or less, is shown
@@ -32,7 +32,6 @@ _KINDS = ("views", "dialogs", "consoles")
 _CONNECTING = 3.0  # s, for the simulation to hear of who answers
 _LONGEST = 1 << 21  # characters of a message; the simulation's own have less
 _KNOWN = {"track": "tracking"}  # what people call it in place of the topic
-_bridge = CvBridge()
 
 
 class CameraSwitches:
@@ -247,11 +246,9 @@ def packed(message: CompressedImage | Image) -> tuple[bytes, str]:
     if isinstance(message, CompressedImage):
         return bytes(message.data), ""
     try:
-        image = _bridge.imgmsg_to_cv2(message)
-    except (CvBridgeError, KeyError, TypeError, ValueError) as error:
+        image = image_messages.pixels(message)
+    except ValueError as error:
         raise ValueError(f"encoding '{message.encoding[:40]}': {error}") from None
-    if not image.size:
-        raise ValueError("has no pixels")
     step = _step(message)
     image = image[::step, ::step]
     if image.ndim == 2 and image.dtype != np.uint8:

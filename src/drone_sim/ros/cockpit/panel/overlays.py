@@ -10,18 +10,16 @@ from typing import Any
 import cv2
 import numpy as np
 import rospy
-from cv_bridge import CvBridge
 from sensor_msgs.msg import Image
 from std_msgs.msg import String
 
-from drone_sim.ros.core import mask_colors
+from drone_sim.ros.core import image_messages, mask_colors
 
 BOXES, MASK = KINDS = ("boxes", "mask")
 _KEPT = 8  # messages, among which is that of the picture's stamp
 _BUFFER = 1 << 24  # bytes: more than a picture
 _EVERYWHERE = "Floor"  # whose box is the picture
 _LONGEST = 1 << 21  # characters of a message
-_bridge = CvBridge()
 
 
 class Overlay:
@@ -79,7 +77,7 @@ class Overlay:
             if one.get("name") != _EVERYWHERE
         ]
         mask = _nearest(self._masks, stamp) if MASK in self.kinds else None
-        numbers = np.unique(_bridge.imgmsg_to_cv2(mask)).tolist() if mask is not None else []
+        numbers = np.unique(image_messages.pixels(mask)).tolist() if mask is not None else []
         legend = [
             {"name": self._categories[number], "color": color_of(number)}
             for number in numbers
@@ -93,7 +91,7 @@ class Overlay:
         image = None if message is None else cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
         if image is None:
             return picture
-        mask = _bridge.imgmsg_to_cv2(message)
+        mask = image_messages.pixels(message)
         mask = cv2.resize(mask, image.shape[1::-1], interpolation=cv2.INTER_NEAREST)
         over = mask_colors.painted(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), mask)
         return bytes(cv2.imencode(".jpg", cv2.cvtColor(over, cv2.COLOR_RGB2BGR))[1])
