@@ -77,10 +77,18 @@ def write_at_the_end(page, words):
 
 def open_file(cockpit, page, name, content):
     """Write a file as another program does, and open it."""
+    cockpit.scripts.mkdir(exist_ok=True)  # the cockpit makes it with the first script that it saves
     (cockpit.scripts / name).write_text(content)
     wait_until(page, lambda: page.locator(f"#script option[value='mine/{name}']").count())
     page.select_option("#script", f"mine/{name}")
     wait_until(page, lambda: content.split("\n")[0] in text(page))
+
+
+def open_counts(cockpit, page, name):
+    """Open the script COUNTS, beside the one that it imports."""
+    cockpit.scripts.mkdir(exist_ok=True)
+    (cockpit.scripts / "helper.py").write_text("def check(count):\n    return count\n")
+    open_file(cockpit, page, name, COUNTS)
 
 
 def accept(page):
@@ -218,8 +226,7 @@ def shown(page, name):
 
 
 def test_a_breakpoint_pauses_with_the_variables_of_its_line(cockpit, desk):
-    (cockpit.scripts / "helper.py").write_text("def check(count):\n    return count\n")
-    open_file(cockpit, desk, "breaks.py", COUNTS)
+    open_counts(cockpit, desk, "breaks.py")
     line_number(desk, 8).click()  # an empty line, and then the function's head: its first line is meant
     run(desk)
     wait_until(desk, lambda: "Paused at line 10 of breaks.py, t = 0.00 s" in desk.inner_text("#variables-of"))
@@ -255,7 +262,7 @@ def test_a_breakpoint_pauses_with_the_variables_of_its_line(cockpit, desk):
 
 def test_a_breakpoint_stays_with_its_line(cockpit, browser):
     with open_page(cockpit, browser) as page:
-        open_file(cockpit, page, "stays.py", COUNTS)
+        open_counts(cockpit, page, "stays.py")
         line_number(page, 11).click()
         page.locator("#text .cm-content").click()
         page.keyboard.press("Control+Home")
