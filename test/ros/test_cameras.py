@@ -71,6 +71,15 @@ class Cameras(unittest.TestCase):
             rospy.rostime.wallsleep(0.01)  # the connections are made in other threads
         self.fail("nothing such in 400 steps")
 
+    def step_to_the_next_picture(self, every, image, odometry):
+        """Take so many steps, each when the one before has been heard: ROS drops what comes faster than it is sent."""
+        pictures = len(image.messages)
+        for _ in range(every):
+            heard = len(odometry.messages)
+            self.node.step()
+            wait_until(lambda heard=heard: len(odometry.messages) > heard)
+        wait_until(lambda: len(image.messages) > pictures)
+
     def rendered_in_a_step(self):
         self.pictures.clear()
         self.node.step()
@@ -92,9 +101,10 @@ class Cameras(unittest.TestCase):
         for name, (topic, info_topic, frame, encoding) in CAMERAS.items():
             with self.subTest(name):
                 image, info = self.listen(topic, Image), self.listen(info_topic, CameraInfo)
-                # On a busy machine ROS drops messages of each topic: of some steps all three are heard.
-                several = image, info, odometry
-                self.step_until(lambda several=several: len(set.intersection(*map(stamps_of, several))) >= 3)
+                self.step_until(lambda several=(image, info, odometry): all(one.messages for one in several))
+                before = len(image.messages) + 1  # what is heard of the one is heard of the others, too, from here on
+                for _ in range(5):
+                    self.step_to_the_next_picture(self.parameters.cameras[name].every, image, odometry)
                 expected = self.parameters.cameras[name]
                 picture, model = image.messages[-1], info.messages[-1]
                 self.assertEqual((picture.encoding, picture.header.frame_id), (encoding, frame))
@@ -106,6 +116,9 @@ class Cameras(unittest.TestCase):
                     np.testing.assert_allclose([matrix[0], matrix[row + 1]], focal, atol=1e-9)
                     np.testing.assert_allclose(matrix[2], (expected.width - 1) / 2, atol=1e-9)
                     np.testing.assert_allclose(matrix[row + 2], (expected.height - 1) / 2, atol=1e-9)
+                stamps = {m.header.stamp for m in image.messages[before : before + 3]}
+                self.assertEqual(len(stamps), 3)
+                wait_until(lambda info=info, stamps=stamps: stamps <= stamps_of(info) & stamps_of(odometry))
 
     def test_every_third_step(self):
         image = self.listen("/drone/floor/image", Image)
@@ -192,6 +205,14 @@ class Cameras(unittest.TestCase):
         self.step_until(lambda: transforms.messages)
         children = {t.child_frame_id for t in transforms.messages[0].transforms}
         self.assertEqual(children, {"base_link", "Track_base", "track_optical", "floor_optical"})
+
+
+def wait_until(condition, seconds=60.0):
+    for _ in range(round(seconds / 0.005)):
+        if condition():
+            return
+        rospy.rostime.wallsleep(0.005)
+    raise AssertionError(f"nothing such in {seconds} s")
 
 
 def stamps_of(listener):

@@ -13,11 +13,11 @@ from drone_sim.run.scene_document import SceneContent, SceneDocument
 from drone_sim.run.scene_settings import PLACE, Settings
 from drone_sim.run.simulation import Simulation
 from drone_sim.scene.operations import SceneOperations
-from drone_sim.scene.scene_parameters import WORLD
+from drone_sim.scene.scene_parameters import WORLD_KEYS
 from drone_sim.vehicles.parameters import VehicleParameters
 from drone_sim.vehicles.vehicle import Vehicle
 
-_FIXED = ("datum", "magnetic_field", "collections", *WORLD)
+_FIXED = ("datum", "magnetic_field", "collections", *WORLD_KEYS)
 
 
 class SceneAccess:

@@ -39,8 +39,8 @@ from drone_sim.scene.object_parameters import SHAPES, ObjectParameters
 
 MAX_OBJECTS = 2000
 # What a scene file may say of these comes before the parameters.
-WORLD = ("time_step", "sub_step", "gravity", "physics")
-BESIDE = ("drone", "vehicles", "weather", *WORLD)  # what a scene file holds besides the scene
+WORLD_KEYS = ("time_step", "sub_step", "gravity", "physics")
+BESIDE = ("drone", "vehicles", "weather", *WORLD_KEYS)  # what a scene file holds besides the scene
 MAX_TRIANGLES = 500_000  # of all meshes of a scene, each counted as often as it stands there
 MAX_PIXELS = 4 * images.MAX_SIDE**2  # of all its textures
 MAX_REACH = 1e5  # m, of a mesh from its own origin
