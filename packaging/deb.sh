@@ -22,8 +22,8 @@ DEPENDS="python3 (>= $python), python3 (<< ${python%.*}.$((${python#*.} + 1))), 
  python3-diagnostic-msgs, python3-dynamic-reconfigure, python3-genpy, python3-geometry-msgs,
  python3-interactive-markers, python3-nav-msgs, python3-numpy, python3-opencv,
  python3-pil, python3-roslaunch, python3-rospy, python3-rosbag, python3-rosmsg, python3-rosnode, python3-rosservice,
- python3-scipy, python3-rostopic, python3-sensor-msgs, python3-std-msgs,
- python3-std-srvs, python3-tf2-ros, python3-tqdm, python3-visualization-msgs, python3-yaml, ros-environment,
+ python3-rostopic, python3-sensor-msgs, python3-std-msgs,
+ python3-std-srvs, python3-tqdm, python3-visualization-msgs, python3-yaml, ros-environment,
  python3-tf2-msgs, python3-zmq, rosbash, libdynamic-reconfigure-config-init-mutex-dev"
 
 mkdir -p "$stage" "$out/deb" build
@@ -34,7 +34,7 @@ DESTDIR=$stage make -C "$out/build" install >"$out/install.log" 2>&1
 /usr/bin/python3 -m venv --system-site-packages --without-pip "$stage$own"
 printf 'home = /usr/bin\ninclude-system-site-packages = true\nversion = %s\n' "$python" >"$stage$own/pyvenv.cfg"
 rm -f "$stage$own"/bin/[aA]ctivate*
-grep -hEv '^(opencv|av|matplotlib)\b' requirements.txt requirements-all.txt >"$out/requirements.txt" # Debian's own will do
+grep -hEv '^(opencv|av|matplotlib|scipy)\b' requirements.txt requirements-all.txt >"$out/requirements.txt" # Debian's own will do
 .venv/bin/python -m pip --python "$stage$own/bin/python" install -q --disable-pip-version-check \
   --find-links "$wheels" --no-compile -r "$out/requirements.txt"
 site=$stage$own/lib/python$python/site-packages
@@ -60,7 +60,7 @@ Priority: optional
 Installed-Size: $(du -sk "$stage/usr" | cut -f1)
 Depends: $DEPENDS
 Recommends: bubblewrap, rviz, python3-tk
-Suggests: python3-av, python3-matplotlib
+Suggests: python3-av, python3-matplotlib, python3-scipy
 Description: drone of a V-REP tutorial, without V-REP
  PyBullet underneath, ROS 1 around it: roslaunch drone_sim drone.launch
 CONTROL

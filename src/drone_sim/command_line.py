@@ -15,7 +15,7 @@ from drone_sim.scripting.errors import ScriptError
 FAILED, SIGNALLED = 1, 128  # exit statuses; shells add the signal's number: 130 after Ctrl-C
 EXPECTED = (ScriptError, OSError, ValueError, RuntimeError)  # their messages are one line for the user
 # What single commands import, and only when they are asked for it: `./dev.sh setup` leaves it out.
-SEPARATE = ("av", "distributed", "jinja2", "matplotlib")
+SEPARATE = ("av", "distributed", "jinja2", "matplotlib", "scipy")
 
 
 class Parser(argparse.ArgumentParser):

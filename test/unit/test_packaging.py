@@ -28,6 +28,7 @@ KEYS = {
     "cv2": "python3-opencv",
     "distributed": "python3-distributed-pip",
     "greenlet": "python3-greenlet-pip",
+    "manifold3d": "python3-manifold3d-pip",
     "moderngl": "python3-moderngl-pip",
     "pybullet": "python3-pybullet-pip",
     "pydantic": "python3-pydantic-pip",
@@ -104,7 +105,7 @@ def test_the_node_imports_neither_what_takes_long_nor_what_setup_leaves_out():
     )
     imported_by_then = {name.partition(".")[0] for name in done.stdout.split()}
     assert "pybullet" in imported_by_then
-    slow = {"collada", "lxml", "scipy", "trimesh", "cbor2", "zmq"}
+    slow = {"collada", "lxml", "manifold3d", "trimesh", "cbor2", "zmq"}
     assert not imported_by_then & {*slow, *SEPARATE, "tkinter"}
     assert "drone_sim.importing.scene_folder" not in done.stdout.split()
 

@@ -26,16 +26,16 @@ def round_solid(volume: float, xx: float, zz: float) -> Solid:
 
 def hull_of(corners: Sequence[np.ndarray]) -> Solid:
     """Return the convex hull of triangles (m, 3, 3) each, as a solid; of what is flat, a thin box of its bounds."""
-    import trimesh  # takes, with SciPy, longer to import than all else
+    import trimesh  # takes longer to import than all else
+    from manifold3d import Manifold
 
     points = np.concatenate(corners).reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
     extents = np.maximum(high - low, _THICKNESS)
-    try:
-        hull = trimesh.convex.convex_hull(points)
-    except Exception:  # whatever Qhull says of what is flat
-        hull = None
-    if hull is None or not hull.volume > _THIN * np.prod(extents):
-        middle = (low + high) / 2
-        hull = trimesh.creation.box(extents, trimesh.transformations.translation_matrix(middle))
-    return Solid(float(hull.volume), np.asarray(hull.center_mass), np.asarray(hull.moment_inertia))
+    hull = Manifold.hull_points(points)
+    if hull.volume() > _THIN * np.prod(extents):
+        told = hull.to_mesh64()
+        solid = trimesh.Trimesh(told.vert_properties, told.tri_verts, process=False)
+    else:
+        solid = trimesh.creation.box(extents, trimesh.transformations.translation_matrix((low + high) / 2))
+    return Solid(float(solid.volume), np.asarray(solid.center_mass), np.asarray(solid.moment_inertia))

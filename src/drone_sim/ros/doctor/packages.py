@@ -22,6 +22,7 @@ _WITHOUT = {  # what still works where a module is missing
     "av": "nothing makes videos",
     "jinja2": "`grade --html` writes no report",
     "distributed": "`--scheduler` finds no other machines",
+    "scipy": "`sweep --optimize` does not work",
     "tqdm": "`fly` does not work",
 }
 _SLOW = "pictures will come from PyBullet's TinyRenderer, at a few frames per second"

@@ -10,10 +10,10 @@ from typing import Any
 
 import genpy
 import rospy
-import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from rosgraph.names import is_legal_name
 from sensor_msgs.msg import Image as ImageMessage
+from tf2_msgs.msg import TFMessage
 
 from drone_sim.ros.core.message_conversion import fill, message_class, service_class
 from drone_sim.scripting.api.backend import Ask, Image
@@ -31,7 +31,7 @@ class RosBackend:
         `is_of_a_camera` tells the topics on which the node's own cameras publish already.
         """
         self._is_of_a_camera, self._stamp = is_of_a_camera, stamp
-        self._broadcaster: tf2_ros.TransformBroadcaster | None = None
+        self._frames: rospy.Publisher | None = None
 
     def time(self) -> float:
         """Return what messages are stamped with, in s."""
@@ -39,11 +39,11 @@ class RosBackend:
 
     def send_transforms(self, transforms: Sequence[Mapping[str, Any]]) -> None:
         """Broadcast frames; what has no stamp gets that of the step."""
-        self._broadcaster = self._broadcaster or tf2_ros.TransformBroadcaster()
+        self._frames = self._frames or rospy.Publisher("/tf", TFMessage, queue_size=100)
         made = [fill(TransformStamped(), one, "geometry_msgs/TransformStamped") for one in transforms]
         for one in made:
             one.header.stamp = one.header.stamp or self._stamp()
-        self._broadcaster.sendTransform(made)
+        self._frames.publish(TFMessage(made))
 
     def parameter(self, name: str) -> Any:
         """Return a parameter, None where it is not set."""
