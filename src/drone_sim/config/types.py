@@ -326,7 +326,7 @@ def flattened(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str,
 class Checked(BaseModel):
     """Every key is known, every value checked, and nothing changes after that."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)  # of most kinds none is ever made
 
 
 @dataclass(frozen=True)

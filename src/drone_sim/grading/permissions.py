@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from drone_sim.grading.own_objects import OwnObjects
-from drone_sim.grading.plan import Plan
 from drone_sim.mechanics.scene_object import SceneObject
 from drone_sim.remote.control import ClientControl
 from drone_sim.run.simulation import Simulation
@@ -41,6 +40,9 @@ from drone_sim.scripting.api.constants import CONSTANTS, bare
 from drone_sim.scripting.api.ignored import MODULES
 from drone_sim.scripting.api.simulation import SimulationFunctions
 from drone_sim.vehicles.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from drone_sim.grading.plan import Plan  # which the node, and its start, can do without
 
 MOVE, PUSH, CHANGE, NEVER, READ = "move", "push", "change", "write", "read"  # NEVER: no plan allows it
 MOST_TRIED = 20  # that a result tells of
