@@ -45,18 +45,20 @@ at_once=$(($(nproc) + 1)) # tests, which wait a third of their time, for a maste
 FEW=4 FEW_SUITES=2 # tests in a browser, and suites of the others, that may fail once
 ALL=(requirements.txt requirements-all.txt requirements-dev.txt)
 
-# ros-environment is what lets setup.bash set ROS_PACKAGE_PATH, and python3-dev is for compiling PyBullet; on
-# Debian 12 other packages bring the first, and there is a wheel of the second. The package.xml without which `rosrun
-# dynamic_reconfigure dynparam` does not run is in libdynamic-reconfigure-config-init-mutex-dev.
+COMPILERS=(build-essential python3-dev)
+WINDOWS=(rviz python3-tk)
+WITNESSES=(python3-cv-bridge python3-tf2-ros) # of the tests: other people's readers of what we publish
+
+# ros-environment is what lets setup.bash set ROS_PACKAGE_PATH; on Debian 12 other packages bring it. The package.xml
+# without which `rosrun dynamic_reconfigure dynparam` does not run is in libdynamic-reconfigure-config-init-mutex-dev.
 packages() {
-  echo bubblewrap python3-scipy python3-venv python3-dev python3-tk build-essential cmake python3-pytest libegl1 libgl1 libgl1-mesa-dri \
-    catkin ros-environment librostest-dev python3-rospy python3-roslaunch python3-rostest rosbash \
-    python3-rosbag python3-rostopic python3-rosnode python3-rosmsg python3-rosservice python3-tf2-ros \
-    python3-tf2-msgs rviz python3-diagnostic-msgs python3-dynamic-reconfigure python3-geometry-msgs \
+  echo bubblewrap python3-setuptools python3-yaml cmake gcc libc6-dev make libegl1 libgl1 libgl1-mesa-dri \
+    catkin ros-environment python3-rospy python3-roslaunch python3-rostest rosbash \
+    python3-rosbag python3-rostopic python3-rosnode python3-rosmsg python3-rosservice \
+    python3-tf2-msgs python3-diagnostic-msgs python3-dynamic-reconfigure python3-geometry-msgs \
     python3-nav-msgs python3-sensor-msgs python3-std-msgs python3-std-srvs python3-interactive-markers \
-    python3-visualization-msgs python3-setuptools python3-yaml libdynamic-reconfigure-config-init-mutex-dev
-  # moderngl needs glcontext, which is compiled where it has no wheel, as on arm64.
-  if [ "$(uname -m)" != x86_64 ]; then echo libx11-dev; fi
+    python3-visualization-msgs libdynamic-reconfigure-config-init-mutex-dev
+  if [ -n "$DISPLAY" ]; then echo "${WINDOWS[@]}"; fi
 }
 
 as_root() {
@@ -68,10 +70,7 @@ installable() { [[ $(LC_ALL=C apt-cache policy "$1") = *"Candidate: "[!\(]* ]]; 
 
 install_packages() { # install_packages NAME...
   local missing=() wanted=() package
-  if [ -n "$ros" ]; then
-    say "using the ROS in $ros"
-    return
-  fi
+  if [ -n "$ros" ]; then return; fi
   command -v dpkg-query >/dev/null || fail "neither Debian nor a ROS 1 that has been sourced: see docs/install.md"
   for package in "$@"; do
     dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null | grep -qx installed || missing+=("$package")
@@ -79,7 +78,8 @@ install_packages() { # install_packages NAME...
   if [ ${#missing[@]} = 0 ] || { [ "${missing[*]}" = rviz ] && ! installable rviz; }; then return; fi
   [ "$(id -u)" = 0 ] || command -v sudo >/dev/null || fail "needs root or sudo to install: ${missing[*]}"
   say "installing ${#missing[@]} packages (a minute or two, once): ${missing[*]}"
-  as_root apt-get update -q >&2
+  if [ -z "$updated" ]; then as_root apt-get update -q >&2; fi
+  updated=yes
   for package in "${missing[@]}"; do
     if [ "$package" != rviz ] || installable rviz; then
       wanted+=("$package")
@@ -145,6 +145,23 @@ fill_venv() { # fill_venv REQUIREMENTS...
   mv "$before" "$venv/.made-from"
 }
 
+compiles_nothing() {
+  local version tag
+  if made_from requirements.txt; then return; fi
+  [ "$(uname -m)" = x86_64 ] || return 1
+  which_pybullet
+  case $tag in cp310 | cp311) return ;; esac
+  have_pybullet || take_pybullet
+}
+
+# Both wait for the network, and then dpkg has one core, and pip the other. Ctrl-C ends apt, and pip a little later.
+fill_both() {
+  { renice -n 10 "$BASHPID" >/dev/null && make_venv requirements.txt; } &
+  # shellcheck disable=SC2046 # one word each
+  install_packages $(packages)
+  wait $!
+}
+
 # There is no wheel of PyBullet for Python 3.12 and later: one that `./dev.sh wheel` has made is taken, or it is compiled
 # once, for all checkouts of this user.
 make_pybullet() {
@@ -152,13 +169,12 @@ make_pybullet() {
   which_pybullet
   if have_pybullet || pip install -q --dry-run --no-deps --only-binary :all: "$version" >/dev/null 2>&1 ||
     take_pybullet; then return; fi
-  pip install -q setuptools numpy wheel >&2 # where they are not the system's
   locked "$wheels" compile_pybullet
 }
 
 which_pybullet() {
   version=$(grep '^pybullet==' requirements.txt)
-  tag=$("$venv/bin/python" -c 'import sys; print("cp{}{}".format(*sys.version_info))')
+  tag=$("$python" -c 'import sys; print("cp{}{}".format(*sys.version_info))')
   mkdir -p "$wheels"
 }
 
@@ -180,7 +196,6 @@ take_pybullet() {
 make_wheel() {
   local version tag
   which_pybullet
-  pip install -q setuptools numpy wheel >&2
   locked "$wheels" compile_pybullet
   packaging/wheel.sh "$venv/bin/python" "$wheels/${version/==/-}-$tag-"*.whl "$root/wheels"
   say "copy $root/wheels into another checkout, or name it there as DRONE_SIM_WHEELS: its set-up takes PyBullet from it"
@@ -190,19 +205,21 @@ have_pybullet() { compgen -G "$wheels/${version/==/-}-$tag-*.whl" >/dev/null; }
 
 compile_pybullet() {
   if have_pybullet; then return; fi # by the one that was waited for
+  install_packages "${COMPILERS[@]}"
+  pip install -q setuptools numpy wheel >&2 # where they are not the system's
   packaging/pybullet.sh "$venv/bin/python" "$version" "$wheels"
 }
 
 pip() { "$venv/bin/python" -m pip --disable-pip-version-check "$@"; }
 
 # build/ holds absolute paths, too: a moved checkout makes it anew.
-build() {
-  local wanted
-  wanted="$root $(cat CMakeLists.txt setup.py package.xml cmake/* | cksum) $(ls test/ros/*.test)"
+build() { # build ON|OFF, with the tests or without
+  local tests=$1 wanted
+  wanted="$root $(cat CMakeLists.txt setup.py package.xml cmake/* | cksum) $(echo test/ros/*.test | cksum)"
   if ! built; then locked "$root" build_anew; fi
 }
 
-built() { [ "$(cat build/.made-from 2>/dev/null)" = "$wanted" ]; }
+built() { grep -qxF -e "$wanted, tests $tests" -e "$wanted, tests ON" build/.made-from 2>/dev/null; }
 
 build_anew() {
   if built; then return; fi # by the one that was waited for
@@ -210,13 +227,13 @@ build_anew() {
   rm -rf build/.made-from build devel
   # The venv's python by name: another python3 first on PATH has neither catkin_pkg nor rospy.
   mkdir build
-  if ! { cmake -S . -B build -DCATKIN_DEVEL_PREFIX="$root/devel" -DPYTHON_EXECUTABLE="$root/.venv/bin/python" \
+  if ! { cmake -S . -B build -DCATKIN_ENABLE_TESTING="$tests" -DCATKIN_DEVEL_PREFIX="$root/devel" -DPYTHON_EXECUTABLE="$root/.venv/bin/python" \
       -DPython_EXECUTABLE="$root/.venv/bin/python" &&
     make -C build; } >build/build.log 2>&1; then
     cat build/build.log >&2
     fail "the build failed"
   fi
-  echo "$wanted" >build/.made-from
+  echo "$wanted, tests $tests" >build/.made-from
 }
 
 # ROS itself would end with a traceback.
@@ -227,13 +244,21 @@ check_home() {
   done
 }
 
-setup() {
+setup() { # setup [ON], with the tests
   check_home
-  # shellcheck disable=SC2046 # one word each
-  install_packages $(packages)
+  if [ -n "$ros" ]; then say "using the ROS in $ros"; fi
+  install_packages python3-venv
+  if compiles_nothing; then
+    fill_both
+  else
+    # moderngl needs glcontext, which has no wheel for arm64.
+    if [ "$(uname -m)" != x86_64 ]; then install_packages "${COMPILERS[@]}" libx11-dev; fi
+    # shellcheck disable=SC2046 # one word each
+    install_packages $(packages)
+    make_venv requirements.txt
+  fi
   grep -qw localhost /etc/hosts || fail "ROS needs the line '127.0.0.1 localhost' in /etc/hosts"
-  make_venv requirements.txt
-  build
+  build "${1:-OFF}"
   source devel/setup.bash
 }
 
@@ -356,7 +381,7 @@ case "$command" in
     if [ $# = 1 ]; then make_venv "${ALL[@]}"; fi
     say "ready: source $root/devel/setup.bash" ;;
   run) stay_on_this_machine; setup; hint_at_the_browser "$@"; cd "$here"; PYTHONUNBUFFERED=1 exec roslaunch drone_sim drone.launch "$@" ;;
-  test) install_packages python3-cv-bridge; setup; run_tests ;; # which reads pictures as well
+  test) install_packages librostest-dev "${WITNESSES[@]}" "${WINDOWS[@]}"; setup ON; run_tests ;;
   test-web)
     install_packages chromium
     setup
@@ -366,7 +391,11 @@ case "$command" in
   docs) install_packages python3-venv; make_docs ;;
   bench) setup; make_venv "${ALL[@]}"; PYTHONPATH=$root:$PYTHONPATH exec .venv/bin/python -m benchmarks "$@" ;;
   fuzz) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/fuzz/run.py "$@" ;;
-  docs-commands) setup; make_venv "${ALL[@]}"; exec .venv/bin/python test/docs/run.py "$@" ;;
+  docs-commands)
+    setup
+    install_packages "${WITNESSES[@]}"
+    make_venv "${ALL[@]}"
+    exec .venv/bin/python test/docs/run.py "$@" ;;
   soak) setup; exec .venv/bin/python test/soak/run.py "$@" ;;
   soak-web)
     install_packages chromium
@@ -382,10 +411,10 @@ case "$command" in
   two-hosts) setup; exec .venv/bin/python test/two_hosts/run.py "$@" ;;
   tasks) setup; PYTHONPATH=$root/src:$PYTHONPATH exec .venv/bin/python test/tasks/check.py "$@" ;;
   pythons) # shellcheck disable=SC2046 # one word each
-    install_packages $(packages)
+    install_packages python3-venv $(packages)
     check_home
     test_pythons "$@" ;;
-  deb) install_packages apt-utils python3-opencv python3-pil python3-scipy python3-tqdm python3-zmq
+  deb) install_packages apt-utils python3-opencv python3-pil python3-tqdm python3-zmq
     setup; make_docs; TMPDIR=$cache packaging/deb.sh "$wheels" ;;
   wheel) setup; make_wheel ;;
   *) sed -n '2,7s/^# \{0,1\}//p' "$0" ;;

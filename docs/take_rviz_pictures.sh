@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 folder=$(realpath "$1")
 
 missing=()
-for needed in Xvfb:xvfb import:imagemagick xdotool:xdotool; do
+for needed in rviz:rviz Xvfb:xvfb import:imagemagick xdotool:xdotool; do
   command -v "${needed%:*}" >/dev/null || missing+=("${needed#*:}")
 done
 if [ ${#missing[@]} != 0 ]; then
