@@ -18,7 +18,7 @@ from drone_sim.render.intrinsics import Tiles
 from drone_sim.render.outputs import COLOR
 from drone_sim.render.target import without_alpha
 
-_WIDEST = math.radians(86.0)  # of a tile
+_WIDEST = math.radians(91.0)  # of a tile: 180 degrees take two
 _SHARE = 0.85  # of the pixels of a part, so many has its tile
 _MARGIN = 2  # pixels around a tile, from which its border is interpolated
 _ALIKE = 0.03  # of a depth: what differs by more is another thing
